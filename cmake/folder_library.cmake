@@ -1,0 +1,41 @@
+# One CMake target per folder of src/cpp. A folder links only the folders below it, so an include
+# that points upwards does not compile or does not link.
+
+add_library(orbslam_options INTERFACE)
+target_compile_options(orbslam_options INTERFACE
+  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Werror)
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  # A portable baseline for every translation unit that sees Eigen types; the AVX2 kernels are
+  # compiled with their own flags and include neither Eigen nor Ceres.
+  target_compile_options(orbslam_options INTERFACE -march=x86-64-v2)
+endif()
+if(ORBSLAM2PY_SANITIZE)
+  target_compile_options(orbslam_options INTERFACE
+    -fsanitize=${ORBSLAM2PY_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  target_link_options(orbslam_options INTERFACE -fsanitize=${ORBSLAM2PY_SANITIZE})
+endif()
+
+# orbslam_folder(NAME [DEPENDS folder...] [PUBLIC lib...] [PRIVATE lib...] [AVX2 source...])
+function(orbslam_folder NAME)
+  cmake_parse_arguments(ARG "" "" "DEPENDS;PUBLIC;PRIVATE;AVX2" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${NAME}/*.cpp)
+  list(TRANSFORM ARG_DEPENDS PREPEND orbslam_ OUTPUT_VARIABLE depends)
+  if(sources)
+    add_library(orbslam_${NAME} STATIC ${sources})
+    set(scope PUBLIC)
+    target_link_libraries(orbslam_${NAME} PUBLIC ${depends} ${ARG_PUBLIC}
+      PRIVATE orbslam_options ${ARG_PRIVATE})
+    target_include_directories(orbslam_${NAME} PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})
+    if(ORBSLAM2PY_SANITIZE)
+      target_link_options(orbslam_${NAME} PUBLIC -fsanitize=${ORBSLAM2PY_SANITIZE})
+    endif()
+  else()
+    add_library(orbslam_${NAME} INTERFACE)
+    target_link_libraries(orbslam_${NAME} INTERFACE ${depends} ${ARG_PUBLIC})
+    target_include_directories(orbslam_${NAME} INTERFACE ${CMAKE_CURRENT_SOURCE_DIR})
+  endif()
+  foreach(source ${ARG_AVX2})
+    set_source_files_properties(${CMAKE_CURRENT_SOURCE_DIR}/${NAME}/${source}
+      PROPERTIES COMPILE_OPTIONS "-mavx2")
+  endforeach()
+endfunction()
