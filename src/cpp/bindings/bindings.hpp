@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+namespace orbslam::bindings {
+
+// One function per folder of src/cpp, defined in the file of the same name.
+void bind_base(pybind11::module_& module);
+void bind_features(pybind11::module_& module);
+void bind_camera(pybind11::module_& module);
+void bind_frame(pybind11::module_& module);
+void bind_map(pybind11::module_& module);
+void bind_places(pybind11::module_& module);
+void bind_geometry(pybind11::module_& module);
+void bind_matching(pybind11::module_& module);
+void bind_optimize(pybind11::module_& module);
+void bind_synthetic(pybind11::module_& module);
+
+}  // namespace orbslam::bindings

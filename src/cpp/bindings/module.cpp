@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "bindings/bindings.hpp"
+
+PYBIND11_MODULE(_core, module) {
+  using namespace orbslam::bindings;
+  module.doc() = "C++ core of orbslam2py: nouns (Frame, Map, Vocabulary, ...) and verbs over them.";
+  // Bottom to top, so that every signature finds its types registered.
+  bind_base(module);
+  bind_features(module);
+  bind_camera(module);
+  bind_frame(module);
+  bind_map(module);
+  bind_places(module);
+  bind_geometry(module);
+  bind_matching(module);
+  bind_optimize(module);
+  bind_synthetic(module);
+}

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "base/ids.hpp"
+#include "base/pose.hpp"
+#include "base/scale_pyramid.hpp"
+#include "camera/camera.hpp"
+#include "features/keypoint.hpp"
+#include "frame/keypoint_grid.hpp"
+#include "frame/words.hpp"
+
+namespace orbslam {
+
+/// What one image (pair) says, without any interpretation: features, depths, words. Built once,
+/// then shared read-only by the tracker and the keyframe made from it.
+struct Frame {
+  FrameId id = -1;
+  double timestamp = 0;  ///< seconds, as given by the caller
+  std::shared_ptr<const Camera> camera;
+  std::shared_ptr<const ScalePyramid> scales;
+
+  std::vector<Keypoint> keypoints;      ///< undistorted coordinates
+  std::vector<Keypoint> raw_keypoints;  ///< as extracted; empty when the lens does not distort
+  std::vector<Descriptor> descriptors;
+  std::vector<float> right_u;  ///< column in the right image; meaningful where depth > 0, else -1
+  std::vector<float> depth;    ///< metres, -1 when unknown
+  KeypointGrid grid;
+
+  WordVector words;          ///< filled by describe() (places/), before the frame is shared
+  DirectIndex direct_index;  ///< same
+  bool described = false;
+
+  std::size_t size() const { return keypoints.size(); }
+  /// The one test of "is a stereo observation": a virtual right column may be negative.
+  bool has_depth(std::size_t i) const { return depth[i] > 0.0F; }
+  bool is_close(std::size_t i) const {
+    return depth[i] > 0.0F && depth[i] < static_cast<float>(camera->close_depth());
+  }
+  /// Keypoint i at its measured depth in the camera frame; depth must be known.
+  Eigen::Vector3d unproject(std::size_t i) const {
+    return camera->pinhole().unproject(keypoints[i].x, keypoints[i].y, depth[i]);
+  }
+};
+
+/// A frame in the tracker's hands: pose and associations, which change while it is tracked.
+struct TrackedFrame {
+  std::shared_ptr<const Frame> frame;
+  std::optional<Pose> T_cw;
+  KeyFrameId reference_keyframe;
+
+  // Per keypoint: the associated map point (invalid id: none), a copy of its position in the
+  // world at association time, and whether the last pose optimisation called it an outlier.
+  std::vector<MapPointId> map_points;
+  std::vector<Eigen::Vector3d> positions;
+  std::vector<std::uint8_t> outlier;
+
+  explicit TrackedFrame(std::shared_ptr<const Frame> f)
+      : frame(std::move(f)),
+        map_points(frame->size()),
+        positions(frame->size(), Eigen::Vector3d::Zero()),
+        outlier(frame->size(), 0) {}
+
+  void associate(std::size_t i, MapPointId point, const Eigen::Vector3d& position) {
+    map_points[i] = point;
+    positions[i] = position;
+    outlier[i] = 0;
+  }
+  void dissociate(std::size_t i) {
+    map_points[i] = MapPointId();
+    outlier[i] = 0;
+  }
+  void clear_associations();
+};
+
+}  // namespace orbslam

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "camera/camera.hpp"
+#include "features/keypoint.hpp"
+
+namespace orbslam {
+
+/// Keypoint indices in 64 x 48 cells over the undistorted image bounds, for area queries.
+class KeypointGrid {
+ public:
+  static constexpr int kColumns = 64;
+  static constexpr int kRows = 48;
+
+  KeypointGrid() = default;
+  KeypointGrid(const std::vector<Keypoint>& keypoints, const ImageBounds& bounds);
+
+  /// Writes into `found` (cleared first) the keypoints with |x_k - x| < r and |y_k - y| < r
+  /// (a square, strict) on levels min_level..max_level; a negative max_level means no upper
+  /// limit, and levels are only looked at if min_level > 0 or max_level >= 0.
+  /// Order: columns ascending, rows inside a column, index inside a cell. Ties in matching
+  /// depend on it.
+  void features_in_area(const std::vector<Keypoint>& keypoints, float x, float y, float r,
+                        int min_level, int max_level, std::vector<std::uint32_t>& found) const;
+
+ private:
+  float min_x_ = 0, min_y_ = 0, inverse_cell_width_ = 0, inverse_cell_height_ = 0;
+  std::vector<std::uint32_t> offsets_;  // column-major: cell (column, row) = column * kRows + row
+  std::vector<std::uint32_t> indices_;
+};
+
+}  // namespace orbslam

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+namespace orbslam {
+
+/// Bag of words of an image: ascending word ids and their weights, L1-normalised.
+struct WordVector {
+  std::vector<std::uint32_t> words;
+  std::vector<double> weights;
+};
+
+/// Direct index: which features fall under which vocabulary node. Nodes ascend; the features of
+/// nodes[i] are indices[offsets[i]] .. indices[offsets[i + 1] - 1], ascending.
+struct DirectIndex {
+  std::vector<std::uint32_t> nodes;
+  std::vector<std::uint32_t> offsets;  ///< nodes.size() + 1 entries, or empty
+  std::vector<std::uint32_t> indices;
+};
+
+}  // namespace orbslam

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <memory>
+#include <set>
+#include <vector>
+
+#include "base/ids.hpp"
+#include "base/pose.hpp"
+#include "frame/frame.hpp"
+
+namespace orbslam {
+
+/// A frame that stays. `frame` never changes and may be read without a lock once the pointer has
+/// been copied; the rest belongs to the Map and is read and written under its lock.
+struct KeyFrame {
+  KeyFrameId id;
+  std::shared_ptr<const Frame> frame;
+  Pose T_cw;
+  std::vector<MapPointId> map_points;  ///< per keypoint: the observed point or an invalid id
+
+  /// Number of shared points per neighbour, all neighbours, symmetric.
+  std::map<KeyFrameId, int> weights;
+  /// Neighbours sharing at least Map::kCovisibilityThreshold points (or the single best one),
+  /// by descending weight, ties by lower id.
+  std::vector<KeyFrameId> neighbours;
+
+  KeyFrameId parent;  ///< spanning tree; invalid for keyframe 0
+  std::set<KeyFrameId> children;
+  std::set<KeyFrameId> loop_edges;
+
+  bool published = false;   ///< processed by local mapping, part of the map's keyframe set
+  int leases = 0;           ///< while > 0 a death is deferred (loop closing works on it)
+  bool to_be_erased = false;
+
+  Eigen::Vector3d center() const { return T_cw.center(); }
+};
+
+}  // namespace orbslam

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "frame/frame.hpp"
+#include "map/point_batch.hpp"
+
+namespace orbslam {
+
+/// The part of the map around the current frame (Mur-Artal et al. 2015, section V-D).
+struct LocalMap {
+  std::vector<KeyFrameId> keyframes;
+  PointBatch points;           ///< all points of the local keyframes, each once
+  KeyFrameId reference_keyframe;  ///< shares most points with the frame; invalid without votes
+};
+
+/// Exchanges replaced points of the frame for their living successors, refreshes the copies of
+/// positions, and drops associations with dead points. Takes the read lock.
+void refresh_associations(const Map& map, TrackedFrame& frame);
+
+/// Keyframes voted for by the frame's points, extended by neighbours, children and parents until
+/// there are more than 80, and all their points (spec 08, 7.1 and 7.2). Drops associations with
+/// dead points from the frame. Takes the read lock once, so the result is one consistent view.
+LocalMap select_local_map(const Map& map, TrackedFrame& frame);
+
+}  // namespace orbslam

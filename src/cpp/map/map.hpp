@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <shared_mutex>
+#include <unordered_map>
+#include <vector>
+
+#include "map/id_table.hpp"
+#include "map/keyframe.hpp"
+#include "map/map_point.hpp"
+
+namespace orbslam {
+
+/// Owner of keyframes and map points, the covisibility graph and the spanning tree.
+///
+/// Locking: the methods below do not lock. Callers hold `read_lock()` for const methods and
+/// `write_lock()` for the others, in sections that neither solve, nor extract, nor match more
+/// than one pair of keyframes, nor wait, nor call Python. No other lock is taken inside.
+///
+/// Ids are never reused before clear(). A pointer returned by find() is valid while the lock is
+/// held; across sections keep ids and look them up again.
+class Map {
+ public:
+  static constexpr int kCovisibilityThreshold = 15;  ///< shared points that make a neighbour
+  static constexpr int kEssentialWeight = 100;       ///< shared points of an essential-graph edge
+
+  Map() = default;
+  Map(const Map&) = delete;
+  Map& operator=(const Map&) = delete;
+
+  [[nodiscard]] std::shared_lock<std::shared_mutex> read_lock() const {
+    return std::shared_lock(mutex_);
+  }
+  [[nodiscard]] std::unique_lock<std::shared_mutex> write_lock() { return std::unique_lock(mutex_); }
+
+  // ---- look-up ---------------------------------------------------------------------------------
+  /// nullptr when the object is dead or never existed.
+  const KeyFrame* find(KeyFrameId id) const { return keyframes_.find(id); }
+  const MapPoint* find(MapPointId id) const { return points_.find(id); }
+  /// Follows replacements to the living end; an invalid id when the point died.
+  MapPointId resolve(MapPointId id) const;
+
+  /// Published and unpublished keyframes, ascending.
+  std::vector<KeyFrameId> keyframe_ids() const;
+  std::vector<MapPointId> point_ids() const;
+  std::size_t n_keyframes() const { return n_published_; }  ///< published ones only
+  std::size_t n_points() const { return points_.size(); }
+  template <class Visitor>
+  void for_each_keyframe(Visitor&& visit) const {
+    keyframes_.for_each(visit);
+  }
+  template <class Visitor>
+  void for_each_point(Visitor&& visit) const {
+    points_.for_each(visit);
+  }
+
+  // ---- keyframes -------------------------------------------------------------------------------
+  /// A new keyframe with empty slots, not yet published. The frame must be described (words) if a
+  /// vocabulary is in use; nobody changes it afterwards.
+  KeyFrameId add_keyframe(std::shared_ptr<const Frame> frame, const Pose& T_cw);
+  /// Makes the keyframe part of the keyframe set (idempotent).
+  void publish(KeyFrameId id);
+  void set_pose(KeyFrameId id, const Pose& T_cw);
+
+  /// Removes a keyframe: neighbours forget it, its points lose the observation (and may die), its
+  /// children find new parents among the neighbours they share most points with, and its pose
+  /// relative to the parent is archived for trajectories. Returns false, and only marks it, while
+  /// leases or loop edges protect it. Keyframe 0 never dies (returns false).
+  bool erase_keyframe(KeyFrameId id);
+
+  /// A counted protection against erase_keyframe(); end_lease() carries out a deferred death.
+  void begin_lease(KeyFrameId id);
+  void end_lease(KeyFrameId id);
+  /// Adds the edge on both keyframes; both are protected for ever.
+  void add_loop_edge(KeyFrameId a, KeyFrameId b);
+  void set_parent(KeyFrameId child, KeyFrameId parent);
+
+  /// Pose of a keyframe, living or culled: a culled one is expressed through its archived pose
+  /// relative to its parent at the time of its death. Throws StateError for an unknown id.
+  Pose T_cw(KeyFrameId id) const;
+
+  // ---- points ----------------------------------------------------------------------------------
+  /// A new point without observations; the caller adds them, then calls update_point().
+  MapPointId add_point(const Eigen::Vector3d& position, KeyFrameId reference, FrameId first_frame);
+  void set_position(MapPointId id, const Eigen::Vector3d& position);
+
+  /// Both sides at once. Does nothing when the point is already observed in the keyframe or the
+  /// slot holds another living point.
+  void add_observation(MapPointId point, KeyFrameId keyframe, std::size_t index);
+  /// Both sides at once. The point dies when its weighted count drops to 2 or less; a lost
+  /// reference keyframe is replaced by the observer with the lowest id.
+  void erase_observation(MapPointId point, KeyFrameId keyframe);
+  void erase_point(MapPointId id);
+  /// Moves the observations of `id` to `by` (where `by` is not observed yet), adds the counters,
+  /// refreshes `by`; `id` dies and resolve(id) gives `by`. `by` is resolved first; nothing happens
+  /// when both are the same or `by` is dead.
+  void replace_point(MapPointId id, MapPointId by);
+  /// Counters of the tracker: seen in the frustum, matched as inlier.
+  void count_visible(MapPointId id, int n = 1);
+  void count_found(MapPointId id, int n = 1);
+
+  /// Representative descriptor: the observed one with the least median distance to the others.
+  void update_descriptor(MapPointId id);
+  /// Mean viewing direction and scale range.
+  void update_geometry(MapPointId id);
+  void update_point(MapPointId id) {
+    update_descriptor(id);
+    update_geometry(id);
+  }
+
+  // ---- covisibility ----------------------------------------------------------------------------
+  /// Recounts the shared points of a keyframe with all others, keeps the graph symmetric, and
+  /// gives the keyframe its parent (the strongest neighbour) the first time.
+  void update_connections(KeyFrameId id);
+  /// The first n of KeyFrame::neighbours.
+  std::vector<KeyFrameId> best_neighbours(KeyFrameId id, std::size_t n) const;
+  /// All neighbours with weight >= w, by descending weight, ties by lower id.
+  std::vector<KeyFrameId> neighbours_by_weight(KeyFrameId id, int w) const;
+  int weight(KeyFrameId a, KeyFrameId b) const;
+
+  // ---- the map as a whole ----------------------------------------------------------------------
+  /// Drops everything and starts a new epoch: ids restart, work begun before must not commit.
+  void clear();
+  std::uint64_t epoch() const { return epoch_.load(); }
+  /// Grows when poses or points moved as a whole (loop correction, full bundle adjustment).
+  std::uint64_t big_change_index() const { return big_change_index_.load(); }
+  void count_big_change() { ++big_change_index_; }
+  /// Grows with every change of structure (objects, observations) and of geometry (poses, points).
+  std::uint64_t structure_version() const { return structure_version_.load(); }
+  std::uint64_t geometry_version() const { return geometry_version_.load(); }
+
+ private:
+  struct ArchivedKeyFrame {
+    KeyFrameId parent;
+    Pose T_kp;  ///< maps the parent's camera frame to the dead keyframe's
+  };
+
+  KeyFrame& keyframe(KeyFrameId id);
+  MapPoint& point(MapPointId id);
+  void set_weight(KeyFrameId a, KeyFrameId b, int weight);
+  void sort_neighbours(KeyFrame& keyframe);
+  void adopt_children(KeyFrame& dying);
+
+  mutable std::shared_mutex mutex_;
+  IdTable<KeyFrameId, KeyFrame> keyframes_;
+  IdTable<MapPointId, MapPoint> points_;
+  std::unordered_map<KeyFrameId, ArchivedKeyFrame> archive_;
+  /// Where replaced points went. Entries older than kReplacementMemory keyframes are forgotten:
+  /// whoever holds an id for longer finds it dead, which is safe.
+  static constexpr std::int64_t kReplacementMemory = 50;
+  std::unordered_map<MapPointId, MapPointId> replaced_by_;
+  std::deque<std::pair<KeyFrameId, MapPointId>> replacements_;
+  KeyFrameId next_keyframe_{0};
+  MapPointId next_point_{0};
+  std::size_t n_published_ = 0;
+  std::atomic<std::uint64_t> epoch_{0}, big_change_index_{0};
+  std::atomic<std::uint64_t> structure_version_{0}, geometry_version_{0};
+};
+
+}  // namespace orbslam

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "base/descriptor.hpp"
+#include "base/ids.hpp"
+
+namespace orbslam {
+
+struct Observation {
+  KeyFrameId keyframe;
+  std::uint32_t index = 0;  ///< keypoint of that keyframe
+  bool has_depth = false;   ///< a stereo observation counts 2, a monocular one 1
+};
+
+/// A 3-D point of the map. Only the Map changes it, so that both sides of an observation, the
+/// count and the derived fields always agree.
+struct MapPoint {
+  MapPointId id;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< world
+  /// Mean of the unit vectors from the observing cameras to the point; its length is <= 1.
+  Eigen::Vector3d mean_direction = Eigen::Vector3d::Zero();
+  double min_distance = 0;  ///< raw scale range [world units]; gates use 0.8 and 1.2 times
+  double max_distance = 0;
+  Descriptor descriptor;
+
+  std::vector<Observation> observations;  ///< ascending keyframe id, one per keyframe
+  int observation_count = 0;              ///< weighted: 2 per observation with depth, else 1
+  int n_visible = 1;                      ///< frames in whose view the point lay
+  int n_found = 1;                        ///< of these, frames that matched it as an inlier
+
+  KeyFrameId reference_keyframe;  ///< gives the scale range; always among the observations
+  KeyFrameId first_keyframe;      ///< the creating keyframe
+  FrameId first_frame = -1;
+
+  double found_ratio() const { return static_cast<double>(n_found) / n_visible; }
+  const Observation* observation_of(KeyFrameId keyframe) const;
+};
+
+}  // namespace orbslam

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <atomic>
+#include <vector>
+
+#include "base/pose.hpp"
+#include "camera/camera.hpp"
+
+namespace orbslam {
+
+/// A bundle adjustment as flat arrays: no map, no locks (spec 16, 9.7).
+struct BundleProblem {
+  struct Camera {
+    Pose T_cw;
+    Pinhole pinhole;
+    double bf = 0;
+    bool fixed = false;
+  };
+  struct Observation {
+    std::uint32_t camera = 0;
+    std::uint32_t point = 0;
+    float u = 0, v = 0;
+    float right_u = 0;  ///< only if has_depth
+    float inverse_sigma2 = 1;
+    bool has_depth = false;
+  };
+  std::vector<Camera> cameras;
+  std::vector<Eigen::Vector3d> points;
+  std::vector<Observation> observations;
+};
+
+struct BundleOptions {
+  int robust_iterations = 5;  ///< with Huber kernel
+  int final_iterations = 10;  ///< without kernel, on the inliers of the first stage; 0: no such stage
+  bool robust = true;
+  int n_threads = 1;  ///< 1 gives the same bytes in every run
+};
+
+struct BundleSummary {
+  double initial_cost = 0;  ///< sum of (robustified) squared whitened residuals
+  double final_cost = 0;
+  int iterations = 0;
+  bool aborted = false;      ///< the flag was raised; parameters hold what was reached
+  bool stage_one_done = false;
+  std::vector<std::uint8_t> outlier;  ///< per observation, judged at the final estimate
+};
+
+/// Solves in place with Ceres (points eliminated by Schur complement, analytic Jacobians).
+/// `abort` is polled once per iteration; nullptr: never.
+BundleSummary solve_bundle(BundleProblem& problem, const BundleOptions& options,
+                           const std::atomic<bool>* abort);
+
+}  // namespace orbslam

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "base/pose.hpp"
+#include "frame/frame.hpp"
+
+namespace orbslam {
+
+/// One correspondence of a pose-only problem.
+struct PoseObservation {
+  Eigen::Vector3d position;  ///< world
+  double u = 0, v = 0;       ///< undistorted pixels
+  double right_u = 0;        ///< only if has_depth
+  double inverse_sigma2 = 1;  ///< of the keypoint's level
+  bool has_depth = false;
+};
+
+struct PoseEstimate {
+  Pose T_cw;
+  int n_inliers = 0;
+  std::vector<std::uint8_t> outlier;  ///< per observation
+  /// Covariance of T_cw in the tangent order (rotation, translation), left perturbation, scaled by
+  /// the residual variance; zero when nothing was estimated.
+  Matrix6d covariance = Matrix6d::Zero();
+  int iterations = 0;
+};
+
+/// Pose of a frame from fixed points (spec 16, section 3): four rounds of damped Gauss-Newton from
+/// the initial pose with a Huber kernel (off in the last), outliers re-classified after each at
+/// 5.991 (two residuals) and 7.815 (three). Fewer than 3 observations: returned unchanged, 0 inliers.
+PoseEstimate optimize_pose(const Pose& T_cw_initial, const Pinhole& pinhole, double bf,
+                           const std::vector<PoseObservation>& observations);
+
+/// The same for a frame's associations: writes its pose and outlier flags.
+PoseEstimate optimize_pose(TrackedFrame& frame);
+
+}  // namespace orbslam
