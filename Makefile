@@ -1,0 +1,92 @@
+# Everything a person needs: `make demo` and `make test` work on a bare Debian 12 with git, make, a
+# compiler and Python. A second run does only what is needed.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+JOBS ?= $(shell nproc)
+
+.PHONY: demo test bench lint types stubs format sanitize wheel install clean \
+  test-cpp test-python help
+
+help:
+	@echo "make demo      install what is needed, run the demonstration"
+	@echo "make test      all tests: C++, Python, lint, types"
+	@echo "make bench     measure, and compare with the reference's figures where they are known"
+	@echo "make sanitize  C++ tests under the address, undefined-behaviour and thread sanitizers"
+	@echo "make wheel     build dist/*.whl"
+	@echo "make format    apply clang-format and ruff"
+
+# ---- environment ---------------------------------------------------------------------------------
+build/.system-packages: scripts/system_packages.txt scripts/install_system_packages.sh
+	@mkdir -p build
+	@scripts/install_system_packages.sh
+	@touch $@
+
+$(VENV)/.requirements: pyproject.toml build/.system-packages
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@$(BIN)/python scripts/install_requirements.py
+	@touch $@
+
+PYTHON_SOURCES := $(shell find src/orbslam2py -name '*.py' -o -name '*.pyx' -o -name 'py.typed' \
+  -o -name '*.pyi' -o -name '*.bvoc')
+CPP_SOURCES := $(shell find src/cpp cmake -name '*.cpp' -o -name '*.hpp' -o -name '*.cmake' \
+  -o -name CMakeLists.txt) CMakeLists.txt
+
+# The package, installed for development: Python files are used from src, extensions from build.
+$(VENV)/.installed: $(VENV)/.requirements $(CPP_SOURCES) $(PYTHON_SOURCES)
+	@echo "Building the package"
+	@$(BIN)/pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps \
+	  -C build-dir=build/python -C editable.mode=redirect -e .
+	@touch $@
+
+install: $(VENV)/.installed
+
+# ---- the main job --------------------------------------------------------------------------------
+demo: install
+	@$(BIN)/orbslam2py demo
+
+# ---- tests ---------------------------------------------------------------------------------------
+test: lint test-cpp test-python types stubs
+	@echo "All tests passed."
+
+test-cpp: build/.system-packages
+	@cmake --preset release >build/configure.log || { cat build/configure.log; exit 1; }
+	@cmake --build build/release -j $(JOBS)
+	@ctest --test-dir build/release --output-on-failure -j $(JOBS)
+
+test-python: install
+	@$(BIN)/python -m pytest -q
+
+lint: $(VENV)/.requirements
+	@$(BIN)/ruff check src tests examples benchmarks scripts
+	@$(BIN)/ruff format --check src tests examples benchmarks scripts
+	@find src/cpp tests/cpp benchmarks -name '*.cpp' -o -name '*.hpp' | xargs clang-format --dry-run -Werror
+
+types: install
+	@$(BIN)/mypy
+
+# The stubs of the C++ extension are part of the source; they must say what the build says.
+stubs: install
+	@$(BIN)/python scripts/generate_stubs.py --check
+
+sanitize: build/.system-packages
+	@cmake --preset asan >/dev/null && cmake --build build/asan -j $(JOBS)
+	@ctest --test-dir build/asan --output-on-failure -j $(JOBS)
+	@cmake --preset tsan >/dev/null && cmake --build build/tsan -j $(JOBS) --target thread_driver
+	@build/tsan/tests/cpp/thread_driver
+
+# ---- the rest ------------------------------------------------------------------------------------
+bench: install
+	@cmake --preset release >/dev/null && cmake --build build/release -j $(JOBS)
+	@$(BIN)/python benchmarks/compare.py
+
+wheel: $(VENV)/.requirements
+	@$(BIN)/pip wheel --no-deps --no-build-isolation -w dist .
+
+format: $(VENV)/.requirements
+	@$(BIN)/ruff check --fix-only src tests examples benchmarks scripts
+	@$(BIN)/ruff format src tests examples benchmarks scripts
+	@find src/cpp tests/cpp benchmarks -name '*.cpp' -o -name '*.hpp' | xargs clang-format -i
+
+clean:
+	rm -rf build dist $(VENV)

@@ -1,0 +1,15 @@
+# orbslam_cython_module(NAME SOURCE): compiles a .pyx of the Python package into an extension
+# module that is installed beside it.
+function(orbslam_cython_module NAME SOURCE)
+  set(generated ${CMAKE_CURRENT_BINARY_DIR}/${NAME}.cpp)
+  add_custom_command(
+    OUTPUT ${generated}
+    COMMAND ${Python_EXECUTABLE} -m cython --cplus -3 ${SOURCE} -o ${generated}
+    DEPENDS ${SOURCE}
+    COMMENT "Cythonizing ${NAME}")
+  Python_add_library(${NAME} MODULE WITH_SOABI ${generated})
+  # Generated code does not follow our warning rules.
+  target_compile_options(${NAME} PRIVATE -O3 -w)
+  install(TARGETS ${NAME} DESTINATION orbslam2py COMPONENT python)
+  add_dependencies(orbslam2py_python ${NAME})
+endfunction()
