@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Local mapping: what happens to the map for every new keyframe.
+
+Mur-Artal, Montiel and Tardos, 2015, section VI.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from orbslam2py import _core as core
+from orbslam2py.sensor import Sensor
+from orbslam2py.threads import Worker
+from orbslam2py.timing import StageStatistics, StageTimer
+
+
+class LocalMapping:
+    """Integrates keyframes: points, fusion, bundle adjustment, culling.
+
+    A waiting keyframe goes before fusion, bundle adjustment and keyframe culling of the present one.
+
+    Parameters
+    ----------
+    world : orbslam2py._core.Map
+        The map.
+    sensor : Sensor
+        Decides thresholds.
+    threaded : bool
+        In a thread of its own, or inline at `insert_keyframe`.
+    on_done : callable
+        ``on_done(keyframe_id)``: takes the finished keyframe (loop closing).
+    """
+
+    def __init__(
+        self,
+        world: core.Map,
+        sensor: Sensor,
+        *,
+        threaded: bool,
+        on_done: Callable[[int], None],
+    ) -> None:
+        self._map = world
+        self._monocular = sensor is Sensor.MONOCULAR
+        self._on_done = on_done
+        self._recent_points = core.RecentPoints()
+        self._point_options = core.NewPointOptions()
+        self._point_options.monocular = self._monocular
+        self._point_options.n_neighbours = self._n_neighbours = 20 if self._monocular else 10
+        self._min_observations = 2 if self._monocular else 3
+        #: Milliseconds per part of the work, over all keyframes.
+        self.statistics = StageStatistics()
+        self.worker: Worker[int] = Worker("local mapping", self.process, threaded=threaded)
+
+    def insert_keyframe(self, keyframe: int) -> None:
+        """Queue a keyframe; a running bundle adjustment is asked to end early."""
+        self.worker.submit(keyframe)
+
+    def reset(self) -> None:
+        """Drop waiting keyframes and the points under probation."""
+        self.worker.reset()
+        self._recent_points.clear()
+
+    def process(self, keyframe: int) -> None:
+        """Everything that is done for one keyframe."""
+        timer = StageTimer()
+        with timer("mapping"):
+            with timer("mapping.insert"):
+                core.process_new_keyframe(self._map, keyframe, self._recent_points)
+            with timer("mapping.cull_points"):
+                core.cull_recent_points(
+                    self._map, keyframe, self._min_observations, self._recent_points
+                )
+            with timer("mapping.new_points"):
+                new_points = core.create_new_points(
+                    self._map, keyframe, self._point_options, self.worker.waiting_flag
+                )
+                self._recent_points.extend(new_points)
+            if not self.worker.n_waiting:
+                with timer("mapping.fuse"):
+                    core.fuse_with_neighbours(self._map, keyframe, self._n_neighbours)
+            if self.worker.lower_interrupt():
+                self._refine(keyframe, timer)
+        self.statistics.add(timer.milliseconds)
+        self._on_done(keyframe)
+
+    def _refine(self, keyframe: int, timer: StageTimer) -> None:
+        if self._map.n_keyframes > 2:
+            with timer("mapping.local_bundle_adjustment"):
+                core.local_bundle_adjustment(
+                    self._map, keyframe, self.worker.interrupt_flag, self._monocular
+                )
+        with timer("mapping.cull_keyframes"):
+            core.cull_keyframes(self._map, keyframe, only_close=not self._monocular)

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What tracking says about each image."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class TrackingState(enum.IntEnum):
+    """State of the tracker after an image."""
+
+    SYSTEM_NOT_READY = -1
+    NO_IMAGES_YET = 0
+    NOT_INITIALIZED = 1
+    OK = 2
+    LOST = 3
+
+
+class Reason(str, enum.Enum):
+    """Why there is no pose."""
+
+    NONE = ""
+    TOO_FEW_KEYPOINTS = "too few keypoints"
+    TOO_FEW_DEPTHS = "too few keypoints with depth"
+    FEW_MATCHES_LAST_FRAME = "too few matches with the last frame"
+    FEW_MATCHES_REFERENCE = "too few matches with the reference keyframe"
+    FEW_INLIERS_REFERENCE = "too few inliers from the reference keyframe"
+    FEW_INLIERS_LOCAL_MAP = "too few inliers in the local map"
+
+    def __str__(self) -> str:
+        return self.value
+
+
+@dataclass(frozen=True)
+class FrameFeatures:
+    """The keypoints of a frame and what they were matched to (on request)."""
+
+    keypoints: npt.NDArray[np.float32]
+    """(n, 2) undistorted pixel coordinates."""
+    levels: npt.NDArray[np.int32]
+    """(n,) pyramid levels."""
+    depths: npt.NDArray[np.float32]
+    """(n,) metres, -1 where unknown."""
+    map_point_ids: npt.NDArray[np.int64]
+    """(n,) id of the matched map point, -1 for none."""
+    inliers: npt.NDArray[np.bool_]
+    """(n,) matched and accepted by the pose optimisation."""
+
+
+@dataclass(frozen=True)
+class TrackingRecord:
+    """Result of one track call."""
+
+    frame_id: int
+    """Number of the image since the last reset, from 0."""
+    timestamp: float
+    """Seconds, as given by the caller."""
+    map_index: int
+    """0 for the first map; grows with every reset."""
+    state: TrackingState
+    reason: Reason
+    """Why there is no pose (`Reason.NONE` if there is one)."""
+    T_cw: FloatArray | None
+    """(4, 4) world to camera, None unless the state is OK."""
+    covariance: FloatArray | None
+    """(6, 6) covariance of the pose: rotation [rad], then translation [m], left perturbation in the
+    camera frame, scaled by the residual variance."""
+    n_matches: int
+    """Keypoints matched to map points before the last pose optimisation."""
+    n_inliers: int
+    """Of these, accepted by it."""
+    is_keyframe: bool
+    reference_keyframe: int
+    """Keyframe that shares most points with the frame, -1 for none."""
+    milliseconds: dict[str, float] = field(default_factory=dict)
+    """Time per stage: wait, extract, stereo, predict, local_map, keyframe, track (all of it)."""
+    features: FrameFeatures | None = None
+
+    @property
+    def T_wc(self) -> FloatArray | None:
+        """(4, 4) camera to world: position and orientation of the camera, or None."""
+        if self.T_cw is None:
+            return None
+        T_wc = np.eye(4)
+        T_wc[:3, :3] = self.T_cw[:3, :3].T
+        T_wc[:3, 3] = -self.T_cw[:3, :3].T @ self.T_cw[:3, 3]
+        return T_wc

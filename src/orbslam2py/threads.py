@@ -1,0 +1,319 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Workers: one thread around one step, with counted pauses, a reset that is served in every
+state, bounded waits, and errors that reach the caller.
+
+The protocol follows section 6 of the thread specification: nobody waits for somebody who waits
+for him, because pauses are counted tickets, a reset is acknowledged while paused as well, and no
+lock of the map is held while waiting. A worker can also run inline (``threaded=False``): the same
+steps in the caller's thread, which makes two runs equal.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import enum
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from types import TracebackType
+from typing import Generic, TypeVar
+
+from orbslam2py._core import StopFlag
+from orbslam2py.errors import StateError, WorkerError
+
+_log = logging.getLogger(__name__)
+
+Job = TypeVar("Job")
+
+#: Longest uninterrupted wait in seconds; between two of these, signals such as Ctrl-C are handled.
+_WAIT_SLICE = 0.2
+
+
+class WorkerState(enum.Enum):
+    """What a worker is doing."""
+
+    IDLE = "idle"
+    BUSY = "busy"
+    PAUSED = "paused"
+    FINISHED = "finished"
+    FAILED = "failed"
+
+
+class PauseTicket:
+    """One holder of a worker's pause; the worker resumes when all tickets are released.
+
+    Releasing is idempotent, and the ticket is a context manager.
+    """
+
+    def __init__(self, release: Callable[[], None], wait: Callable[[float | None], bool]) -> None:
+        self._release = release
+        self._wait = wait
+        self._released = False
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait until the worker stands still; False when `timeout` seconds passed first."""
+        return self._wait(timeout)
+
+    def release(self) -> None:
+        """Give the ticket back."""
+        if not self._released:
+            self._released = True
+            self._release()
+
+    def __enter__(self) -> PauseTicket:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.release()
+
+
+class Worker(Generic[Job]):
+    """A queue and a step that takes one job at a time from it.
+
+    Parameters
+    ----------
+    name : str
+        Name of the thread, used in messages.
+    step : callable
+        ``step(job)``; an exception in it stops the worker and is raised as `WorkerError` by
+        `raise_if_failed`, `submit` and `finish`.
+    threaded : bool
+        False: `submit` runs the step at once in the caller's thread.
+    """
+
+    def __init__(self, name: str, step: Callable[[Job], None], *, threaded: bool) -> None:
+        self.name = name
+        self._step = step
+        self._threaded = threaded
+        self._condition = threading.Condition()
+        self._queue: deque[Job] = deque()
+        self._busy = False
+        self._pauses = 0
+        self._finish_requested = False
+        self._error: BaseException | None = None
+        self._thread: threading.Thread | None = None
+        #: Raised when the running step should end early; lowered when a step begins.
+        self.interrupt_flag = StopFlag()
+        #: Raised while jobs wait behind the running one.
+        self.waiting_flag = StopFlag()
+
+    # ---- life cycle ------------------------------------------------------------------------------
+    def start(self) -> None:
+        """Start the thread (nothing to do for an inline worker)."""
+        if self._threaded and self._thread is None:
+            self._thread = threading.Thread(target=self._run, name=self.name, daemon=True)
+            self._thread.start()
+
+    def finish(self, *, drain: bool = False, timeout: float | None = None) -> None:
+        """End the worker and join its thread.
+
+        Parameters
+        ----------
+        drain : bool
+            Process the waiting jobs first; otherwise they are dropped and the running step is
+            asked to end early.
+        timeout : float, optional
+            Seconds to wait for the thread.
+
+        Raises
+        ------
+        WorkerError
+            If a step failed, now or earlier, or the thread did not end in time.
+        """
+        if drain:
+            self.wait_until(lambda: self._error is not None or self._is_idle(), timeout)
+        with self._condition:
+            self._finish_requested = True
+            self._queue.clear()
+            self.waiting_flag.clear()
+            self.interrupt_flag.set()
+            self._condition.notify_all()
+        if self._thread is not None and self._thread is not threading.current_thread():
+            deadline = None if timeout is None else time.monotonic() + timeout
+            while self._thread.is_alive():
+                self._thread.join(_WAIT_SLICE)
+                if deadline is not None and time.monotonic() > deadline and self._thread.is_alive():
+                    raise WorkerError(f"{self.name} did not end within {timeout} s")
+            self._thread = None
+        self.raise_if_failed()
+
+    def reset(self, timeout: float | None = None) -> None:
+        """Drop all waiting jobs and wait until the running step has ended, paused or not."""
+        with self._condition:
+            self._queue.clear()
+            self.waiting_flag.clear()
+            self.interrupt_flag.set()
+        if not self.wait_until(lambda: not self._busy, timeout):
+            raise WorkerError(f"{self.name} did not acknowledge the reset within {timeout} s")
+
+    # ---- jobs ------------------------------------------------------------------------------------
+    def submit(self, job: Job) -> None:
+        """Append a job; a running step is asked to end early."""
+        self.raise_if_failed()
+        if self._finish_requested:
+            raise StateError(f"{self.name} has been shut down")
+        if not self._threaded:
+            self.interrupt_flag.clear()
+            self._busy = True
+            try:
+                self._step(job)
+            except Exception as error:
+                self._error = error
+                self.raise_if_failed()
+            finally:
+                self._busy = False
+            return
+        with self._condition:
+            self._queue.append(job)
+            self.waiting_flag.set()
+            self.interrupt_flag.set()
+            self._condition.notify_all()
+
+    def interrupt(self) -> None:
+        """Ask the running step to end early."""
+        self.interrupt_flag.set()
+
+    def lower_interrupt(self) -> bool:
+        """Called by a step before its interruptible part.
+
+        Returns
+        -------
+        bool
+            False if the step should skip that part, because a job waits, a pause is asked for or
+            the worker is to finish; otherwise the interrupt is lowered.
+        """
+        with self._condition:
+            if self._queue or self._pauses or self._finish_requested:
+                return False
+            self.interrupt_flag.clear()
+            return True
+
+    # ---- pauses ----------------------------------------------------------------------------------
+    def pause(self) -> PauseTicket:
+        """Ask the worker to stand still after the running step; see `PauseTicket`."""
+        with self._condition:
+            self._pauses += 1
+            self.interrupt_flag.set()
+            self._condition.notify_all()
+
+        def release() -> None:
+            with self._condition:
+                self._pauses -= 1
+                self._condition.notify_all()
+
+        return PauseTicket(release, lambda t: self.wait_until(lambda: not self._busy, t))
+
+    @property
+    def pausing(self) -> bool:
+        """Whether a pause is in force or asked for."""
+        return self._pauses > 0
+
+    # ---- state -----------------------------------------------------------------------------------
+    @property
+    def state(self) -> WorkerState:
+        """What the worker is doing now."""
+        with self._condition:
+            if self._error is not None:
+                return WorkerState.FAILED
+            if self._finish_requested and not self._busy:
+                return WorkerState.FINISHED
+            if self._busy:
+                return WorkerState.BUSY
+            return WorkerState.PAUSED if self._pauses else WorkerState.IDLE
+
+    @property
+    def n_waiting(self) -> int:
+        """Number of jobs not yet begun."""
+        return len(self._queue)
+
+    @property
+    def idle(self) -> bool:
+        """No job waits and none is in work."""
+        with self._condition:
+            return self._is_idle()
+
+    def wait_until_waiting(self, at_most: int) -> None:
+        """Wait while more than `at_most` jobs wait (returns at once when paused or failed)."""
+        self.wait_until(
+            lambda: len(self._queue) <= at_most or self._pauses > 0 or self._error is not None
+        )
+        self.raise_if_failed()
+
+    def wait_until_idle(self, timeout: float | None = None) -> bool:
+        """Wait until every job is done; False when `timeout` seconds passed first."""
+        done = self.wait_until(lambda: self._is_idle() or self._error is not None, timeout)
+        self.raise_if_failed()
+        return done
+
+    def raise_if_failed(self) -> None:
+        """Raise `WorkerError`, with the original as its cause, if a step has failed."""
+        if self._error is not None:
+            raise WorkerError(f"{self.name} stopped: {self._error}") from self._error
+
+    def wait_until(self, condition: Callable[[], bool], timeout: float | None = None) -> bool:
+        """Wait for a condition on the worker's state; False on time-out."""
+        deadline = None if timeout is None else time.monotonic() + timeout
+        with self._condition:
+            while not condition():
+                left = _WAIT_SLICE if deadline is None else deadline - time.monotonic()
+                if left <= 0:
+                    return False
+                self._condition.wait(min(left, _WAIT_SLICE))
+        return True
+
+    # ---- the thread ------------------------------------------------------------------------------
+    def _is_idle(self) -> bool:
+        return not self._queue and not self._busy
+
+    def _run(self) -> None:
+        while True:
+            with self._condition:
+                while not self._finish_requested and (self._pauses or not self._queue):
+                    self._condition.wait()
+                if self._finish_requested:
+                    self._condition.notify_all()
+                    return
+                job = self._queue.popleft()
+                self._busy = True
+                if not self._queue:
+                    self.waiting_flag.clear()
+                    self.interrupt_flag.clear()
+                self._condition.notify_all()
+            try:
+                self._step(job)
+            except BaseException as error:
+                _log.exception("%s failed", self.name)
+                with self._condition:
+                    self._error = error
+                    self._busy = False
+                    self._queue.clear()
+                    self._condition.notify_all()
+                return
+            with self._condition:
+                self._busy = False
+                self._condition.notify_all()
+
+
+class CallGuard:
+    """Allows one call at a time; a second one raises instead of waiting."""
+
+    def __init__(self, what: str) -> None:
+        self._what = what
+        self._lock = threading.Lock()
+
+    @contextlib.contextmanager
+    def __call__(self) -> Iterator[None]:
+        """Enter the guarded call."""
+        if not self._lock.acquire(blocking=False):
+            raise StateError(f"{self._what} is already running in another thread")
+        try:
+            yield
+        finally:
+            self._lock.release()
