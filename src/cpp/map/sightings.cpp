@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "map/sightings.hpp"
+
+#include <algorithm>
+
+namespace orbslam {
+
+void count_sightings(Map& map, const TrackedFrame& frame, const std::vector<MapPointId>& in_view) {
+  // Each point once, although the search may have matched what it saw in the frustum.
+  thread_local std::vector<MapPointId> visible;
+  visible.assign(in_view.begin(), in_view.end());
+  for (const MapPointId id : frame.map_points) {
+    if (id.valid()) visible.push_back(id);
+  }
+  std::sort(visible.begin(), visible.end());
+  visible.erase(std::unique(visible.begin(), visible.end()), visible.end());
+
+  const auto lock = map.write_lock();
+  for (const MapPointId id : visible) {
+    if (map.find(id)) map.count_visible(id);
+  }
+  for (std::size_t i = 0; i < frame.map_points.size(); ++i) {
+    if (frame.outlier[i] == 0 && map.find(frame.map_points[i])) map.count_found(frame.map_points[i]);
+  }
+}
+
+}  // namespace orbslam
