@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""From images to frames: input checks, grey values, features, depth."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from orbslam2py import _core as core
+from orbslam2py.errors import ImageError
+from orbslam2py.sensor import Sensor
+from orbslam2py.settings import Settings
+from orbslam2py.timing import StageTimer
+
+
+class FrontEnd:
+    """Builds frames from images; the first image fixes the size.
+
+    Parameters
+    ----------
+    settings : Settings
+        Calibration and extractor settings.
+    sensor : Sensor
+        Which images come.
+    """
+
+    def __init__(self, settings: Settings, sensor: Sensor) -> None:
+        self._settings = settings
+        self._sensor = sensor
+        self._context: core.FrameContext | None = None
+        self._size: tuple[int, int] | None = None
+        options = settings.orb_options()
+        self._extractor = core.OrbExtractor(options)
+        self._pair_extractor = (
+            core.PairExtractor(options) if sensor is Sensor.STEREO else None
+        )
+
+    def stereo(
+        self,
+        left: npt.NDArray[np.uint8],
+        right: npt.NDArray[np.uint8],
+        frame_id: int,
+        timestamp: float,
+        timer: StageTimer,
+    ) -> core.Frame:
+        """Frame of a rectified pair."""
+        assert self._pair_extractor is not None
+        self._check(left, "left image")
+        self._check(right, "right image")
+        if left.shape != right.shape:
+            raise ImageError(
+                f"left and right image differ: shapes {left.shape} and {right.shape}"
+            )
+        context = self._context_for(left)
+        with timer("extract"):
+            left_grey = core.to_grey(left, self._settings.camera.rgb)
+            right_grey = core.to_grey(right, self._settings.camera.rgb)
+            features_left, features_right = self._pair_extractor.extract(left_grey, right_grey)
+        with timer("stereo"):
+            return core.build_stereo_frame(
+                context, frame_id, timestamp, features_left, features_right
+            )
+
+    def rgbd(
+        self,
+        image: npt.NDArray[np.uint8],
+        depth: npt.NDArray[np.generic],
+        frame_id: int,
+        timestamp: float,
+        timer: StageTimer,
+    ) -> core.Frame:
+        """Frame of a colour image with registered depth."""
+        self._check(image, "image")
+        if not isinstance(depth, np.ndarray) or depth.ndim != 2:
+            shape = getattr(depth, "shape", None)
+            raise ImageError(f"depth must be an array of shape (height, width), got {shape}")
+        if depth.shape != image.shape[:2]:
+            raise ImageError(
+                f"depth has size {depth.shape}, the image {image.shape[:2]}; "
+                "depth must be registered to the image"
+            )
+        if depth.dtype.kind not in "uif":
+            raise ImageError(f"depth must hold numbers (uint16, float32...), got {depth.dtype}")
+        context = self._context_for(image)
+        with timer("extract"):
+            grey = core.to_grey(image, self._settings.camera.rgb)
+            extraction = self._extractor.extract(grey)
+        with timer("stereo"):
+            metres = core.to_depth_metres(depth, self._settings.depth_factor)
+            return core.build_rgbd_frame(context, frame_id, timestamp, extraction, metres)
+
+    def _check(self, image: npt.NDArray[np.uint8], what: str) -> None:
+        if not isinstance(image, np.ndarray):
+            raise ImageError(f"{what} must be a NumPy array, got {type(image).__name__}")
+        if image.dtype != np.uint8:
+            raise ImageError(f"{what} must be uint8, got {image.dtype}")
+        if image.size == 0:
+            raise ImageError(f"{what} is empty, shape {image.shape}")
+        if not (image.ndim == 2 or (image.ndim == 3 and image.shape[2] in (1, 3, 4))):
+            raise ImageError(
+                f"{what} must have shape (height, width) or (height, width, 3 or 4), "
+                f"got {image.shape}"
+            )
+        if self._size is not None and image.shape[:2] != self._size:
+            raise ImageError(
+                f"{what} has size {image.shape[1]}x{image.shape[0]}, the first image had "
+                f"{self._size[1]}x{self._size[0]}; the size must not change"
+            )
+
+    def _context_for(self, image: npt.NDArray[np.uint8]) -> core.FrameContext:
+        if self._context is None:
+            height, width = image.shape[:2]
+            camera = core.Camera(self._settings.camera_options(width, height))
+            self._context = core.FrameContext(camera, self._extractor.scales)
+            self._size = (height, width)
+        return self._context

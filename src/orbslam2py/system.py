@@ -1,0 +1,473 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The system: images in, poses and a map out."""
+
+from __future__ import annotations
+
+import logging
+import math
+import threading
+import weakref
+from collections.abc import Callable
+from dataclasses import dataclass
+from os import PathLike
+from types import TracebackType
+
+import numpy as np
+import numpy.typing as npt
+
+from orbslam2py import _core as core
+from orbslam2py.errors import ImageError, StateError
+from orbslam2py.front_end import FrontEnd
+from orbslam2py.local_mapping import LocalMapping
+from orbslam2py.loop_closing import LoopClosing
+from orbslam2py.records import FrameFeatures, TrackingRecord, TrackingState
+from orbslam2py.sensor import Sensor
+from orbslam2py.settings import Settings
+from orbslam2py.threads import CallGuard, Worker
+from orbslam2py.timing import StageStatistics, StageTimer
+from orbslam2py.tracking import Tracking, TrackingOutcome
+from orbslam2py.trajectory import Trajectory
+from orbslam2py.vocabulary import load_vocabulary
+
+_log = logging.getLogger(__name__)
+
+#: Seconds that a reset or a shutdown waits for a worker before it says who is late.
+_PATIENCE = 60.0
+
+
+@dataclass(frozen=True)
+class MapSnapshot:
+    """A consistent copy of the map, in the frame of keyframe 0's first pose (the world)."""
+
+    keyframe_ids: npt.NDArray[np.int64]
+    """(k,) ascending."""
+    keyframe_timestamps: npt.NDArray[np.float64]
+    """(k,) seconds."""
+    keyframe_T_wc: npt.NDArray[np.float64]
+    """(k, 4, 4) camera to world."""
+    point_ids: npt.NDArray[np.int64]
+    """(p,) ascending."""
+    point_positions: npt.NDArray[np.float64]
+    """(p, 3) world [m]."""
+
+
+class System:
+    """Visual SLAM for a stereo pair or an RGB-D camera.
+
+    Parameters
+    ----------
+    settings : Settings or str or path
+        Calibration and extractor settings: an object, the name of a built-in (``"tum1"``,
+        ``"kitti04-12"``, ``"euroc"``...), or a file in the ORB-SLAM YAML format.
+    sensor : Sensor or str
+        ``"stereo"`` or ``"rgbd"`` (``"mono"`` is reserved).
+    vocabulary : Vocabulary or path, optional
+        Visual words; the one shipped with the package if None.
+    deterministic : bool
+        Run mapping inline after each keyframe: two runs give the same bytes.
+    wait_for_mapping : bool
+        For recorded data: a track call waits until at most one keyframe waits for mapping, so that
+        the result does not depend on the speed at which images are delivered. For live cameras
+        leave it off.
+    seed : int
+        Seed of all random draws.
+
+    Raises
+    ------
+    SettingsError, VocabularyError
+        If these cannot be read or are inconsistent; no thread is left running.
+
+    Examples
+    --------
+    >>> with System("tum1", "rgbd") as slam:  # doctest: +SKIP
+    ...     record = slam.track_rgbd(image, depth, timestamp)
+    ...     print(record.state, record.T_wc)
+    """
+
+    def __init__(
+        self,
+        settings: Settings | str | PathLike[str],
+        sensor: Sensor | str,
+        vocabulary: core.Vocabulary | str | PathLike[str] | None = None,
+        *,
+        deterministic: bool = False,
+        wait_for_mapping: bool = False,
+        seed: int = 0,
+    ) -> None:
+        self.sensor = Sensor(sensor)
+        if not isinstance(settings, Settings):
+            settings = Settings.load(settings, self.sensor)
+        self.settings = settings
+        self.settings.check_for(self.sensor)
+        if not isinstance(vocabulary, core.Vocabulary):
+            vocabulary = load_vocabulary(vocabulary)
+        self.vocabulary = vocabulary
+        self.deterministic = deterministic
+        self.seed = seed
+        self._wait_for_mapping = wait_for_mapping and not deterministic
+
+        self._map = core.Map()
+        self._front_end = FrontEnd(settings, self.sensor)
+        threaded = not deterministic
+        self._loop_closing = LoopClosing(self._map, threaded=threaded)
+        self._mapping = LocalMapping(
+            self._map,
+            self.sensor,
+            threaded=threaded,
+            on_done=self._loop_closing.insert_keyframe,
+        )
+        self._tracking = Tracking(
+            self._map, vocabulary, self._mapping, self.sensor, settings.max_frames
+        )
+        self._recorder = core.TrajectoryRecorder()
+        self._finished_trajectories: list[Trajectory] = []
+        self._statistics = StageStatistics()
+        self._guard = CallGuard("tracking")
+        self._reset_requested = threading.Event()
+        self._next_frame_id = 0
+        self._last_timestamp = -math.inf
+        self._shut_down = False
+        self.n_resets = 0
+
+        # Everything refers to everything it needs before the first thread runs.
+        for worker in self._workers:
+            worker.start()
+        self._finalizer = weakref.finalize(self, _abandon, self._workers)
+
+    # ---- tracking --------------------------------------------------------------------------------
+    def track_stereo(
+        self,
+        left: npt.NDArray[np.uint8],
+        right: npt.NDArray[np.uint8],
+        timestamp: float,
+        *,
+        details: bool = False,
+    ) -> TrackingRecord:
+        """Track one rectified, synchronised stereo pair.
+
+        Parameters
+        ----------
+        left, right : array of uint8, (h, w) or (h, w, 3) or (h, w, 4)
+            Grey or colour (order by ``Camera.RGB`` of the settings), equal size.
+        timestamp : float
+            Seconds; must grow from call to call.
+        details : bool
+            Also return the frame's keypoints and matches.
+
+        Returns
+        -------
+        TrackingRecord
+            State and, if it is OK, the pose of the left camera.
+
+        Raises
+        ------
+        StateError
+            For another sensor, after shutdown, or while another call runs.
+        ImageError
+            For bad images or time stamps; the frame is not counted and nothing has changed.
+        WorkerError
+            If a worker has failed; the original exception is its cause.
+        """
+        self._require(Sensor.STEREO, "track_stereo")
+        return self._track(
+            timestamp, details, lambda i, timer: self._front_end.stereo(left, right, i, timestamp, timer)
+        )
+
+    def track_rgbd(
+        self,
+        image: npt.NDArray[np.uint8],
+        depth: npt.NDArray[np.generic],
+        timestamp: float,
+        *,
+        details: bool = False,
+    ) -> TrackingRecord:
+        """Track one image with registered depth.
+
+        Parameters
+        ----------
+        image : array of uint8, (h, w) or (h, w, 3) or (h, w, 4)
+            Grey or colour (order by ``Camera.RGB`` of the settings).
+        depth : array, (h, w)
+            Raw depth; divided by ``DepthMapFactor`` it is metres. 0, negative or NaN: unknown.
+        timestamp : float
+            Seconds; must grow from call to call.
+        details : bool
+            Also return the frame's keypoints and matches.
+
+        Returns
+        -------
+        TrackingRecord
+            State and, if it is OK, the pose of the colour camera.
+
+        Raises
+        ------
+        StateError, ImageError, WorkerError
+            As for `track_stereo`.
+        """
+        self._require(Sensor.RGBD, "track_rgbd")
+        return self._track(
+            timestamp, details, lambda i, timer: self._front_end.rgbd(image, depth, i, timestamp, timer)
+        )
+
+    def track_monocular(
+        self, image: npt.NDArray[np.uint8], timestamp: float, *, details: bool = False
+    ) -> TrackingRecord:
+        """Track one image of a single camera: not available in this version.
+
+        Raises
+        ------
+        StateError
+            Always.
+        """
+        raise StateError(
+            "tracking with a single camera is not available in this version; "
+            "use a stereo or an RGB-D sensor"
+        )
+
+    def _require(self, sensor: Sensor, call: str) -> None:
+        if self.sensor is not sensor:
+            raise StateError(
+                f"{call} needs a system built for sensor '{sensor.value}', "
+                f"this one is for '{self.sensor.value}'"
+            )
+
+    def _track(
+        self,
+        timestamp: float,
+        details: bool,
+        build: Callable[[int, StageTimer], core.Frame],
+    ) -> TrackingRecord:
+        with self._guard():
+            if self._shut_down:
+                raise StateError("the system has been shut down; make a new one")
+            for worker in self._workers:
+                worker.raise_if_failed()
+            self._check_timestamp(timestamp)
+            if self._reset_requested.is_set():
+                self._reset_now()
+            timer = StageTimer()
+            if self._wait_for_mapping:
+                with timer("wait"):
+                    self._mapping.worker.wait_until_waiting(at_most=1)
+            with timer("track"):
+                frame = core.TrackedFrame(build(self._next_frame_id, timer))
+                # From here on the image counts: every id is one image.
+                self._next_frame_id += 1
+                self._last_timestamp = timestamp
+                outcome = self._tracking.track(frame, timer)
+            self._statistics.add(timer.milliseconds)
+            return self._record(frame, outcome, timer, details)
+
+    def _check_timestamp(self, timestamp: float) -> None:
+        if not math.isfinite(timestamp):
+            raise ImageError(f"the time stamp must be a finite number of seconds, got {timestamp}")
+        if timestamp <= self._last_timestamp:
+            raise ImageError(
+                f"time stamps must grow: {timestamp!r} came after {self._last_timestamp!r}"
+            )
+
+    def _record(
+        self,
+        frame: core.TrackedFrame,
+        outcome: TrackingOutcome,
+        timer: StageTimer,
+        details: bool,
+    ) -> TrackingRecord:
+        ok = outcome.state is TrackingState.OK
+        initialized = outcome.state in (TrackingState.OK, TrackingState.LOST)
+        if outcome.reset_needed:
+            _log.info("lost soon after initialization; starting a new map")
+            self._reset_requested.set()
+        elif initialized:
+            self._recorder.record(self._map, frame, lost=not ok)
+        map_index = len(self._finished_trajectories)
+        return TrackingRecord(
+            frame_id=frame.id,
+            timestamp=frame.timestamp,
+            map_index=map_index,
+            state=outcome.state,
+            reason=outcome.reason,
+            T_cw=frame.T_cw.matrix if ok and frame.T_cw is not None else None,
+            covariance=outcome.covariance if ok else None,
+            n_matches=outcome.n_matches,
+            n_inliers=outcome.n_inliers if ok else 0,
+            is_keyframe=outcome.is_keyframe,
+            reference_keyframe=self._tracking.reference_keyframe,
+            milliseconds=timer.milliseconds,
+            features=_features(frame) if details else None,
+        )
+
+    # ---- control ---------------------------------------------------------------------------------
+    def reset(self) -> None:
+        """Ask for a new map; carried out at the beginning of the next track call.
+
+        Settings, vocabulary and mode stay. The trajectory of the present map is kept, see
+        `trajectories`.
+        """
+        self._reset_requested.set()
+
+    def _reset_now(self) -> None:
+        _log.info("resetting: map %d ends", len(self._finished_trajectories))
+        self._mapping.worker.reset(_PATIENCE)
+        self._loop_closing.worker.reset(_PATIENCE)
+        self._finished_trajectories.append(self._current_trajectory())
+        self._mapping.reset()
+        self._loop_closing.reset()
+        self._map.clear()
+        self._recorder.clear()
+        self._tracking.reset()
+        self._next_frame_id = 0
+        self._reset_requested.clear()
+        self.n_resets += 1
+
+    def wait_until_idle(self, timeout: float | None = None) -> bool:
+        """Wait until every keyframe has been processed; False when `timeout` seconds passed."""
+        done = self._mapping.worker.wait_until_idle(timeout)
+        return self._loop_closing.worker.wait_until_idle(timeout) and done
+
+    def shutdown(self, *, drain: bool = True, timeout: float | None = None) -> None:
+        """Stop the workers and join their threads; idempotent.
+
+        Results remain available. Also called at the end of a ``with`` block.
+
+        Parameters
+        ----------
+        drain : bool
+            Let waiting keyframes be processed first.
+        timeout : float, optional
+            Seconds to wait for each worker.
+
+        Raises
+        ------
+        WorkerError
+            If a worker has failed, or does not end in time.
+        """
+        if self._shut_down:
+            return
+        self._shut_down = True
+        self._finalizer.detach()
+        errors = []
+        for worker in self._workers:
+            try:
+                worker.finish(drain=drain, timeout=timeout)
+            except Exception as error:
+                errors.append(error)
+        if errors:
+            raise errors[0]
+
+    def __enter__(self) -> System:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            self.shutdown(drain=error is None)
+        except Exception:
+            if error is None:
+                raise
+            _log.exception("shutdown after an error failed as well")
+
+    @property
+    def _workers(self) -> tuple[Worker[int], Worker[int]]:
+        return self._mapping.worker, self._loop_closing.worker
+
+    # ---- results ---------------------------------------------------------------------------------
+    @property
+    def state(self) -> TrackingState:
+        """State after the last track call."""
+        return self._tracking.state
+
+    @property
+    def n_keyframes(self) -> int:
+        """Keyframes in the map."""
+        return int(self._map.n_keyframes)
+
+    @property
+    def n_map_points(self) -> int:
+        """Points in the map."""
+        return int(self._map.n_points)
+
+    @property
+    def n_loops_closed(self) -> int:
+        """Loops closed so far."""
+        return self._loop_closing.n_loops
+
+    @property
+    def n_relocalizations(self) -> int:
+        """How often tracking was found again after a loss."""
+        return self._tracking.n_relocalizations
+
+    def trajectory(self) -> Trajectory:
+        """Poses of all images of the present map, after the latest optimisation.
+
+        Returns
+        -------
+        Trajectory
+            Time stamps, ``T_wc`` (n, 4, 4) relative to keyframe 0, and which frames were lost.
+        """
+        return self._current_trajectory()
+
+    def trajectories(self) -> list[Trajectory]:
+        """One trajectory per map: those ended by resets, then the present one."""
+        return [*self._finished_trajectories, self._current_trajectory()]
+
+    def _current_trajectory(self) -> Trajectory:
+        poses = self._recorder.rebuild(self._map)
+        return Trajectory(
+            timestamps=poses.timestamps, T_wc=poses.T_wc, lost=poses.lost, indices=poses.frames
+        )
+
+    def keyframe_trajectory(self) -> Trajectory:
+        """Poses of the keyframes, relative to keyframe 0."""
+        snapshot = self.map_snapshot()
+        T_wc = snapshot.keyframe_T_wc
+        if len(T_wc):
+            T_wc = np.linalg.inv(T_wc[0]) @ T_wc
+        return Trajectory(timestamps=snapshot.keyframe_timestamps, T_wc=T_wc)
+
+    def map_snapshot(self) -> MapSnapshot:
+        """A copy of keyframe poses and points; may be called while the system runs."""
+        keyframes, points = core.snapshot_keyframes(self._map), core.snapshot_points(self._map)
+        return MapSnapshot(
+            keyframe_ids=keyframes.ids,
+            keyframe_timestamps=keyframes.timestamps,
+            keyframe_T_wc=keyframes.T_wc,
+            point_ids=points.ids,
+            point_positions=points.positions,
+        )
+
+    def map_hash(self) -> int:
+        """Hash over poses, points and observations: equal for equal maps."""
+        return int(self._map.content_hash())
+
+    def check_map(self) -> list[str]:
+        """Violated invariants of the map, one sentence each; empty if it is consistent."""
+        return list(core.check_invariants(self._map, require_words=True))
+
+    def stage_statistics(self) -> dict[str, dict[str, float]]:
+        """Median, mean and p99 milliseconds per stage of tracking and mapping."""
+        return {**self._statistics.summary(), **self._mapping.statistics.summary()}
+
+
+def _features(frame: core.TrackedFrame) -> FrameFeatures:
+    ids = frame.map_points
+    return FrameFeatures(
+        keypoints=frame.frame.keypoints,
+        levels=frame.frame.levels,
+        depths=frame.frame.depth,
+        map_point_ids=ids,
+        inliers=(ids >= 0) & (frame.outlier == 0),
+    )
+
+
+def _abandon(workers: tuple[Worker[int], ...]) -> None:
+    """End the threads of a system that was dropped without shutdown."""
+    for worker in workers:
+        try:
+            worker.finish(timeout=_PATIENCE)
+        except Exception:
+            _log.exception("%s failed while the system was dropped", worker.name)
