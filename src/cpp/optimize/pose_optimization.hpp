@@ -10,9 +10,9 @@ namespace orbslam {
 
 /// One correspondence of a pose-only problem.
 struct PoseObservation {
-  Eigen::Vector3d position;  ///< world
-  double u = 0, v = 0;       ///< undistorted pixels
-  double right_u = 0;        ///< only if has_depth
+  Eigen::Vector3d position;   ///< world
+  double u = 0, v = 0;        ///< undistorted pixels
+  double right_u = 0;         ///< only if has_depth
   double inverse_sigma2 = 1;  ///< of the keypoint's level
   bool has_depth = false;
 };
@@ -29,11 +29,16 @@ struct PoseEstimate {
 
 /// Pose of a frame from fixed points (spec 16, section 3): four rounds of damped Gauss-Newton from
 /// the initial pose with a Huber kernel (off in the last), outliers re-classified after each at
-/// 5.991 (two residuals) and 7.815 (three). Fewer than 3 observations: returned unchanged, 0 inliers.
+/// 5.991 (two residuals) and 7.815 (three); a point that is not in front of the camera is an
+/// outlier. Fewer than 10 observations, or fewer than 3 inliers left: no further round. Fewer than
+/// 3 observations: returned unchanged, 0 inliers. Observations with NaN or infinite numbers are
+/// outliers and take no part.
 PoseEstimate optimize_pose(const Pose& T_cw_initial, const Pinhole& pinhole, double bf,
                            const std::vector<PoseObservation>& observations);
 
-/// The same for a frame's associations: writes its pose and outlier flags.
+/// The same for a frame's associations: starts from its pose, and writes its pose and outlier flags
+/// (of all slots; those without a point get 0). `outlier` of the result stays empty, so that calls
+/// after a thread's first do not allocate. Throws StateError when the frame has no pose.
 PoseEstimate optimize_pose(TrackedFrame& frame);
 
 }  // namespace orbslam

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "base/pose.hpp"
+#include "camera/camera.hpp"
+
+namespace orbslam::pose_kernels {
+
+/// Points closer to the camera's plane than this are not projected.
+inline constexpr double kTinyDepth = 1e-9;
+
+/// Observations of one kind (all with, or all without a right column) as flat arrays. Padded to a
+/// multiple of kLanes with weight 0, so that the loops have no remainder.
+struct Group {
+  static constexpr std::size_t kLanes = 2;
+
+  std::vector<double> x, y, z;        ///< world
+  std::vector<double> u, v, right_u;  ///< pixels; right_u only in the group with depth
+  std::vector<double> inverse_sigma2;
+  std::vector<double> weight;     ///< inverse_sigma2 of those in use, 0 of the others
+  std::vector<std::size_t> slot;  ///< position in the caller's list
+
+  std::size_t size() const { return slot.size(); }
+  void clear();
+  void push_back(const Eigen::Vector3d& position, double u_px, double v_px, double right_u_px,
+                 double inverse_variance, std::size_t caller_slot);
+  /// Appends observations of weight 0 up to the next multiple of kLanes.
+  void pad();
+};
+
+/// The pinhole with the stereo base, as the kernels want it.
+struct Projection {
+  Pinhole pinhole;
+  double bf = 0;
+};
+
+/// Normal equations H x = b of the weighted least squares problem in the left tangent of T_cw.
+struct NormalEquations {
+  Matrix6d H = Matrix6d::Zero();
+  Vector6d b = Vector6d::Zero();
+};
+
+/// `huber` is the kernel's width on whitened residuals, or 0 for plain least squares. Both return
+/// the (robustified) sum of squares and add the group's part to `equations` if given. Points on the
+/// camera's plane take no part. Summation order is fixed.
+double accumulate_mono(const Group& group, const Projection& projection, const Pose& T_cw,
+                       double huber, NormalEquations* equations);
+double accumulate_stereo(const Group& group, const Projection& projection, const Pose& T_cw,
+                         double huber, NormalEquations* equations);
+
+/// Squared whitened residual of observation i, infinite when the point is not in front of the
+/// camera.
+double chi2(const Group& group, std::size_t i, bool stereo, const Projection& projection,
+            const Eigen::Matrix3d& R_cw, const Eigen::Vector3d& t_cw);
+
+}  // namespace orbslam::pose_kernels

@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "optimize/pose_optimization.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "base/errors.hpp"
+#include "optimize/gates.hpp"
+#include "optimize/pose_kernels.hpp"
+
+namespace orbslam {
+namespace {
+
+using pose_kernels::Group;
+using pose_kernels::NormalEquations;
+using pose_kernels::Projection;
+
+constexpr int kRounds = 4;
+constexpr int kPlainRound = 3;  // the round without kernel
+constexpr int kIterations = 10;
+constexpr int kTrials = 10;
+constexpr int kMinObservations = 3;
+constexpr int kFewObservations = 10;  // below: one round only
+
+/// Everything a call needs; one per thread, so that calls after the first allocate nothing.
+struct Workspace {
+  Group mono, stereo;
+
+  void clear() {
+    mono.clear();
+    stereo.clear();
+  }
+  /// False, and nothing added, for a broken number: it must not reach the sums.
+  bool add(const Eigen::Vector3d& position, double u, double v, double right_u,
+           double inverse_sigma2, bool has_depth, std::size_t slot) {
+    if (!position.allFinite() || !std::isfinite(u + v + inverse_sigma2)) return false;
+    if (has_depth && !std::isfinite(right_u)) return false;
+    (has_depth ? stereo : mono)
+        .push_back(position, u, v, has_depth ? right_u : 0.0, inverse_sigma2, slot);
+    return true;
+  }
+  int size() const { return static_cast<int>(mono.size() + stereo.size()); }
+};
+
+Workspace& workspace() {
+  static thread_local Workspace instance;
+  return instance;
+}
+
+double evaluate(const Workspace& w, const Projection& projection, const Pose& T_cw, bool robust,
+                NormalEquations* equations) {
+  if (equations != nullptr) *equations = NormalEquations();
+  return accumulate_mono(w.mono, projection, T_cw, robust ? kHuberMono : 0.0, equations) +
+         accumulate_stereo(w.stereo, projection, T_cw, robust ? kHuberStereo : 0.0, equations);
+}
+
+/// One iteration's trials: looks for a damping with which the cost falls. On success `T_cw`, `cost`
+/// and `equations` are those of the new pose.
+class DampedStep {
+ public:
+  DampedStep(const Workspace& w, const Projection& projection, bool robust)
+      : workspace_(w), projection_(projection), robust_(robust) {}
+
+  void start(const NormalEquations& equations) {
+    lambda_ = 1e-5 * equations.H.diagonal().maxCoeff();
+    growth_ = 2;
+  }
+
+  bool advance(Pose& T_cw, double& cost, NormalEquations& equations) {
+    for (int trial = 0; trial < kTrials; ++trial) {
+      Matrix6d damped = equations.H;
+      damped.diagonal().array() += lambda_;
+      const Eigen::LLT<Matrix6d> factor(damped);
+      double gain = -1;
+      if (factor.info() == Eigen::Success) {
+        const Vector6d step = factor.solve(equations.b);
+        const Pose candidate = Pose::exp(step) * T_cw;
+        // Nearly all first trials succeed, and then the next system is needed at this very pose.
+        const bool optimistic = trial == 0;
+        const double candidate_cost =
+            evaluate(workspace_, projection_, candidate, robust_, optimistic ? &next_ : nullptr);
+        const double predicted = step.dot(lambda_ * step + equations.b) + 1e-3;
+        gain = std::isfinite(candidate_cost) ? (cost - candidate_cost) / predicted : -1;
+        if (gain > 0) {
+          T_cw = candidate;
+          cost = candidate_cost;
+          if (!optimistic) evaluate(workspace_, projection_, candidate, robust_, &next_);
+          equations = next_;
+          const double cubed = std::pow(2 * gain - 1, 3);
+          lambda_ *= std::max(1.0 / 3.0, std::min(2.0 / 3.0, 1 - cubed));
+          growth_ = 2;
+          return true;
+        }
+      }
+      if (gain == 0) return false;
+      lambda_ *= growth_;
+      growth_ *= 2;
+      if (!std::isfinite(lambda_)) return false;
+    }
+    return false;
+  }
+
+ private:
+  const Workspace& workspace_;
+  const Projection& projection_;
+  bool robust_;
+  double lambda_ = 0, growth_ = 2;
+  NormalEquations next_;
+};
+
+/// Levenberg-Marquardt with the observations in use. Returns the number of iterations.
+int minimise(const Workspace& w, const Projection& projection, bool robust, Pose& T_cw) {
+  NormalEquations equations;
+  double cost = evaluate(w, projection, T_cw, robust, &equations);
+  if (!std::isfinite(cost)) return 0;
+  DampedStep step(w, projection, robust);
+  step.start(equations);
+  int small_decreases = 0;
+  for (int iteration = 1; iteration <= kIterations; ++iteration) {
+    const double before = cost;
+    if (!step.advance(T_cw, cost, equations)) return iteration;
+    small_decreases = before - cost < kSmallDecrease * before ? small_decreases + 1 : 0;
+    if (small_decreases >= kSmallDecreases) return iteration;
+  }
+  return kIterations;
+}
+
+/// Judges all observations of a group at a pose: inliers get their weight, outliers weight 0.
+int classify(Group& group, bool stereo, const Projection& projection, const Pose& T_cw,
+             std::uint8_t* outlier) {
+  const Eigen::Matrix3d R = T_cw.rotation_matrix();
+  const double gate = stereo ? kGateStereo : kGateMono;
+  int n_inliers = 0;
+  for (std::size_t i = 0; i < group.size(); ++i) {
+    const bool inlier = chi2(group, i, stereo, projection, R, T_cw.translation()) <= gate;
+    group.weight[i] = inlier ? group.inverse_sigma2[i] : 0.0;
+    outlier[group.slot[i]] = inlier ? 0 : 1;
+    n_inliers += inlier ? 1 : 0;
+  }
+  return n_inliers;
+}
+
+/// Leaves out what lies behind the camera at a round's start: its mirror image would pull the pose,
+/// and no small step brings it to the front.
+void leave_out_hidden(Group& group, const Pose& T_cw) {
+  const Eigen::RowVector3d axis = T_cw.rotation_matrix().row(2);
+  for (std::size_t i = 0; i < group.size(); ++i) {
+    const double depth =
+        axis.dot(Eigen::RowVector3d(group.x[i], group.y[i], group.z[i])) + T_cw.translation().z();
+    if (!(depth > pose_kernels::kTinyDepth)) group.weight[i] = 0;
+  }
+}
+
+/// Inverse of the inliers' normal matrix times their residual variance; zero when undetermined.
+Matrix6d covariance(const Workspace& w, const Projection& projection, const Pose& T_cw) {
+  int n_residuals = 0;
+  for (const double weight : w.mono.weight) n_residuals += weight > 0 ? 2 : 0;
+  for (const double weight : w.stereo.weight) n_residuals += weight > 0 ? 3 : 0;
+  if (n_residuals <= 6) return Matrix6d::Zero();
+  NormalEquations equations;
+  const double cost = evaluate(w, projection, T_cw, false, &equations);
+  const Eigen::LLT<Matrix6d> factor(equations.H);
+  if (factor.info() != Eigen::Success) return Matrix6d::Zero();
+  const Matrix6d inverse = factor.solve(Matrix6d::Identity());
+  if (!inverse.allFinite()) return Matrix6d::Zero();
+  return 0.5 * (inverse + inverse.transpose()) * (cost / (n_residuals - 6));
+}
+
+/// The rounds over a filled workspace. `outlier` has one flag per slot, preset by the caller;
+/// only those of the workspace's slots are judged.
+void run_rounds(Workspace& w, const Projection& projection, const Pose& T_cw_initial,
+                PoseEstimate& estimate, std::uint8_t* outlier) {
+  estimate.T_cw = T_cw_initial;
+  const int n_observations = w.size();
+  if (n_observations < kMinObservations) return;
+  w.mono.pad();
+  w.stereo.pad();
+  for (int round = 0; round < kRounds; ++round) {
+    Pose T_cw = T_cw_initial;
+    leave_out_hidden(w.mono, T_cw);
+    leave_out_hidden(w.stereo, T_cw);
+    estimate.iterations += minimise(w, projection, round != kPlainRound, T_cw);
+    estimate.T_cw = T_cw;
+    estimate.n_inliers = classify(w.mono, false, projection, T_cw, outlier) +
+                         classify(w.stereo, true, projection, T_cw, outlier);
+    if (n_observations < kFewObservations || estimate.n_inliers < kMinObservations) break;
+  }
+  estimate.covariance = covariance(w, projection, estimate.T_cw);
+}
+
+}  // namespace
+
+PoseEstimate optimize_pose(const Pose& T_cw_initial, const Pinhole& pinhole, double bf,
+                           const std::vector<PoseObservation>& observations) {
+  Workspace& w = workspace();
+  w.clear();
+  PoseEstimate estimate;
+  estimate.outlier.resize(observations.size());
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    const PoseObservation& o = observations[i];
+    const bool usable = w.add(o.position, o.u, o.v, o.right_u, o.inverse_sigma2, o.has_depth, i);
+    estimate.outlier[i] = usable ? 0 : 1;
+  }
+  run_rounds(w, {pinhole, bf}, T_cw_initial, estimate, estimate.outlier.data());
+  return estimate;
+}
+
+PoseEstimate optimize_pose(TrackedFrame& frame) {
+  if (!frame.T_cw) {
+    throw StateError("optimize_pose: the frame has no pose to start from; set T_cw first");
+  }
+  const Frame& f = *frame.frame;
+  Workspace& w = workspace();
+  w.clear();
+  for (std::size_t i = 0; i < f.size(); ++i) {
+    frame.outlier[i] = 0;
+    if (!frame.map_points[i].valid()) continue;
+    const Keypoint& keypoint = f.keypoints[i];
+    const bool usable = w.add(frame.positions[i], keypoint.x, keypoint.y, f.right_u[i],
+                              f.scales->inverse_sigma2(keypoint.level), f.has_depth(i), i);
+    frame.outlier[i] = usable ? 0 : 1;
+  }
+  PoseEstimate estimate;
+  run_rounds(w, {f.camera->pinhole(), f.camera->bf()}, *frame.T_cw, estimate, frame.outlier.data());
+  frame.T_cw = estimate.T_cw;
+  return estimate;
+}
+
+}  // namespace orbslam
