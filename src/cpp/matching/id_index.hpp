@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "base/ids.hpp"
+
+namespace orbslam {
+
+/// A small table from map point id to a number, for "is this point one of those" in loops over
+/// thousands of points. Open addressing in one flat buffer that is reused: no allocation once it
+/// has grown, and never iterated, so its inner order cannot leak into results.
+class PointIdIndex {
+ public:
+  static constexpr std::int32_t kNone = -1;
+
+  /// Forgets everything and makes room for `n` ids.
+  void reset(std::size_t n) {
+    shift_ = 64 - 4;
+    while ((std::size_t{1} << (64 - shift_)) < 2 * n) --shift_;
+    slots_.assign(std::size_t{1} << (64 - shift_), Slot{});
+  }
+
+  /// The first number given for an id stays. Returns whether the id was new. Ids must be valid
+  /// and no more than reset() made room for.
+  bool insert(MapPointId id, std::int32_t number) {
+    Slot& slot = slots_[position_of(id)];
+    if (slot.id == id.value) return false;
+    slot = {id.value, number};
+    return true;
+  }
+
+  std::int32_t find(MapPointId id) const {
+    if (!id.valid()) return kNone;
+    const Slot& slot = slots_[position_of(id)];
+    return slot.id == id.value ? slot.number : kNone;
+  }
+
+ private:
+  struct Slot {
+    std::int64_t id = -1;
+    std::int32_t number = kNone;
+  };
+
+  // Multiplication by 2^64 / golden ratio spreads consecutive ids over the table.
+  std::size_t position_of(MapPointId id) const {
+    const std::size_t mask = slots_.size() - 1;
+    auto position = static_cast<std::size_t>(
+        (static_cast<std::uint64_t>(id.value) * 0x9E3779B97F4A7C15ULL) >> shift_);
+    while (slots_[position].id >= 0 && slots_[position].id != id.value) {
+      position = (position + 1) & mask;
+    }
+    return position;
+  }
+
+  int shift_ = 60;
+  std::vector<Slot> slots_ = std::vector<Slot>(16);
+};
+
+}  // namespace orbslam

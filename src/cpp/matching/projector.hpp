@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "base/pose.hpp"
+#include "frame/frame.hpp"
+
+namespace orbslam {
+
+/// Where a world point appears: pixel, column in the (virtual) right image, depth [world units].
+struct ImagePoint {
+  double u = 0, v = 0, right_u = 0, z = 0;
+};
+
+/// Projects many world points into one frame. All tests are written so that NaN fails them.
+class Projector {
+ public:
+  Projector(const Frame& frame, const Pose& T_cw)
+      : rotation_(T_cw.rotation_matrix()),
+        translation_(T_cw.translation()),
+        center_(T_cw.center()),
+        pinhole_(frame.camera->pinhole()),
+        bounds_(frame.camera->bounds()),
+        bf_(frame.camera->bf()) {}
+
+  const Eigen::Vector3d& center() const { return center_; }
+
+  /// Frames accept both ends of the image bounds (spec 05, section 3).
+  bool project_into_frame(const Eigen::Vector3d& p_w, ImagePoint& image) const {
+    return project(p_w, image) && bounds_.contains(image.u, image.v);
+  }
+  /// Keyframes exclude the upper ends.
+  bool project_into_keyframe(const Eigen::Vector3d& p_w, ImagePoint& image) const {
+    return project(p_w, image) && bounds_.contains_half_open(image.u, image.v);
+  }
+
+ private:
+  bool project(const Eigen::Vector3d& p_w, ImagePoint& image) const {
+    image.z = rotation_.row(2).dot(p_w) + translation_.z();
+    if (!(image.z > 0)) return false;
+    const double inverse_z = 1.0 / image.z;
+    const double x = rotation_.row(0).dot(p_w) + translation_.x();
+    const double y = rotation_.row(1).dot(p_w) + translation_.y();
+    image.u = pinhole_.fx * x * inverse_z + pinhole_.cx;
+    image.v = pinhole_.fy * y * inverse_z + pinhole_.cy;
+    image.right_u = image.u - bf_ * inverse_z;
+    return true;
+  }
+
+  Eigen::Matrix3d rotation_;
+  Eigen::Vector3d translation_, center_;
+  Pinhole pinhole_;
+  ImageBounds bounds_;
+  double bf_;
+};
+
+/// Whether a point that is `distance` away can show the scales it was seen at (10 to 20 % slack).
+inline bool in_scale_range(double distance, double min_distance, double max_distance) {
+  return distance >= 0.8 * min_distance && distance <= 1.2 * max_distance;
+}
+
+}  // namespace orbslam

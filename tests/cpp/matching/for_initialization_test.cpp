@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "matching/for_initialization.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "base/errors.hpp"
+#include "support/npy.hpp"
+#include "support/synthetic_frames.hpp"
+
+namespace orbslam {
+namespace {
+
+using ::testing::Each;
+using ::testing::ElementsAre;
+using testing::FeatureSpec;
+using testing::make_synthetic_frame;
+using testing::thermometer_descriptor;
+
+std::vector<Eigen::Vector2f> positions_of(const Frame& frame) {
+  std::vector<Eigen::Vector2f> positions;
+  for (const Keypoint& keypoint : frame.keypoints) positions.emplace_back(keypoint.x, keypoint.y);
+  return positions;
+}
+
+FeatureSpec feature(float u, float v, int bits, std::int32_t level = 0, float angle = 0) {
+  FeatureSpec spec;
+  spec.u = u;
+  spec.v = v;
+  spec.level = level;
+  spec.angle = angle;
+  spec.descriptor = thermometer_descriptor(bits);
+  return spec;
+}
+
+std::vector<int> match(const std::vector<FeatureSpec>& initial,
+                       const std::vector<FeatureSpec>& current) {
+  const auto frame_1 = make_synthetic_frame(0, initial);
+  const auto frame_2 = make_synthetic_frame(1, current);
+  auto previous = positions_of(*frame_1);
+  return match_for_initialization(*frame_1, *frame_2, previous, 100, 0.9F);
+}
+
+TEST(MatchForInitialization, TheBetterOfTwoWinsWhateverTheOrder) {
+  const FeatureSpec good = feature(200, 200, 98), worse = feature(210, 200, 90);
+  const std::vector<FeatureSpec> current{feature(205, 205, 100)};
+  EXPECT_THAT(match({good, worse}, current), ElementsAre(0, -1));
+  EXPECT_THAT(match({worse, good}, current), ElementsAre(-1, 0));
+}
+
+TEST(MatchForInitialization, OfEquallyGoodOnesTheFirstStays) {
+  const FeatureSpec one = feature(200, 200, 95), two = feature(210, 200, 95);
+  EXPECT_THAT(match({one, two}, {feature(205, 205, 100)}), ElementsAre(0, -1));
+}
+
+TEST(MatchForInitialization, OnlyLevelZeroOnBothSides) {
+  EXPECT_THAT(match({feature(200, 200, 50, 1)}, {feature(200, 200, 50)}), ElementsAre(-1));
+  EXPECT_THAT(match({feature(200, 200, 50)}, {feature(200, 200, 50, 1)}), ElementsAre(-1));
+}
+
+TEST(MatchForInitialization, DescriptorLimitIsFiftyInclusive) {
+  EXPECT_THAT(match({feature(200, 200, 0)}, {feature(200, 200, 50)}), ElementsAre(0));
+  EXPECT_THAT(match({feature(200, 200, 0)}, {feature(200, 200, 51)}), ElementsAre(-1));
+}
+
+TEST(MatchForInitialization, RatioIsStrict) {
+  // 9 of 10 bits: exactly the ratio 0.9, which does not pass; 8 of 10 does.
+  EXPECT_THAT(match({feature(200, 200, 0)}, {feature(205, 200, 9), feature(195, 200, 10)}),
+              ElementsAre(-1));
+  EXPECT_THAT(match({feature(200, 200, 0)}, {feature(205, 200, 8), feature(195, 200, 10)}),
+              ElementsAre(0));
+}
+
+TEST(MatchForInitialization, WindowIsASquareAroundThePreviousPosition) {
+  EXPECT_THAT(match({feature(200, 200, 0)}, {feature(299.5F, 299.5F, 3)}), ElementsAre(0));
+  EXPECT_THAT(match({feature(200, 200, 0)}, {feature(300, 200, 3)}), ElementsAre(-1));
+}
+
+TEST(MatchForInitialization, SearchFollowsMatchedPositions) {
+  const auto initial = make_synthetic_frame(0, {feature(100, 100, 20), feature(400, 300, 200)});
+  const auto second = make_synthetic_frame(1, {feature(180, 100, 20)});
+  const auto third = make_synthetic_frame(2, {feature(260, 100, 20)});
+  auto previous = positions_of(*initial);
+  EXPECT_THAT(match_for_initialization(*initial, *second, previous, 100, 0.9F), ElementsAre(0, -1));
+  EXPECT_EQ(previous[0], Eigen::Vector2f(180, 100));
+  EXPECT_EQ(previous[1], Eigen::Vector2f(400, 300));
+  EXPECT_THAT(match_for_initialization(*initial, *third, previous, 100, 0.9F), ElementsAre(0, -1));
+}
+
+TEST(MatchForInitialization, RotationMustAgreeWithTheMajority) {
+  std::mt19937_64 random(3);
+  std::vector<FeatureSpec> initial, current;
+  for (int i = 0; i < 40; ++i) {
+    FeatureSpec spec = feature(60.0F + 12.0F * static_cast<float>(i), 240, 0);
+    spec.descriptor = testing::random_descriptor(random);
+    current.push_back(spec);
+    spec.angle = i == 17 ? 200.0F : 100.0F;
+    initial.push_back(spec);
+  }
+  const auto frame_1 = make_synthetic_frame(0, initial);
+  const auto frame_2 = make_synthetic_frame(1, current);
+  auto previous = positions_of(*frame_1);
+  const auto before = previous;
+  const auto matches = match_for_initialization(*frame_1, *frame_2, previous, 100, 0.9F);
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    EXPECT_EQ(matches[i], i == 17 ? -1 : static_cast<int>(i));
+  }
+  EXPECT_EQ(previous, before);
+}
+
+TEST(MatchForInitialization, EmptyFramesAndWrongSizes) {
+  EXPECT_THAT(match({}, {}), ::testing::IsEmpty());
+  EXPECT_THAT(match({feature(1, 1, 0)}, {}), Each(-1));
+  const auto frame = make_synthetic_frame(0, {feature(1, 1, 0)});
+  std::vector<Eigen::Vector2f> previous;
+  EXPECT_THROW(match_for_initialization(*frame, *frame, previous, 100, 0.9F), StateError);
+}
+
+TEST(MatchForInitialization, NonFinitePreviousPositionsMatchNothing) {
+  const auto frame = make_synthetic_frame(0, {feature(10, 10, 0)});
+  std::vector<Eigen::Vector2f> previous{{std::nanf(""), 10}};
+  EXPECT_THAT(match_for_initialization(*frame, *frame, previous, 100, 0.9F), ElementsAre(-1));
+}
+
+// ---- parity with the arrays of the original -------------------------------------------------
+
+std::shared_ptr<Frame> golden_frame(const std::string& which, bool with_angles) {
+  const std::string folder = testing::test_data("golden/match_init_tum/");
+  const auto keypoints = testing::read_npy<float>(folder + "kp" + which + ".npy");
+  const auto levels = testing::read_npy<std::int32_t>(folder + "kp" + which + "_octave.npy");
+  const auto bytes = testing::read_npy<std::uint8_t>(folder + "desc" + which + ".npy");
+  std::vector<FeatureSpec> features(keypoints.rows());
+  for (std::size_t i = 0; i < features.size(); ++i) {
+    features[i].u = keypoints.at(i, 0);
+    features[i].v = keypoints.at(i, 1);
+    if (with_angles) features[i].angle = keypoints.at(i, 3);
+    features[i].level = levels.at(i);
+    std::memcpy(features[i].descriptor.words.data(), bytes.values.data() + 32 * i, 32);
+  }
+  return make_synthetic_frame(0, features);
+}
+
+std::vector<int> golden_matches(bool with_angles) {
+  const auto frame_1 = golden_frame("1", with_angles);
+  const auto frame_2 = golden_frame("2", with_angles);
+  auto previous = positions_of(*frame_1);
+  return match_for_initialization(*frame_1, *frame_2, previous, 100, 0.9F);
+}
+
+std::vector<int> golden_output() {
+  return testing::read_npy<int>(testing::test_data("golden/match_init_tum/out_matches12.npy"))
+      .values;
+}
+
+// With all angles zero nothing is filtered, so what comes out is the search itself. The original's
+// filter (bins 0 to 12 without wrap-around) on top must give the original's matches exactly.
+TEST(MatchForInitializationGolden, SearchIsIdenticalToTheOriginal) {
+  std::vector<int> matches = golden_matches(false);
+  const auto frame_1 = golden_frame("1", true);
+  const auto frame_2 = golden_frame("2", true);
+  std::array<std::vector<std::size_t>, 13> bins;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (matches[i] < 0) continue;
+    float rotation = frame_1->keypoints[i].angle -
+                     frame_2->keypoints[static_cast<std::size_t>(matches[i])].angle;
+    if (rotation < 0) rotation += 360.0F;
+    bins[static_cast<std::size_t>(std::round(rotation / 30.0F))].push_back(i);
+  }
+  std::array<std::size_t, 13> order{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};
+  std::stable_sort(order.begin(), order.end(),
+                   [&](auto a, auto b) { return bins[a].size() > bins[b].size(); });
+  ASSERT_GE(10 * bins[order[2]].size(), bins[order[0]].size());  // so exactly three stay
+  for (std::size_t rank = 3; rank < order.size(); ++rank) {
+    for (const std::size_t i : bins[order[rank]]) matches[i] = -1;
+  }
+  EXPECT_EQ(matches, golden_output());
+}
+
+// Ours has 12 bins with wrap-around: rotations near 0 degrees count together instead of as two
+// half bins, so that a further bin can be among the three. The difference is small.
+TEST(MatchForInitializationGolden, WrapAroundChangesFewMatches) {
+  const std::vector<int> matches = golden_matches(true), expected = golden_output();
+  ASSERT_EQ(matches.size(), expected.size());
+  int common = 0, ours = 0, theirs = 0;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    ours += matches[i] >= 0;
+    theirs += expected[i] >= 0;
+    common += matches[i] >= 0 && matches[i] == expected[i];
+  }
+  EXPECT_EQ(theirs, 75);
+  EXPECT_GE(common, 0.97 * theirs);
+  EXPECT_GE(common, 0.9 * ours);
+}
+
+}  // namespace
+}  // namespace orbslam
