@@ -31,9 +31,7 @@ class FrontEnd:
         self._size: tuple[int, int] | None = None
         options = settings.orb_options()
         self._extractor = core.OrbExtractor(options)
-        self._pair_extractor = (
-            core.PairExtractor(options) if sensor is Sensor.STEREO else None
-        )
+        self._pair_extractor = core.PairExtractor(options) if sensor is Sensor.STEREO else None
 
     def stereo(
         self,
@@ -48,9 +46,7 @@ class FrontEnd:
         self._check(left, "left image")
         self._check(right, "right image")
         if left.shape != right.shape:
-            raise ImageError(
-                f"left and right image differ: shapes {left.shape} and {right.shape}"
-            )
+            raise ImageError(f"left and right image differ: shapes {left.shape} and {right.shape}")
         context = self._context_for(left)
         with timer("extract"):
             left_grey = core.to_grey(left, self._settings.camera.rgb)

@@ -26,9 +26,7 @@ class DepthInitializer:
     The camera's frame becomes the world's frame.
     """
 
-    def __init__(
-        self, world: core.Map, vocabulary: core.Vocabulary, mapping: LocalMapping
-    ) -> None:
+    def __init__(self, world: core.Map, vocabulary: core.Vocabulary, mapping: LocalMapping) -> None:
         self._map = world
         self._vocabulary = vocabulary
         self._mapping = mapping
@@ -41,9 +39,7 @@ class DepthInitializer:
             return Reason.TOO_FEW_DEPTHS
         frame.T_cw = core.Pose()
         core.describe(frame.frame, self._vocabulary)
-        keyframe = core.insert_keyframe(
-            self._map, frame, create_points=True, n_minimum=sys.maxsize
-        )
+        keyframe = core.insert_keyframe(self._map, frame, create_points=True, n_minimum=sys.maxsize)
         frame.reference_keyframe = keyframe
         self._mapping.insert_keyframe(keyframe)
         _log.info("new map with %d points", self._map.n_points)

@@ -170,7 +170,9 @@ class System:
         """
         self._require(Sensor.STEREO, "track_stereo")
         return self._track(
-            timestamp, details, lambda i, timer: self._front_end.stereo(left, right, i, timestamp, timer)
+            timestamp,
+            details,
+            lambda i, timer: self._front_end.stereo(left, right, i, timestamp, timer),
         )
 
     def track_rgbd(
@@ -206,7 +208,9 @@ class System:
         """
         self._require(Sensor.RGBD, "track_rgbd")
         return self._track(
-            timestamp, details, lambda i, timer: self._front_end.rgbd(image, depth, i, timestamp, timer)
+            timestamp,
+            details,
+            lambda i, timer: self._front_end.rgbd(image, depth, i, timestamp, timer),
         )
 
     def track_monocular(

@@ -158,7 +158,11 @@ class Tracking:
         self._remember(frame, tracked=True)
         n = frame.n_associated()
         return TrackingOutcome(
-            TrackingState.OK, n_matches=n, n_inliers=n, is_keyframe=True, covariance=np.zeros((6, 6))
+            TrackingState.OK,
+            n_matches=n,
+            n_inliers=n,
+            is_keyframe=True,
+            covariance=np.zeros((6, 6)),
         )
 
     def _lose(self, frame: core.TrackedFrame, outcome: TrackingOutcome) -> TrackingOutcome:

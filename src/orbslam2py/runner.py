@@ -1,0 +1,285 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Run the system over a recorded sequence."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from orbslam2py import _core as core
+from orbslam2py.datasets.base import Images, Sequence
+from orbslam2py.errors import DatasetError, ImageError, OrbSlamError
+from orbslam2py.prefetch import Prefetcher
+from orbslam2py.records import TrackingRecord, TrackingState
+from orbslam2py.sensor import Sensor
+from orbslam2py.settings import Settings
+from orbslam2py.system import MapSnapshot, System
+from orbslam2py.trajectory import Trajectory
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """What to run and how."""
+
+    sensor: Sensor
+    deterministic: bool = False
+    realtime: bool = False
+    """Follow the time stamps and drop frames as a camera would; otherwise every frame is tracked,
+    as fast as possible, waiting for mapping."""
+    start: int = 0
+    """Index of the first frame."""
+    stride: int = 1
+    """Take every so many frames."""
+    max_frames: int | None = None
+    """Take at most so many frames."""
+    seed: int = 0
+
+    def indices(self, n_frames: int) -> list[int]:
+        """Indices of the frames of a sequence that are used.
+
+        Raises
+        ------
+        DatasetError
+            If there are none, or the options contradict each other.
+        """
+        if self.deterministic and self.realtime:
+            raise DatasetError(
+                "--deterministic and --realtime exclude each other: dropping frames depends on time"
+            )
+        if self.start < 0 or self.stride < 1 or (self.max_frames is not None and self.max_frames < 1):
+            raise DatasetError("--start must be 0 or more, --stride and --max-frames 1 or more")
+        indices = list(range(self.start, n_frames, self.stride))
+        if not indices:
+            raise DatasetError(f"--start {self.start} is past the end: {n_frames} frames")
+        return indices[: self.max_frames]
+
+
+@dataclass(frozen=True)
+class FrameRow:
+    """One input frame and what became of it."""
+
+    index: int
+    """Index in the sequence."""
+    timestamp: str
+    """The source's text."""
+    record: TrackingRecord | None
+    """None for a skipped or dropped frame."""
+    reason: str
+    """Why there is no pose; empty if there is one."""
+
+    @property
+    def state(self) -> str:
+        """Name of the tracking state, or SKIPPED or DROPPED."""
+        if self.record is None:
+            return "DROPPED" if self.reason == DROPPED else "SKIPPED"
+        return self.record.state.name
+
+
+#: Reason of a frame that real time left no room for.
+DROPPED = "dropped to keep up with real time"
+
+
+@dataclass
+class RunResult:
+    """Everything a run gives, whether it ended or was interrupted."""
+
+    sequence: Sequence
+    settings: Settings
+    options: RunOptions
+    n_frames: int
+    """Frames that were to be processed."""
+    rows: list[FrameRow] = field(default_factory=list)
+    trajectories: list[Trajectory] = field(default_factory=list)
+    """One per map; `Trajectory.indices` count the tracked images of that map."""
+    keyframes: Trajectory | None = None
+    snapshot: MapSnapshot | None = None
+    stages: dict[str, dict[str, float]] = field(default_factory=dict)
+    seconds: float = 0.0
+    slam_seconds: float = 0.0
+    """Time in track calls and waiting for mapping."""
+    n_resets: int = 0
+    n_relocalizations: int = 0
+    n_loops_closed: int = 0
+    interrupted: bool = False
+    error: BaseException | None = None
+
+    @property
+    def n_tracked(self) -> int:
+        """Frames with a pose."""
+        return sum(r.record is not None and r.record.state is TrackingState.OK for r in self.rows)
+
+    @property
+    def n_skipped(self) -> int:
+        """Frames that could not be read or were refused."""
+        return sum(row.state == "SKIPPED" for row in self.rows)
+
+    @property
+    def n_dropped(self) -> int:
+        """Frames that real time left no room for."""
+        return sum(row.state == "DROPPED" for row in self.rows)
+
+    def why_nothing_was_tracked(self) -> str:
+        """The most frequent reason."""
+        reasons = Counter(row.reason for row in self.rows if row.reason)
+        return reasons.most_common(1)[0][0] if reasons else "no frames"
+
+
+#: Called after every frame with the row and the system.
+Progress = Callable[[FrameRow, System], None]
+
+
+class SequenceRunner:
+    """Feeds a sequence to a `System` and collects the results.
+
+    A Ctrl-C, or an exception, ends the run early; what was computed is in the result.
+
+    Parameters
+    ----------
+    sequence : Sequence
+        Images and time stamps.
+    settings : Settings
+        For the system.
+    vocabulary : Vocabulary
+        For the system.
+    options : RunOptions
+        Which frames, and how.
+    """
+
+    def __init__(
+        self,
+        sequence: Sequence,
+        settings: Settings,
+        vocabulary: core.Vocabulary | None,
+        options: RunOptions,
+    ) -> None:
+        self._sequence = sequence
+        self._vocabulary = vocabulary
+        self._indices = options.indices(len(sequence))
+        self._options = options
+        self.result = RunResult(sequence, settings, options, len(self._indices))
+
+    def run(self, progress: Progress | None = None) -> RunResult:
+        """Process the frames; returns the result also after Ctrl-C."""
+        result, options = self.result, self._options
+        begin = time.perf_counter()
+        system = System(
+            result.settings,
+            options.sensor,
+            self._vocabulary,
+            deterministic=options.deterministic,
+            wait_for_mapping=not options.realtime,
+            seed=options.seed,
+        )
+        try:
+            try:
+                with Prefetcher[Images](self._sequence, self._indices) as images:
+                    self._feed(system, images, progress)
+                self._wait_for_mapping(system)
+            except KeyboardInterrupt:
+                _log.warning("interrupted; saving what was done so far")
+                result.interrupted = True
+            except OrbSlamError as error:
+                result.error = error
+            self._shut_down(system)
+        finally:
+            self._collect(system)
+            result.seconds = time.perf_counter() - begin
+        return result
+
+    # ---- one pass over the frames ----------------------------------------------------------------
+    def _feed(
+        self, system: System, images: Prefetcher[Images], progress: Progress | None
+    ) -> None:
+        clock = _Clock(self._sequence.timestamps, self._indices) if self._options.realtime else None
+        for position, (index, item) in enumerate(images):
+            if clock is not None and clock.must_drop(position):
+                row = self._row(index, None, DROPPED)
+            else:
+                row = self._track(system, index, item)
+            self.result.rows.append(row)
+            if progress is not None:
+                progress(row, system)
+
+    def _track(self, system: System, index: int, item: Images | Exception) -> FrameRow:
+        if isinstance(item, Exception):
+            if not isinstance(item, (OrbSlamError, OSError)):
+                raise item
+            return self._skip(index, item)
+        begin = time.perf_counter()
+        try:
+            record = self._call(system, item, float(self._sequence.timestamps[index]))
+        except ImageError as error:
+            return self._skip(index, error)
+        finally:
+            self.result.slam_seconds += time.perf_counter() - begin
+        return self._row(index, record, str(record.reason))
+
+    def _call(self, system: System, images: Images, timestamp: float) -> TrackingRecord:
+        if self._options.sensor is Sensor.STEREO:
+            return system.track_stereo(images.image, _second(images.right), timestamp)
+        if self._options.sensor is Sensor.RGBD:
+            return system.track_rgbd(images.image, _second(images.depth), timestamp)
+        return system.track_monocular(images.image, timestamp)
+
+    def _skip(self, index: int, error: Exception) -> FrameRow:
+        _log.warning("frame %d skipped: %s", index, error)
+        return self._row(index, None, str(error))
+
+    def _row(self, index: int, record: TrackingRecord | None, reason: str) -> FrameRow:
+        return FrameRow(index, self._sequence.timestamp_text(index), record, reason)
+
+    # ---- the end ---------------------------------------------------------------------------------
+    def _wait_for_mapping(self, system: System) -> None:
+        begin = time.perf_counter()
+        system.wait_until_idle()
+        self.result.slam_seconds += time.perf_counter() - begin
+
+    def _shut_down(self, system: System) -> None:
+        try:
+            system.shutdown(drain=not self.result.interrupted and self.result.error is None)
+        except OrbSlamError as error:
+            self.result.error = self.result.error or error
+
+    def _collect(self, system: System) -> None:
+        result = self.result
+        result.trajectories = system.trajectories()
+        result.keyframes = system.keyframe_trajectory()
+        result.snapshot = system.map_snapshot()
+        result.stages = system.stage_statistics()
+        result.n_resets = system.n_resets
+        result.n_relocalizations = system.n_relocalizations
+        result.n_loops_closed = system.n_loops_closed
+
+
+class _Clock:
+    """Plays time stamps: a frame is dropped when the next one has come before it was taken."""
+
+    def __init__(self, timestamps: np.ndarray, indices: list[int]) -> None:
+        self._due = np.asarray(timestamps)[indices]
+        self._offset: float | None = None
+
+    def must_drop(self, position: int) -> bool:
+        """Wait until the frame is due; True if its successor is already there."""
+        now = time.perf_counter()
+        if self._offset is None:
+            self._offset = now - float(self._due[position])
+            return False
+        early = float(self._due[position]) + self._offset - now
+        if early > 0:
+            time.sleep(early)
+            return False
+        has_next = position + 1 < len(self._due)
+        return has_next and now >= float(self._due[position + 1]) + self._offset
+
+
+def _second(array: np.ndarray | None) -> np.ndarray:
+    if array is None:
+        raise DatasetError("the sequence delivers no second image for this sensor")
+    return array
