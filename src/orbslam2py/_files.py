@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Writing files so that a reader sees the old content or the new one, never a part."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import IO, Any, NoReturn
+
+
+@contextlib.contextmanager
+def atomic_write(path: str | Path, *, binary: bool = False) -> Iterator[IO[Any]]:
+    r"""Open a file for writing; it appears under its name only when all was written.
+
+    The content goes to a temporary file in the same folder, which replaces `path` at the end of
+    the ``with`` block. If the block raises or the disk is full, the temporary file is removed and
+    an existing file stays as it was. Devices and pipes are written directly.
+
+    Parameters
+    ----------
+    path
+        The file to write; a symbolic link is followed.
+    binary
+        Bytes instead of UTF-8 text. Text keeps "\n" as line end on every system.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written (no permission, no such folder, disk full); the message
+        names the file. Subclasses (`PermissionError`, `FileNotFoundError`) as usual.
+    """
+    target = Path(os.path.realpath(path))
+    if target.exists() and not target.is_file():
+        with _open(path, target, os.O_WRONLY, binary) as stream:
+            yield stream
+        return
+    temporary = target.with_name(f".{target.name}.{os.getpid()}-{secrets.token_hex(4)}.tmp")
+    stream = _open(path, temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, binary)
+    try:
+        try:
+            yield stream
+        except BaseException:
+            with contextlib.suppress(OSError):
+                stream.close()
+            raise
+        _report_as(path, lambda: _finish(stream))
+        _report_as(path, lambda: temporary.replace(target))
+    except OSError as error:
+        _remove(temporary)
+        # A full disk shows itself already inside the block, when the buffer is flushed.
+        if error.filename is None and error.errno is not None:
+            _raise_named(path, error)
+        raise
+    except BaseException:
+        _remove(temporary)
+        raise
+
+
+def _finish(stream: IO[Any]) -> None:
+    try:
+        stream.flush()
+        os.fsync(stream.fileno())
+    finally:
+        stream.close()
+
+
+def _remove(path: Path) -> None:
+    with contextlib.suppress(OSError):
+        path.unlink()
+
+
+def _open(path: str | Path, actual: Path, flags: int, binary: bool) -> IO[Any]:
+    try:
+        descriptor = os.open(actual, flags, 0o666)
+    except OSError as error:
+        _raise_named(path, error)
+    if binary:
+        return os.fdopen(descriptor, "wb")
+    return os.fdopen(descriptor, "w", encoding="utf-8", newline="\n")
+
+
+def _report_as(path: str | Path, step: Callable[[], object]) -> None:
+    try:
+        step()
+    except OSError as error:
+        _raise_named(path, error)
+
+
+def _raise_named(path: str | Path, error: OSError) -> NoReturn:
+    reason = os.strerror(error.errno) if error.errno else str(error)
+    message = f"cannot write {path}: {reason}; a file that was there is kept"
+    # OSError(errno, ...) makes the matching subclass by itself.
+    raise OSError(error.errno, message, str(path)) from error

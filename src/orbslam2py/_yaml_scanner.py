@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A line scanner for the YAML dialect of OpenCV (ORB-SLAM settings, EuRoC ``sensor.yaml``).
+
+OpenCV's own reader hides doubled keys and turns bad numbers into 0 or 3.4e38; generic YAML
+libraries refuse the first line ``%YAML:1.0`` and ``key:[1, 2]`` without a blank. This scanner
+keeps every value as text together with its line, so that the caller can say what is wrong where.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+_KEY = re.compile(r"^(?P<key>[A-Za-z_][\w.\-]*)\s*:(?P<value>.*)$")
+_NUMBER = re.compile(r"^[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?$")
+_NOT_FINITE = re.compile(r"^[+-]?\.?(nan|inf|infinity)$", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Something wrong with a file; `line` counts from 1, None if no line is to blame."""
+
+    line: int | None
+    text: str
+
+    def located(self, path: object) -> str:
+        """``path:line: text``, the form that editors jump to."""
+        return f"{path}:{self.line}: {self.text}" if self.line else f"{path}: {self.text}"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One key with its unconverted value: a scalar's text, a list's items or nested entries."""
+
+    key: str
+    line: int
+    value: str | tuple[str, ...] | Mapping[str, Entry]
+
+
+@dataclass
+class Document:
+    """The entries of a file by key (the first of doubled ones) and what was wrong with it."""
+
+    entries: dict[str, Entry] = field(default_factory=dict)
+    problems: list[Problem] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class _Line:
+    number: int
+    indent: int
+    text: str
+
+
+def scan(text: str) -> Document:
+    """Split a file into entries.
+
+    Parameters
+    ----------
+    text
+        The whole file. The ``%YAML`` line is optional, ``---`` and ``...`` are skipped.
+
+    Returns
+    -------
+    Document
+        Keys in the order of the file; lines that are not ``key: value``, unclosed lists and
+        doubled keys are reported as problems.
+    """
+    document = Document()
+    lines = _content_lines(text)
+    document.entries, _ = _scan_block(lines, 0, 0, document.problems)
+    return document
+
+
+def parse_number(text: str) -> float:
+    """Convert the text of a scalar.
+
+    Raises
+    ------
+    ValueError
+        With a sentence for the user if the text is no finite decimal number.
+    """
+    if _NUMBER.match(text):
+        value = float(text)
+        if math.isfinite(value):
+            return value
+        raise ValueError(f"{text} is too large")
+    if _NOT_FINITE.match(text):
+        raise ValueError(f"{text} is not finite")
+    raise ValueError(f"'{text}' is not a number" if text else "the value is empty")
+
+
+def _content_lines(text: str) -> list[_Line]:
+    lines = []
+    for number, raw in enumerate(text.lstrip("\ufeff").splitlines(), start=1):
+        line = _without_comment(raw.expandtabs(8)).rstrip()
+        content = line.lstrip()
+        if content and not content.startswith("%YAML") and content not in ("---", "..."):
+            lines.append(_Line(number, len(line) - len(content), content))
+    return lines
+
+
+def _without_comment(line: str) -> str:
+    quote = ""
+    for position, character in enumerate(line):
+        if quote:
+            quote = "" if character == quote else quote
+        elif character in "\"'":
+            quote = character
+        elif character == "#" and (position == 0 or line[position - 1] in " \t],"):
+            return line[:position]
+    return line
+
+
+def _scan_block(
+    lines: list[_Line], start: int, indent: int, problems: list[Problem]
+) -> tuple[dict[str, Entry], int]:
+    """Read entries from `start` until a line is indented less; returns them and that line."""
+    entries: dict[str, Entry] = {}
+    position = start
+    while position < len(lines) and lines[position].indent >= indent:
+        line = lines[position]
+        match = _KEY.match(line.text)
+        position += 1
+        if match is None:
+            problems.append(Problem(line.number, f"expected 'key: value', found '{line.text}'"))
+            continue
+        key, value = match["key"], match["value"].strip()
+        if value.startswith("["):
+            while "]" not in value and position < len(lines):
+                if _KEY.match(lines[position].text):
+                    break
+                value += " " + lines[position].text
+                position += 1
+            entry = _list_entry(key, value, line.number, problems)
+        elif value == "" or value.startswith("!!"):
+            entry, position = _scan_nested(key, line, lines, position, problems)
+        else:
+            entry = Entry(key, line.number, _unquoted(value))
+        if key in entries:
+            first = entries[key].line
+            problems.append(
+                Problem(line.number, f"{key} is given twice (first on line {first}); keep one")
+            )
+        else:
+            entries[key] = entry
+    return entries, position
+
+
+def _scan_nested(
+    key: str, line: _Line, lines: list[_Line], position: int, problems: list[Problem]
+) -> tuple[Entry, int]:
+    if position < len(lines) and lines[position].indent > line.indent:
+        nested, position = _scan_block(lines, position, lines[position].indent, problems)
+        return Entry(key, line.number, nested), position
+    return Entry(key, line.number, ""), position
+
+
+def _list_entry(key: str, text: str, number: int, problems: list[Problem]) -> Entry:
+    body, closed, rest = text[1:].partition("]")
+    if not closed:
+        problems.append(Problem(number, f"the list of {key} is not closed with ']'"))
+    elif rest.strip():
+        problems.append(Problem(number, f"'{rest.strip()}' after the list of {key}"))
+    items = [item.strip() for item in body.split(",")]
+    if items and items[-1] == "":
+        items.pop()  # an empty list, or a comma after the last item
+    return Entry(key, number, tuple(items))
+
+
+def _unquoted(value: str) -> str:
+    if len(value) >= 2 and value[0] == value[-1] and value[0] in "\"'":
+        return value[1:-1]
+    return value
