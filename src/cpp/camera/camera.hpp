@@ -73,16 +73,17 @@ struct ImageBounds {
 struct CameraOptions {
   Pinhole pinhole;
   std::array<double, 5> distortion{};  ///< k1, k2, p1, p2, k3; all zero for rectified images
-  double bf = 0;           ///< baseline times fx [pixel metre]; 0 for a single camera
-  double depth_ratio = 0;  ///< close/far limit in multiples of the baseline (ThDepth)
-  ImageSize image_size;    ///< of the first image
+  double bf = 0;                       ///< baseline times fx [pixel metre]; 0 for a single camera
+  double depth_ratio = 0;              ///< close/far limit in multiples of the baseline (ThDepth)
+  ImageSize image_size;                ///< of the first image
 };
 
 /// A calibrated camera: pinhole, lens, (virtual) right camera and the image bounds that follow
 /// from them. Immutable, shared by all frames of a system; nothing of it is global.
 class Camera {
  public:
-  /// Throws SettingsError when a focal length or the image size is not positive.
+  /// Throws SettingsError when a focal length or the image size is not positive, a coefficient is
+  /// not finite, bf is negative, or there is a baseline without a positive depth_ratio.
   explicit Camera(const CameraOptions& options);
 
   const Pinhole& pinhole() const { return pinhole_; }
@@ -91,7 +92,7 @@ class Camera {
   ImageSize image_size() const { return image_size_; }
 
   bool has_baseline() const { return bf_ > 0; }
-  double bf() const { return bf_; }                    ///< pixel metre
+  double bf() const { return bf_; }                      ///< pixel metre
   double baseline() const { return bf_ / pinhole_.fx; }  ///< metres
   /// Depths below this [m] are trusted from one view; infinite without a baseline.
   double close_depth() const { return close_depth_; }

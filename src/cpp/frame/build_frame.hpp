@@ -20,9 +20,8 @@ std::shared_ptr<Frame> build_monocular_frame(const FrameContext& context, FrameI
                                              double timestamp, Features features);
 
 /// Frame of a rectified pair; depth by stereo matching (frame/stereo_matching.hpp).
-std::shared_ptr<Frame> build_stereo_frame(const FrameContext& context, FrameId id,
-                                          double timestamp, Extraction left,
-                                          const Extraction& right);
+std::shared_ptr<Frame> build_stereo_frame(const FrameContext& context, FrameId id, double timestamp,
+                                          Extraction left, const Extraction& right);
 
 /// Frame of a colour image with registered depth (CV_32FC1, metres; <= 0 or NaN: no depth).
 /// Throws ImageError when the depth image has another size or type.

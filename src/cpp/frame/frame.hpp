@@ -46,6 +46,12 @@ struct Frame {
   }
 };
 
+/// How many close keypoints have an inlier map point, and how many do not.
+struct CloseCounts {
+  int tracked = 0;
+  int untracked = 0;
+};
+
 /// A frame in the tracker's hands: pose and associations, which change while it is tracked.
 struct TrackedFrame {
   std::shared_ptr<const Frame> frame;
@@ -74,6 +80,14 @@ struct TrackedFrame {
     outlier[i] = 0;
   }
   void clear_associations();
+  /// Dissociates the outliers. Returns the ids of their points, ascending.
+  std::vector<MapPointId> discard_outliers();
+
+  /// Keypoints with a map point, outliers included.
+  std::size_t n_associated() const;
+  /// Over the close keypoints; both 0 without depth. Tells whether a keyframe is needed to bring
+  /// new close points into the map.
+  CloseCounts n_close_tracked_untracked() const;
 };
 
 }  // namespace orbslam

@@ -10,6 +10,11 @@
 
 namespace orbslam {
 
+/// Column and row of a grid cell; both -1: outside the grid.
+struct GridCell {
+  int column = -1, row = -1;
+};
+
 /// Keypoint indices in 64 x 48 cells over the undistorted image bounds, for area queries.
 class KeypointGrid {
  public:
@@ -18,6 +23,10 @@ class KeypointGrid {
 
   KeypointGrid() = default;
   KeypointGrid(const std::vector<Keypoint>& keypoints, const ImageBounds& bounds);
+
+  /// The cell of a position: the nearest grid line, not the enclosing cell. Positions inside the
+  /// bounds that round to one past the end belong to the last column or row.
+  GridCell cell_of(float x, float y) const;
 
   /// Writes into `found` (cleared first) the keypoints with |x_k - x| < r and |y_k - y| < r
   /// (a square, strict) on levels min_level..max_level; a negative max_level means no upper
@@ -28,7 +37,8 @@ class KeypointGrid {
                         int min_level, int max_level, std::vector<std::uint32_t>& found) const;
 
  private:
-  float min_x_ = 0, min_y_ = 0, inverse_cell_width_ = 0, inverse_cell_height_ = 0;
+  ImageBounds bounds_;
+  float inverse_cell_width_ = 0, inverse_cell_height_ = 0;
   std::vector<std::uint32_t> offsets_;  // column-major: cell (column, row) = column * kRows + row
   std::vector<std::uint32_t> indices_;
 };

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "frame/build_frame.hpp"
+
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "base/errors.hpp"
+#include "frame/stereo_matching.hpp"
+
+namespace orbslam {
+namespace {
+
+constexpr float kUnknown = -1.0F;
+
+std::vector<Keypoint> undistorted(const Camera& camera, const std::vector<Keypoint>& raw) {
+  std::vector<float> xy;
+  xy.reserve(2 * raw.size());
+  for (const Keypoint& keypoint : raw) {
+    xy.push_back(keypoint.x);
+    xy.push_back(keypoint.y);
+  }
+  camera.lens().undistort(camera.pinhole(), xy);
+  std::vector<Keypoint> keypoints = raw;
+  for (std::size_t i = 0; i < keypoints.size(); ++i) {
+    keypoints[i].x = xy[2 * i];
+    keypoints[i].y = xy[2 * i + 1];
+  }
+  return keypoints;
+}
+
+// Everything but depth; a frame without keypoints is as complete as any other.
+std::shared_ptr<Frame> frame_of(const FrameContext& context, FrameId id, double timestamp,
+                                Features features) {
+  auto frame = std::make_shared<Frame>();
+  frame->id = id;
+  frame->timestamp = timestamp;
+  frame->camera = context.camera;
+  frame->scales = context.scales;
+  frame->descriptors = std::move(features.descriptors);
+  if (context.camera->lens().is_identity()) {
+    frame->keypoints = std::move(features.keypoints);
+  } else {
+    frame->keypoints = undistorted(*context.camera, features.keypoints);
+    frame->raw_keypoints = std::move(features.keypoints);
+  }
+  frame->grid = KeypointGrid(frame->keypoints, context.camera->bounds());
+  return frame;
+}
+
+void clear_depth(Frame& frame) {
+  frame.right_u.assign(frame.size(), kUnknown);
+  frame.depth.assign(frame.size(), kUnknown);
+}
+
+void check_depth(const cv::Mat& depth, ImageSize size) {
+  if (depth.type() != CV_32FC1) {
+    throw ImageError("depth image must be float32 metres with one channel; convert it first");
+  }
+  if (depth.cols != size.width || depth.rows != size.height) {
+    throw ImageError("depth image is " + std::to_string(depth.cols) + "x" +
+                     std::to_string(depth.rows) + ", expected " + std::to_string(size.width) + "x" +
+                     std::to_string(size.height) + " like the colour image");
+  }
+}
+
+}  // namespace
+
+std::shared_ptr<Frame> build_monocular_frame(const FrameContext& context, FrameId id,
+                                             double timestamp, Features features) {
+  auto frame = frame_of(context, id, timestamp, std::move(features));
+  clear_depth(*frame);
+  return frame;
+}
+
+std::shared_ptr<Frame> build_stereo_frame(const FrameContext& context, FrameId id, double timestamp,
+                                          Extraction left, const Extraction& right) {
+  const Camera& camera = *context.camera;
+  if (!camera.has_baseline()) {
+    throw StateError("a stereo frame needs a camera with a baseline; set Camera.bf");
+  }
+  StereoMatches matches =
+      match_stereo(left, right, *context.scales, camera.bf(), camera.pinhole().fx);
+  auto frame = frame_of(context, id, timestamp, std::move(left.features));
+  frame->right_u = std::move(matches.right_u);
+  frame->depth = std::move(matches.depth);
+  return frame;
+}
+
+std::shared_ptr<Frame> build_rgbd_frame(const FrameContext& context, FrameId id, double timestamp,
+                                        Features features, const cv::Mat& depth) {
+  const Camera& camera = *context.camera;
+  if (!camera.has_baseline()) {
+    throw StateError("an RGB-D frame needs a camera with a virtual baseline; set Camera.bf");
+  }
+  check_depth(depth, camera.image_size());
+  auto frame = frame_of(context, id, timestamp, std::move(features));
+  clear_depth(*frame);
+
+  const auto& raw = frame->raw_keypoints.empty() ? frame->keypoints : frame->raw_keypoints;
+  const float bf = static_cast<float>(camera.bf());
+  for (std::size_t i = 0; i < raw.size(); ++i) {
+    const int column = static_cast<int>(raw[i].x);
+    const int row = static_cast<int>(raw[i].y);
+    if (column < 0 || column >= depth.cols || row < 0 || row >= depth.rows) continue;
+    const float z = depth.at<float>(row, column);
+    // Some drivers write infinity for "too far", which is as good as no measurement.
+    if (!(z > 0.0F) || !std::isfinite(z)) continue;
+    frame->depth[i] = z;
+    frame->right_u[i] = frame->keypoints[i].x - bf / z;
+  }
+  return frame;
+}
+
+}  // namespace orbslam

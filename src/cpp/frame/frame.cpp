@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "frame/frame.hpp"
+
+#include <algorithm>
+
+namespace orbslam {
+
+void TrackedFrame::clear_associations() {
+  std::fill(map_points.begin(), map_points.end(), MapPointId());
+  std::fill(positions.begin(), positions.end(), Eigen::Vector3d::Zero());
+  std::fill(outlier.begin(), outlier.end(), std::uint8_t{0});
+}
+
+std::vector<MapPointId> TrackedFrame::discard_outliers() {
+  std::vector<MapPointId> discarded;
+  for (std::size_t i = 0; i < map_points.size(); ++i) {
+    if (!map_points[i].valid() || outlier[i] == 0) continue;
+    discarded.push_back(map_points[i]);
+    dissociate(i);
+  }
+  std::sort(discarded.begin(), discarded.end());
+  return discarded;
+}
+
+std::size_t TrackedFrame::n_associated() const {
+  return static_cast<std::size_t>(std::count_if(map_points.begin(), map_points.end(),
+                                                [](MapPointId point) { return point.valid(); }));
+}
+
+CloseCounts TrackedFrame::n_close_tracked_untracked() const {
+  CloseCounts counts;
+  for (std::size_t i = 0; i < frame->size(); ++i) {
+    if (!frame->is_close(i)) continue;
+    const bool tracked = map_points[i].valid() && outlier[i] == 0;
+    ++(tracked ? counts.tracked : counts.untracked);
+  }
+  return counts;
+}
+
+}  // namespace orbslam
