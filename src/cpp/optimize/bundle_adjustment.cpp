@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "optimize/bundle_adjustment.hpp"
+
+#include <ceres/ceres.h>
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <limits>
+#include <string>
+
+#include "base/errors.hpp"
+#include "optimize/bundle_iterations.hpp"
+#include "optimize/bundle_residuals.hpp"
+#include "optimize/gates.hpp"
+
+namespace orbslam {
+namespace {
+
+using Observation = BundleProblem::Observation;
+
+void check_indices(const BundleProblem& problem) {
+  for (std::size_t i = 0; i < problem.observations.size(); ++i) {
+    const Observation& o = problem.observations[i];
+    if (o.camera >= problem.cameras.size() || o.point >= problem.points.size()) {
+      throw StateError("solve_bundle: observation " + std::to_string(i) + " names camera " +
+                       std::to_string(o.camera) + " and point " + std::to_string(o.point) +
+                       ", but there are " + std::to_string(problem.cameras.size()) + " and " +
+                       std::to_string(problem.points.size()));
+    }
+  }
+}
+
+/// Squared whitened residual of every observation, and whether its point is in front.
+struct Judgement {
+  std::vector<double> chi2;
+  std::vector<std::uint8_t> in_front;
+
+  bool usable(std::size_t i) const { return in_front[i] != 0 && std::isfinite(chi2[i]); }
+  bool outlier(std::size_t i, bool has_depth) const {
+    return !(usable(i) && chi2[i] <= (has_depth ? kGateStereo : kGateMono));
+  }
+};
+
+Judgement judge(const BundleProblem& problem) {
+  std::vector<Eigen::Matrix3d> rotations;
+  rotations.reserve(problem.cameras.size());
+  for (const auto& camera : problem.cameras) rotations.push_back(camera.T_cw.rotation_matrix());
+  const std::size_t n = problem.observations.size();
+  Judgement result{std::vector<double>(n), std::vector<std::uint8_t>(n)};
+  for (std::size_t i = 0; i < n; ++i) {
+    const Observation& o = problem.observations[i];
+    const BundleProblem::Camera& camera = problem.cameras[o.camera];
+    const Eigen::Vector3d p =
+        rotations[o.camera] * problem.points[o.point] + camera.T_cw.translation();
+    const Eigen::Vector2d pixel = camera.pinhole.project(p);
+    double squared = (Eigen::Vector2d(o.u, o.v) - pixel).squaredNorm();
+    if (o.has_depth) {
+      const double error = o.right_u - (pixel.x() - camera.bf / p.z());
+      squared += error * error;
+    }
+    result.chi2[i] = static_cast<double>(o.inverse_sigma2) * squared;
+    result.in_front[i] = p.z() > 0 ? 1 : 0;
+  }
+  return result;
+}
+
+double kernel_width(const Observation& o) { return o.has_depth ? kHuberStereo : kHuberMono; }
+
+/// Sum of squares of the observations that were usable at the start, robustified if wanted. One
+/// that has fallen behind its camera since costs as much as an infinitely wrong one.
+double total_cost(const BundleProblem& problem, const Judgement& start, const Judgement& now,
+                  bool robust) {
+  double sum = 0;
+  for (std::size_t i = 0; i < problem.observations.size(); ++i) {
+    if (!start.usable(i)) continue;
+    const double q = now.chi2[i], d = kernel_width(problem.observations[i]);
+    if (!now.usable(i)) return std::numeric_limits<double>::infinity();
+    sum += robust && q > d * d ? 2 * d * std::sqrt(q) - d * d : q;
+  }
+  return sum;
+}
+
+/// The Ceres problem of a bundle. Cost functions read measurements and views by pointer, so the
+/// second stage changes weights and kernels instead of building again.
+class BundleSolver final : public ceres::EvaluationCallback {
+ public:
+  BundleSolver(BundleProblem& problem, const BundleOptions& options, const Judgement& start)
+      : bundle_(problem), options_(options), problem_(problem_options(this)) {
+    make_views();
+    make_measurements(start);
+    add_residuals();
+  }
+
+  void PrepareForEvaluation(bool, bool new_evaluation_point) override {
+    if (!new_evaluation_point) return;
+    for (const std::size_t camera : free_cameras_) {
+      views_[camera].set_pose(pose_from_block(pose_block(camera)));
+    }
+  }
+
+  /// Takes kernels away and leaves outliers out.
+  void keep_inliers(const Judgement& now) {
+    for (std::size_t i = 0; i < measurements_.size(); ++i) {
+      const Observation& o = bundle_.observations[i];
+      measurements_[i].huber = 0;
+      measurements_[i].scale = now.outlier(i, o.has_depth) ? 0.0 : deviation(o);
+    }
+    mono_loss_.Reset(nullptr, ceres::TAKE_OWNERSHIP);
+  }
+
+  /// Minimises and writes the poses and points reached into the bundle. Returns whether the flag
+  /// was raised.
+  bool minimise(int iterations, const std::atomic<bool>* abort, BundleSummary& summary) {
+    if (problem_.NumResidualBlocks() == 0) return is_raised(abort);
+    BundleIterations rules(iterations, abort);
+    ceres::Solver::Options solver = solver_options(iterations);
+    solver.callbacks.push_back(&rules);
+    ceres::Solver::Summary report;
+    ceres::Solve(solver, &problem_, &report);
+    summary.iterations += rules.successful();
+    for (const std::size_t camera : free_cameras_) {
+      bundle_.cameras[camera].T_cw = pose_from_block(pose_block(camera));
+    }
+    return rules.aborted();
+  }
+
+ private:
+  static ceres::Problem::Options problem_options(ceres::EvaluationCallback* callback) {
+    ceres::Problem::Options options;
+    options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    options.disable_all_safety_checks = true;
+    options.evaluation_callback = callback;
+    return options;
+  }
+
+  static double deviation(const Observation& o) {
+    return std::sqrt(static_cast<double>(o.inverse_sigma2));
+  }
+  double* pose_block(std::size_t camera) {
+    return poses_.data() + camera * PoseManifold::kAmbientSize;
+  }
+
+  void make_views() {
+    views_.resize(bundle_.cameras.size());
+    poses_.resize(bundle_.cameras.size() * PoseManifold::kAmbientSize);
+    for (std::size_t i = 0; i < views_.size(); ++i) {
+      const BundleProblem::Camera& camera = bundle_.cameras[i];
+      views_[i].pinhole = camera.pinhole;
+      views_[i].bf = camera.bf;
+      views_[i].set_pose(camera.T_cw);
+      pose_to_block(camera.T_cw, pose_block(i));
+    }
+  }
+
+  void make_measurements(const Judgement& start) {
+    measurements_.resize(bundle_.observations.size());
+    for (std::size_t i = 0; i < measurements_.size(); ++i) {
+      const Observation& o = bundle_.observations[i];
+      BundleMeasurement& m = measurements_[i];
+      m.view = &views_[o.camera];
+      m.u = o.u;
+      m.v = o.v;
+      m.right_u = o.right_u;
+      m.scale = start.usable(i) ? deviation(o) : 0.0;
+      m.huber = options_.robust ? kernel_width(o) : 0.0;
+      if (!start.usable(i)) m.u = m.v = m.right_u = 0;  // zero times NaN would still be NaN
+    }
+  }
+
+  void add_residuals() {
+    std::vector<std::uint8_t> used(bundle_.cameras.size(), 0);
+    for (const Observation& o : bundle_.observations) used[o.camera] = 1;
+    for (std::size_t i = 0; i < used.size(); ++i) {
+      if (used[i] == 0 || bundle_.cameras[i].fixed) continue;
+      free_cameras_.push_back(i);
+      problem_.AddParameterBlock(pose_block(i), PoseManifold::kAmbientSize, &manifold_);
+    }
+    if (options_.robust) mono_loss_.Reset(new ceres::HuberLoss(kHuberMono), ceres::TAKE_OWNERSHIP);
+    for (std::size_t i = 0; i < measurements_.size(); ++i) {
+      const Observation& o = bundle_.observations[i];
+      if (!bundle_.points[o.point].allFinite()) continue;
+      double* point = bundle_.points[o.point].data();
+      double* pose = bundle_.cameras[o.camera].fixed ? nullptr : pose_block(o.camera);
+      const BundleMeasurement* m = &measurements_[i];
+      if (o.has_depth && pose != nullptr) {
+        problem_.AddResidualBlock(&stereo_free_.emplace_back(m), nullptr, pose, point);
+        problem_.AddResidualBlock(&right_free_.emplace_back(m), nullptr, pose, point);
+      } else if (o.has_depth) {
+        problem_.AddResidualBlock(&stereo_fixed_.emplace_back(m), nullptr, point);
+        problem_.AddResidualBlock(&right_fixed_.emplace_back(m), nullptr, point);
+      } else if (pose != nullptr) {
+        problem_.AddResidualBlock(&mono_free_.emplace_back(m), &mono_loss_, pose, point);
+      } else {
+        problem_.AddResidualBlock(&mono_fixed_.emplace_back(m), &mono_loss_, point);
+      }
+    }
+  }
+
+  ceres::Solver::Options solver_options(int iterations) {
+    ceres::Solver::Options solver;
+    solver.max_num_iterations = 2 * iterations;
+    solver.function_tolerance = 1e-6;
+    solver.num_threads = options_.n_threads;
+    solver.logging_type = ceres::SILENT;
+    // Above some thirty free poses the reduced camera system is sparse enough to gain by it.
+    solver.linear_solver_type =
+        free_cameras_.size() <= 30 ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
+    auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+    std::vector<double*> blocks;
+    problem_.GetParameterBlocks(&blocks);
+    for (double* block : blocks) {
+      const bool is_pose = block >= poses_.data() && block < poses_.data() + poses_.size();
+      ordering->AddElementToGroup(block, is_pose ? 1 : 0);
+    }
+    solver.linear_solver_ordering = ordering;
+    return solver;
+  }
+
+  BundleProblem& bundle_;
+  BundleOptions options_;
+  PoseManifold manifold_;
+  ceres::LossFunctionWrapper mono_loss_{nullptr, ceres::TAKE_OWNERSHIP};
+  std::vector<BundleView> views_;
+  std::vector<double> poses_;
+  std::vector<std::size_t> free_cameras_;
+  std::vector<BundleMeasurement> measurements_;
+  std::deque<MonoResiduals<true>> mono_free_;
+  std::deque<MonoResiduals<false>> mono_fixed_;
+  std::deque<StereoResiduals<true, false>> stereo_free_;
+  std::deque<StereoResiduals<true, true>> right_free_;
+  std::deque<StereoResiduals<false, false>> stereo_fixed_;
+  std::deque<StereoResiduals<false, true>> right_fixed_;
+  ceres::Problem problem_;
+};
+
+}  // namespace
+
+BundleSummary solve_bundle(BundleProblem& problem, const BundleOptions& options,
+                           const std::atomic<bool>* abort) {
+  check_indices(problem);
+  BundleSummary summary;
+  const Judgement start = judge(problem);
+  Judgement now = start;
+  summary.initial_cost = total_cost(problem, start, start, options.robust);
+  summary.aborted = is_raised(abort);
+  if (!summary.aborted) {
+    BundleSolver solver(problem, options, start);
+    summary.aborted = solver.minimise(options.robust_iterations, abort, summary);
+    summary.stage_one_done = !summary.aborted;
+    if (!summary.aborted && options.final_iterations > 0) {
+      solver.keep_inliers(judge(problem));
+      summary.aborted = solver.minimise(options.final_iterations, abort, summary);
+    }
+    now = judge(problem);
+  }
+  summary.final_cost = total_cost(problem, start, now, options.robust);
+  summary.outlier.resize(problem.observations.size());
+  for (std::size_t i = 0; i < summary.outlier.size(); ++i) {
+    summary.outlier[i] = now.outlier(i, problem.observations[i].has_depth) ? 1 : 0;
+  }
+  return summary;
+}
+
+}  // namespace orbslam
