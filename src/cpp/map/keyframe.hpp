@@ -26,12 +26,13 @@ struct KeyFrame {
   /// by descending weight, ties by lower id.
   std::vector<KeyFrameId> neighbours;
 
-  KeyFrameId parent;  ///< spanning tree; invalid for keyframe 0
+  KeyFrameId parent;  ///< spanning tree; invalid for keyframe 0 and before publication
+  bool provisional_parent = false;  ///< there was no neighbour yet; the first one replaces it
   std::set<KeyFrameId> children;
   std::set<KeyFrameId> loop_edges;
 
-  bool published = false;   ///< processed by local mapping, part of the map's keyframe set
-  int leases = 0;           ///< while > 0 a death is deferred (loop closing works on it)
+  bool published = false;  ///< processed by local mapping, part of the map's keyframe set
+  int leases = 0;          ///< while > 0 a death is deferred (loop closing works on it)
   bool to_be_erased = false;
 
   Eigen::Vector3d center() const { return T_cw.center(); }

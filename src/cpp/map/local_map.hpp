@@ -11,7 +11,7 @@ namespace orbslam {
 /// The part of the map around the current frame (Mur-Artal et al. 2015, section V-D).
 struct LocalMap {
   std::vector<KeyFrameId> keyframes;
-  PointBatch points;           ///< all points of the local keyframes, each once
+  PointBatch points;              ///< all points of the local keyframes, each once
   KeyFrameId reference_keyframe;  ///< shares most points with the frame; invalid without votes
 };
 

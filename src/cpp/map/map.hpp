@@ -37,7 +37,9 @@ class Map {
   [[nodiscard]] std::shared_lock<std::shared_mutex> read_lock() const {
     return std::shared_lock(mutex_);
   }
-  [[nodiscard]] std::unique_lock<std::shared_mutex> write_lock() { return std::unique_lock(mutex_); }
+  [[nodiscard]] std::unique_lock<std::shared_mutex> write_lock() {
+    return std::unique_lock(mutex_);
+  }
 
   // ---- look-up ---------------------------------------------------------------------------------
   /// nullptr when the object is dead or never existed.
@@ -64,21 +66,29 @@ class Map {
   /// A new keyframe with empty slots, not yet published. The frame must be described (words) if a
   /// vocabulary is in use; nobody changes it afterwards.
   KeyFrameId add_keyframe(std::shared_ptr<const Frame> frame, const Pose& T_cw);
-  /// Makes the keyframe part of the keyframe set (idempotent).
+  /// Makes the keyframe part of the keyframe set (idempotent). A keyframe that has no parent yet
+  /// hangs provisionally under the published keyframe before it, so that the tree spans all.
   void publish(KeyFrameId id);
+  /// Only for a keyframe not yet published: notes a match (or its absence, with an invalid id)
+  /// whose observation process_new_keyframe() adds later. The slot must not hold an observation.
+  void set_slot(KeyFrameId id, std::size_t index, MapPointId point);
   void set_pose(KeyFrameId id, const Pose& T_cw);
 
   /// Removes a keyframe: neighbours forget it, its points lose the observation (and may die), its
   /// children find new parents among the neighbours they share most points with, and its pose
   /// relative to the parent is archived for trajectories. Returns false, and only marks it, while
-  /// leases or loop edges protect it. Keyframe 0 never dies (returns false).
+  /// leases or loop edges protect it. Keyframe 0 never dies and dead ones do not die again
+  /// (returns false).
   bool erase_keyframe(KeyFrameId id);
 
-  /// A counted protection against erase_keyframe(); end_lease() carries out a deferred death.
+  /// A counted protection against erase_keyframe(). Throws StateError for a dead keyframe.
   void begin_lease(KeyFrameId id);
+  /// The last one carries out a deferred death, unless a loop edge protects the keyframe by now;
+  /// the request is cleared either way. Ignored when clear() removed the keyframe meanwhile.
   void end_lease(KeyFrameId id);
   /// Adds the edge on both keyframes; both are protected for ever.
   void add_loop_edge(KeyFrameId a, KeyFrameId b);
+  /// Throws StateError when that would make a cycle or give keyframe 0 a parent.
   void set_parent(KeyFrameId child, KeyFrameId parent);
 
   /// Pose of a keyframe, living or culled: a culled one is expressed through its archived pose
@@ -89,6 +99,9 @@ class Map {
   /// A new point without observations; the caller adds them, then calls update_point().
   MapPointId add_point(const Eigen::Vector3d& position, KeyFrameId reference, FrameId first_frame);
   void set_position(MapPointId id, const Eigen::Vector3d& position);
+
+  // The methods that create or move something throw StateError for a dead or unknown id, because
+  // the caller should have looked; those that remove, refresh or count ignore it.
 
   /// Both sides at once. Does nothing when the point is already observed in the keyframe or the
   /// slot holds another living point.
@@ -101,7 +114,7 @@ class Map {
   /// refreshes `by`; `id` dies and resolve(id) gives `by`. `by` is resolved first; nothing happens
   /// when both are the same or `by` is dead.
   void replace_point(MapPointId id, MapPointId by);
-  /// Counters of the tracker: seen in the frustum, matched as inlier.
+  /// Counters of the tracker: seen in the frustum, matched as inlier. Replacements are followed.
   void count_visible(MapPointId id, int n = 1);
   void count_found(MapPointId id, int n = 1);
 
@@ -116,16 +129,18 @@ class Map {
 
   // ---- covisibility ----------------------------------------------------------------------------
   /// Recounts the shared points of a keyframe with all others, keeps the graph symmetric, and
-  /// gives the keyframe its parent (the strongest neighbour) the first time.
+  /// gives the keyframe its parent (the strongest neighbour that is not its descendant) the first
+  /// time that it has neighbours.
   void update_connections(KeyFrameId id);
   /// The first n of KeyFrame::neighbours.
   std::vector<KeyFrameId> best_neighbours(KeyFrameId id, std::size_t n) const;
-  /// All neighbours with weight >= w, by descending weight, ties by lower id.
+  /// The part of KeyFrame::neighbours with weight >= w.
   std::vector<KeyFrameId> neighbours_by_weight(KeyFrameId id, int w) const;
   int weight(KeyFrameId a, KeyFrameId b) const;
 
   // ---- the map as a whole ----------------------------------------------------------------------
   /// Drops everything and starts a new epoch: ids restart, work begun before must not commit.
+  /// The big-change index restarts too; the versions go on growing.
   void clear();
   std::uint64_t epoch() const { return epoch_.load(); }
   /// Grows when poses or points moved as a whole (loop correction, full bundle adjustment).
@@ -143,9 +158,22 @@ class Map {
 
   KeyFrame& keyframe(KeyFrameId id);
   MapPoint& point(MapPointId id);
-  void set_weight(KeyFrameId a, KeyFrameId b, int weight);
-  void sort_neighbours(KeyFrame& keyframe);
-  void adopt_children(KeyFrame& dying);
+  const KeyFrame& keyframe(KeyFrameId id) const;
+
+  void insert_observation(MapPoint& point, KeyFrame& keyframe, std::size_t index);
+  void refresh_descriptor(MapPoint& point);
+  void refresh_geometry(MapPoint& point);
+  void remember_replacement(MapPointId id, MapPointId by);
+  void forget_old_replacements();
+
+  static bool set_weight(KeyFrame& keyframe, KeyFrameId other, int weight);
+  static void sort_neighbours(KeyFrame& keyframe);
+  void forget_covisibility(KeyFrame& dying);
+
+  bool is_in_subtree(KeyFrameId id, KeyFrameId root) const;
+  void link(KeyFrame& child, KeyFrameId parent);
+  void choose_parent(KeyFrame& keyframe);
+  void adopt_children(KeyFrame& dying, KeyFrameId grandparent);
 
   mutable std::shared_mutex mutex_;
   IdTable<KeyFrameId, KeyFrame> keyframes_;

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "map/map.hpp"
+
+#include <string>
+
+#include "base/errors.hpp"
+
+namespace orbslam {
+namespace {
+
+[[noreturn]] void throw_dead(const char* what, std::int64_t id) {
+  throw StateError(std::string(what) + " " + std::to_string(id) +
+                   " is not in the map; look it up with find() under the lock before changing it");
+}
+
+}  // namespace
+
+KeyFrame& Map::keyframe(KeyFrameId id) {
+  KeyFrame* found = keyframes_.find(id);
+  if (!found) throw_dead("keyframe", id.value);
+  return *found;
+}
+
+const KeyFrame& Map::keyframe(KeyFrameId id) const {
+  const KeyFrame* found = keyframes_.find(id);
+  if (!found) throw_dead("keyframe", id.value);
+  return *found;
+}
+
+MapPoint& Map::point(MapPointId id) {
+  MapPoint* found = points_.find(id);
+  if (!found) throw_dead("map point", id.value);
+  return *found;
+}
+
+std::vector<KeyFrameId> Map::keyframe_ids() const {
+  std::vector<KeyFrameId> ids;
+  ids.reserve(keyframes_.size());
+  keyframes_.for_each([&](const KeyFrame& keyframe) { ids.push_back(keyframe.id); });
+  return ids;
+}
+
+std::vector<MapPointId> Map::point_ids() const {
+  std::vector<MapPointId> ids;
+  ids.reserve(points_.size());
+  points_.for_each([&](const MapPoint& point) { ids.push_back(point.id); });
+  return ids;
+}
+
+KeyFrameId Map::add_keyframe(std::shared_ptr<const Frame> frame, const Pose& T_cw) {
+  auto added = std::make_unique<KeyFrame>();
+  const KeyFrameId id = next_keyframe_;
+  added->id = id;
+  added->map_points.resize(frame->size());
+  added->frame = std::move(frame);
+  added->T_cw = T_cw;
+  keyframes_.insert(id, std::move(added));
+  ++next_keyframe_.value;
+  forget_old_replacements();
+  ++structure_version_;
+  return id;
+}
+
+void Map::publish(KeyFrameId id) {
+  KeyFrame& published = keyframe(id);
+  if (published.published) return;
+  published.published = true;
+  ++n_published_;
+  ++structure_version_;
+  if (published.parent.valid() || id.value == 0) return;
+
+  // Keyframe 0 never dies, so there is always somebody to hang under.
+  KeyFrameId before(id.value - 1);
+  for (; before.value > 0; --before.value) {
+    const KeyFrame* candidate = find(before);
+    if (candidate && candidate->published && !is_in_subtree(before, id)) break;
+  }
+  link(published, before);
+  published.provisional_parent = true;
+}
+
+void Map::set_slot(KeyFrameId id, std::size_t index, MapPointId point_id) {
+  KeyFrame& owner = keyframe(id);
+  if (owner.published) {
+    throw StateError("keyframe " + std::to_string(id.value) +
+                     " is published; add_observation() and erase_observation() change its slots");
+  }
+  MapPointId& slot = owner.map_points.at(index);
+  const MapPoint* present = find(slot);
+  const Observation* observation = present ? present->observation_of(id) : nullptr;
+  if (slot != point_id && observation && observation->index == index) {
+    throw StateError("slot " + std::to_string(index) + " of keyframe " + std::to_string(id.value) +
+                     " holds an observation; erase it first");
+  }
+  slot = point_id;
+  ++structure_version_;
+}
+
+void Map::set_pose(KeyFrameId id, const Pose& T_cw) {
+  keyframe(id).T_cw = T_cw;
+  ++geometry_version_;
+}
+
+void Map::begin_lease(KeyFrameId id) { ++keyframe(id).leases; }
+
+void Map::end_lease(KeyFrameId id) {
+  KeyFrame* leased = keyframes_.find(id);
+  if (!leased) return;
+  if (leased->leases == 0) {
+    throw StateError("keyframe " + std::to_string(id.value) +
+                     " has no lease; begin_lease() and end_lease() must come in pairs");
+  }
+  if (--leased->leases > 0 || !leased->to_be_erased) return;
+  leased->to_be_erased = false;
+  if (leased->loop_edges.empty()) erase_keyframe(id);
+}
+
+Pose Map::T_cw(KeyFrameId id) const {
+  Pose T_ck;  // from the keyframe reached so far to the one asked for
+  for (KeyFrameId at = id;;) {
+    if (const KeyFrame* living = find(at)) return T_ck * living->T_cw;
+    const auto archived = archive_.find(at);
+    if (archived == archive_.end()) {
+      throw StateError("keyframe " + std::to_string(id.value) +
+                       " never existed in this map; its pose is unknown");
+    }
+    T_ck = T_ck * archived->second.T_kp;
+    at = archived->second.parent;
+  }
+}
+
+void Map::clear() {
+  points_.clear();
+  keyframes_.clear();
+  archive_.clear();
+  replaced_by_.clear();
+  replacements_.clear();
+  next_keyframe_ = KeyFrameId(0);
+  next_point_ = MapPointId(0);
+  n_published_ = 0;
+  big_change_index_ = 0;
+  ++epoch_;
+  ++structure_version_;
+  ++geometry_version_;
+}
+
+}  // namespace orbslam
