@@ -16,19 +16,24 @@ class PointIdIndex {
  public:
   static constexpr std::int32_t kNone = -1;
 
-  /// Forgets everything and makes room for `n` ids.
+  /// Forgets everything and makes room for `n` ids; more make the table grow.
   void reset(std::size_t n) {
     shift_ = 64 - 4;
-    while ((std::size_t{1} << (64 - shift_)) < 2 * n) --shift_;
-    slots_.assign(std::size_t{1} << (64 - shift_), Slot{});
+    while (capacity() < 2 * n) --shift_;
+    slots_.assign(capacity(), Slot{});
+    size_ = 0;
   }
 
-  /// The first number given for an id stays. Returns whether the id was new. Ids must be valid
-  /// and no more than reset() made room for.
+  /// The first number given for an id stays. Returns whether the id was new. The id must be valid.
   bool insert(MapPointId id, std::int32_t number) {
-    Slot& slot = slots_[position_of(id)];
-    if (slot.id == id.value) return false;
-    slot = {id.value, number};
+    Slot* slot = &slots_[position_of(id)];
+    if (slot->id == id.value) return false;
+    if (2 * (size_ + 1) > capacity()) {
+      grow();
+      slot = &slots_[position_of(id)];
+    }
+    *slot = {id.value, number};
+    ++size_;
     return true;
   }
 
@@ -44,6 +49,17 @@ class PointIdIndex {
     std::int32_t number = kNone;
   };
 
+  std::size_t capacity() const { return std::size_t{1} << (64 - shift_); }
+
+  void grow() {
+    std::vector<Slot> old(2 * capacity());
+    old.swap(slots_);
+    --shift_;
+    for (const Slot& slot : old) {
+      if (slot.id >= 0) slots_[position_of(MapPointId(slot.id))] = slot;
+    }
+  }
+
   // Multiplication by 2^64 / golden ratio spreads consecutive ids over the table.
   std::size_t position_of(MapPointId id) const {
     const std::size_t mask = slots_.size() - 1;
@@ -56,6 +72,7 @@ class PointIdIndex {
   }
 
   int shift_ = 60;
+  std::size_t size_ = 0;
   std::vector<Slot> slots_ = std::vector<Slot>(16);
 };
 

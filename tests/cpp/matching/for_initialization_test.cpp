@@ -172,27 +172,18 @@ TEST(MatchForInitializationGolden, SearchIsIdenticalToTheOriginal) {
   std::array<std::size_t, 13> order{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};
   std::stable_sort(order.begin(), order.end(),
                    [&](auto a, auto b) { return bins[a].size() > bins[b].size(); });
-  ASSERT_GE(10 * bins[order[2]].size(), bins[order[0]].size());  // so exactly three stay
-  for (std::size_t rank = 3; rank < order.size(); ++rank) {
+  for (std::size_t rank = 1; rank < order.size(); ++rank) {
+    const bool kept = rank < 3 && 10 * bins[order[rank]].size() >= bins[order[0]].size();
+    if (kept) continue;
     for (const std::size_t i : bins[order[rank]]) matches[i] = -1;
   }
   EXPECT_EQ(matches, golden_output());
 }
 
-// Ours has 12 bins with wrap-around: rotations near 0 degrees count together instead of as two
-// half bins, so that a further bin can be among the three. The difference is small.
-TEST(MatchForInitializationGolden, WrapAroundChangesFewMatches) {
-  const std::vector<int> matches = golden_matches(true), expected = golden_output();
-  ASSERT_EQ(matches.size(), expected.size());
-  int common = 0, ours = 0, theirs = 0;
-  for (std::size_t i = 0; i < matches.size(); ++i) {
-    ours += matches[i] >= 0;
-    theirs += expected[i] >= 0;
-    common += matches[i] >= 0 && matches[i] == expected[i];
-  }
-  EXPECT_EQ(theirs, 75);
-  EXPECT_GE(common, 0.97 * theirs);
-  EXPECT_GE(common, 0.9 * ours);
+// Ours has 12 bins with wrap-around, so rotations near 0 degrees count together instead of as two
+// half bins. That may change which bins survive; with this pair it changes no match.
+TEST(MatchForInitializationGolden, WrapAroundKeepsTheSameMatches) {
+  EXPECT_EQ(golden_matches(true), golden_output());
 }
 
 }  // namespace

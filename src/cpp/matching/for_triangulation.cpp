@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "matching/for_triangulation.hpp"
+
+#include <algorithm>
+#include <optional>
+
+#include "geometry/triangulation.hpp"
+#include "matching/by_projection.hpp"
+#include "matching/common_nodes.hpp"
+#include "matching/pair_triangulation.hpp"
+#include "matching/pose_guard.hpp"
+
+namespace orbslam {
+namespace {
+
+using FeaturePairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
+
+constexpr double kEpipolarGate = 3.84;           // chi-square, 95 %, 1 degree of freedom
+constexpr double kEpipoleExclusion = 100.0;      // pixels^2 at scale 1
+constexpr double kLeastBaselinePerDepth = 0.01;  // of a single camera
+
+// A keyframe as the search sees it, copied under the lock.
+struct FreeFeatures {
+  std::shared_ptr<const Frame> frame;
+  Pose T_cw;
+  std::vector<std::uint8_t> occupied;  // per keypoint: it has a point
+};
+
+std::optional<FreeFeatures> gather(const Map& map, KeyFrameId id) {
+  const KeyFrame* keyframe = map.find(id);
+  if (!keyframe) return std::nullopt;
+  FreeFeatures view{keyframe->frame, keyframe->T_cw, {}};
+  view.occupied.resize(keyframe->map_points.size());
+  for (std::size_t i = 0; i < view.occupied.size(); ++i) {
+    view.occupied[i] = map.find(keyframe->map_points[i]) != nullptr;
+  }
+  return view;
+}
+
+Eigen::Matrix3d calibration_matrix(const Pinhole& pinhole) {
+  Eigen::Matrix3d K;
+  K << pinhole.fx, 0, pinhole.cx, 0, pinhole.fy, pinhole.cy, 0, 0, 1;
+  return K;
+}
+
+// What the relative pose of two cameras says about a feature of 2 for a given feature of 1.
+class EpipolarGeometry {
+ public:
+  EpipolarGeometry(const FreeFeatures& a, const FreeFeatures& b) : scales_(*b.frame->scales) {
+    const Pinhole& pinhole_b = b.frame->camera->pinhole();
+    F_ = fundamental_matrix(a.T_cw, b.T_cw, calibration_matrix(a.frame->camera->pinhole()),
+                            calibration_matrix(pinhole_b));
+    const Eigen::Vector3d center = b.T_cw * a.T_cw.center();
+    if (center.z() > 0) epipole_ = pinhole_b.project(center);
+  }
+
+  void select(const Keypoint& feature_1) {
+    line_ = F_.transpose() * Eigen::Vector3d(feature_1.x, feature_1.y, 1.0);
+    squared_normal_ = line_.head<2>().squaredNorm();
+  }
+
+  // Near the epipole every feature lies on every line, and depth cannot be triangulated.
+  bool near_epipole(const Keypoint& feature_2) const {
+    if (!epipole_) return false;
+    const double du = epipole_->x() - feature_2.x, dv = epipole_->y() - feature_2.y;
+    return du * du + dv * dv < kEpipoleExclusion * scales_.scale(feature_2.level);
+  }
+
+  bool on_line(const Keypoint& feature_2) const {
+    if (!(squared_normal_ > 0)) return false;
+    const double offset = line_.x() * feature_2.x + line_.y() * feature_2.y + line_.z();
+    return offset * offset / squared_normal_ < kEpipolarGate * scales_.sigma2(feature_2.level);
+  }
+
+ private:
+  const ScalePyramid& scales_;
+  Eigen::Matrix3d F_;
+  std::optional<Eigen::Vector2d> epipole_;  // image of camera 1, if it lies in front of camera 2
+  Eigen::Vector3d line_ = Eigen::Vector3d::Zero();
+  double squared_normal_ = 0;
+};
+
+// Spec 06, 2.9. Marks the matched features of b as occupied.
+FeaturePairs find_pairs(const FreeFeatures& a, FreeFeatures& b) {
+  const Frame& frame_a = *a.frame;
+  const Frame& frame_b = *b.frame;
+  EpipolarGeometry geometry(a, b);
+  FeaturePairs pairs;
+  for_each_common_node(frame_a, frame_b, [&](NodeFeatures node_a, NodeFeatures node_b) {
+    for (const std::uint32_t i : node_a) {
+      if (a.occupied[i]) continue;
+      geometry.select(frame_a.keypoints[i]);
+      int best = kDescriptorLow;
+      std::int64_t match = -1;
+      for (const std::uint32_t j : node_b) {
+        if (b.occupied[j]) continue;
+        const int distance = hamming_distance(frame_a.descriptors[i], frame_b.descriptors[j]);
+        if (distance > best) continue;  // the last of equals wins
+        const Keypoint& feature = frame_b.keypoints[j];
+        const bool has_depth = frame_a.has_depth(i) || frame_b.has_depth(j);
+        if (!has_depth && geometry.near_epipole(feature)) continue;
+        if (!geometry.on_line(feature)) continue;
+        best = distance;
+        match = j;
+      }
+      if (match < 0) continue;
+      b.occupied[static_cast<std::size_t>(match)] = 1;
+      pairs.emplace_back(i, static_cast<std::uint32_t>(match));
+    }
+  });
+  std::sort(pairs.begin(), pairs.end());
+  return pairs;
+}
+
+// Lower median of the depths of a keyframe's points; nothing when it has none.
+std::optional<double> median_depth(const Map& map, const KeyFrame& keyframe) {
+  std::vector<double> depths;
+  for (const MapPointId id : keyframe.map_points) {
+    if (const MapPoint* point = map.find(id)) {
+      depths.push_back((keyframe.T_cw * point->position).z());
+    }
+  }
+  if (depths.empty()) return std::nullopt;
+  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>((depths.size() - 1) / 2);
+  std::nth_element(depths.begin(), middle, depths.end());
+  return *middle;
+}
+
+// Whether the cameras are far enough apart for new points to have a reliable depth.
+bool wide_enough(const Map& map, const KeyFrame& current, const KeyFrame& neighbour,
+                 bool monocular) {
+  const double distance = (neighbour.center() - current.center()).norm();
+  if (!monocular) return distance >= neighbour.frame->camera->baseline();
+  const std::optional<double> depth = median_depth(map, neighbour);
+  return depth && distance / *depth >= kLeastBaselinePerDepth;
+}
+
+struct NewPoint {
+  std::uint32_t feature_1, feature_2;
+  Eigen::Vector3d position;
+};
+
+// Adds what still fits: both keyframes alive and unmoved, both keypoints still without a point.
+void commit(Map& map, KeyFrameId id_1, const Pose& T_1w, KeyFrameId id_2, const Pose& T_2w,
+            const std::vector<NewPoint>& points, std::vector<MapPointId>& created) {
+  const KeyFrame* keyframe_1 = map.find(id_1);
+  const KeyFrame* keyframe_2 = map.find(id_2);
+  if (!stands_at(keyframe_1, T_1w) || !stands_at(keyframe_2, T_2w)) return;
+  for (const NewPoint& point : points) {
+    if (map.find(keyframe_1->map_points[point.feature_1]) ||
+        map.find(keyframe_2->map_points[point.feature_2])) {
+      continue;
+    }
+    const MapPointId id = map.add_point(point.position, id_1, keyframe_1->frame->id);
+    map.add_observation(id, id_1, point.feature_1);
+    map.add_observation(id, id_2, point.feature_2);
+    map.update_point(id);
+    created.push_back(id);
+  }
+}
+
+// One neighbour: copy under the read lock, match and triangulate without, commit in one section.
+void create_with_neighbour(Map& map, std::uint64_t epoch, KeyFrameId id_1, KeyFrameId id_2,
+                           bool monocular, std::vector<MapPointId>& created) {
+  std::optional<FreeFeatures> view_1, view_2;
+  {
+    const auto lock = map.read_lock();
+    const KeyFrame* current = map.find(id_1);
+    const KeyFrame* neighbour = map.find(id_2);
+    if (map.epoch() != epoch || !current || !neighbour) return;
+    if (!wide_enough(map, *current, *neighbour, monocular)) return;
+    view_1 = gather(map, id_1);
+    view_2 = gather(map, id_2);
+  }
+  const PairTriangulation triangulation(*view_1->frame, view_1->T_cw, *view_2->frame, view_2->T_cw);
+  std::vector<NewPoint> points;
+  for (const auto& [i, j] : find_pairs(*view_1, *view_2)) {
+    if (const auto position = triangulation(i, j)) points.push_back({i, j, *position});
+  }
+  if (points.empty()) return;
+  const auto lock = map.write_lock();
+  if (map.epoch() == epoch) {
+    commit(map, id_1, view_1->T_cw, id_2, view_2->T_cw, points, created);
+  }
+}
+
+}  // namespace
+
+FeaturePairs match_for_triangulation(const Map& map, KeyFrameId a, KeyFrameId b) {
+  std::optional<FreeFeatures> view_a, view_b;
+  {
+    const auto lock = map.read_lock();
+    view_a = gather(map, a);
+    view_b = gather(map, b);
+  }
+  if (!view_a || !view_b) return {};
+  return find_pairs(*view_a, *view_b);
+}
+
+std::vector<MapPointId> create_new_points(Map& map, KeyFrameId current,
+                                          const NewPointOptions& options,
+                                          const std::atomic<bool>* should_stop) {
+  std::vector<KeyFrameId> neighbours;
+  std::uint64_t epoch = 0;
+  {
+    const auto lock = map.read_lock();
+    if (!map.find(current)) return {};
+    epoch = map.epoch();
+    neighbours = map.best_neighbours(current, options.n_neighbours);
+  }
+  std::vector<MapPointId> created;
+  for (std::size_t i = 0; i < neighbours.size(); ++i) {
+    if (i > 0 && should_stop && should_stop->load()) break;
+    create_with_neighbour(map, epoch, current, neighbours[i], options.monocular, created);
+  }
+  return created;
+}
+
+}  // namespace orbslam
