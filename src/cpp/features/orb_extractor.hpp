@@ -6,6 +6,7 @@
 
 #include "base/scale_pyramid.hpp"
 #include "features/image_pyramid.hpp"
+#include "features/kernels.hpp"
 #include "features/keypoint.hpp"
 
 namespace orbslam {
@@ -33,7 +34,9 @@ struct Extraction {
 /// on the image and the options only.
 class OrbExtractor {
  public:
-  explicit OrbExtractor(const OrbOptions& options);
+  /// `kernels` chooses between implementations that give the same bytes. Throws SettingsError for
+  /// options out of range and for kernels this processor cannot run.
+  explicit OrbExtractor(const OrbOptions& options, KernelChoice kernels = KernelChoice::automatic);
   ~OrbExtractor();
   OrbExtractor(OrbExtractor&&) noexcept;
   OrbExtractor& operator=(OrbExtractor&&) noexcept;
@@ -45,6 +48,8 @@ class OrbExtractor {
 
   const OrbOptions& options() const;
   const ScalePyramid& scales() const;
+  /// "avx2" or "portable".
+  const char* kernel_name() const;
 
  private:
   struct Impl;

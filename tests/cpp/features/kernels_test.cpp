@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "features/kernels.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "features/gaussian_blur.hpp"
+#include "features/images.hpp"
+#include "features/orb_extractor.hpp"
+#include "features/orb_pattern.hpp"
+#include "features/orientation.hpp"
+#include "features/pyramid_builder.hpp"
+
+namespace orbslam {
+namespace {
+
+using testing::random_image;
+
+const Kernels* avx2_or_null() {
+  try {
+    return &choose_kernels(KernelChoice::avx2);
+  } catch (const std::runtime_error&) {
+    return nullptr;
+  }
+}
+
+/// Both implementations, or the portable one alone.
+std::vector<const Kernels*> all_kernels() {
+  std::vector<const Kernels*> kernels = {&portable_kernels()};
+  if (const Kernels* avx2 = avx2_or_null()) kernels.push_back(avx2);
+  return kernels;
+}
+
+TEST(Kernels, BothGiveTheSameFeatures) {
+  if (avx2_or_null() == nullptr) GTEST_SKIP() << "this processor has no AVX2";
+  const cv::Size sizes[] = {{640, 480}, {333, 257}, {101, 99},  {62, 62},  {63, 131},
+                            {67, 65},   {250, 777}, {777, 250}, {95, 400}, {1241, 376}};
+  std::uint64_t seed = 0;
+  for (const cv::Size& size : sizes) {
+    OrbOptions options;
+    options.n_features = 700;
+    options.scale_factor = 1.1F + 0.1F * static_cast<float>(seed % 8);
+    OrbExtractor portable(options, KernelChoice::portable), avx2(options, KernelChoice::avx2);
+    ASSERT_STREQ(portable.kernel_name(), "portable");
+    ASSERT_STREQ(avx2.kernel_name(), "avx2");
+    for (int repeat = 0; repeat < 3; ++repeat, ++seed) {
+      const cv::Mat image = random_image(size.width, size.height, seed);
+      const Extraction a = portable.extract(image), b = avx2.extract(image);
+      EXPECT_GT(a.features.size(), 0U);
+      EXPECT_TRUE(testing::same_features(a.features, b.features)) << size << " seed " << seed;
+      for (std::size_t level = 0; level < a.pyramid.levels.size(); ++level) {
+        EXPECT_TRUE(testing::same_pixels(a.pyramid.levels[level], b.pyramid.levels[level]));
+      }
+    }
+  }
+}
+
+TEST(Kernels, PyramidEqualsOpenCvResize) {
+  const cv::Size sizes[] = {{640, 480}, {333, 257}, {39, 21}, {17, 5}, {16, 16}, {128, 64}, {1, 9}};
+  for (const Kernels* kernels : all_kernels()) {
+    SCOPED_TRACE(kernels->name);
+    for (const cv::Size& size : sizes) {
+      for (const float factor : {1.01F, 1.2F, 1.37F, 1.5F, 1.93F, 2.0F}) {
+        const cv::Mat image =
+            random_image(size.width, size.height, static_cast<std::uint64_t>(size.area()));
+        const ScalePyramid scales(factor, 5);
+        const auto levels = PyramidBuilder().build(image, scales, *kernels).levels;
+        ASSERT_EQ(levels.size(), 5U);
+        for (int level = 1; level < 5; ++level) {
+          const auto at = static_cast<std::size_t>(level);
+          const ImageSize expected = scales.level_size({size.width, size.height}, level);
+          if (levels[at].empty()) {
+            EXPECT_EQ(expected.width * expected.height, 0);
+            break;
+          }
+          ASSERT_EQ(levels[at].cols, expected.width);
+          ASSERT_EQ(levels[at].rows, expected.height);
+          cv::Mat resized;
+          cv::resize(levels[at - 1], resized, levels[at].size(), 0, 0, cv::INTER_LINEAR);
+          EXPECT_TRUE(testing::same_pixels(levels[at], resized))
+              << size << " factor " << factor << " level " << level;
+        }
+      }
+    }
+  }
+}
+
+TEST(Kernels, BlurEqualsOpenCvGaussian) {
+  for (const Kernels* kernels : all_kernels()) {
+    SCOPED_TRACE(kernels->name);
+    GaussianBlur gaussian;
+    for (const cv::Size& size : {cv::Size(640, 480), cv::Size(33, 31), cv::Size(65, 7),
+                                 cv::Size(7, 65), cv::Size(4, 4), cv::Size(301, 200)}) {
+      const cv::Mat image = random_image(size.width, size.height, 3);
+      cv::Mat expected;
+      cv::GaussianBlur(image, expected, cv::Size(7, 7), 2, 2, cv::BORDER_REFLECT_101);
+      EXPECT_TRUE(testing::same_pixels(gaussian.blur(image, *kernels), expected)) << size;
+    }
+    const cv::Mat white(40, 50, CV_8UC1, cv::Scalar(255));
+    EXPECT_TRUE(testing::same_pixels(gaussian.blur(white, *kernels), white));
+  }
+}
+
+/// Definition: 9 neighbours in a row all brighter or all darker by more than the threshold.
+bool is_corner(const cv::Mat& image, int x, int y, int threshold) {
+  static const int ring[16][2] = {{0, 3},  {1, 3},  {2, 2},  {3, 1},   {3, 0},   {3, -1},
+                                  {2, -2}, {1, -3}, {0, -3}, {-1, -3}, {-2, -2}, {-3, -1},
+                                  {-3, 0}, {-3, 1}, {-2, 2}, {-1, 3}};
+  for (int start = 0; start < 16; ++start) {
+    bool bright = true, dark = true;
+    for (int k = 0; k < 9; ++k) {
+      const int* offset = ring[(start + k) % 16];
+      const int difference =
+          image.at<std::uint8_t>(y + offset[1], x + offset[0]) - image.at<std::uint8_t>(y, x);
+      bright = bright && difference > threshold;
+      dark = dark && difference < -threshold;
+    }
+    if (bright || dark) return true;
+  }
+  return false;
+}
+
+TEST(Kernels, FastScoreIsTheLargestThreshold) {
+  for (const Kernels* kernels : all_kernels()) {
+    SCOPED_TRACE(kernels->name);
+    for (const std::uint64_t seed : {3U, 4U, 5U}) {
+      const cv::Mat image = random_image(71, 20, seed);
+      const int count = image.cols - 6;
+      std::vector<std::uint8_t> scores(static_cast<std::size_t>(count));
+      for (int y = 3; y < image.rows - 3; ++y) {
+        kernels->fast_scores(image.ptr(y) + 3, static_cast<std::ptrdiff_t>(image.step[0]), count, 7,
+                             scores.data());
+        for (int x = 3; x < image.cols - 3; ++x) {
+          const int score = scores[static_cast<std::size_t>(x - 3)];
+          if (score == 0) {
+            EXPECT_FALSE(is_corner(image, x, y, 7));
+          } else {
+            EXPECT_GE(score, 7);
+            EXPECT_TRUE(is_corner(image, x, y, score));
+            EXPECT_FALSE(is_corner(image, x, y, score + 1));
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(Kernels, MomentsOfTheDisc) {
+  for (const Kernels* kernels : all_kernels()) {
+    SCOPED_TRACE(kernels->name);
+    for (std::uint64_t seed = 0; seed < 20; ++seed) {
+      const cv::Mat image =
+          seed == 0 ? cv::Mat(41, 41, CV_8UC1, cv::Scalar(255)) : random_image(41, 41, seed);
+      int m10 = 0, m01 = 0, pixels = 0;
+      for (int v = -15; v <= 15; ++v) {
+        for (int u = -15; u <= 15; ++u) {
+          // The disc is symmetric about the diagonals, so both half lengths decide alike.
+          if (std::abs(u) > disc_half_length[std::abs(v)]) continue;
+          EXPECT_LE(std::abs(v), disc_half_length[std::abs(u)]);
+          m10 += u * image.at<std::uint8_t>(20 + v, 20 + u);
+          m01 += v * image.at<std::uint8_t>(20 + v, 20 + u);
+          ++pixels;
+        }
+      }
+      EXPECT_EQ(pixels, 749);
+      std::int32_t found10 = 1, found01 = 1;
+      kernels->moments(image.ptr(20) + 20, static_cast<std::ptrdiff_t>(image.step[0]), &found10,
+                       &found01);
+      EXPECT_EQ(found10, m10);
+      EXPECT_EQ(found01, m01);
+    }
+  }
+}
+
+TEST(Kernels, TablesEqualTheReference) {
+  const auto pattern =
+      testing::read_npy<std::int32_t>(testing::test_data("golden/misc/out_pattern.npy"));
+  for (std::size_t i = 0; i < 256; ++i) {
+    for (std::size_t k = 0; k < 4; ++k) EXPECT_EQ(orb_pattern[i][k], pattern.values[4 * i + k]);
+  }
+  const auto disc = testing::read_npy<std::int32_t>(testing::test_data("golden/misc/out_umax.npy"));
+  for (std::size_t v = 0; v < 16; ++v) EXPECT_EQ(disc_half_length[v], disc.at(v));
+}
+
+TEST(Orientation, EqualsOpenCvToTheBit) {
+  std::mt19937_64 generator(5);
+  for (int i = 0; i < 20000; ++i) {
+    const auto draw = [&] {
+      return static_cast<float>(static_cast<std::int64_t>(generator() % 1200001) - 600000);
+    };
+    const float y = draw(), x = draw();
+    EXPECT_EQ(fast_atan2_degrees(y, x), cv::fastAtan2(y, x)) << y << " " << x;
+  }
+  EXPECT_EQ(fast_atan2_degrees(0, 0), 0.0F);
+  EXPECT_EQ(fast_atan2_degrees(5, 0), 90.0F);
+  EXPECT_EQ(fast_atan2_degrees(0, -5), 180.0F);
+  EXPECT_EQ(fast_atan2_degrees(-5, 0), 270.0F);
+}
+
+}  // namespace
+}  // namespace orbslam
