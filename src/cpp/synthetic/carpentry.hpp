@@ -26,6 +26,8 @@ class Carpenter {
   void block(double x0, double z0, double x1, double z1, double top, double bottom,
              double repeat = 0);
 
+  void use_texel(double texel) { texel_ = texel; }
+
   std::vector<Rectangle>& rectangles() { return rectangles_; }
 
  private:

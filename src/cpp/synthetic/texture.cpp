@@ -11,7 +11,12 @@ namespace {
 
 constexpr int kOctaves = 7;
 constexpr double kFinestCell = 8;  // texels
-constexpr double kDensity = 0.6;   // polygons per cell
+// Shapes per cell, finest octave first. Sparse in the small: walls are not gravel.
+constexpr std::array<double, kOctaves> kDensity = {0.10, 0.16, 0.24, 0.34, 0.45, 0.6, 0.7};
+// Small things come in clusters: the density of a cell depends on the block of 8 x 8 cells of its
+// octave it lies in. The factors have mean 1.
+constexpr std::array<double, 4> kClutter = {0.15, 0.45, 1.0, 2.4};
+constexpr int kFirstEvenOctave = 4;  // from 0.5 m on there are no clusters
 
 /// A picture while it is painted; grey levels times 16, so that blending does not lose steps.
 struct Canvas {
@@ -24,6 +29,27 @@ struct Polygon {
   int corners = 0;
   std::array<double, kMaxCorners> x{}, y{};  // texels, counter-clockwise seen with y down
 };
+
+/// A rectangle, mostly hanging straight, sometimes askew: posters, doors, tiles.
+Polygon random_panel(HashStream& random, double cx, double cy, double radius) {
+  Polygon polygon;
+  polygon.corners = 4;
+  const double flatness = random.uniform(0.35, 1.0);
+  const bool upright = random.below(2) == 0;
+  const double a = radius * (upright ? flatness : 1.0);
+  const double b = radius * (upright ? 1.0 : flatness);
+  const double most = random.below(3) == 0 ? 0.6 : 0.04;
+  const double turn = random.uniform(-most, most);
+  const double cosine = std::cos(turn);
+  const double sine = std::sin(turn);
+  const std::array<double, 4> along = {-a, a, a, -a};
+  const std::array<double, 4> down = {-b, -b, b, b};
+  for (std::size_t i = 0; i < 4; ++i) {
+    polygon.x[i] = cx + cosine * along[i] - sine * down[i];
+    polygon.y[i] = cy + sine * along[i] + cosine * down[i];
+  }
+  return polygon;
+}
 
 /// A convex polygon inscribed in an ellipse, hence never degenerate or self-crossing.
 Polygon random_polygon(HashStream& random, double cx, double cy, double radius) {
@@ -79,36 +105,67 @@ void paint(Canvas& canvas, const Polygon& polygon, int grey, int opacity) {
   }
 }
 
-/// The polygons of one size. Each cell of a lattice over the endless wall owns at most one, so
-/// that any cut-out of the wall shows the same picture.
-void paint_octave(Canvas& canvas, const Rectangle& rectangle, int octave) {
-  double cell = kFinestCell * rectangle.texel * std::ldexp(1.0, octave);
-  std::int64_t period = 0;
-  if (rectangle.texture_repeat > 0) {
-    period = std::max<std::int64_t>(1, std::llround(rectangle.texture_repeat / cell));
-    cell = rectangle.texture_repeat / static_cast<double>(period);
+/// The lattice of one octave over the endless wall.
+struct Lattice {
+  double cell;          // metres
+  std::int64_t period;  // cells along u after which the picture comes again; 0: never
+  int octave;
+  std::uint64_t seed;
+
+  Lattice(const Rectangle& rectangle, int octave_in)
+      : cell(kFinestCell * rectangle.texel * std::ldexp(1.0, octave_in)),
+        period(0),
+        octave(octave_in),
+        seed(mix(rectangle.texture, static_cast<std::uint64_t>(octave_in))) {
+    if (rectangle.texture_repeat > 0) {
+      period = std::max<std::int64_t>(1, std::llround(rectangle.texture_repeat / cell));
+      cell = rectangle.texture_repeat / static_cast<double>(period);
+    }
   }
-  const auto index = [&](double metres) {
+
+  std::int64_t index(double metres) const {
     return static_cast<std::int64_t>(std::floor(metres / cell));
-  };
-  const std::uint64_t seed = mix(rectangle.texture, static_cast<std::uint64_t>(octave));
+  }
+  std::uint64_t hash(std::int64_t i, std::int64_t j) const {
+    const std::int64_t column = period > 0 ? ((i % period) + period) % period : i;
+    return mix(mix(seed, static_cast<std::uint64_t>(column)), static_cast<std::uint64_t>(j));
+  }
+  double density(std::int64_t i, std::int64_t j) const {
+    const double mean = kDensity[static_cast<std::size_t>(octave)];
+    if (octave >= kFirstEvenOctave) return mean;
+    const std::int64_t column = period > 0 ? ((i % period) + period) % period : i;
+    // >> rounds down for negative cells too.
+    const std::uint64_t block = mix(mix(~seed, static_cast<std::uint64_t>(column >> 3)),
+                                    static_cast<std::uint64_t>(j >> 3));
+    return mean * kClutter[block & 3];
+  }
+};
+
+/// The shapes of one size. Each cell of the lattice owns at most one, so that any cut-out of the
+/// wall shows the same picture.
+void paint_octave(Canvas& canvas, const Rectangle& rectangle, int octave) {
+  const Lattice lattice(rectangle, octave);
   const double u = rectangle.texture_offset;
   const double v = rectangle.texture_offset_v;
-  for (std::int64_t j = index(v) - 1; j <= index(v + rectangle.height) + 1; ++j) {
-    for (std::int64_t i = index(u) - 1; i <= index(u + rectangle.width) + 1; ++i) {
-      const std::int64_t column = period > 0 ? ((i % period) + period) % period : i;
-      HashStream random(
-          mix(mix(seed, static_cast<std::uint64_t>(column)), static_cast<std::uint64_t>(j)));
-      if (random.uniform(0, 1) > kDensity) continue;
-      const double x = ((static_cast<double>(i) + random.uniform(0.1, 0.9)) * cell - u);
-      const double y = ((static_cast<double>(j) + random.uniform(0.1, 0.9)) * cell - v);
-      const double radius = cell * random.uniform(0.25, 0.6);
-      const int grey = 8 + random.below(240);
-      const int opacity = 128 + random.below(100);
+  const double cell = lattice.cell;
+  const double texel = rectangle.texel;
+  for (std::int64_t j = lattice.index(v) - 1; j <= lattice.index(v + rectangle.height) + 1; ++j) {
+    for (std::int64_t i = lattice.index(u) - 1; i <= lattice.index(u + rectangle.width) + 1; ++i) {
+      HashStream random(lattice.hash(i, j));
+      if (random.uniform(0, 1) > lattice.density(i, j)) continue;
       // Pixel centres are at half texels.
-      const Polygon polygon = random_polygon(random, x / rectangle.texel - 0.5,
-                                             y / rectangle.texel - 0.5, radius / rectangle.texel);
-      paint(canvas, polygon, grey, opacity);
+      const double x =
+          ((static_cast<double>(i) + random.uniform(0.1, 0.9)) * cell - u) / texel - 0.5;
+      const double y =
+          ((static_cast<double>(j) + random.uniform(0.1, 0.9)) * cell - v) / texel - 0.5;
+      const double radius = cell / texel * random.uniform(0.25, 0.6);
+      const int grey = 8 + random.below(240);
+      const int opacity = 110 + random.below(130);
+      if (random.below(5) < 3) {
+        paint(canvas, random_panel(random, x, y, radius), grey, opacity);
+      } else {
+        paint(canvas, random_polygon(random, x, y, radius), grey, opacity);
+      }
     }
   }
 }

@@ -11,7 +11,7 @@ namespace orbslam::synthetic {
 
 /// The picture of a rectangle as a pyramid of bitmaps, each half the size of the one before.
 ///
-/// The picture is a "dead leaves" image: half-transparent polygons of random shape and grey,
+/// The picture is a "dead leaves" image: half-transparent panels and polygons of random grey,
 /// sizes in octaves from 2 m down to 3 cm (for a texel of 4 mm), small on top of large. Images of
 /// this kind share their statistics with photographs, and look alike at all scales, so that
 /// corners are found at every distance.

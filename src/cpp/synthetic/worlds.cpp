@@ -15,6 +15,7 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr double kRoomTexel = 0.004;
 constexpr double kCorridorTexel = 0.005;
 constexpr double kStreetTexel = 0.02;
+constexpr double kCarTexel = 0.01;
 constexpr double kCameraAboveRoad = 1.65;
 constexpr double kDoorWidth = 1.6;
 
@@ -178,8 +179,10 @@ World make_street(double length, double width, std::uint64_t seed) {
     }
     for (z = random.uniform(3, 12); z < end; z += random.uniform(8, 25)) {
       const double x = side * (width / 2 - 1.1);  // parked along the kerb
+      carpenter.use_texel(kCarTexel);
       carpenter.box(x, z, random.uniform(1.6, 1.9), random.uniform(3.6, 5.2),
                     bottom - random.uniform(1.3, 2.2), bottom, 0);
+      carpenter.use_texel(kStreetTexel);
     }
   }
   carpenter.wall(-half, end, half, end, bottom - 12, bottom);
