@@ -29,7 +29,7 @@ class FrontEnd:
         self._sensor = sensor
         self._context: core.FrameContext | None = None
         self._size: tuple[int, int] | None = None
-        options = settings.orb_options()
+        options = _orb_options(settings)
         self._extractor = core.OrbExtractor(options)
         self._pair_extractor = core.PairExtractor(options) if sensor is Sensor.STEREO else None
 
@@ -82,7 +82,7 @@ class FrontEnd:
             grey = core.to_grey(image, self._settings.camera.rgb)
             extraction = self._extractor.extract(grey)
         with timer("stereo"):
-            metres = core.to_depth_metres(depth, self._settings.depth_factor)
+            metres = core.to_depth_metres(depth, 1.0 / self._settings.depth_scale)
             return core.build_rgbd_frame(context, frame_id, timestamp, extraction, metres)
 
     def _check(self, image: npt.NDArray[np.uint8], what: str) -> None:
@@ -106,7 +106,28 @@ class FrontEnd:
     def _context_for(self, image: npt.NDArray[np.uint8]) -> core.FrameContext:
         if self._context is None:
             height, width = image.shape[:2]
-            camera = core.Camera(self._settings.camera_options(width, height))
+            camera = core.Camera(_camera_options(self._settings, width, height))
             self._context = core.FrameContext(camera, self._extractor.scales)
             self._size = (height, width)
         return self._context
+
+
+def _orb_options(settings: Settings) -> core.OrbOptions:
+    options = core.OrbOptions()
+    options.n_features = settings.orb.n_features
+    options.scale_factor = settings.orb.scale_factor
+    options.n_levels = settings.orb.n_levels
+    options.initial_threshold = settings.orb.ini_th_fast
+    options.minimum_threshold = settings.orb.min_th_fast
+    return options
+
+
+def _camera_options(settings: Settings, width: int, height: int) -> core.CameraOptions:
+    camera = settings.camera
+    options = core.CameraOptions()
+    options.fx, options.fy, options.cx, options.cy = camera.fx, camera.fy, camera.cx, camera.cy
+    options.distortion = [camera.k1, camera.k2, camera.p1, camera.p2, camera.k3]
+    options.bf = camera.bf
+    options.depth_ratio = settings.depth.close_factor if settings.depth is not None else 0.0
+    options.width, options.height = width, height
+    return options

@@ -9,13 +9,14 @@ import threading
 import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
-from os import PathLike
+from pathlib import Path
 from types import TracebackType
 
 import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
+from orbslam2py.builtin_settings import resolve_settings
 from orbslam2py.errors import ImageError, StateError
 from orbslam2py.front_end import FrontEnd
 from orbslam2py.local_mapping import LocalMapping
@@ -86,19 +87,16 @@ class System:
 
     def __init__(
         self,
-        settings: Settings | str | PathLike[str],
+        settings: Settings | str | Path,
         sensor: Sensor | str,
-        vocabulary: core.Vocabulary | str | PathLike[str] | None = None,
+        vocabulary: core.Vocabulary | str | Path | None = None,
         *,
         deterministic: bool = False,
         wait_for_mapping: bool = False,
         seed: int = 0,
     ) -> None:
         self.sensor = Sensor(sensor)
-        if not isinstance(settings, Settings):
-            settings = Settings.load(settings, self.sensor)
-        self.settings = settings
-        self.settings.check_for(self.sensor)
+        self.settings = settings = resolve_settings(settings, self.sensor)
         if not isinstance(vocabulary, core.Vocabulary):
             vocabulary = load_vocabulary(vocabulary)
         self.vocabulary = vocabulary

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Assembles the subcommands and turns errors into messages and exit codes."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from orbslam2py import __version__
+from orbslam2py.cli import demo, evaluate, run, synthesize, vocabulary
+from orbslam2py.cli.exit_codes import ExitCode
+from orbslam2py.errors import OrbSlamError
+
+app = typer.Typer(
+    name="orbslam2py",
+    help="Visual SLAM for a stereo pair or an RGB-D camera: images in, path and map out.",
+    no_args_is_help=True,
+    rich_markup_mode="markdown",
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _show_version(value: bool) -> None:
+    if value:
+        typer.echo(f"orbslam2py {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version."),
+    ] = False,
+) -> None:
+    """Visual SLAM for a stereo pair or an RGB-D camera: images in, path and map out."""
+
+
+app.command("run")(run.run)
+app.command("demo")(demo.demo)
+app.command("synthesize")(synthesize.synthesize)
+app.command("evaluate")(evaluate.evaluate)
+app.add_typer(vocabulary.app, name="vocabulary")
+
+
+def main() -> None:
+    """Run the command line; errors a person can act on become one message and an exit code."""
+    try:
+        app()
+    except (OrbSlamError, OSError) as error:
+        Console(stderr=True).print(f"[bold red]Error:[/] {error}", highlight=False, soft_wrap=True)
+        sys.exit(ExitCode.BAD_INPUT)
+    except KeyboardInterrupt:
+        sys.exit(ExitCode.INTERRUPTED)

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``orbslam2py demo``: the whole system on a world made on the spot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from orbslam2py.cli.run import run_and_write
+from orbslam2py.errors import SettingsError
+from orbslam2py.runner import RunOptions
+from orbslam2py.sensor import Sensor
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+
+
+def demo(
+    sensor: Annotated[Sensor, typer.Option(help="stereo or rgbd.")] = Sensor.STEREO,
+    frames: Annotated[int, typer.Option(help="Number of images.", min=10)] = 300,
+    output: Annotated[
+        Path, typer.Option(help="Folder for the results.")
+    ] = Path("runs/demo"),
+    quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
+) -> None:
+    """Track a camera through a synthetic room: needs no data.
+
+    **Example**
+
+        orbslam2py demo --sensor rgbd
+    """
+    if sensor is Sensor.MONOCULAR:
+        raise SettingsError("the demo runs with --sensor stereo or rgbd")
+    sequence = SyntheticSequence(SyntheticOptions(sensor=sensor, world="room", frames=frames))
+    code = run_and_write(
+        sequence,
+        sequence.default_settings(),
+        RunOptions(sensor),
+        output=output,
+        force=True,
+        quiet=quiet,
+    )
+    if not quiet:
+        typer.echo(f"Look at {output / 'trajectory.png'}.")
+    raise typer.Exit(code)

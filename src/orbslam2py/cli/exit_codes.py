@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Exit codes of the command line."""
+
+from enum import IntEnum
+
+
+class ExitCode(IntEnum):
+    """What the shell is told."""
+
+    OK = 0
+    FAILED = 1
+    """Something broke in the middle; what was done until then is saved."""
+    BAD_INPUT = 2
+    """Bad input or usage; nothing was run."""
+    NOTHING_TRACKED = 3
+    INTERRUPTED = 130
+    """Ctrl-C; what was done until then is saved."""

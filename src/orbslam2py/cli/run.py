@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``orbslam2py run``: the system over a recorded sequence."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.logging import RichHandler
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
+from rich.table import Table
+
+from orbslam2py.builtin_settings import resolve_settings
+from orbslam2py.cli.exit_codes import ExitCode
+from orbslam2py.datasets import open_sequence
+from orbslam2py.datasets.base import Sequence
+from orbslam2py.outputs import OutputWriter, link_latest, prepare_output_folder
+from orbslam2py.report import evaluate_run, make_report
+from orbslam2py.runner import FrameRow, RunOptions, RunResult, SequenceRunner
+from orbslam2py.sensor import Sensor
+from orbslam2py.settings import Settings
+from orbslam2py.system import System
+from orbslam2py.vocabulary import load_vocabulary
+
+EXAMPLE = """
+**Example**
+
+    orbslam2py run rgbd_dataset_freiburg1_desk --sensor rgbd
+
+    orbslam2py run dataset/sequences/06 --sensor stereo --output runs/06
+"""
+
+
+def run(
+    sequence: Annotated[
+        Path, typer.Argument(help="Folder of a TUM RGB-D, KITTI odometry or EuRoC sequence.")
+    ],
+    sensor: Annotated[Sensor, typer.Option(help="What the images come from.")],
+    settings: Annotated[
+        str | None,
+        typer.Option(
+            help="Built-in name (tum1, kitti04-12, euroc, ...) or ORB-SLAM YAML file; "
+            "found by itself where the sequence tells.",
+            metavar="NAME_OR_FILE",
+        ),
+    ] = None,
+    vocabulary: Annotated[
+        Path | None, typer.Option(help="Vocabulary file; the one of the package if not given.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option(help="Folder for the results [runs/<sequence>-<time>].")
+    ] = None,
+    deterministic: Annotated[
+        bool, typer.Option("--deterministic", help="Map inline: the same bytes in every run.")
+    ] = False,
+    realtime: Annotated[
+        bool,
+        typer.Option("--realtime", help="Follow the time stamps; drop frames as a camera would."),
+    ] = False,
+    start: Annotated[int, typer.Option(help="First frame.", min=0)] = 0,
+    stride: Annotated[int, typer.Option(help="Take every so many frames.", min=1)] = 1,
+    max_frames: Annotated[
+        int | None, typer.Option(help="Take at most so many frames.", min=1)
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of all random draws.", min=0)] = 0,
+    force: Annotated[
+        bool, typer.Option("--force", help="Write into an output folder that is not empty.")
+    ] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
+) -> None:
+    """Track a recorded sequence; write trajectory, map and report."""
+    images = open_sequence(sequence, sensor)
+    chosen = images.default_settings() if settings is None else resolve_settings(settings, sensor)
+    images = images.rectified(chosen)
+    options = RunOptions(sensor, deterministic, realtime, start, stride, max_frames, seed)
+    raise typer.Exit(
+        run_and_write(
+            images, chosen, options, vocabulary=vocabulary, output=output, force=force, quiet=quiet
+        )
+    )
+
+
+run.__doc__ = f"{run.__doc__}\n{EXAMPLE}"
+
+
+def run_and_write(
+    sequence: Sequence,
+    settings: Settings,
+    options: RunOptions,
+    *,
+    vocabulary: Path | None = None,
+    output: Path | None = None,
+    force: bool = False,
+    quiet: bool = False,
+) -> ExitCode:
+    """Run, write all files, show a table; returns the exit code."""
+    console = Console(quiet=quiet)
+    errors = Console(stderr=True)
+    _log_to(errors, quiet=quiet)
+    runner = SequenceRunner(sequence, settings, load_vocabulary(vocabulary), options)
+    folder = prepare_output_folder(output, sequence.name, force=force)
+    if output is None:
+        link_latest(folder)
+
+    with _progress_bar(console) as bar:
+        display = _Display(bar, runner.result.n_frames)
+        result = runner.run(display.show)
+
+    evaluation = evaluate_run(result)
+    report = make_report(result, evaluation)
+    writer = OutputWriter(folder)
+    writer.write_all(result, report, evaluation)
+    console.print(_table(report))
+    console.print(f"Results are in [bold]{folder}[/]", highlight=False)
+    return _conclude(result, writer, errors)
+
+
+def _conclude(result: RunResult, writer: OutputWriter, errors: Console) -> ExitCode:
+    for problem in writer.problems:
+        errors.print(f"[bold red]Error:[/] {problem}", highlight=False, soft_wrap=True)
+    if result.error is not None:
+        errors.print(
+            f"[bold red]Error:[/] {result.error} (what was done until then is saved)",
+            highlight=False,
+            soft_wrap=True,
+        )
+        return ExitCode.FAILED
+    if result.interrupted:
+        return ExitCode.INTERRUPTED
+    if writer.problems:
+        return ExitCode.BAD_INPUT
+    if result.n_tracked == 0:
+        errors.print(
+            f"[bold red]Nothing could be tracked:[/] {result.why_nothing_was_tracked()}",
+            highlight=False,
+            soft_wrap=True,
+        )
+        return ExitCode.NOTHING_TRACKED
+    return ExitCode.OK
+
+
+def _log_to(console: Console, *, quiet: bool) -> None:
+    handler = RichHandler(console=console, show_path=False, show_time=False, markup=False)
+    logger = logging.getLogger("orbslam2py")
+    logger.handlers = [handler]
+    logger.propagate = False
+    logger.setLevel(logging.ERROR if quiet else logging.WARNING)
+
+
+def _progress_bar(console: Console) -> Progress:
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[status]}"),
+        console=console,
+        transient=True,
+    )
+
+
+class _Display:
+    """Keeps the progress bar up to date, at most ten times a second."""
+
+    def __init__(self, bar: Progress, total: int) -> None:
+        self._bar = bar
+        self._task: TaskID = bar.add_task("tracking", total=total, status="")
+        self._done = 0
+        self._shown_at = 0.0
+
+    def show(self, row: FrameRow, system: System) -> None:
+        """Called after every frame."""
+        self._done += 1
+        now = self._bar.get_time()
+        if now - self._shown_at < 0.1:
+            return
+        task = self._bar.tasks[self._task]
+        speed = self._done / task.elapsed if task.elapsed else 0.0
+        status = (
+            f"{speed:5.1f} frames/s  {row.state}  {system.n_keyframes} keyframes  "
+            f"{system.n_map_points} points"
+        )
+        self._bar.update(self._task, completed=self._done, status=status)
+        self._shown_at = now
+
+
+def _table(report: dict[str, Any]) -> Table:
+    table = Table(title=f"{report['sequence']} ({report['sensor']})", show_header=False)
+    table.add_column(justify="left")
+    table.add_column(justify="right")
+    for key, value in report.items():
+        if key in {"sequence", "sensor", "milliseconds", "settings"} or value is None:
+            continue
+        text = f"{value:.4f}" if isinstance(value, float) else str(value)
+        table.add_row(key.replace("_", " "), text)
+    table.add_section()
+    for stage, numbers in report["milliseconds"].items():
+        table.add_row(
+            f"{stage} [ms]",
+            f"median {numbers['median']:.2f}  mean {numbers['mean']:.2f}  p99 {numbers['p99']:.2f}",
+        )
+    return table
+
