@@ -1,0 +1,312 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "frame/frame.hpp"
+
+#include <pybind11/eigen.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include "base/errors.hpp"
+#include "bindings/arrays.hpp"
+#include "bindings/bindings.hpp"
+#include "frame/build_frame.hpp"
+#include "frame/extract_pair.hpp"
+#include "frame/image_input.hpp"
+#include "frame/stereo_matching.hpp"
+
+namespace orbslam::bindings {
+namespace {
+
+/// Contiguous, native byte order; copies only what is not.
+py::array normal_form(const py::array& array) {
+  py::array native = array;
+  if (!array.dtype().attr("isnative").cast<bool>()) {
+    native = array.attr("astype")(array.dtype().attr("newbyteorder")("=")).cast<py::array>();
+  }
+  return py::array::ensure(native, py::array::c_style);
+}
+
+/// A header over a (h, w) or (h, w, channels) array of OpenCV depth `depth`.
+cv::Mat view_image(const py::array& array, int depth) {
+  if (array.ndim() != 2 && array.ndim() != 3) {
+    throw ImageError(
+        "image must have the shape (height, width) or (height, width, channels), "
+        "got " +
+        std::to_string(array.ndim()) + " dimensions");
+  }
+  if (array.size() == 0) throw ImageError("image is empty; check that the file could be read");
+  const auto channels = array.ndim() == 2 ? 1 : array.shape(2);
+  if (channels > 4) {
+    throw ImageError("image has " + std::to_string(channels) + " channels, at most 4 are possible");
+  }
+  return {static_cast<int>(array.shape(0)), static_cast<int>(array.shape(1)),
+          CV_MAKETYPE(depth, static_cast<int>(channels)), const_cast<void*>(array.data())};
+}
+
+template <class Item>
+bool holds(const py::array& array) {
+  return array.dtype().kind() == py::dtype::of<Item>().kind() &&
+         array.itemsize() == static_cast<py::ssize_t>(sizeof(Item));
+}
+
+py::array grey_of(const py::array& image, bool is_rgb) {
+  if (!holds<std::uint8_t>(image)) throw ImageError("image must be uint8 (8 bits per channel)");
+  const py::array pixels = normal_form(image);
+  const cv::Mat source = view_image(pixels, CV_8U);
+  if (source.channels() == 1 && pixels.ndim() == 2) return pixels;
+  py::array_t<std::uint8_t> result({source.rows, source.cols});
+  cv::Mat grey(source.rows, source.cols, CV_8UC1, result.mutable_data());
+  {
+    const py::gil_scoped_release release;
+    to_grey(source, is_rgb, grey);
+  }
+  return result;
+}
+
+// OpenCV's name of the item type; -1: it has none.
+int opencv_depth(const py::array& array) {
+  if (holds<std::uint8_t>(array)) return CV_8U;
+  if (holds<std::int8_t>(array)) return CV_8S;
+  if (holds<std::uint16_t>(array)) return CV_16U;
+  if (holds<std::int16_t>(array)) return CV_16S;
+  if (holds<std::int32_t>(array)) return CV_32S;
+  if (holds<float>(array)) return CV_32F;
+  if (holds<double>(array)) return CV_64F;
+  return -1;
+}
+
+py::array depth_metres_of(const py::array& raw, double factor) {
+  py::array values = normal_form(raw);
+  int depth = opencv_depth(values);
+  if (depth < 0) {
+    const char kind = values.dtype().kind();
+    if (kind != 'u' && kind != 'i' && kind != 'f') {
+      throw ImageError("depth image must be numeric, got " +
+                       py::str(raw.dtype()).cast<std::string>());
+    }
+    values = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(values);
+    depth = CV_64F;
+  }
+  const cv::Mat source = view_image(values, depth);
+  py::array_t<float> result({source.rows, source.cols});
+  cv::Mat metres(source.rows, source.cols, CV_32FC1, result.mutable_data());
+  {
+    const py::gil_scoped_release release;
+    to_depth_metres(source, factor, metres);
+  }
+  return result;
+}
+
+py::array_t<float> positions_of(const std::vector<Keypoint>& keypoints) {
+  py::array_t<float> array({static_cast<py::ssize_t>(keypoints.size()), py::ssize_t{2}});
+  float* out = array.mutable_data();
+  for (const Keypoint& keypoint : keypoints) {
+    *out++ = keypoint.x;
+    *out++ = keypoint.y;
+  }
+  return array;
+}
+
+template <class Item>
+py::array_t<Item> field_of(const std::vector<Keypoint>& keypoints, Item Keypoint::*field) {
+  py::array_t<Item> array(static_cast<py::ssize_t>(keypoints.size()));
+  Item* out = array.mutable_data();
+  for (const Keypoint& keypoint : keypoints) *out++ = keypoint.*field;
+  return array;
+}
+
+std::size_t checked(const TrackedFrame& tracked, py::ssize_t i) {
+  if (i < 0 || i >= static_cast<py::ssize_t>(tracked.map_points.size())) {
+    throw py::index_error("keypoint index out of range");
+  }
+  return static_cast<std::size_t>(i);
+}
+
+void bind_frame_class(py::module_& module) {
+  py::class_<Frame, std::shared_ptr<Frame>>(
+      module, "Frame",
+      "What one image (pair) says: features, depths, words. Arrays are copies; n keypoints.")
+      .def("__len__", &Frame::size)
+      .def_property_readonly("size", &Frame::size, "Number n of keypoints.")
+      .def_readonly("id", &Frame::id)
+      .def_readonly("timestamp", &Frame::timestamp, "Seconds, as given by the caller.")
+      .def_readonly("described", &Frame::described, "True once the words are computed.")
+      .def_property_readonly(
+          "camera", [](const Frame& f) { return std::const_pointer_cast<Camera>(f.camera); })
+      .def_property_readonly(
+          "keypoints", [](const Frame& f) { return positions_of(f.keypoints); },
+          "(n, 2) float32, undistorted pixels.")
+      .def_property_readonly(
+          "raw_keypoints",
+          [](const Frame& f) {
+            return positions_of(f.raw_keypoints.empty() ? f.keypoints : f.raw_keypoints);
+          },
+          "(n, 2) float32, pixels of the image as it was given.")
+      .def_property_readonly(
+          "levels", [](const Frame& f) { return field_of(f.keypoints, &Keypoint::level); },
+          "(n,) int32, pyramid levels.")
+      .def_property_readonly(
+          "angles", [](const Frame& f) { return field_of(f.keypoints, &Keypoint::angle); },
+          "(n,) float32, degrees in [0, 360).")
+      .def_property_readonly(
+          "descriptors",
+          [](const Frame& f) {
+            return copy_to_array<std::uint8_t>(f.descriptors.data(),
+                                               {static_cast<py::ssize_t>(f.size()), 32});
+          },
+          "(n, 32) uint8.")
+      .def_property_readonly(
+          "right_u", [](const Frame& f) { return to_array(f.right_u); },
+          "(n,) float32, column in the right image [px]; meaningful where depth > 0.")
+      .def_property_readonly(
+          "depth", [](const Frame& f) { return to_array(f.depth); },
+          "(n,) float32, metres; -1 when unknown.")
+      .def(
+          "features_in_area",
+          [](const Frame& f, float x, float y, float r, int min_level, int max_level) {
+            std::vector<std::uint32_t> found;
+            f.grid.features_in_area(f.keypoints, x, y, r, min_level, max_level, found);
+            return to_array(found);
+          },
+          py::arg("x"), py::arg("y"), py::arg("r"), py::arg("min_level") = -1,
+          py::arg("max_level") = -1,
+          "Indices (uint32) of the keypoints less than r pixels away in both coordinates.");
+}
+
+void bind_tracked_frame(py::module_& module) {
+  py::class_<TrackedFrame, std::shared_ptr<TrackedFrame>>(
+      module, "TrackedFrame",
+      "A frame with the pose and the associations the tracker gives it. Arrays are copies.")
+      .def(py::init([](const std::shared_ptr<Frame>& frame) { return TrackedFrame(frame); }),
+           py::arg("frame").none(false))
+      .def_property_readonly(
+          "frame", [](const TrackedFrame& t) { return std::const_pointer_cast<Frame>(t.frame); })
+      .def_readwrite("T_cw", &TrackedFrame::T_cw, "World to camera; None while unknown.")
+      .def_readwrite("reference_keyframe", &TrackedFrame::reference_keyframe, "-1: none.")
+      .def_property_readonly(
+          "map_points", [](const TrackedFrame& t) { return to_array(t.map_points); },
+          "(n,) int64, ids of the associated map points, -1: none.")
+      .def_property_readonly(
+          "outlier",
+          [](const TrackedFrame& t) {
+            return copy_to_array<bool>(t.outlier.data(),
+                                       {static_cast<py::ssize_t>(t.outlier.size())});
+          },
+          "(n,) bool, verdict of the last pose optimisation.")
+      .def_property_readonly(
+          "positions",
+          [](const TrackedFrame& t) {
+            return copy_to_array<double>(t.positions.data(),
+                                         {static_cast<py::ssize_t>(t.positions.size()), 3});
+          },
+          "(n, 3) float64, world positions of the associated points at association time.")
+      .def(
+          "associate",
+          [](TrackedFrame& t, py::ssize_t i, MapPointId point, const Eigen::Vector3d& position) {
+            t.associate(checked(t, i), point, position);
+          },
+          py::arg("i"), py::arg("point"), py::arg("position"),
+          "Associates keypoint i with a map point at a world position.")
+      .def(
+          "dissociate", [](TrackedFrame& t, py::ssize_t i) { t.dissociate(checked(t, i)); },
+          py::arg("i"), "Removes the map point of keypoint i.")
+      .def("clear_associations", &TrackedFrame::clear_associations,
+           "Removes all map points, positions and outlier flags; keeps the pose.")
+      .def("n_associated", &TrackedFrame::n_associated,
+           "Number of keypoints with a map point, outliers included.")
+      .def(
+          "n_close_tracked_untracked",
+          [](const TrackedFrame& t) {
+            const CloseCounts counts = t.n_close_tracked_untracked();
+            return py::make_tuple(counts.tracked, counts.untracked);
+          },
+          "(with, without) an inlier map point, over the close keypoints.");
+}
+
+void bind_builders(py::module_& module) {
+  // ScalePyramid is copied: a small table, and Python's object need not be a shared one.
+  py::class_<FrameContext>(module, "FrameContext", "What all frames of one system share.")
+      .def(py::init([](const std::shared_ptr<Camera>& camera, const ScalePyramid& scales) {
+             return FrameContext{camera, std::make_shared<ScalePyramid>(scales)};
+           }),
+           py::arg("camera").none(false), py::arg("scales"))
+      .def_property_readonly(
+          "camera", [](const FrameContext& c) { return std::const_pointer_cast<Camera>(c.camera); })
+      .def_property_readonly("scales", [](const FrameContext& c) { return *c.scales; });
+
+  module.def("build_monocular_frame", &build_monocular_frame, py::arg("context"), py::arg("id"),
+             py::arg("timestamp"), py::arg("features"), py::call_guard<py::gil_scoped_release>(),
+             "Frame of a single camera: undistorted keypoints, no depth.");
+  module.def("build_stereo_frame", &build_stereo_frame, py::arg("context"), py::arg("id"),
+             py::arg("timestamp"), py::arg("left"), py::arg("right"),
+             py::call_guard<py::gil_scoped_release>(),
+             "Frame of a rectified pair with depth by stereo matching.");
+  module.def(
+      "build_rgbd_frame",
+      [](const FrameContext& context, FrameId id, double timestamp, const Features& features,
+         const py::array& depth) {
+        if (!holds<float>(depth)) {
+          throw ImageError("depth image must be float32 metres; use to_depth_metres");
+        }
+        const py::array metres = normal_form(depth);
+        const cv::Mat view = view_image(metres, CV_32F);
+        const py::gil_scoped_release release;
+        return build_rgbd_frame(context, id, timestamp, features, view);
+      },
+      py::arg("context"), py::arg("id"), py::arg("timestamp"), py::arg("features"),
+      py::arg("depth"),
+      "Frame of an image with registered depth (h, w) float32 [m]; <= 0, NaN and inf: none. "
+      "Raises ImageError when the depth image has another size or type.");
+}
+
+}  // namespace
+
+void bind_frame(py::module_& module) {
+  bind_frame_class(module);
+  bind_tracked_frame(module);
+  bind_builders(module);
+
+  module.def(
+      "match_stereo",
+      [](const Extraction& left, const Extraction& right, const ScalePyramid& scales, double bf,
+         double max_disparity) {
+        StereoMatches matches;
+        {
+          const py::gil_scoped_release release;
+          matches = match_stereo(left, right, scales, bf, max_disparity);
+        }
+        return py::make_tuple(to_array(matches.right_u), to_array(matches.depth));
+      },
+      py::arg("left"), py::arg("right"), py::arg("scales"), py::arg("bf"), py::arg("max_disparity"),
+      "(right_u [px], depth [m]) of the left keypoints, float32, -1: none. bf in px m, "
+      "max_disparity in px.");
+
+  py::class_<WorkerThread>(module, "WorkerThread",
+                           "A helper thread that waits for work as long as it lives.")
+      .def(py::init<>());
+  module.def(
+      "extract_pair",
+      [](OrbExtractor& left_extractor, OrbExtractor& right_extractor, WorkerThread& helper,
+         const py::array& left, const py::array& right) {
+        if (!holds<std::uint8_t>(left) || !holds<std::uint8_t>(right)) {
+          throw ImageError("images of a pair must be grey, uint8; use to_grey");
+        }
+        const py::array left_pixels = normal_form(left), right_pixels = normal_form(right);
+        // Level 0 of a pyramid shares the image's pixels and outlives the arrays: copy them.
+        const cv::Mat left_view = view_image(left_pixels, CV_8U);
+        const cv::Mat right_view = view_image(right_pixels, CV_8U);
+        const py::gil_scoped_release release;
+        return extract_pair(left_extractor, right_extractor, helper, left_view.clone(),
+                            right_view.clone());
+      },
+      py::arg("left_extractor"), py::arg("right_extractor"), py::arg("helper"), py::arg("left"),
+      py::arg("right"),
+      "Extractions (left, right) of two grey images (h, w) uint8 of one size, at the same time.");
+
+  module.def("to_grey", &grey_of, py::arg("image"), py::arg("is_rgb"),
+             "Grey image (h, w) uint8 of a grey, colour (h, w, 3) or colour + alpha (h, w, 4) "
+             "image; a contiguous grey image comes back itself.");
+  module.def("to_depth_metres", &depth_metres_of, py::arg("raw"), py::arg("factor"),
+             "Depth (h, w) float32 in metres: raw / factor. Values <= 0 and NaN mean none.");
+}
+
+}  // namespace orbslam::bindings
