@@ -17,6 +17,8 @@
 namespace orbslam {
 namespace {
 
+constexpr double kInitialDamping = 1e-5;
+
 using Observation = BundleProblem::Observation;
 
 void check_indices(const BundleProblem& problem) {
@@ -111,10 +113,21 @@ class BundleSolver final : public ceres::EvaluationCallback {
 
   /// Minimises and writes the poses and points reached into the bundle. Returns whether the flag
   /// was raised.
-  bool minimise(int iterations, const std::atomic<bool>* abort, BundleSummary& summary) {
+  ///
+  /// kEqual damps all unknowns alike, starting at 1e-5 times the largest curvature. It leaves
+  /// weakly determined depths where they were while the rest converges, so that a stage of few
+  /// iterations before the classification judges them as the published method does. kScaled damps
+  /// every unknown in proportion to its own curvature, which needs half the iterations to converge.
+  enum class Damping { kEqual, kScaled };
+  bool minimise(int iterations, Damping damping, const std::atomic<bool>* abort,
+                BundleSummary& summary) {
     if (problem_.NumResidualBlocks() == 0) return is_raised(abort);
     BundleIterations rules(iterations, abort);
     ceres::Solver::Options solver = solver_options(iterations);
+    if (damping == Damping::kEqual) {
+      solver.min_lm_diagonal = solver.max_lm_diagonal = 1;
+      solver.initial_trust_region_radius = 1 / (kInitialDamping * max_curvature());
+    }
     solver.callbacks.push_back(&rules);
     ceres::Solver::Summary report;
     ceres::Solve(solver, &problem_, &report);
@@ -164,6 +177,7 @@ class BundleSolver final : public ceres::EvaluationCallback {
       m.u = o.u;
       m.v = o.v;
       m.right_u = o.right_u;
+      m.has_depth = o.has_depth;
       m.scale = start.usable(i) ? deviation(o) : 0.0;
       m.huber = options_.robust ? kernel_width(o) : 0.0;
       if (!start.usable(i)) m.u = m.v = m.right_u = 0;  // zero times NaN would still be NaN
@@ -199,12 +213,29 @@ class BundleSolver final : public ceres::EvaluationCallback {
     }
   }
 
+  /// Largest diagonal entry of the Gauss-Newton matrix at the present poses and points.
+  double max_curvature() const {
+    std::vector<Vector6d> poses(views_.size(), Vector6d::Zero());
+    std::vector<Eigen::Vector3d> points(bundle_.points.size(), Eigen::Vector3d::Zero());
+    for (std::size_t i = 0; i < measurements_.size(); ++i) {
+      const Observation& o = bundle_.observations[i];
+      add_curvature(measurements_[i], bundle_.points[o.point], poses[o.camera], points[o.point]);
+    }
+    double largest = 1;
+    for (const std::size_t camera : free_cameras_) {
+      largest = std::max(largest, poses[camera].maxCoeff());
+    }
+    for (const Eigen::Vector3d& point : points) largest = std::max(largest, point.maxCoeff());
+    return largest;
+  }
+
   ceres::Solver::Options solver_options(int iterations) {
     ceres::Solver::Options solver;
     solver.max_num_iterations = 2 * iterations;
     solver.function_tolerance = 1e-6;
     solver.num_threads = options_.n_threads;
     solver.logging_type = ceres::SILENT;
+    solver.jacobi_scaling = false;  // the damping takes care of different units
     // Above some thirty free poses the reduced camera system is sparse enough to gain by it.
     solver.linear_solver_type =
         free_cameras_.size() <= 30 ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
@@ -248,11 +279,14 @@ BundleSummary solve_bundle(BundleProblem& problem, const BundleOptions& options,
   summary.aborted = is_raised(abort);
   if (!summary.aborted) {
     BundleSolver solver(problem, options, start);
-    summary.aborted = solver.minimise(options.robust_iterations, abort, summary);
+    const auto damping = options.final_iterations > 0 ? BundleSolver::Damping::kEqual
+                                                      : BundleSolver::Damping::kScaled;
+    summary.aborted = solver.minimise(options.robust_iterations, damping, abort, summary);
     summary.stage_one_done = !summary.aborted;
     if (!summary.aborted && options.final_iterations > 0) {
       solver.keep_inliers(judge(problem));
-      summary.aborted = solver.minimise(options.final_iterations, abort, summary);
+      summary.aborted =
+          solver.minimise(options.final_iterations, BundleSolver::Damping::kScaled, abort, summary);
     }
     now = judge(problem);
   }

@@ -74,6 +74,16 @@ void write_image_rows(const BundleMeasurement& m, const Projected& projected, do
   write_row<kFree>(m, projected, 1, 0, b, -b * projected.y, jacobians);
 }
 
+/// The row of the right column, times `factor`.
+template <bool kFree>
+void write_right_row(const BundleMeasurement& m, const Projected& projected, int row, double factor,
+                     double** jacobians) {
+  const double scale = factor * projected.scale * projected.inverse_z;
+  const double a = scale * m.view->pinhole.fx;
+  const double c = -a * projected.x + scale * m.view->bf * projected.inverse_z;
+  write_row<kFree>(m, projected, row, a, 0, c, jacobians);
+}
+
 }  // namespace
 
 template <bool kFree>
@@ -114,15 +124,32 @@ bool StereoResiduals<kFree, kSecond>::Evaluate(double const* const* parameters, 
   }
   if (jacobians == nullptr) return true;
   if constexpr (kSecond) {
-    const double scale = factor * projected.scale * projected.inverse_z;
-    const double a = scale * m.view->pinhole.fx;
-    write_row<kFree>(m, projected, 0, a, 0,
-                     -a * projected.x + scale * m.view->bf * projected.inverse_z, jacobians);
+    write_right_row<kFree>(m, projected, 0, factor, jacobians);
     write_row<kFree>(m, projected, 1, 0, 0, 0, jacobians);
   } else {
     write_image_rows<kFree>(m, projected, factor, jacobians);
   }
   return true;
+}
+
+void add_curvature(const BundleMeasurement& m, const Eigen::Vector3d& point,
+                   Vector6d& pose_diagonal, Eigen::Vector3d& point_diagonal) {
+  const Projected projected(m, point.data());
+  Eigen::Matrix<double, 3, PoseManifold::kAmbientSize, Eigen::RowMajor> pose;
+  Eigen::Matrix<double, 3, 3, Eigen::RowMajor> position;
+  double* jacobians[] = {pose.data(), position.data()};
+  write_image_rows<true>(m, projected, 1.0, jacobians);
+  double q = std::pow(projected.error_u(m), 2) + std::pow(projected.error_v(m), 2);
+  if (m.has_depth) {
+    write_right_row<true>(m, projected, 2, 1.0, jacobians);
+    q += std::pow(projected.error_right_u(m), 2);
+  } else {
+    pose.row(2).setZero();
+    position.row(2).setZero();
+  }
+  const double weight = m.huber > 0 && q > m.huber * m.huber ? m.huber / std::sqrt(q) : 1.0;
+  pose_diagonal += weight * pose.leftCols<6>().colwise().squaredNorm().transpose();
+  point_diagonal += weight * position.colwise().squaredNorm().transpose();
 }
 
 template class MonoResiduals<true>;

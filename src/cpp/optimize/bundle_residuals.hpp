@@ -30,7 +30,8 @@ struct BundleMeasurement {
   const BundleView* view = nullptr;
   double u = 0, v = 0, right_u = 0;
   double scale = 1;  ///< one over the standard deviation; 0 takes the observation out
-  double huber = 0;  ///< width of the kernel that stereo residuals apply themselves; 0: none
+  double huber = 0;  ///< width of the kernel; 0: none
+  bool has_depth = false;
 };
 
 /// Two residuals of an observation by one camera, measurement minus prediction, times `scale`.
@@ -68,5 +69,9 @@ class StereoResiduals final : public TwoResiduals<kFree> {
  private:
   const BundleMeasurement* measurement_;
 };
+
+/// Adds the observation's part of the diagonal of the Gauss-Newton matrix (kernel weight included).
+void add_curvature(const BundleMeasurement& measurement, const Eigen::Vector3d& point,
+                   Vector6d& pose_diagonal, Eigen::Vector3d& point_diagonal);
 
 }  // namespace orbslam
