@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "map/content_hash.hpp"
+
+#include <cstring>
+
+namespace orbslam {
+namespace {
+
+/// Words are mixed in order with the finalizer of splitmix64, which is bijective per word.
+class Hash {
+ public:
+  void add(std::uint64_t word) {
+    state_ += word + 0x9e3779b97f4a7c15U;
+    state_ = (state_ ^ (state_ >> 30)) * 0xbf58476d1ce4e5b9U;
+    state_ = (state_ ^ (state_ >> 27)) * 0x94d049bb133111ebU;
+    state_ ^= state_ >> 31;
+  }
+  void add(std::int64_t value) { add(static_cast<std::uint64_t>(value)); }
+  void add(double value) {
+    std::uint64_t bits;
+    std::memcpy(&bits, &value, sizeof(bits));
+    add(bits);
+  }
+  void add(const Eigen::Vector3d& v) {
+    for (const double x : {v.x(), v.y(), v.z()}) add(x);
+  }
+  std::uint64_t value() const { return state_; }
+
+ private:
+  std::uint64_t state_ = 0;
+};
+
+}  // namespace
+
+std::uint64_t content_hash(const Map& map) {
+  Hash hash;
+  const auto lock = map.read_lock();
+  map.for_each_keyframe([&](const KeyFrame& keyframe) {
+    hash.add(keyframe.id.value);
+    hash.add(keyframe.parent.value);
+    const Eigen::Quaterniond& q = keyframe.T_cw.rotation();
+    for (const double x : {q.w(), q.x(), q.y(), q.z()}) hash.add(x);
+    hash.add(keyframe.T_cw.translation());
+  });
+  map.for_each_point([&](const MapPoint& point) {
+    hash.add(point.id.value);
+    hash.add(point.position);
+    for (const std::uint64_t word : point.descriptor.words) hash.add(word);
+    hash.add(static_cast<std::uint64_t>(point.observations.size()));
+    for (const Observation& observation : point.observations) {
+      hash.add(observation.keyframe.value);
+      hash.add(static_cast<std::uint64_t>(observation.index));
+    }
+  });
+  return hash.value();
+}
+
+}  // namespace orbslam

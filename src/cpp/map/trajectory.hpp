@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "map/snapshot.hpp"
+
+namespace orbslam {
+
+/// Camera poses of all recorded frames, one entry each.
+struct Trajectory {
+  std::vector<double> timestamps;  ///< seconds
+  std::vector<Matrix4> T_wc;       ///< camera to world; the world is the frame of keyframe 0
+  std::vector<std::uint8_t> lost;  ///< 1: tracking was lost, the pose repeats the last known one
+  std::vector<FrameId> frames;
+};
+
+/// Remembers each frame relative to its reference keyframe, so that all later optimisation moves
+/// the frames with their keyframes (spec 03, sections 6 and 7). Not synchronised: one thread
+/// records and rebuilds.
+class TrajectoryRecorder {
+ public:
+  /// Appends a frame. Without a pose or a reference keyframe it repeats the last relative pose (at
+  /// first: none, the frame then is lost whatever the flag says). Takes the map's read lock.
+  /// Throws StateError when the map was cleared since the first record and clear() was not called.
+  void record(const Map& map, const TrackedFrame& frame, bool lost);
+
+  /// All poses, through culled keyframes as well, anchored at keyframe 0. Takes the map's read
+  /// lock. Frames recorded before the first pose have the identity. Throws StateError as above.
+  Trajectory rebuild(const Map& map) const;
+
+  void clear();
+  std::size_t size() const { return timestamps_.size(); }
+  /// Allocated memory; stays below 120 bytes a frame for long sequences.
+  std::size_t n_bytes() const;
+
+ private:
+  struct RelativePose {  // T_cr as plain numbers: Eigen's quaternion would pad to 64 bytes
+    double qw = 1, qx = 0, qy = 0, qz = 0, x = 0, y = 0, z = 0;
+  };
+  void check_epoch(const Map& map) const;
+
+  std::vector<double> timestamps_;
+  std::vector<RelativePose> T_cr_;
+  std::vector<KeyFrameId> references_;
+  std::vector<FrameId> frames_;
+  std::vector<std::uint8_t> lost_;
+  std::uint64_t epoch_ = 0;  // of the map at the first record
+};
+
+}  // namespace orbslam
