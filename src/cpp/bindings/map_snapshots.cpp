@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Copies of the map for users, viewers and writers; called by bind_map().
+#include <pybind11/stl.h>
+
+#include "bindings/arrays.hpp"
+#include "bindings/bindings.hpp"
+#include "map/snapshot.hpp"
+#include "map/trajectory.hpp"
+
+namespace orbslam::bindings {
+
+void bind_map_snapshots(py::module_& module);
+
+namespace {
+
+using namespace py::literals;
+using Release = py::call_guard<py::gil_scoped_release>;
+
+template <class Row, class Item = typename Row::value_type>
+py::array_t<Item> rows(const std::vector<Row>& values) {
+  return copy_to_array<Item>(values.data(), {static_cast<py::ssize_t>(values.size()),
+                                             static_cast<py::ssize_t>(Row().size())});
+}
+
+py::array_t<double> matrices(const std::vector<Matrix4>& values) {
+  return copy_to_array<double>(values.data(), {static_cast<py::ssize_t>(values.size()), 4, 4});
+}
+
+py::array_t<bool> flags(const std::vector<std::uint8_t>& values) {
+  return copy_to_array<bool>(values.data(), {static_cast<py::ssize_t>(values.size())});
+}
+
+void bind_snapshots(py::module_& module) {
+  py::class_<KeyFrameSnapshot>(module, "KeyFrameSnapshot", "Published keyframes by ascending id.")
+      .def_property_readonly(
+          "ids", [](const KeyFrameSnapshot& self) { return to_array(self.ids); }, "(n,) int64.")
+      .def_property_readonly(
+          "T_wc", [](const KeyFrameSnapshot& self) { return matrices(self.T_wc); },
+          "(n, 4, 4) float64, camera to world.")
+      .def_property_readonly(
+          "timestamps", [](const KeyFrameSnapshot& self) { return to_array(self.timestamps); },
+          "(n,) float64, seconds.")
+      .def_property_readonly(
+          "parents", [](const KeyFrameSnapshot& self) { return to_array(self.parents); },
+          "(n,) int64, -1 for keyframe 0.");
+  py::class_<EdgeSnapshot>(module, "EdgeSnapshot", "Covisibility edges a < b.")
+      .def_property_readonly(
+          "a", [](const EdgeSnapshot& self) { return to_array(self.a); }, "(n,) int64.")
+      .def_property_readonly(
+          "b", [](const EdgeSnapshot& self) { return to_array(self.b); }, "(n,) int64.")
+      .def_property_readonly(
+          "weights", [](const EdgeSnapshot& self) { return to_array(self.weights); },
+          "(n,) int32, shared points.");
+  py::class_<PointSnapshot>(module, "PointSnapshot", "Points by ascending id.")
+      .def_property_readonly(
+          "ids", [](const PointSnapshot& self) { return to_array(self.ids); }, "(n,) int64.")
+      .def_property_readonly(
+          "positions", [](const PointSnapshot& self) { return rows(self.positions); },
+          "(n, 3) float64, world.")
+      .def_property_readonly(
+          "observation_counts",
+          [](const PointSnapshot& self) { return to_array(self.observation_counts); },
+          "(n,) int32, 2 per observation with depth, else 1.");
+  py::class_<ObservationSnapshot>(module, "ObservationSnapshot",
+                                  "Observations of ids[i]: entries offsets[i]:offsets[i + 1].")
+      .def_property_readonly(
+          "ids", [](const ObservationSnapshot& self) { return to_array(self.ids); }, "(n,) int64.")
+      .def_property_readonly(
+          "offsets", [](const ObservationSnapshot& self) { return to_array(self.offsets); },
+          "(n + 1,) int64.")
+      .def_property_readonly(
+          "keyframes", [](const ObservationSnapshot& self) { return to_array(self.keyframes); },
+          "(m,) int64.")
+      .def_property_readonly(
+          "keypoints", [](const ObservationSnapshot& self) { return to_array(self.keypoints); },
+          "(m,) int32, index of the keypoint in its keyframe.");
+  module.def("snapshot_keyframes", &snapshot_keyframes, "map"_a, Release(),
+             "Copy ids, poses, time stamps and parents of the keyframes.");
+  module.def("snapshot_edges", &snapshot_edges, "map"_a,
+             "min_weight"_a = static_cast<int>(Map::kCovisibilityThreshold), Release(),
+             "Copy the covisibility edges with at least `min_weight` shared points.");
+  module.def("snapshot_points", &snapshot_points, "map"_a, Release(),
+             "Copy ids, positions and observation counts of the points.");
+  module.def("snapshot_observations", &snapshot_observations, "map"_a, Release(),
+             "Copy who observes what, as compressed rows.");
+}
+
+void bind_trajectory(py::module_& module) {
+  // "Trajectory" is the Python class that readers and writers use.
+  py::class_<Trajectory>(module, "RecordedTrajectory", "Camera poses of all recorded frames.")
+      .def_property_readonly(
+          "timestamps", [](const Trajectory& self) { return to_array(self.timestamps); },
+          "(n,) float64, seconds.")
+      .def_property_readonly(
+          "T_wc", [](const Trajectory& self) { return matrices(self.T_wc); },
+          "(n, 4, 4) float64, camera to the frame of keyframe 0.")
+      .def_property_readonly(
+          "lost", [](const Trajectory& self) { return flags(self.lost); },
+          "(n,) bool: tracking was lost, the pose repeats the last known one.")
+      .def_property_readonly(
+          "frames", [](const Trajectory& self) { return to_array(self.frames); },
+          "(n,) int64, frame ids.");
+  py::class_<TrajectoryRecorder>(module, "TrajectoryRecorder",
+                                 "Remembers frames relative to their reference keyframes.")
+      .def(py::init<>(), "Nothing recorded.")
+      .def("__len__", &TrajectoryRecorder::size)
+      .def("record", &TrajectoryRecorder::record, "map"_a, "frame"_a, "lost"_a, Release(),
+           "Append a frame; without a pose it repeats the last relative pose.")
+      .def("rebuild", &TrajectoryRecorder::rebuild, "map"_a, Release(),
+           "All poses from the present keyframe poses, anchored at keyframe 0.")
+      .def("clear", &TrajectoryRecorder::clear, "Forget all frames.")
+      .def_property_readonly("n_bytes", &TrajectoryRecorder::n_bytes, "Allocated memory.");
+}
+
+}  // namespace
+
+void bind_map_snapshots(py::module_& module) {
+  bind_snapshots(module);
+  bind_trajectory(module);
+}
+
+}  // namespace orbslam::bindings
