@@ -3,11 +3,13 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "base/descriptor.hpp"
 #include "frame/frame.hpp"
+#include "places/vocabulary_file.hpp"
 
 namespace orbslam {
 
@@ -26,6 +28,33 @@ struct VocabularyNode {
   double weight = 0;  ///< of a word: its inverse document frequency
 };
 
+/// The same as columns, for trees of a million nodes. Row i describes node i + 1.
+struct NodeTable {
+  std::vector<std::uint32_t> parents;
+  std::vector<std::uint8_t> is_word;
+  std::vector<Descriptor> centres;
+  std::vector<double> weights;
+};
+
+/// Borrowed columns. Centres are 32 bytes per row without alignment.
+struct NodeRows {
+  std::size_t count = 0;
+  const std::uint32_t* parents = nullptr;
+  const std::uint8_t* is_word = nullptr;
+  const std::uint8_t* centres = nullptr;
+  const double* weights = nullptr;
+};
+
+struct NodeProblem {
+  std::size_t node = 0;  ///< number in the text format
+  std::string what;
+};
+
+/// The first row that breaks the rules of the tree (spec 11, section 2): parents come before
+/// their children, words have none, the others have 1 to `branching`, no path is longer than
+/// `depth`, weights are finite and not negative.
+std::optional<NodeProblem> find_problem(int branching, int depth, const NodeRows& rows);
+
 struct Quantised {
   std::uint32_t word = 0;
   std::uint32_t node = 0;  ///< ancestor at kDirectIndexDepth, or the leaf if it is shallower
@@ -38,16 +67,22 @@ struct Quantised {
 class Vocabulary {
  public:
   /// Memory-maps a file in the binary format (places/vocabulary_file.hpp). Pages are shared
-  /// between processes. Throws VocabularyError naming the path and what is wrong.
+  /// between processes. Throws VocabularyError naming the path and what is wrong. The file must
+  /// not be cut short while it is open; replacing it by a rename, as save() does, is harmless.
   static std::shared_ptr<const Vocabulary> open(const std::string& path);
   /// Nodes in text order without the root. Throws VocabularyError naming the first bad node.
   static std::shared_ptr<const Vocabulary> from_nodes(int branching, int depth, Scoring scoring,
                                                       Weighting weighting,
                                                       const std::vector<VocabularyNode>& nodes);
+  /// Throws VocabularyError as well when scoring is not L1, the only one the system computes.
+  static std::shared_ptr<const Vocabulary> from_rows(int branching, int depth, Scoring scoring,
+                                                     Weighting weighting, const NodeRows& rows);
   ~Vocabulary();
 
-  /// Writes the binary format to a temporary name, then renames.
+  /// Writes the binary format to a temporary name, then renames. The short form keeps the comment.
   void save(const std::string& path) const;
+  void save(const std::string& path, const std::string& comment,
+            const VocabularySource& source) const;
 
   int branching() const;
   int depth() const;
@@ -55,8 +90,14 @@ class Vocabulary {
   Weighting weighting() const;
   std::size_t n_nodes() const;  ///< the root included
   std::size_t n_words() const;
-  std::uint64_t hash() const;  ///< of the content; saved maps remember it
-  std::vector<VocabularyNode> nodes() const;  ///< for the text writer
+  std::uint64_t hash() const;       ///< of the content; saved maps remember it
+  std::string comment() const;      ///< where it comes from, its licence
+  VocabularySource source() const;  ///< the text file it was made from, if any
+  std::vector<VocabularyNode> nodes() const;
+  NodeTable table() const;  ///< for the text writer
+  /// Throws VocabularyError unless the content matches its hash. open() has done so for files up
+  /// to VocabularyImage::kSmallFile bytes, of larger ones it has read the small tables only.
+  void check_content() const;
 
   Quantised quantise(const Descriptor& descriptor) const;
   /// Words and direct index of an image (spec 11, section 4).

@@ -86,6 +86,7 @@ Array<T> read_npy(const std::string& path) {
 template Array<float> read_npy(const std::string&);
 template Array<double> read_npy(const std::string&);
 template Array<std::int32_t> read_npy(const std::string&);
+template Array<std::uint32_t> read_npy(const std::string&);
 template Array<std::int64_t> read_npy(const std::string&);
 template Array<std::uint8_t> read_npy(const std::string&);
 
