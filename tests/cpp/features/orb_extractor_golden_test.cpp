@@ -124,7 +124,7 @@ INSTANTIATE_TEST_SUITE_P(Synthetic, Golden,
                            return std::string(chosen.param.name) + "_" +
                                   std::to_string(chosen.param.n_features) +
                                   (chosen.param.kernels == KernelChoice::avx2 ? "_avx2"
-                                                                            : "_portable");
+                                                                              : "_portable");
                          });
 
 }  // namespace
