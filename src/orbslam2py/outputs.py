@@ -18,11 +18,12 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py._files import atomic_write
+from orbslam2py._rotations import quaternions_from_rotations
 from orbslam2py.errors import DatasetError
 from orbslam2py.plots import draw_trajectory
 from orbslam2py.report import RunEvaluation
 from orbslam2py.runner import FrameRow, RunResult
-from orbslam2py.trajectory import quaternion_xyzw, write_kitti, write_tum
+from orbslam2py.trajectory import Trajectory, write_kitti, write_tum
 
 _log = logging.getLogger(__name__)
 
@@ -103,37 +104,28 @@ class OutputWriter:
         self._write("settings.yaml", result.settings.save)
         self._write_trajectories(result)
         self._write("frames.csv", lambda path: _write_frames(path, result.rows))
-        snapshot = result.snapshot
-        if snapshot is not None:
-            points = anchored_points(result)
-            self._write("points.ply", lambda path: write_ply(path, points))
-        if result.trajectories and len(result.trajectories[-1].timestamps):
+        points = anchored_points(result)
+        self._write("points.ply", lambda path: write_ply(path, points))
+        if len(result.tracked_trajectory()):
             self._write("trajectory.png", lambda path: _draw(path, result, evaluation, report))
         self._write(
             "report.json", lambda path: _write_text(path, json.dumps(report, indent=2) + "\n")
         )
 
     def _write_trajectories(self, result: RunResult) -> None:
-        texts = tracked_timestamp_texts(result)
         *earlier, last = result.trajectories
         for number, trajectory in enumerate(earlier):
-            self._write(
-                f"trajectory_map{number}.txt",
-                lambda path, t=trajectory, n=number: write_tum(
-                    path, t.tracked(), texts[n]
-                ),
-            )
+            self._write_tum(f"trajectory_map{number}.txt", result, trajectory)
+        self._write_tum("trajectory.txt", result, last)
+        self._write_tum("trajectory_online.txt", result, result.online_trajectory())
+        self._write_tum("keyframes.txt", result, result.keyframes)
         self._write(
-            "trajectory.txt", lambda path: write_tum(path, last.tracked(), texts[len(earlier)])
+            "trajectory_kitti.txt", lambda path: write_kitti(path, last, len(result.rows))
         )
-        self._write("trajectory_online.txt", lambda path: _write_online(path, result.rows))
-        self._write("trajectory_kitti.txt", lambda path: write_kitti(path, last.T_wc))
-        if result.keyframes is not None:
-            keyframes = result.keyframes
-            self._write(
-                "keyframes.txt",
-                lambda path: write_tum(path, keyframes, keyframe_timestamp_texts(result)),
-            )
+
+    def _write_tum(self, name: str, result: RunResult, trajectory: Trajectory) -> None:
+        texts = [result.rows[int(i)].timestamp for i in trajectory.indices]
+        self._write(name, lambda path: write_tum(path, trajectory, texts))
 
     def _write(self, name: str, write: Callable[[Path], object]) -> None:
         try:
@@ -155,35 +147,9 @@ class OutputWriter:
         self.problems.append(message)
 
 
-def tracked_timestamp_texts(result: RunResult) -> list[list[str]]:
-    """Per map, the time stamp texts of the frames with a pose, as the source wrote them."""
-    texts: list[list[str]] = [[] for _ in result.trajectories]
-    by_key = {
-        (row.record.map_index, row.record.frame_id): row.timestamp
-        for row in result.rows
-        if row.record is not None
-    }
-    for number, trajectory in enumerate(result.trajectories):
-        texts[number] = [by_key[number, int(i)] for i in trajectory.tracked().indices]
-    return texts
-
-
-def keyframe_timestamp_texts(result: RunResult) -> list[str]:
-    """Time stamp texts of the keyframes of the last map."""
-    last_map = len(result.trajectories) - 1
-    by_time = {
-        row.record.timestamp: row.timestamp
-        for row in result.rows
-        if row.record is not None and row.record.map_index == last_map
-    }
-    assert result.keyframes is not None
-    return [by_time[float(stamp)] for stamp in result.keyframes.timestamps]
-
-
 def anchored_points(result: RunResult) -> npt.NDArray[np.float64]:
     """Map points (p, 3) in the frame of keyframe 0, like the trajectories."""
     snapshot = result.snapshot
-    assert snapshot is not None
     if not len(snapshot.keyframe_T_wc):
         return snapshot.point_positions
     T_0w = np.linalg.inv(snapshot.keyframe_T_wc[0])
@@ -208,14 +174,6 @@ def _write_text(path: Path, text: str) -> None:
         stream.write(text)
 
 
-def _write_online(path: Path, rows: list[FrameRow]) -> None:
-    """Poses at tracking time, of all maps, each in the world frame of its map."""
-    tracked = [row for row in rows if row.record is not None and row.record.T_cw is not None]
-    T_wc = [row.record.T_wc for row in tracked if row.record is not None]
-    poses = np.array(T_wc) if T_wc else np.zeros((0, 4, 4))
-    write_tum(path, poses, [row.timestamp for row in tracked])
-
-
 def _write_frames(path: Path, rows: list[FrameRow]) -> None:
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
@@ -235,7 +193,8 @@ def _frame_fields(row: FrameRow) -> list[object]:
         return [row.index, row.timestamp, "", row.state, row.reason] + [""] * (11 + len(STAGES))
     pose: list[object] = [""] * 7
     if record.T_wc is not None:
-        values = [*record.T_wc[:3, 3], *quaternion_xyzw(record.T_wc[:3, :3])]
+        quaternion = quaternions_from_rotations(record.T_wc[None, :3, :3])[0]
+        values = [*record.T_wc[:3, 3], *quaternion]
         pose = [f"{value:.9f}" for value in values]
     reference = record.reference_keyframe if record.reference_keyframe >= 0 else ""
     stages = [f"{record.milliseconds.get(stage, 0.0):.3f}" for stage in STAGES]
@@ -257,26 +216,23 @@ def _frame_fields(row: FrameRow) -> list[object]:
 def _draw(
     path: Path, result: RunResult, evaluation: RunEvaluation | None, report: dict[str, Any]
 ) -> None:
-    last = result.trajectories[-1].tracked()
-    if not len(last.timestamps):
-        return
+    last = result.tracked_trajectory()
     begin = float(last.timestamps[0])
-    keyframes = result.keyframes
     truth = None
     subtitle = (
         f"{report['tracked']} of {report['frames']} frames tracked, "
         f"{report['keyframes']} keyframes, {report['map_points']} points"
     )
-    if evaluation is not None and evaluation.ate is not None:
-        truth = (evaluation.truth_timestamps - begin, evaluation.truth_positions)
-        subtitle += f", ATE {evaluation.ate.rmse:.4f} m"
+    if evaluation is not None:
+        truth = (evaluation.truth.timestamps - begin, evaluation.truth.positions)
+        subtitle += f", ATE {report['ate_rmse_m']:.4f} m"
     draw_trajectory(
         path,
         title=f"{report['sequence']} ({report['sensor']})",
         subtitle=subtitle,
-        positions=last.T_wc[:, :3, 3],
+        positions=last.positions,
         seconds=last.timestamps - begin,
-        keyframes=keyframes.T_wc[:, :3, 3] if keyframes is not None else np.zeros((0, 3)),
+        keyframes=result.keyframes.positions,
         points=anchored_points(result),
         truth=truth,
     )

@@ -7,9 +7,11 @@ import logging
 import time
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from orbslam2py import _core as core
 from orbslam2py.datasets.base import Images, Sequence
@@ -86,6 +88,17 @@ class FrameRow:
 DROPPED = "dropped to keep up with real time"
 
 
+def empty_trajectory() -> Trajectory:
+    """No poses."""
+    return Trajectory(timestamps=np.zeros(0), T_wc=np.zeros((0, 4, 4)))
+
+
+def empty_snapshot() -> MapSnapshot:
+    """A map without anything."""
+    ids = np.zeros(0, np.int64)
+    return MapSnapshot(ids, np.zeros(0), np.zeros((0, 4, 4)), ids, np.zeros((0, 3)))
+
+
 @dataclass
 class RunResult:
     """Everything a run gives, whether it ended or was interrupted."""
@@ -97,9 +110,11 @@ class RunResult:
     """Frames that were to be processed."""
     rows: list[FrameRow] = field(default_factory=list)
     trajectories: list[Trajectory] = field(default_factory=list)
-    """One per map; `Trajectory.indices` count the tracked images of that map."""
-    keyframes: Trajectory | None = None
-    snapshot: MapSnapshot | None = None
+    """One per map, lost frames included; `Trajectory.indices` are positions in `rows`."""
+    keyframes: Trajectory = field(default_factory=empty_trajectory)
+    """Keyframes of the last map."""
+    snapshot: MapSnapshot = field(default_factory=empty_snapshot)
+    """The last map."""
     stages: dict[str, dict[str, float]] = field(default_factory=dict)
     seconds: float = 0.0
     slam_seconds: float = 0.0
@@ -124,6 +139,28 @@ class RunResult:
     def n_dropped(self) -> int:
         """Frames that real time left no room for."""
         return sum(row.state == "DROPPED" for row in self.rows)
+
+    def tracked_trajectory(self) -> Trajectory:
+        """Frames of the last map that have a pose, after the last optimisation."""
+        if not self.trajectories:
+            return empty_trajectory()
+        last = self.trajectories[-1]
+        return last.select(~last.lost)
+
+    def online_trajectory(self) -> Trajectory:
+        """Poses as they were when each frame was tracked; every map in its own world frame."""
+        tracked = [
+            (position, row.record)
+            for position, row in enumerate(self.rows)
+            if row.record is not None and row.record.T_cw is not None
+        ]
+        if not tracked:
+            return empty_trajectory()
+        return Trajectory(
+            timestamps=np.array([record.timestamp for _, record in tracked]),
+            T_wc=np.array([record.T_wc for _, record in tracked]),
+            indices=np.array([position for position, _ in tracked]),
+        )
 
     def why_nothing_was_tracked(self) -> str:
         """The most frequent reason."""
@@ -249,8 +286,23 @@ class SequenceRunner:
 
     def _collect(self, system: System) -> None:
         result = self.result
-        result.trajectories = system.trajectories()
-        result.keyframes = system.keyframe_trajectory()
+        trajectories = system.trajectories()
+        last_map = len(trajectories) - 1
+        by_frame: dict[tuple[int, int], int] = {}
+        by_time: dict[float, int] = {}
+        for position, row in enumerate(result.rows):
+            if row.record is not None:
+                by_frame[row.record.map_index, row.record.frame_id] = position
+                if row.record.map_index == last_map:
+                    by_time[row.record.timestamp] = position
+        result.trajectories = [
+            _renumber(t, [by_frame.get((number, int(i)), -1) for i in t.indices])
+            for number, t in enumerate(trajectories)
+        ]
+        keyframes = system.keyframe_trajectory()
+        result.keyframes = _renumber(
+            keyframes, [by_time.get(float(t), -1) for t in keyframes.timestamps]
+        )
         result.snapshot = system.map_snapshot()
         result.stages = system.stage_statistics()
         result.n_resets = system.n_resets
@@ -258,10 +310,16 @@ class SequenceRunner:
         result.n_loops_closed = system.n_loops_closed
 
 
+def _renumber(trajectory: Trajectory, positions: list[int]) -> Trajectory:
+    """Give every pose the position of its row; an interrupt may have left a pose without one."""
+    indices = np.array(positions, np.int64)
+    return replace(trajectory, indices=indices).select(indices >= 0)
+
+
 class _Clock:
     """Plays time stamps: a frame is dropped when the next one has come before it was taken."""
 
-    def __init__(self, timestamps: np.ndarray, indices: list[int]) -> None:
+    def __init__(self, timestamps: npt.NDArray[np.float64], indices: list[int]) -> None:
         self._due = np.asarray(timestamps)[indices]
         self._offset: float | None = None
 
@@ -279,7 +337,7 @@ class _Clock:
         return has_next and now >= float(self._due[position + 1]) + self._offset
 
 
-def _second(array: np.ndarray | None) -> np.ndarray:
+def _second(array: npt.NDArray[Any] | None) -> npt.NDArray[Any]:
     if array is None:
         raise DatasetError("the sequence delivers no second image for this sensor")
     return array
