@@ -233,16 +233,21 @@ void bind_builders(py::module_& module) {
           "camera", [](const FrameContext& c) { return std::const_pointer_cast<Camera>(c.camera); })
       .def_property_readonly("scales", [](const FrameContext& c) { return *c.scales; });
 
-  module.def("build_monocular_frame", &build_monocular_frame, py::arg("context"), py::arg("id"),
-             py::arg("timestamp"), py::arg("features"), py::call_guard<py::gil_scoped_release>(),
-             "Frame of a single camera: undistorted keypoints, no depth.");
+  module.def(
+      "build_monocular_frame",
+      [](const FrameContext& context, FrameId id, double timestamp, const Extraction& extraction) {
+        return build_monocular_frame(context, id, timestamp, extraction.features);
+      },
+      py::arg("context"), py::arg("id"), py::arg("timestamp"), py::arg("extraction"),
+      py::call_guard<py::gil_scoped_release>(),
+      "Frame of a single camera: undistorted keypoints, no depth.");
   module.def("build_stereo_frame", &build_stereo_frame, py::arg("context"), py::arg("id"),
              py::arg("timestamp"), py::arg("left"), py::arg("right"),
              py::call_guard<py::gil_scoped_release>(),
              "Frame of a rectified pair with depth by stereo matching.");
   module.def(
       "build_rgbd_frame",
-      [](const FrameContext& context, FrameId id, double timestamp, const Features& features,
+      [](const FrameContext& context, FrameId id, double timestamp, const Extraction& extraction,
          const py::array& depth) {
         if (!holds<float>(depth)) {
           throw ImageError("depth image must be float32 metres; use to_depth_metres");
@@ -250,9 +255,9 @@ void bind_builders(py::module_& module) {
         const py::array metres = normal_form(depth);
         const cv::Mat view = view_image(metres, CV_32F);
         const py::gil_scoped_release release;
-        return build_rgbd_frame(context, id, timestamp, features, view);
+        return build_rgbd_frame(context, id, timestamp, extraction.features, view);
       },
-      py::arg("context"), py::arg("id"), py::arg("timestamp"), py::arg("features"),
+      py::arg("context"), py::arg("id"), py::arg("timestamp"), py::arg("extraction"),
       py::arg("depth"),
       "Frame of an image with registered depth (h, w) float32 [m]; <= 0, NaN and inf: none. "
       "Raises ImageError when the depth image has another size or type.");
@@ -280,27 +285,21 @@ void bind_frame(py::module_& module) {
       "(right_u [px], depth [m]) of the left keypoints, float32, -1: none. bf in px m, "
       "max_disparity in px.");
 
-  py::class_<WorkerThread>(module, "WorkerThread",
-                           "A helper thread that waits for work as long as it lives.")
-      .def(py::init<>());
-  module.def(
-      "extract_pair",
-      [](OrbExtractor& left_extractor, OrbExtractor& right_extractor, WorkerThread& helper,
-         const py::array& left, const py::array& right) {
-        if (!holds<std::uint8_t>(left) || !holds<std::uint8_t>(right)) {
-          throw ImageError("images of a pair must be grey, uint8; use to_grey");
-        }
-        const py::array left_pixels = normal_form(left), right_pixels = normal_form(right);
-        // Level 0 of a pyramid shares the image's pixels and outlives the arrays: copy them.
-        const cv::Mat left_view = view_image(left_pixels, CV_8U);
-        const cv::Mat right_view = view_image(right_pixels, CV_8U);
-        const py::gil_scoped_release release;
-        return extract_pair(left_extractor, right_extractor, helper, left_view.clone(),
-                            right_view.clone());
-      },
-      py::arg("left_extractor"), py::arg("right_extractor"), py::arg("helper"), py::arg("left"),
-      py::arg("right"),
-      "Extractions (left, right) of two grey images (h, w) uint8 of one size, at the same time.");
+  py::class_<PairExtractor>(module, "PairExtractor",
+                            "Extracts left and right images at the same time, in two threads.")
+      .def(py::init<const OrbOptions&>(), py::arg("options"))
+      .def(
+          "extract",
+          [](PairExtractor& self, const py::array& left, const py::array& right) {
+            // Level 0 of a pyramid shares the image's pixels and outlives the arrays: copy them.
+            const cv::Mat left_pixels = view_uint8(left, "left image").clone();
+            const cv::Mat right_pixels = view_uint8(right, "right image").clone();
+            const py::gil_scoped_release release;
+            return self.extract(left_pixels, right_pixels);
+          },
+          py::arg("left"), py::arg("right"),
+          "Extractions (left, right) of two grey images (h, w) uint8 of one size. Raises "
+          "ImageError for anything else, StateError while another thread uses this object.");
 
   module.def("to_grey", &grey_of, py::arg("image"), py::arg("is_rgb"),
              "Grey image (h, w) uint8 of a grey, colour (h, w, 3) or colour + alpha (h, w, 4) "
