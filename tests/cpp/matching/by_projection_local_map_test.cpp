@@ -199,6 +199,7 @@ int brute_force(TrackedFrame& frame, const PointBatch& points, float factor) {
     for (std::size_t k = 0; k < image.size(); ++k) {
       const Keypoint& keypoint = image.keypoints[k];
       if (frame.map_points[k].valid()) continue;
+      if (keypoint.x > 640 || keypoint.y > 480) continue;  // noise: in no cell of the grid
       if (keypoint.level < views[i].level - 1 || keypoint.level > views[i].level) continue;
       if (!(std::abs(keypoint.x - views[i].u) < r && std::abs(keypoint.y - views[i].v) < r)) {
         continue;
