@@ -25,11 +25,6 @@ py::array_t<float> undistort(const Camera& camera,
   return copy_to_array<float>(xy.data(), {points.shape(0), 2});
 }
 
-// Sizes are (width, height) in Python.
-using SizePair = std::pair<int, int>;
-
-SizePair to_pair(const ImageSize& size) { return {size.width, size.height}; }
-
 void bind_pinhole(py::module_& module) {
   py::class_<Pinhole>(module, "Pinhole", "Pinhole intrinsics in pixels.")
       .def(py::init([](double fx, double fy, double cx, double cy) {
@@ -48,34 +43,47 @@ void bind_pinhole(py::module_& module) {
       .def_readonly("max_y", &ImageBounds::max_y);
 }
 
+// Pinhole and size lie flat in Python: options.fx, options.width.
+template <class Part, class Value>
+void flat_property(py::class_<CameraOptions>& options, const char* name, Part CameraOptions::*part,
+                   Value Part::*value, const char* doc) {
+  options.def_property(
+      name, [=](const CameraOptions& o) { return o.*part.*value; },
+      [=](CameraOptions& o, Value v) { o.*part.*value = v; }, doc);
+}
+
+void bind_options(py::module_& module) {
+  py::class_<CameraOptions> options(module, "CameraOptions", "What a Camera is made from.");
+  options
+      .def(py::init([](double fx, double fy, double cx, double cy, int width, int height,
+                       const std::array<double, 5>& distortion, double bf, double depth_ratio) {
+             return CameraOptions{{fx, fy, cx, cy}, distortion, bf, depth_ratio, {width, height}};
+           }),
+           py::arg("fx") = 0.0, py::arg("fy") = 0.0, py::arg("cx") = 0.0, py::arg("cy") = 0.0,
+           py::arg("width") = 0, py::arg("height") = 0,
+           py::arg("distortion") = std::array<double, 5>{}, py::arg("bf") = 0.0,
+           py::arg("depth_ratio") = 0.0, "Nothing is checked before a Camera is made.")
+      .def_readwrite("distortion", &CameraOptions::distortion,
+                     "k1, k2, p1, p2, k3; zeros for rectified images.")
+      .def_readwrite("bf", &CameraOptions::bf, "Baseline times fx [px m]; 0: single camera.")
+      .def_readwrite("depth_ratio", &CameraOptions::depth_ratio,
+                     "Close/far limit in multiples of the baseline.");
+  flat_property(options, "fx", &CameraOptions::pinhole, &Pinhole::fx, "Focal length [px].");
+  flat_property(options, "fy", &CameraOptions::pinhole, &Pinhole::fy, "Focal length [px].");
+  flat_property(options, "cx", &CameraOptions::pinhole, &Pinhole::cx, "Principal point [px].");
+  flat_property(options, "cy", &CameraOptions::pinhole, &Pinhole::cy, "Principal point [px].");
+  flat_property(options, "width", &CameraOptions::image_size, &ImageSize::width,
+                "Width of the first image [px].");
+  flat_property(options, "height", &CameraOptions::image_size, &ImageSize::height,
+                "Height of the first image [px].");
+}
+
 }  // namespace
 
 void bind_camera(py::module_& module) {
   bind_pinhole(module);
 
-  py::class_<CameraOptions>(module, "CameraOptions", "What a Camera is made from.")
-      .def(py::init([](const Pinhole& pinhole, const SizePair& image_size,
-                       const std::array<double, 5>& distortion, double bf, double depth_ratio) {
-             return CameraOptions{pinhole, distortion, bf, depth_ratio,
-                                  ImageSize{image_size.first, image_size.second}};
-           }),
-           py::arg("pinhole"), py::arg("image_size"),
-           py::arg("distortion") = std::array<double, 5>{}, py::arg("bf") = 0.0,
-           py::arg("depth_ratio") = 0.0,
-           "image_size: (width, height) [px]. distortion: k1, k2, p1, p2, k3 (zeros: rectified "
-           "images). bf: baseline times fx "
-           "[px m], 0 for a single camera. depth_ratio: close/far limit in baselines.")
-      .def_readwrite("pinhole", &CameraOptions::pinhole)
-      .def_readwrite("distortion", &CameraOptions::distortion, "k1, k2, p1, p2, k3.")
-      .def_readwrite("bf", &CameraOptions::bf, "Baseline times fx [px m]; 0: none.")
-      .def_readwrite("depth_ratio", &CameraOptions::depth_ratio,
-                     "Close/far limit in multiples of the baseline.")
-      .def_property(
-          "image_size", [](const CameraOptions& options) { return to_pair(options.image_size); },
-          [](CameraOptions& options, const SizePair& size) {
-            options.image_size = {size.first, size.second};
-          },
-          "(width, height) of the first image [px].");
+  bind_options(module);
 
   py::class_<Camera, std::shared_ptr<Camera>>(
       module, "Camera", "A calibrated camera: pinhole, lens, (virtual) right camera, bounds.")
@@ -84,7 +92,10 @@ void bind_camera(py::module_& module) {
       .def_property_readonly("pinhole", &Camera::pinhole)
       .def_property_readonly("bounds", &Camera::bounds)
       .def_property_readonly(
-          "image_size", [](const Camera& camera) { return to_pair(camera.image_size()); },
+          "image_size",
+          [](const Camera& camera) {
+            return std::pair(camera.image_size().width, camera.image_size().height);
+          },
           "(width, height) [px].")
       .def_property_readonly(
           "is_rectified", [](const Camera& camera) { return camera.lens().is_identity(); },

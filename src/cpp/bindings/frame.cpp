@@ -180,6 +180,7 @@ void bind_tracked_frame(py::module_& module) {
            py::arg("frame").none(false))
       .def_property_readonly(
           "frame", [](const TrackedFrame& t) { return std::const_pointer_cast<Frame>(t.frame); })
+      .def_property_readonly("id", [](const TrackedFrame& t) { return t.frame->id; })
       .def_readwrite("T_cw", &TrackedFrame::T_cw, "World to camera; None while unknown.")
       .def_readwrite("reference_keyframe", &TrackedFrame::reference_keyframe, "-1: none.")
       .def_property_readonly(

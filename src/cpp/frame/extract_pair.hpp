@@ -21,4 +21,20 @@ std::pair<Extraction, Extraction> extract_pair(OrbExtractor& left_extractor,
                                                const cv::Mat& left_mask = {},
                                                const cv::Mat& right_mask = {});
 
+/// Two extractors with the same options and their helper thread. One thread at a time: a second
+/// caller gets a StateError before anything is touched.
+class PairExtractor {
+ public:
+  explicit PairExtractor(const OrbOptions& options) : left_(options), right_(options) {}
+
+  /// Extractions of (left, right); see extract_pair().
+  std::pair<Extraction, Extraction> extract(const cv::Mat& left, const cv::Mat& right) {
+    return extract_pair(left_, right_, helper_, left, right);
+  }
+
+ private:
+  OrbExtractor left_, right_;
+  WorkerThread helper_;
+};
+
 }  // namespace orbslam

@@ -69,6 +69,13 @@ TEST_F(ExtractPair, ExceptionsOfEitherSideArriveAndTheNextPairWorks) {
   expect_equal(pair.second, right_.extract(right_image_));
 }
 
+TEST_F(ExtractPair, AnExtractorForPairsGivesTheSame) {
+  PairExtractor extractor{OrbOptions{}};
+  const auto pair = extractor.extract(left_image_, right_image_);
+  expect_equal(pair.first, left_.extract(left_image_));
+  expect_equal(pair.second, right_.extract(right_image_));
+}
+
 TEST_F(ExtractPair, SizesMustAgreeAndExtractorsDiffer) {
   EXPECT_THROW(
       extract_pair(left_, right_, helper_, left_image_, right_image_(cv::Rect(0, 0, 300, 300))),
