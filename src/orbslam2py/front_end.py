@@ -113,21 +113,21 @@ class FrontEnd:
 
 
 def _orb_options(settings: Settings) -> core.OrbOptions:
-    options = core.OrbOptions()
-    options.n_features = settings.orb.n_features
-    options.scale_factor = settings.orb.scale_factor
-    options.n_levels = settings.orb.n_levels
-    options.initial_threshold = settings.orb.ini_th_fast
-    options.minimum_threshold = settings.orb.min_th_fast
-    return options
+    return core.OrbOptions(
+        n_features=settings.orb.n_features,
+        scale_factor=settings.orb.scale_factor,
+        n_levels=settings.orb.n_levels,
+        initial_threshold=settings.orb.ini_th_fast,
+        minimum_threshold=settings.orb.min_th_fast,
+    )
 
 
 def _camera_options(settings: Settings, width: int, height: int) -> core.CameraOptions:
     camera = settings.camera
-    options = core.CameraOptions()
-    options.fx, options.fy, options.cx, options.cy = camera.fx, camera.fy, camera.cx, camera.cy
-    options.distortion = [camera.k1, camera.k2, camera.p1, camera.p2, camera.k3]
-    options.bf = camera.bf
-    options.depth_ratio = settings.depth.close_factor if settings.depth is not None else 0.0
-    options.width, options.height = width, height
-    return options
+    return core.CameraOptions(
+        pinhole=core.Pinhole(camera.fx, camera.fy, camera.cx, camera.cy),
+        image_size=(width, height),
+        distortion=[camera.k1, camera.k2, camera.p1, camera.p2, camera.k3],
+        bf=camera.bf,
+        depth_ratio=settings.depth.close_factor if settings.depth is not None else 0.0,
+    )

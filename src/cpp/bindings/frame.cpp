@@ -212,6 +212,9 @@ void bind_tracked_frame(py::module_& module) {
           py::arg("i"), "Removes the map point of keypoint i.")
       .def("clear_associations", &TrackedFrame::clear_associations,
            "Removes all map points, positions and outlier flags; keeps the pose.")
+      .def(
+          "discard_outliers", [](TrackedFrame& t) { return to_array(t.discard_outliers()); },
+          "Dissociates the outliers; ids (int64) of their points, ascending.")
       .def("n_associated", &TrackedFrame::n_associated,
            "Number of keypoints with a map point, outliers included.")
       .def(
