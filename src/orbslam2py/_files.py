@@ -12,7 +12,7 @@ from typing import IO, Any, NoReturn
 
 
 @contextlib.contextmanager
-def atomic_write(path: str | Path, *, binary: bool = False) -> Iterator[IO[Any]]:
+def atomic_write(path: str | os.PathLike[str], *, binary: bool = False) -> Iterator[IO[Any]]:
     r"""Open a file for writing; it appears under its name only when all was written.
 
     The content goes to a temporary file in the same folder, which replaces `path` at the end of
@@ -72,7 +72,7 @@ def _remove(path: Path) -> None:
         path.unlink()
 
 
-def _open(path: str | Path, actual: Path, flags: int, binary: bool) -> IO[Any]:
+def _open(path: str | os.PathLike[str], actual: Path, flags: int, binary: bool) -> IO[Any]:
     try:
         descriptor = os.open(actual, flags, 0o666)
     except OSError as error:
@@ -82,14 +82,14 @@ def _open(path: str | Path, actual: Path, flags: int, binary: bool) -> IO[Any]:
     return os.fdopen(descriptor, "w", encoding="utf-8", newline="\n")
 
 
-def _report_as(path: str | Path, step: Callable[[], object]) -> None:
+def _report_as(path: str | os.PathLike[str], step: Callable[[], object]) -> None:
     try:
         step()
     except OSError as error:
         _raise_named(path, error)
 
 
-def _raise_named(path: str | Path, error: OSError) -> NoReturn:
+def _raise_named(path: str | os.PathLike[str], error: OSError) -> NoReturn:
     reason = os.strerror(error.errno) if error.errno else str(error)
     message = f"cannot write {path}: {reason}; a file that was there is kept"
     # OSError(errno, ...) makes the matching subclass by itself.

@@ -10,6 +10,7 @@ import difflib
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from numbers import Real
 
 from orbslam2py.sensor import Sensor
 
@@ -194,20 +195,23 @@ def convert(key: Key, value: float) -> float | int | bool:
     return key.kind(value)
 
 
-def problems_of_group(group: str, values: object) -> list[str]:
-    """Say what is wrong with the values of one settings dataclass."""
+def check_group(group: str, values: object) -> list[str]:
+    """Say what is wrong with the values of one settings dataclass.
+
+    Good values get the type of their key, so that NumPy's numbers become Python's own.
+    """
     problems = []
     for key in KEYS:
         if key.group != group:
             continue
         value = getattr(values, key.field)
         if value is None or (key.name == "Camera.bf" and value == 0):
-            continue  # absent: image size unknown, or a camera without depth
-        if isinstance(value, str) or not isinstance(value, (int, float)):
+            continue  # image size unknown, a camera without depth
+        if not isinstance(value, Real):
             problems.append(f"{key.name} ({key.field}) is {value!r}, not a number")
             continue
         try:
-            convert(key, value)
+            object.__setattr__(values, key.field, convert(key, float(value)))
         except ValueError as error:
             problems.append(str(error))
     return problems

@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orbslam2py._settings_keys import nearest
+from orbslam2py._settings_reader import read_settings
 from orbslam2py.errors import SettingsError
 from orbslam2py.sensor import Sensor
 from orbslam2py.settings import (
@@ -95,7 +97,7 @@ def builtin_settings(name: str, sensor: Sensor) -> Settings:
 
 
 def resolve_settings(
-    choice: str | Path | Settings, sensor: Sensor, *, allow_unknown: bool = False
+    choice: str | PathLike[str] | Settings, sensor: Sensor, *, allow_unknown: bool = False
 ) -> Settings:
     """Make settings of what a user gave: a built-in name, a file, or finished settings.
 
@@ -105,15 +107,14 @@ def resolve_settings(
         If it is neither a name nor a readable and correct file, or made for another sensor.
     """
     if isinstance(choice, Settings):
-        if choice.sensor is not sensor:
-            raise SettingsError(f"these settings are for {choice.sensor}, not for {sensor}")
+        choice.check_for(sensor)
         return choice
     name = str(choice)
     if name.lower() in BUILTIN_NAMES or name.lower() in _KITTI_SEQUENCES:
         return builtin_settings(name, sensor)
     path = Path(choice)
     if path.exists() or path.suffix or len(path.parts) > 1:
-        return Settings.load(path, sensor, allow_unknown=allow_unknown)
+        return read_settings(path, sensor, allow_unknown=allow_unknown)
     return builtin_settings(name, sensor)  # tells the names there are
 
 

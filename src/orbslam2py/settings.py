@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from pathlib import Path
+from os import PathLike
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orbslam2py._files import atomic_write
-from orbslam2py._settings_keys import problems_of_group
+from orbslam2py._settings_keys import check_group
 from orbslam2py._settings_writer import format_settings
 from orbslam2py.errors import SettingsError
 from orbslam2py.sensor import Sensor
@@ -67,7 +67,7 @@ class CameraSettings:
     rgb: bool = False
 
     def __post_init__(self) -> None:
-        _require(problems_of_group("camera", self))
+        _require(check_group("camera", self))
 
     @property
     def matrix(self) -> Array:
@@ -107,7 +107,7 @@ class OrbSettings:
     min_th_fast: int = 7
 
     def __post_init__(self) -> None:
-        problems = problems_of_group("orb", self)
+        problems = check_group("orb", self)
         if not problems and self.min_th_fast > self.ini_th_fast:
             problems = [thresholds_swapped(self.min_th_fast, self.ini_th_fast)]
         _require(problems)
@@ -137,7 +137,7 @@ class DepthSettings:
     raw_per_metre: float = 1.0
 
     def __post_init__(self) -> None:
-        _require(problems_of_group("depth", self))
+        _require(check_group("depth", self))
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ class ViewerSettings:
     viewpoint_f: float = 500.0
 
     def __post_init__(self) -> None:
-        _require(problems_of_group("viewer", self))
+        _require(check_group("viewer", self))
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,21 +279,29 @@ class Settings:
         return max(1, math.trunc(self.camera.fps))
 
     @property
-    def depth_scale(self) -> float:
-        """What a raw depth value is multiplied with to become metres."""
+    def depth_factor(self) -> float:
+        """Raw units of the depth image per metre; 1 if it is in metres."""
         # A factor of (nearly) zero stands for "already metres" in the files of ORB-SLAM.
         if self.depth is None or self.depth.raw_per_metre < 1e-5:
             return 1.0
-        return 1.0 / self.depth.raw_per_metre
+        return self.depth.raw_per_metre
+
+    def check_for(self, sensor: Sensor) -> None:
+        """Raise `SettingsError` unless these settings were made for the sensor."""
+        if self.sensor is not sensor:
+            raise SettingsError(f"these settings are for {self.sensor}, not for {sensor}")
 
     @classmethod
-    def load(cls, path: str | Path, sensor: Sensor, *, allow_unknown: bool = False) -> Settings:
-        """Read an ORB-SLAM settings file.
+    def load(
+        cls, path: str | PathLike[str], sensor: Sensor, *, allow_unknown: bool = False
+    ) -> Settings:
+        """Read an ORB-SLAM settings file, or take built-in settings by name.
 
         Parameters
         ----------
         path
-            The file, in OpenCV's YAML dialect.
+            The file, in OpenCV's YAML dialect, or a name such as ``tum1`` (see
+            `orbslam2py.builtin_settings`).
         sensor
             What to read it for: the same file serves several sensors with different needs.
         allow_unknown
@@ -304,12 +312,12 @@ class Settings:
         SettingsError
             Listing everything that is wrong: file, line, key, allowed values, nearest key.
         """
-        # The reader builds Settings, so it cannot be imported before the class exists.
-        from orbslam2py._settings_reader import read_settings  # noqa: PLC0415
+        # These build Settings, so they cannot be imported before the class exists.
+        from orbslam2py.builtin_settings import resolve_settings  # noqa: PLC0415
 
-        return read_settings(Path(path), sensor, allow_unknown=allow_unknown)
+        return resolve_settings(path, sensor, allow_unknown=allow_unknown)
 
-    def save(self, path: str | Path) -> None:
+    def save(self, path: str | PathLike[str]) -> None:
         """Write an ORB-SLAM settings file that `load` turns into equal settings.
 
         Raises

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lines of the text lists that data sets come with."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from orbslam2py.errors import DatasetError
+
+
+@dataclass(frozen=True)
+class TextLine:
+    """A line with content: its number from 1 and its fields without surrounding blanks."""
+
+    number: int
+    fields: list[str]
+
+
+def content_lines(path: str | Path, separator: str | None = None) -> list[TextLine]:
+    """Split a text file into fields; empty lines and lines starting with ``#`` are left out.
+
+    Parameters
+    ----------
+    path
+        The file.
+    separator
+        Between fields; blanks and tabs if None.
+
+    Raises
+    ------
+    DatasetError
+        If the file cannot be read.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig", errors="replace")
+    except OSError as error:
+        raise DatasetError(f"cannot open {path}: {error.strerror or error}") from error
+    lines = []
+    for number, raw in enumerate(text.splitlines(), start=1):
+        line = raw.strip()
+        if line and not line.startswith("#"):
+            fields = line.split(separator)
+            lines.append(TextLine(number, [field.strip() for field in fields]))
+    return lines
+
+
+def numbers_of(path: str | Path, line: TextLine, counts: tuple[int, ...]) -> list[float]:
+    """Convert all fields of a line.
+
+    Raises
+    ------
+    DatasetError
+        Naming file and line if the number of fields is none of `counts` or one is no number.
+    """
+    if len(line.fields) not in counts:
+        expected = " or ".join(str(count) for count in counts)
+        raise DatasetError(
+            f"{path}:{line.number}: expected {expected} numbers, found {len(line.fields)} fields"
+        )
+    return [number_of(path, line, field) for field in line.fields]
+
+
+def number_of(path: str | Path, line: TextLine, text: str) -> float:
+    """Convert one field to a finite number.
+
+    Raises
+    ------
+    DatasetError
+        Naming file and line.
+    """
+    try:
+        value = float(text)
+    except ValueError:
+        raise DatasetError(f"{path}:{line.number}: '{text}' is not a number") from None
+    if not math.isfinite(value):
+        raise DatasetError(f"{path}:{line.number}: {text} is not finite")
+    return value

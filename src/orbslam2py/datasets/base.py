@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What every data set offers, whatever its layout on disk."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbslam2py.errors import DatasetError
+from orbslam2py.sensor import Sensor
+from orbslam2py.settings import Settings
+from orbslam2py.trajectory import Trajectory
+
+_log = logging.getLogger(__name__)
+
+
+class Layout(str, Enum):
+    """How a recorded sequence lies on disk."""
+
+    TUM = "tum"
+    KITTI = "kitti"
+    EUROC = "euroc"
+
+    def __str__(self) -> str:
+        return self.value
+
+
+@dataclass(frozen=True)
+class Images:
+    """The images of one moment, as the tracking calls take them.
+
+    Attributes
+    ----------
+    image
+        Image of the only, left or colour camera: uint8 (h, w), (h, w, 3) or (h, w, 4) with the
+        colour order that the settings declare.
+    right
+        Right image of a rectified pair (stereo), else None.
+    depth
+        Raw depth registered to `image`, single channel (h, w) (RGB-D), else None.
+    """
+
+    image: NDArray[np.uint8]
+    right: NDArray[np.uint8] | None = None
+    depth: NDArray[np.generic] | None = None
+
+
+class Sequence(Protocol):
+    """A sequence of images opened for one sensor, recorded or made up.
+
+    Attributes
+    ----------
+    name
+        Name of the folder or of the world.
+    layout
+        How it lies on disk.
+    sensor
+        What it delivers images for.
+    settings
+        Given by the caller, or `default_settings`.
+    timestamps
+        Time of every frame in seconds, float64 (n,).
+    """
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+    @property
+    def layout(self) -> str: ...  # noqa: D102
+    @property
+    def sensor(self) -> Sensor: ...  # noqa: D102
+    @property
+    def settings(self) -> Settings: ...  # noqa: D102
+    @property
+    def timestamps(self) -> NDArray[np.float64]: ...  # noqa: D102
+
+    def __len__(self) -> int:
+        """Return the number of frames."""
+        ...
+
+    def timestamp_text(self, index: int, /) -> str:
+        """Return the time of a frame in seconds, with all digits of the source."""
+        ...
+
+    def default_settings(self) -> Settings:
+        """Choose settings by what comes with the images.
+
+        Raises
+        ------
+        DatasetError
+            If nothing tells them, listing what can be done.
+        SettingsError
+            If a settings file that comes with the images is wrong.
+        """
+        ...
+
+    def load(self, index: int, /) -> Images:
+        """Read (and rectify) the images of a frame.
+
+        Raises
+        ------
+        DatasetError
+            If a file is missing.
+        ImageError
+            If a file is no readable image of the right type.
+        """
+        ...
+
+    def ground_truth(self) -> Trajectory | None:
+        """Return the true poses ``T_wc`` of the only, left (rectified) or colour camera.
+
+        Returns
+        -------
+        Trajectory or None
+            None if there are none.
+
+        Raises
+        ------
+        DatasetError
+            If there is a file but it is malformed.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Stamps:
+    """Time stamps of a list file.
+
+    Attributes
+    ----------
+    seconds
+        float64 (n,).
+    texts
+        The same as text in seconds, all digits of the source kept.
+    lines
+        Line number of each in the file, from 1.
+    """
+
+    seconds: NDArray[np.float64]
+    texts: tuple[str, ...]
+    lines: tuple[int, ...]
+
+    def warn_unless_increasing(self, path: Path) -> None:
+        """Log the lines whose time stamp is not after the one before."""
+        for i in np.flatnonzero(np.diff(self.seconds) <= 0).tolist():
+            _log.warning(
+                "%s:%d: time stamp %s is not after the one before it, %s",
+                path,
+                self.lines[i + 1],
+                self.texts[i + 1],
+                self.texts[i],
+            )
+
+
+def choose_sensor(folder: Path, wanted: Sensor | None, available: tuple[Sensor, ...]) -> Sensor:
+    """Return the wanted sensor, or the richest available one.
+
+    Raises
+    ------
+    DatasetError
+        If the sequence has no images for it.
+    """
+    if wanted is None:
+        return available[0]
+    if wanted not in available:
+        names = ", ".join(str(sensor) for sensor in available)
+        raise DatasetError(f"{folder} has no {wanted} images; it can be used as: {names}")
+    return wanted
+
+
+def require_frames(source: Path, count: int) -> None:
+    """Raise `DatasetError` if a list names no images."""
+    if count == 0:
+        raise DatasetError(f"no images: {source} lists none")

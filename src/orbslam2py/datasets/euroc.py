@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""EuRoC MAV: ``mav0/cam0``, ``mav0/cam1`` with ``data.csv``, ``sensor.yaml`` and ``data/``."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbslam2py._text_lines import content_lines
+from orbslam2py.datasets.base import Images, Layout, Stamps, require_frames
+from orbslam2py.datasets.choose_settings import SettingsChoice
+from orbslam2py.datasets.euroc_calibration import (
+    monocular_settings,
+    read_sensor_yaml,
+    stereo_settings,
+)
+from orbslam2py.datasets.images import read_image
+from orbslam2py.datasets.recorded import RecordedSequence
+from orbslam2py.datasets.rectification import Rectifier
+from orbslam2py.errors import DatasetError, SettingsError
+from orbslam2py.sensor import Sensor
+from orbslam2py.settings import Settings, StereoRectification
+from orbslam2py.trajectory import Trajectory, read_euroc
+
+_log = logging.getLogger(__name__)
+
+_IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
+
+
+def find_root(folder: Path) -> Path | None:
+    """Return the folder that holds ``cam0``: the given one or ``mav0`` in it; None if neither."""
+    for root in (folder / "mav0", folder):
+        if (root / "cam0" / "data").is_dir() or (root / "cam0" / "data.csv").is_file():
+            return root
+    return None
+
+
+@dataclass(frozen=True)
+class _CameraList:
+    """Image files by time stamp [ns], in the order of the list, and where each was listed."""
+
+    source: Path
+    paths: dict[int, Path]
+    lines: dict[int, int]
+
+
+class EurocSequence(RecordedSequence):
+    """A sequence in the layout of the EuRoC MAV data set; see `datasets.base.Sequence`.
+
+    Stereo pairs are rectified as the settings say: with ``LEFT.*`` and ``RIGHT.*`` of a settings
+    file, with the built-in ``euroc``, or by the cameras' ``sensor.yaml``.
+
+    Parameters
+    ----------
+    folder
+        The folder of the sequence or its ``mav0``.
+    sensor
+        Monocular (``cam0`` as it is) or stereo; by default stereo if there is ``cam1``.
+    settings
+        Settings, a file, a built-in name, or None to let the folder decide.
+
+    Raises
+    ------
+    DatasetError
+        Naming the file, and the line if a list is malformed.
+    SettingsError
+        If the settings are wrong, or lack the rectification for stereo.
+    """
+
+    layout = Layout.EUROC
+
+    def __init__(
+        self,
+        folder: str | Path,
+        sensor: Sensor | None = None,
+        *,
+        settings: SettingsChoice = None,
+    ) -> None:
+        folder = Path(folder)
+        root = find_root(folder)
+        if root is None:
+            raise DatasetError(f"{folder} has neither mav0/cam0 nor cam0 with images")
+        self._root = root
+        has_right = has_camera(root, "cam1")
+        available = (Sensor.STEREO, Sensor.MONOCULAR) if has_right else (Sensor.MONOCULAR,)
+        super().__init__(folder, available, sensor, settings)
+        if self.name == "mav0":
+            self.name = folder.resolve().parent.name
+        if self._chosen is not None and self.sensor is Sensor.STEREO:
+            _ = self._rectification  # tells at once if the chosen settings have none
+        left = _list_images(root / "cam0")
+        kept = list(left.paths)
+        self._right: dict[int, Path] = {}
+        if self.sensor is Sensor.STEREO:
+            self._right = _list_images(root / "cam1").paths
+            kept = [stamp for stamp in kept if stamp in self._right]
+            alone = len(left.paths) + len(self._right) - 2 * len(kept)
+            if alone:
+                _log.warning("%s: %d images have no partner, left out", root, alone)
+            if not kept and left.paths:
+                raise DatasetError(f"{root}: cam0 and cam1 have no time stamp in common")
+        require_frames(left.source, len(kept))
+        self._nanoseconds, self._left = kept, left.paths
+        self._stamps = Stamps(
+            np.array([stamp / 1e9 for stamp in kept], dtype=np.float64),
+            tuple(f"{stamp // 10**9}.{stamp % 10**9:09d}" for stamp in kept),
+            tuple(left.lines[stamp] for stamp in kept),
+        )
+        self._stamps.warn_unless_increasing(left.source)
+
+    def load(self, index: int, /) -> Images:
+        """Read and rectify the images of a frame; see `datasets.base.Sequence.load`."""
+        stamp = self._nanoseconds[index]
+        left = self._read(self._left[stamp])
+        if self.sensor is Sensor.MONOCULAR:
+            return Images(left)
+        right = self._read(self._right[stamp])
+        rectify_left, rectify_right = self._rectifiers
+        return Images(
+            rectify_left.rectify(left, self._left[stamp]),
+            right=rectify_right.rectify(right, self._right[stamp]),
+        )
+
+    def ground_truth(self) -> Trajectory | None:
+        """Read the body's poses and move them to the (rectified) left camera.
+
+        See `datasets.base.Sequence.ground_truth`. None as well if ``cam0/sensor.yaml`` is missing:
+        without ``T_BS`` the camera's place on the vehicle is unknown.
+        """
+        path = self._root / "state_groundtruth_estimate0" / "data.csv"
+        if not path.is_file():
+            return None
+        calibration = self._root / "cam0" / "sensor.yaml"
+        if not calibration.is_file():
+            _log.warning("%s is not used: %s with T_BS is missing", path, calibration)
+            return None
+        body = read_euroc(path)
+        T_body_camera = read_sensor_yaml(calibration).T_BS.copy()
+        if self.sensor is Sensor.STEREO:
+            rectification = self._rectification
+            # R of the rectification turns raw into rectified coordinates.
+            T_body_camera[:3, :3] = T_body_camera[:3, :3] @ rectification.left.R.T
+        return Trajectory(body.timestamps, body.T_wc @ T_body_camera)
+
+    @cached_property
+    def _rectifiers(self) -> tuple[Rectifier, Rectifier]:
+        rectification = self._rectification
+        return Rectifier(rectification.left), Rectifier(rectification.right)
+
+    @property
+    def _rectification(self) -> StereoRectification:
+        if self.settings.rectification is None:
+            raise SettingsError(
+                f"calibration parameters to rectify stereo are missing for {self.folder}: add "
+                "LEFT.* and RIGHT.* to the settings, use the built-in 'euroc', or give no settings "
+                "to use sensor.yaml"
+            )
+        return self.settings.rectification
+
+    def _read(self, path: Path) -> NDArray[np.uint8]:
+        return read_image(path, rgb=self.settings.camera.rgb)
+
+    def _settings_folders(self) -> tuple[Path, ...]:
+        return (self.folder.resolve(), self._root.resolve())
+
+    def _from_calibration(self) -> Settings | None:
+        paths = [self._root / "cam0" / "sensor.yaml"]
+        if self.sensor is Sensor.STEREO:
+            paths.append(self._root / "cam1" / "sensor.yaml")
+        if not all(path.is_file() for path in paths):
+            return None
+        cameras = [read_sensor_yaml(path) for path in paths]
+        try:
+            if self.sensor is Sensor.STEREO:
+                return stereo_settings(*cameras)
+            return monocular_settings(cameras[0])
+        except SettingsError as error:
+            raise DatasetError(f"{paths[0]}: {error}") from error
+
+
+def has_camera(root: Path, camera: str) -> bool:
+    """Whether a camera has images."""
+    return (root / camera / "data").is_dir()
+
+
+def _list_images(camera: Path) -> _CameraList:
+    source = camera / "data.csv"
+    if not source.is_file():
+        return _list_folder(camera / "data")
+    listed = _CameraList(source, {}, {})
+    for line in content_lines(source, separator=","):
+        text = line.fields[0]
+        if not text.isdigit():
+            raise DatasetError(f"{source}:{line.number}: '{text}' is not a time stamp in ns")
+        stamp = int(text)
+        if stamp in listed.paths:
+            _log.warning("%s:%d: time stamp %s is there twice, left out", source, line.number, text)
+            continue
+        name = line.fields[1] if len(line.fields) > 1 else ""
+        listed.paths[stamp] = camera / "data" / name if name else _guess_path(camera, text)
+        listed.lines[stamp] = line.number
+    return listed
+
+
+def _guess_path(camera: Path, stamp: str) -> Path:
+    candidates = [camera / "data" / (stamp + suffix) for suffix in _IMAGE_SUFFIXES]
+    return next((path for path in candidates if path.is_file()), candidates[0])
+
+
+def _list_folder(folder: Path) -> _CameraList:
+    """Images named by their time stamps, for copies without ``data.csv``."""
+    if not folder.is_dir():
+        raise DatasetError(f"cannot open {folder}: no such folder")
+    found = sorted(
+        (int(path.stem), path)
+        for path in folder.iterdir()
+        if path.suffix.lower() in _IMAGE_SUFFIXES and path.stem.isdigit()
+    )
+    return _CameraList(folder, dict(found), {stamp: k for k, (stamp, _) in enumerate(found, 1)})

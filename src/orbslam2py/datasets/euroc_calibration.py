@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""EuRoC's ``sensor.yaml`` of a camera, and the settings that follow from one or two of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbslam2py._rotations import inverse_poses, nearest_rotations, poses_from
+from orbslam2py._settings_reader import read_matrix
+from orbslam2py._yaml_scanner import Entry, parse_number, scan
+from orbslam2py.builtin_settings import EUROC_CLOSE_FACTOR, EUROC_STEREO_ORB
+from orbslam2py.datasets.rectification import rectification_of_pair
+from orbslam2py.errors import DatasetError
+from orbslam2py.sensor import Sensor
+from orbslam2py.settings import CameraSettings, DepthSettings, OrbSettings, Settings
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class SensorCalibration:
+    """What ``sensor.yaml`` tells about a camera.
+
+    Attributes
+    ----------
+    T_BS
+        Camera to body, float64 (4, 4), metres.
+    intrinsics
+        fx, fy, cx, cy in pixels, (4,).
+    distortion
+        k1, k2, p1, p2, (4,).
+    size
+        Width and height in pixels.
+    rate
+        Images per second.
+    """
+
+    T_BS: Array
+    intrinsics: Array
+    distortion: Array
+    size: tuple[int, int]
+    rate: float
+
+    @property
+    def camera_matrix(self) -> Array:
+        """Camera matrix (3, 3), pixels."""
+        fx, fy, cx, cy = self.intrinsics
+        return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+
+
+def read_sensor_yaml(path: Path) -> SensorCalibration:
+    """Read the calibration of a pinhole camera.
+
+    Raises
+    ------
+    DatasetError
+        Naming the file, the line and the key.
+    """
+    try:
+        document = scan(path.read_text(encoding="utf-8", errors="replace"))
+    except OSError as error:
+        raise DatasetError(f"cannot open {path}: {error.strerror or error}") from error
+    if document.problems:
+        raise DatasetError("\n".join(problem.located(path) for problem in document.problems))
+    entries = document.entries
+    keys = ("T_BS", "intrinsics", "distortion_coefficients", "resolution")
+    missing = [key for key in keys if key not in entries]
+    if missing:
+        raise DatasetError(f"{path} has no {', '.join(missing)}")
+    for key, allowed in (("camera_model", "pinhole"), ("distortion_model", "radial-tangential")):
+        if key in entries and entries[key].value != allowed:
+            entry = entries[key]
+            raise DatasetError(f"{path}:{entry.line}: {key} is {entry.value}; allowed: {allowed}")
+    T_BS = _matrix(path, entries["T_BS"])
+    if T_BS.shape != (4, 4) or np.abs(T_BS[:3, :3] @ T_BS[:3, :3].T - np.eye(3)).max() > 1e-3:
+        raise DatasetError(f"{path}:{entries['T_BS'].line}: T_BS is no 4 x 4 rigid transform")
+    width, height = _numbers(path, entries["resolution"], 2)
+    rate = _numbers(path, entries["rate_hz"], 1)[0] if "rate_hz" in entries else 20.0
+    return SensorCalibration(
+        T_BS=poses_from(nearest_rotations(T_BS[None, :3, :3]), T_BS[None, :3, 3])[0],
+        intrinsics=_numbers(path, entries["intrinsics"], 4),
+        distortion=_numbers(path, entries["distortion_coefficients"], 4),
+        size=(int(width), int(height)),
+        rate=float(rate),
+    )
+
+
+def monocular_settings(camera: SensorCalibration) -> Settings:
+    """Make settings for the raw images of one camera."""
+    fx, fy, cx, cy = camera.intrinsics.tolist()
+    k1, k2, p1, p2 = camera.distortion.tolist()
+    return Settings(
+        sensor=Sensor.MONOCULAR,
+        camera=CameraSettings(
+            *(fx, fy, cx, cy),
+            *(k1, k2, p1, p2),
+            width=camera.size[0],
+            height=camera.size[1],
+            fps=camera.rate,
+            rgb=True,
+        ),
+        orb=OrbSettings(n_features=1000),
+    )
+
+
+def stereo_settings(left: SensorCalibration, right: SensorCalibration) -> Settings:
+    """Make settings for the pair, with the rectification that makes its images fit them."""
+    rectification = rectification_of_pair(
+        (left.camera_matrix, right.camera_matrix),
+        (left.distortion, right.distortion),
+        inverse_poses(right.T_BS) @ left.T_BS,
+        left.size,
+    )
+    P = rectification.left.P
+    return Settings(
+        sensor=Sensor.STEREO,
+        camera=CameraSettings(
+            *(float(P[0, 0]), float(P[1, 1]), float(P[0, 2]), float(P[1, 2])),
+            width=left.size[0],
+            height=left.size[1],
+            fps=left.rate,
+            bf=-float(rectification.right.P[0, 3]),
+            rgb=True,
+        ),
+        orb=EUROC_STEREO_ORB,
+        depth=DepthSettings(EUROC_CLOSE_FACTOR),
+        rectification=rectification,
+    )
+
+
+def _matrix(path: Path, entry: Entry) -> Array:
+    try:
+        return read_matrix(entry)
+    except ValueError as error:
+        raise DatasetError(f"{path}:{entry.line}: {error}") from None
+
+
+def _numbers(path: Path, entry: Entry, count: int) -> Array:
+    items = (entry.value,) if isinstance(entry.value, str) else entry.value
+    if not isinstance(items, tuple) or len(items) != count:
+        raise DatasetError(f"{path}:{entry.line}: {entry.key} must hold {count} numbers")
+    try:
+        return np.array([parse_number(item) for item in items], dtype=np.float64)
+    except ValueError as error:
+        raise DatasetError(f"{path}:{entry.line}: {entry.key}: {error}") from None

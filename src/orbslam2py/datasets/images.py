@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Image files to arrays, with errors that name the file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from orbslam2py.errors import DatasetError, ImageError
+
+_PNG, _PNG_END = b"\x89PNG", b"IEND"
+_JPEG, _JPEG_END = b"\xff\xd8", b"\xff\xd9"
+_TAIL = 4096  # where the end mark must be; some cameras append a few bytes after it
+
+
+def read_image(path: Path, *, rgb: bool) -> NDArray[np.uint8]:
+    """Read a grey or colour image as it is.
+
+    Parameters
+    ----------
+    path
+        An 8-bit image file of any format OpenCV reads.
+    rgb
+        Whether colour is wanted in the order RGB (True) or BGR.
+
+    Returns
+    -------
+    NDArray[np.uint8]
+        (h, w), (h, w, 3) or (h, w, 4).
+
+    Raises
+    ------
+    DatasetError
+        If there is no such file.
+    ImageError
+        If it is no complete 8-bit image.
+    """
+    decoded = _decode(path)
+    if decoded.dtype != np.uint8:
+        raise ImageError(f"{path} has {decoded.dtype} pixels; images must be 8 bits per channel")
+    image = decoded.astype(np.uint8, copy=False)
+    if image.ndim == 3 and image.shape[2] == 1:
+        image = image[:, :, 0]
+    if rgb and image.ndim == 3:
+        code = cv2.COLOR_BGR2RGB if image.shape[2] == 3 else cv2.COLOR_BGRA2RGBA
+        image = np.asarray(cv2.cvtColor(image, code), dtype=np.uint8)
+    return np.ascontiguousarray(image)
+
+
+def read_depth(path: Path) -> NDArray[np.generic]:
+    """Read a depth image unchanged, single channel (h, w), uint16 as a rule.
+
+    Raises
+    ------
+    DatasetError
+        If there is no such file.
+    ImageError
+        If it is no complete image with one channel.
+    """
+    depth = _decode(path)
+    if depth.ndim == 3 and depth.shape[2] == 1:
+        depth = depth[:, :, 0]
+    if depth.ndim != 2:
+        raise ImageError(f"{path} has {depth.shape[2]} channels; depth images have one")
+    return depth
+
+
+def _decode(path: Path) -> NDArray[np.generic]:
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        raise DatasetError(f"image {path} is listed but missing") from None
+    except OSError as error:
+        raise ImageError(f"cannot read image {path}: {error.strerror or error}") from error
+    # Some versions of OpenCV fill the rest of a truncated image with grey and say nothing.
+    for begin, end in ((_PNG, _PNG_END), (_JPEG, _JPEG_END)):
+        if content.startswith(begin) and end not in content[-_TAIL:]:
+            raise ImageError(f"image {path} is truncated ({len(content)} bytes)")
+    image = None
+    if content:
+        try:
+            image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
+        except cv2.error as error:
+            raise ImageError(f"cannot decode image {path}: {error}") from error
+    if image is None or image.size == 0:
+        raise ImageError(f"{path} is no readable image ({len(content)} bytes)")
+    return np.asarray(image)

@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""KITTI odometry: ``times.txt``, ``image_0``, ``image_1``, ``calib.txt``."""
+
+from __future__ import annotations
+
+import logging
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbslam2py._text_lines import content_lines, number_of
+from orbslam2py.builtin_settings import KITTI_VIEWERS
+from orbslam2py.datasets.base import Images, Layout, Stamps, require_frames
+from orbslam2py.datasets.choose_settings import SettingsChoice
+from orbslam2py.datasets.images import read_image
+from orbslam2py.datasets.recorded import RecordedSequence
+from orbslam2py.errors import DatasetError, SettingsError
+from orbslam2py.sensor import Sensor
+from orbslam2py.settings import CameraSettings, DepthSettings, OrbSettings, Settings
+from orbslam2py.trajectory import Trajectory, read_kitti
+
+_log = logging.getLogger(__name__)
+
+_CLOSE_FACTOR = 40.0
+_USUAL_RATE = 10.0
+
+
+class KittiSequence(RecordedSequence):
+    """A sequence in the layout of KITTI odometry; see `datasets.base.Sequence`.
+
+    Parameters
+    ----------
+    folder
+        The folder with ``times.txt`` and ``image_0``.
+    sensor
+        Monocular (left camera) or stereo; by default stereo if ``image_1`` is there.
+    settings
+        Settings, a file, a built-in name, or None to let the folder decide.
+
+    Raises
+    ------
+    DatasetError
+        Naming the file, and the line if a list is malformed.
+    SettingsError
+        If the settings are wrong.
+    """
+
+    layout = Layout.KITTI
+
+    def __init__(
+        self,
+        folder: str | Path,
+        sensor: Sensor | None = None,
+        *,
+        settings: SettingsChoice = None,
+    ) -> None:
+        folder = Path(folder)
+        has_right = (folder / "image_1").is_dir()
+        available = (Sensor.STEREO, Sensor.MONOCULAR) if has_right else (Sensor.MONOCULAR,)
+        super().__init__(folder, available, sensor, settings)
+        times = self.folder / "times.txt"
+        self._stamps = _read_times(times)
+        require_frames(times, len(self))
+        self._stamps.warn_unless_increasing(times)
+
+    def load(self, index: int, /) -> Images:
+        """Read the images of a frame; see `datasets.base.Sequence.load`."""
+        image = self._read("image_0", index)
+        if self.sensor is Sensor.MONOCULAR:
+            return Images(image)
+        return Images(image, right=self._read("image_1", index))
+
+    def ground_truth(self) -> Trajectory | None:
+        """Read ``poses.txt``, ``NN.txt`` or ``../../poses/NN.txt``.
+
+        See `datasets.base.Sequence.ground_truth`. Poses belong to frames by their number; the
+        files of the benchmark may hold more of them than a shortened sequence has frames.
+        """
+        path = self._ground_truth_path()
+        if path is None:
+            return None
+        poses = read_kitti(path, np.arange(sum(1 for _ in content_lines(path)), dtype=np.float64))
+        n = min(len(poses), len(self))
+        if len(poses) != len(self):
+            _log.warning("%s holds %d poses for %d frames", path, len(poses), len(self))
+        return Trajectory(self.timestamps[:n], poses.T_wc[:n])
+
+    def _read(self, camera: str, index: int) -> NDArray[np.uint8]:
+        if not 0 <= index < len(self):
+            raise IndexError(f"frame {index} of {len(self)}")
+        folder = self.folder / camera
+        path = folder / f"{index:06d}.png"
+        if not path.is_file() and path.with_suffix(".jpg").is_file():
+            path = path.with_suffix(".jpg")
+        return read_image(path, rgb=self.settings.camera.rgb)
+
+    def _ground_truth_path(self) -> Path | None:
+        candidates = [self.folder / "poses.txt"]
+        if re.fullmatch(r"\d\d", self.name):
+            candidates.append(self.folder / f"{self.name}.txt")
+            candidates.append(self.folder.resolve().parent.parent / "poses" / f"{self.name}.txt")
+        candidates += sorted(
+            path for path in self.folder.glob("*.txt") if re.fullmatch(r"\d\d", path.stem)
+        )
+        return next((path for path in candidates if path.is_file()), None)
+
+    def _from_calibration(self) -> Settings | None:
+        path = self.folder / "calib.txt"
+        if not path.is_file():
+            return None
+        projections = _read_calibration(path)
+        if "P0" not in projections:
+            raise DatasetError(f"{path} has no line 'P0:' (left grey camera)")
+        stereo = self.sensor is Sensor.STEREO
+        if stereo and "P1" not in projections:
+            raise DatasetError(f"{path} has no line 'P1:' (right grey camera), needed for stereo")
+        P0 = projections["P0"]
+        try:
+            camera = CameraSettings(
+                fx=P0[0, 0],
+                fy=P0[1, 1],
+                cx=P0[0, 2],
+                cy=P0[1, 2],
+                fps=self._rate(),
+                bf=-projections["P1"][0, 3] if stereo else 0.0,
+                rgb=True,
+            )
+            return Settings(
+                sensor=self.sensor,
+                camera=camera,
+                orb=OrbSettings(n_features=2000),
+                depth=DepthSettings(_CLOSE_FACTOR) if stereo else None,
+                viewer=KITTI_VIEWERS[self.sensor],
+            )
+        except SettingsError as error:
+            raise DatasetError(f"{path}: {error}") from error
+
+    def _rate(self) -> float:
+        steps = np.diff(self.timestamps)
+        steps = steps[steps > 0]
+        # Rounded, since times are written with few digits: 9.99999 would count as 9 frames.
+        return round(1.0 / float(np.median(steps)), 3) if len(steps) else _USUAL_RATE
+
+
+def _read_times(path: Path) -> Stamps:
+    lines = content_lines(path)
+    for line in lines:
+        if len(line.fields) != 1:
+            raise DatasetError(
+                f"{path}:{line.number}: expected one time stamp, found {len(line.fields)} fields"
+            )
+    return Stamps(
+        np.array([number_of(path, line, line.fields[0]) for line in lines], dtype=np.float64),
+        tuple(line.fields[0] for line in lines),
+        tuple(line.number for line in lines),
+    )
+
+
+def _read_calibration(path: Path) -> dict[str, NDArray[np.float64]]:
+    """Projection matrices (3, 4) by name; lines with other names (Tr) are left out."""
+    projections = {}
+    for line in content_lines(path):
+        name = line.fields[0].rstrip(":")
+        if not re.fullmatch(r"P\d", name):
+            continue
+        numbers = [number_of(path, line, field) for field in line.fields[1:]]
+        if len(numbers) != 12:
+            raise DatasetError(
+                f"{path}:{line.number}: {name} has {len(numbers)} numbers instead of 12"
+            )
+        projections[name] = np.array(numbers).reshape(3, 4)
+    return projections

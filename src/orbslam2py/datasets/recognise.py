@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What kind of sequence a folder holds, told by its files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from orbslam2py.datasets.base import Layout
+from orbslam2py.datasets.choose_settings import SettingsChoice
+from orbslam2py.datasets.euroc import EurocSequence, find_root
+from orbslam2py.datasets.kitti import KittiSequence
+from orbslam2py.datasets.recorded import RecordedSequence
+from orbslam2py.datasets.tum import TumSequence, find_association
+from orbslam2py.errors import DatasetError
+from orbslam2py.sensor import Sensor
+
+_MARKS = (
+    "rgb.txt or associations.txt (TUM), times.txt and image_0 (KITTI), mav0/cam0 or cam0 (EuRoC)"
+)
+
+
+def recognise(folder: str | Path) -> Layout:
+    """Tell the layout of a sequence.
+
+    Raises
+    ------
+    DatasetError
+        If the folder is missing, fits no layout, or several.
+    """
+    folder = Path(folder)
+    if not folder.exists():
+        raise DatasetError(f"{folder} does not exist")
+    if not folder.is_dir():
+        raise DatasetError(f"{folder} is no folder; give the folder of a sequence")
+    found = _layouts(folder)
+    if len(found) > 1:
+        names = ", ".join(str(layout) for layout in found)
+        raise DatasetError(f"{folder} looks like several layouts ({names}); name the one you mean")
+    if found:
+        return found[0]
+    message = f"{folder} is no sequence we know: looked for {_MARKS}"
+    inner = sorted(child for child in folder.iterdir() if child.is_dir() and _layouts(child))
+    if inner:
+        message += f"; did you mean {inner[0]}?"
+    raise DatasetError(message)
+
+
+def open_sequence(
+    folder: str | Path,
+    sensor: Sensor | None = None,
+    *,
+    settings: SettingsChoice = None,
+    association: str | Path | None = None,
+    layout: Layout | None = None,
+) -> RecordedSequence:
+    """Open the sequence in a folder, recognised by its files.
+
+    Parameters
+    ----------
+    folder
+        TUM RGB-D, KITTI odometry or EuRoC (the sequence or its ``mav0``).
+    sensor
+        What to deliver images for; by default the richest the folder has images for.
+    settings
+        Settings, a file, a built-in name, or None to let the folder decide when they are needed.
+    association
+        Association file of a TUM sequence; by default one in the folder, else by time stamps.
+    layout
+        How to read the folder, if it should not be recognised.
+
+    Raises
+    ------
+    DatasetError
+        If the folder is no sequence, its lists are malformed or it has no images for the sensor.
+    SettingsError
+        If the settings given are wrong.
+    """
+    layout = recognise(folder) if layout is None else layout
+    if layout is Layout.TUM:
+        return TumSequence(folder, sensor, settings=settings, association=association)
+    if association is not None:
+        raise DatasetError(f"an association file belongs to a TUM sequence; {folder} is {layout}")
+    kind = KittiSequence if layout is Layout.KITTI else EurocSequence
+    return kind(folder, sensor, settings=settings)
+
+
+def _layouts(folder: Path) -> list[Layout]:
+    found = []
+    if (folder / "rgb.txt").is_file() or find_association(folder) is not None:
+        found.append(Layout.TUM)
+    if (folder / "times.txt").is_file() and (folder / "image_0").is_dir():
+        found.append(Layout.KITTI)
+    if find_root(folder) is not None:
+        found.append(Layout.EUROC)
+    return found

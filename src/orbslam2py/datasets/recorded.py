@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the sequences on disk have in common."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbslam2py.builtin_settings import resolve_settings
+from orbslam2py.datasets.base import (
+    Images,
+    Layout,
+    Stamps,
+    choose_sensor,
+)
+from orbslam2py.datasets.choose_settings import SettingsChoice, choose_settings
+from orbslam2py.sensor import Sensor
+from orbslam2py.settings import Settings
+from orbslam2py.trajectory import Trajectory
+
+
+class RecordedSequence(ABC):
+    """A folder of images, opened for one sensor; see `datasets.base.Sequence`.
+
+    Parameters
+    ----------
+    folder
+        Where the images are.
+    available
+        Sensors there are images for, the richest first.
+    sensor
+        One of them; by default the first.
+    settings
+        Settings, a file, a built-in name, or None to let the folder decide.
+
+    Raises
+    ------
+    DatasetError
+        If there are no images for the sensor.
+    SettingsError
+        If the settings are wrong.
+    """
+
+    layout: Layout
+
+    def __init__(
+        self,
+        folder: Path,
+        available: tuple[Sensor, ...],
+        sensor: Sensor | None,
+        settings: SettingsChoice,
+    ) -> None:
+        self.folder = folder
+        self.name = folder.resolve().name
+        self.sensors = available
+        self.sensor = choose_sensor(folder, sensor, available)
+        self._chosen = None if settings is None else resolve_settings(settings, self.sensor)
+        self._stamps = Stamps(np.zeros(0), (), ())
+
+    @cached_property
+    def settings(self) -> Settings:
+        """What the caller chose, or `default_settings`."""
+        return self.default_settings() if self._chosen is None else self._chosen
+
+    def default_settings(self) -> Settings:
+        """Choose by what is in the folder; see `choose_settings`."""
+        return choose_settings(self.sensor, self._settings_folders(), self._from_calibration)
+
+    def __len__(self) -> int:
+        return len(self._stamps.texts)
+
+    @property
+    def timestamps(self) -> NDArray[np.float64]:
+        """Time of every frame in seconds, float64 (n,)."""
+        return self._stamps.seconds
+
+    def timestamp_text(self, index: int, /) -> str:
+        """Return the time of a frame in seconds, with all digits of the source."""
+        return self._stamps.texts[index]
+
+    @abstractmethod
+    def load(self, index: int, /) -> Images:
+        """Read (and rectify) the images of a frame; see `datasets.base.Sequence.load`."""
+
+    @abstractmethod
+    def ground_truth(self) -> Trajectory | None:
+        """Read the true poses; see `datasets.base.Sequence.ground_truth`."""
+
+    def _settings_folders(self) -> tuple[Path, ...]:
+        return (self.folder.resolve(),)
+
+    def _from_calibration(self) -> Settings | None:
+        return None

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Rectification of raw stereo pairs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from orbslam2py.errors import ImageError
+from orbslam2py.settings import CameraRectification, StereoRectification
+
+Array = NDArray[np.float64]
+
+
+def rectification_of_pair(
+    K: tuple[Array, Array], D: tuple[Array, Array], T_right_left: Array, size: tuple[int, int]
+) -> StereoRectification:
+    """Find the rectification of a calibrated pair.
+
+    Both principal points become equal (zero disparity at infinity) and the images are zoomed until
+    no black border is left (OpenCV's alpha 0).
+
+    Parameters
+    ----------
+    K, D
+        Camera matrices (3, 3) [pixels] and distortion coefficients of the left and right camera.
+    T_right_left
+        Transform (4, 4) from left to right camera coordinates [m].
+    size
+        Width and height of the images.
+    """
+    R_left, R_right, P_left, P_right, *_ = cv2.stereoRectify(
+        *(K[0], D[0], K[1], D[1]),
+        size,
+        np.ascontiguousarray(T_right_left[:3, :3]),
+        np.ascontiguousarray(T_right_left[:3, 3:]),
+        flags=cv2.CALIB_ZERO_DISPARITY,
+        alpha=0,
+    )
+    return StereoRectification(
+        left=CameraRectification(K[0], D[0], _float64(R_left), _float64(P_left), *size),
+        right=CameraRectification(K[1], D[1], _float64(R_right), _float64(P_right), *size),
+    )
+
+
+def _float64(matrix: NDArray[Any]) -> Array:
+    return np.asarray(matrix, dtype=np.float64)
+
+
+class Rectifier:
+    """Rectifies the images of one camera of a pair.
+
+    Parameters
+    ----------
+    camera
+        Raw and rectified calibration.
+    """
+
+    def __init__(self, camera: CameraRectification) -> None:
+        self._size = (camera.height, camera.width)
+        self._maps = cv2.initUndistortRectifyMap(
+            camera.K,
+            camera.D,
+            camera.R,
+            camera.P[:, :3],
+            (camera.width, camera.height),
+            cv2.CV_32FC1,
+        )
+
+    def rectify(self, image: NDArray[np.uint8], what: object = "image") -> NDArray[np.uint8]:
+        """Resample an image bilinearly; black where the raw image has no pixels.
+
+        Parameters
+        ----------
+        image
+            Raw image (h, w) or (h, w, channels) of the calibrated size.
+        what
+            Name of the image for the message.
+
+        Raises
+        ------
+        ImageError
+            If the size is not the one of the calibration.
+        """
+        if image.shape[:2] != self._size:
+            height, width = self._size
+            raise ImageError(
+                f"{what} is {image.shape[1]} x {image.shape[0]}, but the rectification is for "
+                f"{width} x {height}"
+            )
+        rectified = cv2.remap(
+            image, *self._maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0
+        )
+        return np.asarray(rectified, dtype=np.uint8)

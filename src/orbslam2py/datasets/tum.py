@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""TUM RGB-D benchmark: ``rgb.txt``, ``depth.txt`` or an association of both."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from orbslam2py._text_lines import TextLine, content_lines, number_of
+from orbslam2py.datasets.base import Images, Layout, Stamps, require_frames
+from orbslam2py.datasets.choose_settings import SettingsChoice
+from orbslam2py.datasets.images import read_depth, read_image
+from orbslam2py.datasets.recorded import RecordedSequence
+from orbslam2py.errors import DatasetError
+from orbslam2py.sensor import Sensor
+from orbslam2py.time_association import MAX_DIFFERENCE, associate
+from orbslam2py.trajectory import Trajectory, read_tum
+
+_log = logging.getLogger(__name__)
+
+#: Names under which an association file is looked for, the first that is there counts.
+ASSOCIATION_NAMES = ("associations.txt", "association.txt", "associate.txt", "assoc.txt")
+
+
+@dataclass(frozen=True)
+class _ImageList:
+    stamps: Stamps
+    paths: tuple[str, ...]
+
+
+class TumSequence(RecordedSequence):
+    """A sequence in the layout of the TUM RGB-D benchmark; see `datasets.base.Sequence`.
+
+    Parameters
+    ----------
+    folder
+        The folder with ``rgb.txt``.
+    sensor
+        Monocular or RGB-D; by default RGB-D if there is depth.
+    settings
+        Settings, a file, a built-in name, or None to let the folder decide.
+    association
+        Lines ``t_rgb path_rgb t_depth path_depth``. By default a file of the usual names in the
+        folder, else colour and depth images are associated by their time stamps.
+
+    Raises
+    ------
+    DatasetError
+        Naming the file, and the line if a list is malformed.
+    SettingsError
+        If the settings are wrong.
+    """
+
+    layout = Layout.TUM
+
+    def __init__(
+        self,
+        folder: str | Path,
+        sensor: Sensor | None = None,
+        *,
+        settings: SettingsChoice = None,
+        association: str | Path | None = None,
+    ) -> None:
+        folder = Path(folder)
+        found = Path(association) if association is not None else find_association(folder)
+        has_depth = found is not None or (folder / "depth.txt").is_file()
+        available = (Sensor.RGBD, Sensor.MONOCULAR) if has_depth else (Sensor.MONOCULAR,)
+        super().__init__(folder, available, sensor, settings)
+        self._depth_paths: tuple[str, ...] | None = None
+        if self.sensor is Sensor.RGBD:
+            source = found or self.folder / "rgb.txt"
+            colour, self._depth_paths = (
+                _read_association(found) if found else _associate_lists(self.folder)
+            )
+        elif (self.folder / "rgb.txt").is_file() or found is None:
+            source = self.folder / "rgb.txt"
+            colour = _read_list(source)
+        else:
+            source = found
+            colour, _ = _read_association(found)
+        require_frames(source, len(colour.paths))
+        colour.stamps.warn_unless_increasing(source)
+        self._colour_paths, self._stamps = colour.paths, colour.stamps
+
+    def load(self, index: int, /) -> Images:
+        """Read the images of a frame; see `datasets.base.Sequence.load`."""
+        image = read_image(self.folder / self._colour_paths[index], rgb=self.settings.camera.rgb)
+        if self._depth_paths is None:
+            return Images(image)
+        return Images(image, depth=read_depth(self.folder / self._depth_paths[index]))
+
+    def ground_truth(self) -> Trajectory | None:
+        """Read ``groundtruth.txt``; see `datasets.base.Sequence.ground_truth`."""
+        path = self.folder / "groundtruth.txt"
+        return read_tum(path) if path.is_file() else None
+
+
+def find_association(folder: Path) -> Path | None:
+    """Return the association file of a folder, None if there is none."""
+    found = [folder / name for name in ASSOCIATION_NAMES if (folder / name).is_file()]
+    if len(found) > 1:
+        _log.info("several association files, using %s", found[0])
+    return found[0] if found else None
+
+
+def _record(path: Path, line: TextLine, count: int, meaning: str) -> None:
+    if len(line.fields) != count:
+        raise DatasetError(
+            f"{path}:{line.number}: expected {meaning}, found {len(line.fields)} fields"
+        )
+
+
+def _read_list(path: Path) -> _ImageList:
+    lines = content_lines(path)
+    for line in lines:
+        _record(path, line, 2, "'timestamp path'")
+    return _image_list(path, lines, 0)
+
+
+def _read_association(path: Path) -> tuple[_ImageList, tuple[str, ...]]:
+    lines = content_lines(path)
+    for line in lines:
+        _record(path, line, 4, "'t_rgb path_rgb t_depth path_depth'")
+        number_of(path, line, line.fields[2])
+    return _image_list(path, lines, 0), tuple(line.fields[3] for line in lines)
+
+
+def _image_list(path: Path, lines: list[TextLine], first: int) -> _ImageList:
+    seconds = [number_of(path, line, line.fields[first]) for line in lines]
+    stamps = Stamps(
+        np.array(seconds, dtype=np.float64),
+        tuple(line.fields[first] for line in lines),
+        tuple(line.number for line in lines),
+    )
+    return _ImageList(stamps, tuple(line.fields[first + 1] for line in lines))
+
+
+def _associate_lists(folder: Path) -> tuple[_ImageList, tuple[str, ...]]:
+    colour, depth = _read_list(folder / "rgb.txt"), _read_list(folder / "depth.txt")
+    require_frames(folder / "rgb.txt", len(colour.paths))
+    require_frames(folder / "depth.txt", len(depth.paths))
+    i, j = associate(colour.stamps.seconds, depth.stamps.seconds)
+    if not len(i):
+        raise DatasetError(
+            f"{folder}: no colour and depth image lie within {MAX_DIFFERENCE} s of each other"
+        )
+    left_out = len(colour.paths) - len(i)
+    if left_out:
+        _log.warning("%s: %d colour images have no depth image, left out", folder, left_out)
+    stamps = Stamps(
+        colour.stamps.seconds[i],
+        tuple(colour.stamps.texts[k] for k in i),
+        tuple(colour.stamps.lines[k] for k in i),
+    )
+    paired = _ImageList(stamps, tuple(colour.paths[k] for k in i))
+    return paired, tuple(depth.paths[k] for k in j)

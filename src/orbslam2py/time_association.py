@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which time stamps of two lists belong together."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Largest difference of stamps that may belong together [s].
+MAX_DIFFERENCE = 0.02
+
+_ROUNDS = 16
+
+
+def associate(
+    first: NDArray[np.float64],
+    second: NDArray[np.float64],
+    max_difference: float = MAX_DIFFERENCE,
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pair the time stamps of two lists, each used at most once.
+
+    Of all pairs that differ by less than `max_difference` the nearest is taken, then the nearest
+    among the stamps still free, and so on; ties go to the earlier stamps. This is the procedure of
+    the tools of the TUM RGB-D benchmark (Sturm et al. 2012).
+
+    Parameters
+    ----------
+    first, second
+        Seconds, float64 (n,) and (m,), in any order.
+    max_difference
+        Limit in seconds; pairs must stay below it.
+
+    Returns
+    -------
+    first_indices, second_indices
+        int64 (k,) each, in the order of the stamps of `first`.
+    """
+    first, second = np.asarray(first, np.float64), np.asarray(second, np.float64)
+    i, j = _candidates(first, second, max_difference)
+    order = np.lexsort((second[j], first[i], np.abs(first[i] - second[j])))
+    i, j = i[order], j[order]
+    taken = _take_greedily(i, j, len(first), len(second))
+    i, j = i[taken], j[taken]
+    by_time = np.lexsort((i, first[i]))
+    return i[by_time], j[by_time]
+
+
+def _candidates(
+    first: NDArray[np.float64], second: NDArray[np.float64], max_difference: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    by_time = np.argsort(second, kind="stable")
+    ordered = second[by_time]
+    begin = np.searchsorted(ordered, first - max_difference, side="left")
+    end = np.searchsorted(ordered, first + max_difference, side="right")
+    counts = end - begin
+    i = np.repeat(np.arange(len(first)), counts)
+    within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    j = by_time[np.repeat(begin, counts) + within]
+    near = np.abs(first[i] - second[j]) < max_difference
+    return i[near].astype(np.int64), j[near].astype(np.int64)
+
+
+def _take_greedily(
+    i: NDArray[np.int64], j: NDArray[np.int64], n_first: int, n_second: int
+) -> NDArray[np.int64]:
+    """Positions in the list of candidates (best first) that the greedy walk takes."""
+    remaining = np.arange(len(i))
+    taken = []
+    # A candidate that is the best one of both its members is taken whatever happens before it, so
+    # most are found at once; only chains of conflicts are left to the walk below.
+    for _ in range(_ROUNDS):
+        if not len(remaining):
+            break
+        best_of_first = np.full(n_first, -1)
+        best_of_second = np.full(n_second, -1)
+        best_of_first[i[remaining[::-1]]] = remaining[::-1]
+        best_of_second[j[remaining[::-1]]] = remaining[::-1]
+        is_best = (best_of_first[i[remaining]] == remaining) & (
+            best_of_second[j[remaining]] == remaining
+        )
+        accepted = remaining[is_best]
+        taken.append(accepted)
+        free_first, free_second = np.ones(n_first, bool), np.ones(n_second, bool)
+        free_first[i[accepted]] = False
+        free_second[j[accepted]] = False
+        remaining = remaining[free_first[i[remaining]] & free_second[j[remaining]]]
+    used_first, used_second, rest = set(), set(), []
+    for position in remaining.tolist():
+        a, b = int(i[position]), int(j[position])
+        if a not in used_first and b not in used_second:
+            used_first.add(a)
+            used_second.add(b)
+            rest.append(position)
+    return np.concatenate([*taken, np.array(rest, dtype=np.int64)]).astype(np.int64)
