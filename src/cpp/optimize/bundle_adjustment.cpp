@@ -18,6 +18,9 @@ namespace orbslam {
 namespace {
 
 constexpr double kInitialDamping = 1e-5;
+// Hardly damped steps converge quadratically: after one with a smaller relative decrease of the
+// cost than this, the next would change nothing that matters.
+constexpr double kConverged = 1e-4;
 
 using Observation = BundleProblem::Observation;
 
@@ -83,10 +86,17 @@ double total_cost(const BundleProblem& problem, const Judgement& start, const Ju
   return sum;
 }
 
-/// The Ceres problem of a bundle. Cost functions read measurements and views by pointer, so the
-/// second stage changes weights and kernels instead of building again.
+/// The Ceres problem of a bundle. Cost functions read measurements by pointer, so the second stage
+/// changes weights and kernels instead of building again.
 class BundleSolver final : public ceres::EvaluationCallback {
  public:
+  /// kEqual damps all unknowns alike, starting at 1e-5 times the largest curvature. It leaves
+  /// weakly determined depths where they were while the rest converges, so that a stage of few
+  /// iterations before the classification judges them as the published method does. kScaled damps
+  /// every unknown in proportion to its own curvature and hardly at all, which needs half the
+  /// iterations to converge.
+  enum class Damping { kEqual, kScaled };
+
   BundleSolver(BundleProblem& problem, const BundleOptions& options, const Judgement& start)
       : bundle_(problem), options_(options), problem_(problem_options(this)) {
     make_views();
@@ -95,10 +105,7 @@ class BundleSolver final : public ceres::EvaluationCallback {
   }
 
   void PrepareForEvaluation(bool, bool new_evaluation_point) override {
-    if (!new_evaluation_point) return;
-    for (const std::size_t camera : free_cameras_) {
-      views_[camera].set_pose(pose_from_block(pose_block(camera)));
-    }
+    if (new_evaluation_point) evaluate();
   }
 
   /// Takes kernels away and leaves outliers out.
@@ -108,23 +115,17 @@ class BundleSolver final : public ceres::EvaluationCallback {
       measurements_[i].huber = 0;
       measurements_[i].scale = now.outlier(i, o.has_depth) ? 0.0 : deviation(o);
     }
-    mono_loss_.Reset(nullptr, ceres::TAKE_OWNERSHIP);
   }
 
   /// Minimises and writes the poses and points reached into the bundle. Returns whether the flag
   /// was raised.
-  ///
-  /// kEqual damps all unknowns alike, starting at 1e-5 times the largest curvature. It leaves
-  /// weakly determined depths where they were while the rest converges, so that a stage of few
-  /// iterations before the classification judges them as the published method does. kScaled damps
-  /// every unknown in proportion to its own curvature, which needs half the iterations to converge.
-  enum class Damping { kEqual, kScaled };
   bool minimise(int iterations, Damping damping, const std::atomic<bool>* abort,
                 BundleSummary& summary) {
     if (problem_.NumResidualBlocks() == 0) return is_raised(abort);
-    BundleIterations rules(iterations, abort);
+    const bool equal = damping == Damping::kEqual;
+    BundleIterations rules(iterations, equal ? 0.0 : kConverged, abort);
     ceres::Solver::Options solver = solver_options(iterations);
-    if (damping == Damping::kEqual) {
+    if (equal) {
       solver.min_lm_diagonal = solver.max_lm_diagonal = 1;
       solver.initial_trust_region_radius = 1 / (kInitialDamping * max_curvature());
     }
@@ -133,7 +134,8 @@ class BundleSolver final : public ceres::EvaluationCallback {
     ceres::Solve(solver, &problem_, &report);
     summary.iterations += rules.successful();
     for (const std::size_t camera : free_cameras_) {
-      bundle_.cameras[camera].T_cw = pose_from_block(pose_block(camera));
+      views_[camera].move(parameters(camera));
+      bundle_.cameras[camera].T_cw = views_[camera].T_cw();
     }
     return rules.aborted();
   }
@@ -142,8 +144,6 @@ class BundleSolver final : public ceres::EvaluationCallback {
   static ceres::Problem::Options problem_options(ceres::EvaluationCallback* callback) {
     ceres::Problem::Options options;
     options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-    options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-    options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
     options.disable_all_safety_checks = true;
     options.evaluation_callback = callback;
     return options;
@@ -152,20 +152,15 @@ class BundleSolver final : public ceres::EvaluationCallback {
   static double deviation(const Observation& o) {
     return std::sqrt(static_cast<double>(o.inverse_sigma2));
   }
-  double* pose_block(std::size_t camera) {
-    return poses_.data() + camera * PoseManifold::kAmbientSize;
+  double* parameters(std::size_t camera) {
+    return parameters_.data() + camera * BundleView::kParameters;
   }
 
   void make_views() {
-    views_.resize(bundle_.cameras.size());
-    poses_.resize(bundle_.cameras.size() * PoseManifold::kAmbientSize);
-    for (std::size_t i = 0; i < views_.size(); ++i) {
-      const BundleProblem::Camera& camera = bundle_.cameras[i];
-      views_[i].pinhole = camera.pinhole;
-      views_[i].bf = camera.bf;
-      views_[i].set_pose(camera.T_cw);
-      pose_to_block(camera.T_cw, pose_block(i));
+    for (const BundleProblem::Camera& camera : bundle_.cameras) {
+      views_.emplace_back(camera.T_cw, camera.pinhole, camera.bf);
     }
+    parameters_.assign(views_.size() * BundleView::kParameters, 0.0);
   }
 
   void make_measurements(const Judgement& start) {
@@ -174,13 +169,15 @@ class BundleSolver final : public ceres::EvaluationCallback {
       const Observation& o = bundle_.observations[i];
       BundleMeasurement& m = measurements_[i];
       m.view = &views_[o.camera];
+      m.point = bundle_.points[o.point].data();
+      m.has_depth = o.has_depth;
+      m.huber = options_.robust ? kernel_width(o) : 0.0;
+      m.scale = 0;
+      if (!start.usable(i)) continue;  // its numbers stay away: zero times NaN would still be NaN
       m.u = o.u;
       m.v = o.v;
       m.right_u = o.right_u;
-      m.has_depth = o.has_depth;
-      m.scale = start.usable(i) ? deviation(o) : 0.0;
-      m.huber = options_.robust ? kernel_width(o) : 0.0;
-      if (!start.usable(i)) m.u = m.v = m.right_u = 0;  // zero times NaN would still be NaN
+      m.scale = deviation(o);
     }
   }
 
@@ -190,36 +187,43 @@ class BundleSolver final : public ceres::EvaluationCallback {
     for (std::size_t i = 0; i < used.size(); ++i) {
       if (used[i] == 0 || bundle_.cameras[i].fixed) continue;
       free_cameras_.push_back(i);
-      problem_.AddParameterBlock(pose_block(i), PoseManifold::kAmbientSize, &manifold_);
+      problem_.AddParameterBlock(parameters(i), BundleView::kParameters);
     }
-    if (options_.robust) mono_loss_.Reset(new ceres::HuberLoss(kHuberMono), ceres::TAKE_OWNERSHIP);
     for (std::size_t i = 0; i < measurements_.size(); ++i) {
       const Observation& o = bundle_.observations[i];
       if (!bundle_.points[o.point].allFinite()) continue;
       double* point = bundle_.points[o.point].data();
-      double* pose = bundle_.cameras[o.camera].fixed ? nullptr : pose_block(o.camera);
       const BundleMeasurement* m = &measurements_[i];
-      if (o.has_depth && pose != nullptr) {
-        problem_.AddResidualBlock(&stereo_free_.emplace_back(m), nullptr, pose, point);
-        problem_.AddResidualBlock(&right_free_.emplace_back(m), nullptr, pose, point);
-      } else if (o.has_depth) {
-        problem_.AddResidualBlock(&stereo_fixed_.emplace_back(m), nullptr, point);
+      if (problem_.NumResidualBlocks() == 0) {
+        problem_.AddResidualBlock(&missing_cost_block_, nullptr, point);
+      }
+      if (bundle_.cameras[o.camera].fixed) {
+        problem_.AddResidualBlock(&image_fixed_.emplace_back(m), nullptr, point);
+        if (!o.has_depth) continue;
         problem_.AddResidualBlock(&right_fixed_.emplace_back(m), nullptr, point);
-      } else if (pose != nullptr) {
-        problem_.AddResidualBlock(&mono_free_.emplace_back(m), &mono_loss_, pose, point);
       } else {
-        problem_.AddResidualBlock(&mono_fixed_.emplace_back(m), &mono_loss_, point);
+        double* pose = parameters(o.camera);
+        problem_.AddResidualBlock(&image_free_.emplace_back(m), nullptr, pose, point);
+        if (!o.has_depth) continue;
+        problem_.AddResidualBlock(&right_free_.emplace_back(m), nullptr, pose, point);
       }
     }
   }
 
+  void evaluate() {
+    for (const std::size_t camera : free_cameras_) views_[camera].move(parameters(camera));
+    missing_cost_ = 0;
+    for (BundleMeasurement& m : measurements_) missing_cost_ += m.evaluate();
+  }
+
   /// Largest diagonal entry of the Gauss-Newton matrix at the present poses and points.
-  double max_curvature() const {
+  double max_curvature() {
+    evaluate();
     std::vector<Vector6d> poses(views_.size(), Vector6d::Zero());
     std::vector<Eigen::Vector3d> points(bundle_.points.size(), Eigen::Vector3d::Zero());
     for (std::size_t i = 0; i < measurements_.size(); ++i) {
       const Observation& o = bundle_.observations[i];
-      add_curvature(measurements_[i], bundle_.points[o.point], poses[o.camera], points[o.point]);
+      measurements_[i].add_curvature(poses[o.camera], points[o.point]);
     }
     double largest = 1;
     for (const std::size_t camera : free_cameras_) {
@@ -232,7 +236,8 @@ class BundleSolver final : public ceres::EvaluationCallback {
   ceres::Solver::Options solver_options(int iterations) {
     ceres::Solver::Options solver;
     solver.max_num_iterations = 2 * iterations;
-    solver.function_tolerance = 1e-6;
+    solver.function_tolerance = 0;  // would throw the last step away; BundleIterations keeps it
+    solver.initial_trust_region_radius = 1e6;
     solver.num_threads = options_.n_threads;
     solver.logging_type = ceres::SILENT;
     solver.jacobi_scaling = false;  // the damping takes care of different units
@@ -243,8 +248,9 @@ class BundleSolver final : public ceres::EvaluationCallback {
     std::vector<double*> blocks;
     problem_.GetParameterBlocks(&blocks);
     for (double* block : blocks) {
-      const bool is_pose = block >= poses_.data() && block < poses_.data() + poses_.size();
-      ordering->AddElementToGroup(block, is_pose ? 1 : 0);
+      const bool is_camera =
+          block >= parameters_.data() && block < parameters_.data() + parameters_.size();
+      ordering->AddElementToGroup(block, is_camera ? 1 : 0);
     }
     solver.linear_solver_ordering = ordering;
     return solver;
@@ -252,18 +258,16 @@ class BundleSolver final : public ceres::EvaluationCallback {
 
   BundleProblem& bundle_;
   BundleOptions options_;
-  PoseManifold manifold_;
-  ceres::LossFunctionWrapper mono_loss_{nullptr, ceres::TAKE_OWNERSHIP};
   std::vector<BundleView> views_;
-  std::vector<double> poses_;
+  std::vector<double> parameters_;
   std::vector<std::size_t> free_cameras_;
   std::vector<BundleMeasurement> measurements_;
-  std::deque<MonoResiduals<true>> mono_free_;
-  std::deque<MonoResiduals<false>> mono_fixed_;
-  std::deque<StereoResiduals<true, false>> stereo_free_;
-  std::deque<StereoResiduals<true, true>> right_free_;
-  std::deque<StereoResiduals<false, false>> stereo_fixed_;
-  std::deque<StereoResiduals<false, true>> right_fixed_;
+  double missing_cost_ = 0;
+  MissingCost missing_cost_block_{&missing_cost_};
+  std::deque<ImageResiduals<true>> image_free_;
+  std::deque<ImageResiduals<false>> image_fixed_;
+  std::deque<RightResidual<true>> right_free_;
+  std::deque<RightResidual<false>> right_fixed_;
   ceres::Problem problem_;
 };
 

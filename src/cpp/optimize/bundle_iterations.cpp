@@ -25,9 +25,12 @@ ceres::CallbackReturnType BundleIterations::operator()(const ceres::IterationSum
   }
   rejected_ = 0;
   ++successful_;
-  small_decreases_ = cost_ - summary.cost < kSmallDecrease * cost_ ? small_decreases_ + 1 : 0;
+  const double decrease = cost_ - summary.cost;
+  const bool converged = decrease < converged_ * cost_;
+  small_decreases_ = decrease < kSmallDecrease * cost_ ? small_decreases_ + 1 : 0;
   cost_ = summary.cost;
-  const bool done = successful_ >= max_successful_ || small_decreases_ >= kSmallDecreases;
+  const bool done =
+      converged || successful_ >= max_successful_ || small_decreases_ >= kSmallDecreases;
   return done ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
 }
 

@@ -8,12 +8,12 @@
 namespace orbslam {
 
 /// Ends a minimisation by the rules of spec 16, 9.4: after `max_successful` successful steps, after
-/// three in a row with a relative decrease below 1e-3, after ten rejected ones in a row, or when
-/// `abort` is raised. What was reached is kept.
+/// three in a row with a relative decrease below 1e-3 or one below `converged`, after ten rejected
+/// ones in a row, or when `abort` is raised. What was reached is kept.
 class BundleIterations final : public ceres::IterationCallback {
  public:
-  BundleIterations(int max_successful, const std::atomic<bool>* abort)
-      : max_successful_(max_successful), abort_(abort) {}
+  BundleIterations(int max_successful, double converged, const std::atomic<bool>* abort)
+      : max_successful_(max_successful), converged_(converged), abort_(abort) {}
 
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override;
 
@@ -22,6 +22,7 @@ class BundleIterations final : public ceres::IterationCallback {
 
  private:
   int max_successful_;
+  double converged_;
   const std::atomic<bool>* abort_;
   int successful_ = 0, rejected_ = 0, small_decreases_ = 0;
   double cost_ = 0;

@@ -9,154 +9,157 @@ namespace {
 
 constexpr double kTinyDepth = 1e-9;
 
-/// An observed point in the camera frame and on the normalised image plane.
-struct Projected {
-  double p[3];  // camera frame
-  double x, y, inverse_z;
-  double scale;  // 0 where there is no projection
-
-  Projected(const BundleMeasurement& m, const double* w) {
-    const Eigen::Matrix3d& R = m.view->R_cw;
-    const Eigen::Vector3d& t = m.view->t_cw;
-    for (int i = 0; i < 3; ++i) p[i] = R(i, 0) * w[0] + R(i, 1) * w[1] + R(i, 2) * w[2] + t(i);
-    const bool projects = std::abs(p[2]) > kTinyDepth;
-    inverse_z = projects ? 1.0 / p[2] : 0.0;
-    scale = projects ? m.scale : 0.0;
-    x = p[0] * inverse_z;
-    y = p[1] * inverse_z;
-  }
-
-  double error_u(const BundleMeasurement& m) const {
-    return scale * (m.u - (m.view->pinhole.fx * x + m.view->pinhole.cx));
-  }
-  double error_v(const BundleMeasurement& m) const {
-    return scale * (m.v - (m.view->pinhole.fy * y + m.view->pinhole.cy));
-  }
-  double error_right_u(const BundleMeasurement& m) const {
-    return scale *
-           (m.right_u - (m.view->pinhole.fx * x + m.view->pinhole.cx - m.view->bf * inverse_z));
-  }
+/// Derivative of one weighted prediction with respect to the point in the camera frame.
+struct CameraRow {
+  double a, b, c;
 };
 
-/// Writes one row of the Jacobians. (a, b, c) is the derivative of the *prediction* with respect to
-/// the point in the camera frame; a pointer may be null.
+CameraRow row_u(const BundleMeasurement& m) {
+  const double a = m.factor * m.view->pinhole().fx * m.inverse_z;
+  return {a, 0, -a * m.p_c[0] * m.inverse_z};
+}
+CameraRow row_v(const BundleMeasurement& m) {
+  const double b = m.factor * m.view->pinhole().fy * m.inverse_z;
+  return {0, b, -b * m.p_c[1] * m.inverse_z};
+}
+CameraRow row_right(const BundleMeasurement& m) {
+  const CameraRow row = row_u(m);
+  return {row.a, 0, row.c + m.factor * m.view->bf() * m.inverse_z * m.inverse_z};
+}
+
+/// Derivative of the residual (minus the prediction) with respect to the six camera parameters.
+void write_camera_row(const BundleMeasurement& m, const CameraRow& g, double* out) {
+  const Eigen::Matrix3d& J = m.view->left_jacobian();
+  const Eigen::Vector3d& v = m.view->shift();
+  // p_c = exp(w) y + v, so d p_c / d w = -[p_c - v]x left_jacobian.
+  const double y0 = m.p_c[0] - v(0), y1 = m.p_c[1] - v(1), y2 = m.p_c[2] - v(2);
+  const double r0 = g.b * y2 - g.c * y1;
+  const double r1 = g.c * y0 - g.a * y2;
+  const double r2 = g.a * y1 - g.b * y0;
+  for (int i = 0; i < 3; ++i) out[i] = r0 * J(0, i) + r1 * J(1, i) + r2 * J(2, i);
+  out[3] = -g.a;
+  out[4] = -g.b;
+  out[5] = -g.c;
+}
+
+void write_point_row(const BundleMeasurement& m, const CameraRow& g, double* out) {
+  const Eigen::Matrix3d& R = m.view->R_cw();
+  for (int i = 0; i < 3; ++i) out[i] = -(g.a * R(0, i) + g.b * R(1, i) + g.c * R(2, i));
+}
+
 template <bool kFree>
-void write_row(const BundleMeasurement& m, const Projected& projected, int row, double a, double b,
-               double c, double** jacobians) {
+void write_rows(const BundleMeasurement& m, const CameraRow& first, const CameraRow& second,
+                double** jacobians) {
   if constexpr (kFree) {
     if (jacobians[0] != nullptr) {
-      double* out = jacobians[0] + row * PoseManifold::kAmbientSize;
-      const double* p = projected.p;
-      out[0] = b * p[2] - c * p[1];
-      out[1] = c * p[0] - a * p[2];
-      out[2] = a * p[1] - b * p[0];
-      out[3] = -a;
-      out[4] = -b;
-      out[5] = -c;
-      out[6] = 0;
+      write_camera_row(m, first, jacobians[0]);
+      write_camera_row(m, second, jacobians[0] + BundleView::kParameters);
     }
   }
-  constexpr int kPointBlock = kFree ? 1 : 0;
-  if (jacobians[kPointBlock] != nullptr) {
-    double* out = jacobians[kPointBlock] + row * 3;
-    const Eigen::Matrix3d& R = m.view->R_cw;
-    for (int i = 0; i < 3; ++i) out[i] = -(a * R(0, i) + b * R(1, i) + c * R(2, i));
+  double* point = jacobians[kFree ? 1 : 0];
+  if (point != nullptr) {
+    write_point_row(m, first, point);
+    write_point_row(m, second, point + 3);
   }
-}
-
-/// Rows u and v, times `factor`.
-template <bool kFree>
-void write_image_rows(const BundleMeasurement& m, const Projected& projected, double factor,
-                      double** jacobians) {
-  const double a = factor * projected.scale * m.view->pinhole.fx * projected.inverse_z;
-  const double b = factor * projected.scale * m.view->pinhole.fy * projected.inverse_z;
-  write_row<kFree>(m, projected, 0, a, 0, -a * projected.x, jacobians);
-  write_row<kFree>(m, projected, 1, 0, b, -b * projected.y, jacobians);
-}
-
-/// The row of the right column, times `factor`.
-template <bool kFree>
-void write_right_row(const BundleMeasurement& m, const Projected& projected, int row, double factor,
-                     double** jacobians) {
-  const double scale = factor * projected.scale * projected.inverse_z;
-  const double a = scale * m.view->pinhole.fx;
-  const double c = -a * projected.x + scale * m.view->bf * projected.inverse_z;
-  write_row<kFree>(m, projected, row, a, 0, c, jacobians);
 }
 
 }  // namespace
 
+BundleView::BundleView(const Pose& T_cw, const Pinhole& pinhole, double bf)
+    : start_(T_cw), pinhole_(pinhole), bf_(bf) {
+  const double origin[kParameters] = {};
+  move(origin);
+}
+
+void BundleView::move(const double* parameters) {
+  const Eigen::Map<const Eigen::Vector3d> w(parameters);
+  shift_ = Eigen::Map<const Eigen::Vector3d>(parameters + 3);
+  const double angle_squared = w.squaredNorm();
+  const double angle = std::sqrt(angle_squared);
+  // Series below 1e-4 rad, where the closed forms lose digits.
+  const bool small = angle < 1e-4;
+  const double b = small ? 0.5 - angle_squared / 24 : (1 - std::cos(angle)) / angle_squared;
+  const double c =
+      small ? 1.0 / 6 - angle_squared / 120 : (angle - std::sin(angle)) / (angle_squared * angle);
+  const Eigen::Matrix3d W = skew(w);
+  left_jacobian_ = Eigen::Matrix3d::Identity() + b * W + c * W * W;
+
+  Vector6d xi = Vector6d::Zero();
+  xi.head<3>() = w;
+  const Eigen::Quaterniond turn = Pose::exp(xi).rotation();
+  rotation_ = (turn * start_.rotation()).normalized();
+  R_cw_ = rotation_.toRotationMatrix();
+  t_cw_ = turn * start_.translation() + shift_;
+}
+
+double BundleMeasurement::evaluate() {
+  const Eigen::Matrix3d& R = view->R_cw();
+  const Eigen::Vector3d& t = view->t_cw();
+  for (int i = 0; i < 3; ++i) {
+    p_c[i] = R(i, 0) * point[0] + R(i, 1) * point[1] + R(i, 2) * point[2] + t(i);
+  }
+  const bool projects = std::abs(p_c[2]) > kTinyDepth;
+  inverse_z = projects ? 1 / p_c[2] : 0;
+  factor = projects ? scale : 0;
+  const Pinhole& k = view->pinhole();
+  const double predicted_u = k.fx * p_c[0] * inverse_z + k.cx;
+  residual[0] = factor * (u - predicted_u);
+  residual[1] = factor * (v - (k.fy * p_c[1] * inverse_z + k.cy));
+  residual[2] = has_depth ? factor * (right_u - (predicted_u - view->bf() * inverse_z)) : 0.0;
+  if (huber == 0) return 0;
+  const double q =
+      residual[0] * residual[0] + residual[1] * residual[1] + residual[2] * residual[2];
+  if (q <= huber * huber) return 0;
+  const double root = std::sqrt(q);
+  const double weight = std::sqrt(huber / root);
+  factor *= weight;
+  for (double& r : residual) r *= weight;
+  return huber * (root - huber);  // (2 d root - d^2) - d root
+}
+
+void BundleMeasurement::add_curvature(Vector6d& pose_diagonal,
+                                      Eigen::Vector3d& point_diagonal) const {
+  const CameraRow rows[] = {row_u(*this), row_v(*this), row_right(*this)};
+  for (int i = 0; i < (has_depth ? 3 : 2); ++i) {
+    Vector6d pose;
+    Eigen::Vector3d position;
+    write_camera_row(*this, rows[i], pose.data());
+    write_point_row(*this, rows[i], position.data());
+    pose_diagonal += pose.cwiseAbs2();
+    point_diagonal += position.cwiseAbs2();
+  }
+}
+
 template <bool kFree>
-bool MonoResiduals<kFree>::Evaluate(double const* const* parameters, double* residuals,
+bool ImageResiduals<kFree>::Evaluate(double const* const*, double* residuals,
+                                     double** jacobians) const {
+  const BundleMeasurement& m = *measurement_;
+  residuals[0] = m.residual[0];
+  residuals[1] = m.residual[1];
+  if (jacobians != nullptr) write_rows<kFree>(m, row_u(m), row_v(m), jacobians);
+  return true;
+}
+
+template <bool kFree>
+bool RightResidual<kFree>::Evaluate(double const* const*, double* residuals,
                                     double** jacobians) const {
   const BundleMeasurement& m = *measurement_;
-  const Projected projected(m, parameters[kFree ? 1 : 0]);
-  residuals[0] = projected.error_u(m);
-  residuals[1] = projected.error_v(m);
-  if (jacobians != nullptr) write_image_rows<kFree>(m, projected, 1.0, jacobians);
+  residuals[0] = m.residual[2];
+  residuals[1] = 0;
+  if (jacobians != nullptr) write_rows<kFree>(m, row_right(m), {0, 0, 0}, jacobians);
   return true;
 }
 
-template <bool kFree, bool kSecond>
-bool StereoResiduals<kFree, kSecond>::Evaluate(double const* const* parameters, double* residuals,
-                                               double** jacobians) const {
-  const BundleMeasurement& m = *measurement_;
-  const Projected projected(m, parameters[kFree ? 1 : 0]);
-  const double u = projected.error_u(m), v = projected.error_v(m);
-  const double right_u = projected.error_right_u(m);
-
-  double factor = 1, missing_cost = 0;
-  if (m.huber > 0) {
-    const double q = u * u + v * v + right_u * right_u;
-    if (q > m.huber * m.huber) {
-      const double root = std::sqrt(q);
-      factor = std::sqrt(m.huber / root);
-      // rho(q) - rho'(q) q = (2 d root - d^2) - d root
-      missing_cost = m.huber * (root - m.huber);
-    }
-  }
-  if constexpr (kSecond) {
-    residuals[0] = factor * right_u;
-    residuals[1] = std::sqrt(std::max(0.0, missing_cost));
-  } else {
-    residuals[0] = factor * u;
-    residuals[1] = factor * v;
-  }
-  if (jacobians == nullptr) return true;
-  if constexpr (kSecond) {
-    write_right_row<kFree>(m, projected, 0, factor, jacobians);
-    write_row<kFree>(m, projected, 1, 0, 0, 0, jacobians);
-  } else {
-    write_image_rows<kFree>(m, projected, factor, jacobians);
-  }
+bool MissingCost::Evaluate(double const* const*, double* residuals, double** jacobians) const {
+  residuals[0] = std::sqrt(std::max(0.0, *sum_));
+  residuals[1] = 0;
+  if (jacobians != nullptr && jacobians[0] != nullptr) std::fill_n(jacobians[0], 6, 0.0);
   return true;
 }
 
-void add_curvature(const BundleMeasurement& m, const Eigen::Vector3d& point,
-                   Vector6d& pose_diagonal, Eigen::Vector3d& point_diagonal) {
-  const Projected projected(m, point.data());
-  Eigen::Matrix<double, 3, PoseManifold::kAmbientSize, Eigen::RowMajor> pose;
-  Eigen::Matrix<double, 3, 3, Eigen::RowMajor> position;
-  double* jacobians[] = {pose.data(), position.data()};
-  write_image_rows<true>(m, projected, 1.0, jacobians);
-  double q = std::pow(projected.error_u(m), 2) + std::pow(projected.error_v(m), 2);
-  if (m.has_depth) {
-    write_right_row<true>(m, projected, 2, 1.0, jacobians);
-    q += std::pow(projected.error_right_u(m), 2);
-  } else {
-    pose.row(2).setZero();
-    position.row(2).setZero();
-  }
-  const double weight = m.huber > 0 && q > m.huber * m.huber ? m.huber / std::sqrt(q) : 1.0;
-  pose_diagonal += weight * pose.leftCols<6>().colwise().squaredNorm().transpose();
-  point_diagonal += weight * position.colwise().squaredNorm().transpose();
-}
-
-template class MonoResiduals<true>;
-template class MonoResiduals<false>;
-template class StereoResiduals<true, true>;
-template class StereoResiduals<true, false>;
-template class StereoResiduals<false, true>;
-template class StereoResiduals<false, false>;
+template class ImageResiduals<true>;
+template class ImageResiduals<false>;
+template class RightResidual<true>;
+template class RightResidual<false>;
 
 }  // namespace orbslam

@@ -7,46 +7,75 @@
 
 #include "base/pose.hpp"
 #include "camera/camera.hpp"
-#include "optimize/pose_manifold.hpp"
 
 namespace orbslam {
 
-/// A camera at the present evaluation point. The rotation matrix is computed once per evaluation,
-/// not once per observation.
-struct BundleView {
-  Eigen::Matrix3d R_cw = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d t_cw = Eigen::Vector3d::Zero();
-  Pinhole pinhole;
-  double bf = 0;
+/// A camera of a bundle in a chart around its starting pose: six parameters (w, v) stand for
+/// T_cw = (exp(w) R, exp(w) t + v) with (R, t) the pose at the start. To first order that is the
+/// left perturbation (rotation, translation) of the camera, and being a plain vector space it saves
+/// Ceres a product by a manifold's Jacobian per observation.
+class BundleView {
+ public:
+  static constexpr int kParameters = 6;
 
-  void set_pose(const Pose& T_cw) {
-    R_cw = T_cw.rotation_matrix();
-    t_cw = T_cw.translation();
-  }
+  BundleView(const Pose& T_cw, const Pinhole& pinhole, double bf);
+  /// Moves to the given parameters.
+  void move(const double* parameters);
+
+  Pose T_cw() const { return Pose(rotation_, t_cw_); }
+  const Eigen::Matrix3d& R_cw() const { return R_cw_; }
+  const Eigen::Vector3d& t_cw() const { return t_cw_; }
+  const Eigen::Vector3d& shift() const { return shift_; }  ///< v
+  /// Left Jacobian of SO(3) at w: exp(w + d) = exp(left_jacobian * d) exp(w) to first order.
+  const Eigen::Matrix3d& left_jacobian() const { return left_jacobian_; }
+  const Pinhole& pinhole() const { return pinhole_; }
+  double bf() const { return bf_; }
+
+ private:
+  Pose start_;
+  Pinhole pinhole_;
+  double bf_;
+  Eigen::Quaterniond rotation_;
+  Eigen::Matrix3d R_cw_, left_jacobian_;
+  Eigen::Vector3d t_cw_, shift_;
 };
 
-/// What one observation measured.
+/// One observation, and its state at the present evaluation point. The state is computed once per
+/// point (evaluate) and read by all cost functions of the observation.
 struct BundleMeasurement {
   const BundleView* view = nullptr;
+  const double* point = nullptr;  ///< world
   double u = 0, v = 0, right_u = 0;
   double scale = 1;  ///< one over the standard deviation; 0 takes the observation out
   double huber = 0;  ///< width of the kernel; 0: none
   bool has_depth = false;
+
+  double p_c[3] = {};  ///< the point in the camera frame
+  double inverse_z = 0;
+  double factor = 0;        ///< scale times sqrt(rho'), of residuals and derivatives
+  double residual[3] = {};  ///< u, v, right u: measurement minus prediction, times factor
+
+  /// Returns rho(q) - rho'(q) q: what the squared residuals lack of the robustified cost.
+  /// Points on the camera's plane have zero residuals.
+  double evaluate();
+  /// Adds this observation's part of the diagonal of the Gauss-Newton matrix.
+  void add_curvature(Vector6d& pose_diagonal, Eigen::Vector3d& point_diagonal) const;
 };
 
-/// Two residuals of an observation by one camera, measurement minus prediction, times `scale`.
-/// Points on the camera's plane have zero residuals. kFree: parameter blocks pose and point,
-/// otherwise the camera is fixed and the only block is the point.
+/// Two residuals of an observation. kFree: the parameter blocks are camera and point, otherwise the
+/// camera is fixed and the only block is the point. Ceres' Schur complement is specialised for rows
+/// of two (and cameras of six), so three rows are cut into two blocks. Kernels are part of the
+/// residuals: no loss function must be attached.
 template <bool kFree>
 using TwoResiduals =
-    std::conditional_t<kFree, ceres::SizedCostFunction<2, PoseManifold::kAmbientSize, 3>,
+    std::conditional_t<kFree, ceres::SizedCostFunction<2, BundleView::kParameters, 3>,
                        ceres::SizedCostFunction<2, 3>>;
 
-/// Monocular: u and v. The kernel, if any, is a loss function of the problem.
+/// Rows u and v.
 template <bool kFree>
-class MonoResiduals final : public TwoResiduals<kFree> {
+class ImageResiduals final : public TwoResiduals<kFree> {
  public:
-  explicit MonoResiduals(const BundleMeasurement* measurement) : measurement_(measurement) {}
+  explicit ImageResiduals(const BundleMeasurement* measurement) : measurement_(measurement) {}
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
 
@@ -54,15 +83,11 @@ class MonoResiduals final : public TwoResiduals<kFree> {
   const BundleMeasurement* measurement_;
 };
 
-/// Stereo: three residuals under one common Huber kernel, cut into two cost functions of two rows
-/// because Ceres' Schur complement is specialised for rows of two. kSecond false: u and v; true:
-/// right u, and a row without derivatives that carries the part of the robustified cost which
-/// sqrt(rho') times the residuals lacks. Cost, gradient and Gauss-Newton matrix of the pair are
-/// those of a three-row block under ceres::HuberLoss. No loss function must be attached.
-template <bool kFree, bool kSecond>
-class StereoResiduals final : public TwoResiduals<kFree> {
+/// The row of the right column, and an empty one.
+template <bool kFree>
+class RightResidual final : public TwoResiduals<kFree> {
  public:
-  explicit StereoResiduals(const BundleMeasurement* measurement) : measurement_(measurement) {}
+  explicit RightResidual(const BundleMeasurement* measurement) : measurement_(measurement) {}
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override;
 
@@ -70,8 +95,18 @@ class StereoResiduals final : public TwoResiduals<kFree> {
   const BundleMeasurement* measurement_;
 };
 
-/// Adds the observation's part of the diagonal of the Gauss-Newton matrix (kernel weight included).
-void add_curvature(const BundleMeasurement& measurement, const Eigen::Vector3d& point,
-                   Vector6d& pose_diagonal, Eigen::Vector3d& point_diagonal);
+/// Carries the part of the robustified cost that the weighted residuals lack, so that the total
+/// cost, its gradient and the Gauss-Newton matrix are those of ceres::HuberLoss on each
+/// observation. One per problem, on any point: it has no derivatives.
+class MissingCost final : public ceres::SizedCostFunction<2, 3> {
+ public:
+  /// `sum` is that of BundleMeasurement::evaluate() over the problem.
+  explicit MissingCost(const double* sum) : sum_(sum) {}
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+ private:
+  const double* sum_;
+};
 
 }  // namespace orbslam
