@@ -42,9 +42,7 @@ def test_stereo_frame_equals_the_reference(name: str, n_features: int) -> None:
     pair = extractor.extract(left, right)
 
     height, width = left.shape
-    camera = core.Camera(
-        core.CameraOptions(fx, fy, cx, cy, width, height, bf=bf, depth_ratio=35.0)
-    )
+    camera = core.Camera(core.CameraOptions(fx, fy, cx, cy, width, height, bf=bf, depth_ratio=35.0))
     context = core.FrameContext(camera, core.ScalePyramid(1.2, 8))
     frame = core.build_stereo_frame(context, 0, 0.0, *pair)
 

@@ -180,7 +180,11 @@ void bind_tracked_frame(py::module_& module) {
            py::arg("frame").none(false))
       .def_property_readonly(
           "frame", [](const TrackedFrame& t) { return std::const_pointer_cast<Frame>(t.frame); })
-      .def_property_readonly("id", [](const TrackedFrame& t) { return t.frame->id; })
+      .def_property_readonly(
+          "id", [](const TrackedFrame& t) { return t.frame->id; }, "Id of the frame.")
+      .def_property_readonly(
+          "timestamp", [](const TrackedFrame& t) { return t.frame->timestamp; },
+          "Seconds, as given by the caller.")
       .def_readwrite("T_cw", &TrackedFrame::T_cw, "World to camera; None while unknown.")
       .def_readwrite("reference_keyframe", &TrackedFrame::reference_keyframe, "-1: none.")
       .def_property_readonly(

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
+
 namespace orbslam {
 namespace {
 
@@ -54,6 +56,19 @@ TEST(TrackedFrame, DissociatingForgetsTheOutlierFlag) {
   tracked.dissociate(0);
   EXPECT_EQ(tracked.n_associated(), 0U);
   EXPECT_EQ(tracked.outlier[0], 0);
+}
+
+TEST(TrackedFrame, DiscardingReturnsTheOutliersPointsAndKeepsTheInliers) {
+  TrackedFrame tracked(frame_with_depths({1, 2, 3, 4}));
+  for (const auto& [i, id] : {std::pair(0U, 9), {1U, 5}, {2U, 7}}) {
+    tracked.associate(i, MapPointId(id), {0, 0, 1});
+  }
+  tracked.outlier = {1, 0, 1, 1};  // the last one has no point
+  EXPECT_EQ(tracked.discard_outliers(), (std::vector<MapPointId>{MapPointId(7), MapPointId(9)}));
+  EXPECT_EQ(tracked.n_associated(), 1U);
+  EXPECT_EQ(tracked.map_points[1], MapPointId(5));
+  EXPECT_EQ(tracked.outlier[0], 0);
+  EXPECT_TRUE(tracked.discard_outliers().empty());
 }
 
 TEST(TrackedFrame, CloseCountsTellInliersFromTheRest) {
