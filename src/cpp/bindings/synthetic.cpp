@@ -64,12 +64,15 @@ void bind_paths(py::module_& module) {
       .def("length", &Way::length, "Metres; of one lap if closed.")
       .def(
           "T_wc",
-          [](const Way& way, double distance, double lateral, double yaw, double sway) {
-            return way.T_wc(distance, PathOptions{lateral, yaw, sway}).matrix();
+          [](const Way& way, double distance, double lateral, double yaw, double sway,
+             double stride) {
+            return way.T_wc(distance, PathOptions{lateral, yaw, sway, stride}).matrix();
           },
           "distance"_a, "lateral"_a = 0.0, "yaw"_a = 0.0, "sway"_a = PathOptions{}.sway,
+          "stride"_a = PathOptions{}.stride,
           "Camera to world (4, 4) after `distance` metres, `lateral` metres to the right of the "
-          "way, looking `yaw` radians to its right.");
+          "way, looking `yaw` radians to its right, swaying by `sway` metres every `stride` "
+          "metres.");
   module.def(
       "room_T_wc",
       [](const Eigen::Vector3d& size, double seconds, double period) {

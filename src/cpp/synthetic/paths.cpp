@@ -116,20 +116,18 @@ double Way::heading_integral(double distance) const {
 }
 
 Pose Way::T_wc(double distance, const PathOptions& options) const {
+  if (!(options.stride > 0)) throw SettingsError("Way: stride must be positive");
   const double look =
       (heading_integral(distance + smoothing_) - heading_integral(distance - smoothing_)) /
       (2 * smoothing_);
-  // The sway has whole periods per lap only by chance; it is small.
-  constexpr double kStride = 2 * kPi / 1.7;  // rad per metre
-  const double side = options.lateral + options.sway * std::sin(kStride * distance);
+  const double gait = 2 * kPi * distance / options.stride;
+  const double side = options.lateral + options.sway * std::sin(gait);
   const Eigen::Vector2d at = position(distance);
   // To the right of the direction (x, z) = (sin h, cos h) lies (cos h, -sin h).
-  const Eigen::Vector3d p(at.x() + side * std::cos(look),
-                          0.5 * options.sway * std::sin(1.3 * kStride * distance),
+  const Eigen::Vector3d p(at.x() + side * std::cos(look), 0.5 * options.sway * std::sin(1.3 * gait),
                           at.y() - side * std::sin(look));
   const double tilt = 0.2 * options.sway;
-  return camera_to_world(p, look + options.yaw, tilt * std::sin(0.7 * kStride * distance),
-                         tilt * std::sin(kStride * distance));
+  return camera_to_world(p, look + options.yaw, tilt * std::sin(0.7 * gait), tilt * std::sin(gait));
 }
 
 Pose room_T_wc(const Eigen::Vector3d& size, double seconds, double period) {
@@ -173,7 +171,7 @@ Way two_rooms_way(const Eigen::Vector3d& size, double passage) {
               {-x, far + z},
               {x, far + z},
               {x, far - z}},
-             std::min(0.6, 0.8 * std::min(x, z)), false);
+             std::min(0.8, 0.5 * std::min(x, z)), false);
 }
 
 }  // namespace orbslam::synthetic

@@ -10,9 +10,10 @@ namespace orbslam::synthetic {
 
 /// How a camera departs from its path.
 struct PathOptions {
-  double lateral = 0;  ///< metres to the right of the path: other viewpoints of the same places
-  double yaw = 0;      ///< radians to the right of the direction of travel
-  double sway = 0.08;  ///< metres; amplitude of the carrier's gait to the side, half of it up
+  double lateral = 0;   ///< metres to the right of the path: other viewpoints of the same places
+  double yaw = 0;       ///< radians to the right of the direction of travel
+  double sway = 0.08;   ///< metres; amplitude of the carrier's gait to the side, half of it up
+  double stride = 1.7;  ///< metres; way between two sways to the same side
 };
 
 /// A way along corridors or streets: straight legs joined by arcs, in the plane y = 0 of the world

@@ -55,7 +55,7 @@ TEST(RoomPath, ComesBackAfterAPeriodAndStaysInTheMiddle) {
 
 TEST(Way, IsClosedAndSmoothAlsoAcrossLaps) {
   for (const Way& way : {corridor_way(16, 12, 2.4), figure_eight_way(16, 20, 2.4)}) {
-    const auto still = PathOptions{0, 0, 0};
+    const PathOptions still{0, 0, 0, 1};
     EXPECT_LT(
         (way.T_wc(1.5, still).inverse() * way.T_wc(1.5 + 2 * way.length(), still)).log().norm(),
         1e-9);
@@ -85,7 +85,7 @@ TEST(Way, StaysInTheMiddleOfTheCorridor) {
 
 TEST(Way, FigureOfEightUsesTheMiddleLegTwiceInTheSameDirection) {
   const Way way = figure_eight_way(16, 20, 2.4);
-  const PathOptions still{0, 0, 0};
+  const PathOptions still{0, 0, 0, 1};
   const Pose first = way.T_wc(0, still);
   const Pose second = way.T_wc(way.length() / 2, still);
   EXPECT_LT((first.inverse() * second).log().norm(), 1e-9);
@@ -96,18 +96,36 @@ TEST(Way, FigureOfEightUsesTheMiddleLegTwiceInTheSameDirection) {
 TEST(Way, LooksWhereItGoes) {
   const Way way = street_way(600);
   EXPECT_NEAR(way.length(), 600, 1e-9);
-  const Pose T_wc = way.T_wc(100, {0, 0, 0});
+  const Pose T_wc = way.T_wc(100, {0, 0, 0, 1});
   EXPECT_LT((T_wc.translation() - Eigen::Vector3d(0, 0, 100)).norm(), 1e-9);
   EXPECT_LT((T_wc.rotation() * Eigen::Vector3d::UnitZ() - Eigen::Vector3d::UnitZ()).norm(), 1e-9);
-  const Pose beside = way.T_wc(100, {1.5, 0.5, 0});
+  const Pose beside = way.T_wc(100, {1.5, 0.5, 0, 1});
   EXPECT_LT((beside.translation() - Eigen::Vector3d(1.5, 0, 100)).norm(), 1e-9);
   EXPECT_GT((beside.rotation() * Eigen::Vector3d::UnitZ()).x(), 0.4);
+}
+
+TEST(Way, SwaysOncePerStride) {
+  const Way way = street_way(100);
+  const PathOptions options{0, 0, 0.05, 40};
+  EXPECT_NEAR(way.T_wc(10, options).translation().x(), 0.05, 1e-9);
+  EXPECT_NEAR(way.T_wc(20, options).translation().x(), 0, 1e-9);
+  EXPECT_NEAR(way.T_wc(30, options).translation().x(), -0.05, 1e-9);
+}
+
+TEST(Way, GoesFromOneRoomIntoTheOtherWhateverTheirSize) {
+  for (const Eigen::Vector3d size :
+       {Eigen::Vector3d(6, 3, 6), Eigen::Vector3d(5, 3, 12), Eigen::Vector3d(12, 3, 5)}) {
+    const Way way = two_rooms_way(size, 3);
+    EXPECT_LT(way.T_wc(0).translation().z(), size.z() / 2);
+    EXPECT_GT(way.T_wc(way.length()).translation().z(), size.z() / 2 + 3);
+  }
 }
 
 TEST(Way, RefusesLegsThatAreTooShort) {
   EXPECT_THROW(Way({{0, 0}, {0, 1}, {1, 1}}, 2, true), SettingsError);
   EXPECT_THROW(Way({{0, 0}}, 1, false), SettingsError);
   EXPECT_THROW(Way({{0, 0}, {0, 5}}, 0, false), SettingsError);
+  EXPECT_THROW(street_way(10).T_wc(1, {0, 0, 0.1, 0}), SettingsError);
 }
 
 }  // namespace

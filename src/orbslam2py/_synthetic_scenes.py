@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The synthetic worlds and the camera's way through each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbslam2py import _core as core
+
+
+class SyntheticWorld(str, Enum):
+    """The worlds there are, with the way the camera takes through them."""
+
+    ROOM = "room"
+    """A room of 6 x 6 m; the camera looks around from its middle, once in 30 s."""
+    CORRIDOR = "corridor"
+    """A corridor around a block; one lap (26 m) and a bit."""
+    REPEATING_CORRIDOR = "repeating-corridor"
+    """The same, but the pictures on its walls come again every four metres."""
+    FIGURE_EIGHT = "figure-eight"
+    """Two corridors with a common leg; two loops and a bit."""
+    STREET = "street"
+    """A drive of 600 m along a straight street."""
+    TWO_ROOMS = "two-rooms"
+    """From a room through a door and a passage into a room that looks the same."""
+
+    def __str__(self) -> str:
+        return self.value
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A world and the way through it.
+
+    Attributes
+    ----------
+    make_world
+        Makes the world from a seed.
+    way
+        None stands for looking around in the room.
+    speed
+        Usual speed [m/s].
+    laps
+        How often the whole way is gone.
+    outdoors
+        Open above; seen from a car.
+    """
+
+    make_world: Callable[[int], core.World]
+    way: core.Way | None
+    speed: float = 0.7
+    laps: float = 1.0
+    outdoors: bool = False
+
+    def seconds(self, speed: float) -> float:
+        """Time that the whole way takes."""
+        return _LOOKING_AROUND if self.way is None else self.laps * self.way.length() / speed
+
+    def T_wc(  # noqa: N802 - the field's notation
+        self, seconds: float, speed: float, lateral: float, yaw: float
+    ) -> NDArray[np.float64]:
+        """Camera to world (4, 4) at a time.
+
+        Parameters
+        ----------
+        seconds
+            Since the start.
+        speed
+            Metres per second.
+        lateral
+            Metres to the right of the way.
+        yaw
+            Radians to the right of the direction of travel.
+        """
+        if self.way is not None:
+            # A car rolls gently where a walker sways at every step.
+            sway, stride = (0.05, 40.0) if self.outdoors else (0.08, 1.7)
+            return np.asarray(self.way.T_wc(speed * seconds, lateral, yaw, sway, stride))
+        T_wc = np.asarray(core.room_T_wc(_ROOM, seconds, 2 * _LOOKING_AROUND))
+        aside = np.eye(4)
+        aside[0, 3] = lateral
+        aside[0, [0, 2]] = math.cos(yaw), math.sin(yaw)
+        aside[2, [0, 2]] = -math.sin(yaw), math.cos(yaw)
+        return np.asarray(T_wc @ aside)
+
+
+_ROOM = (6.0, 3.0, 6.0)
+_LOOKING_AROUND = 15.0  # seconds, for half a turn
+_CORRIDOR = (10.0, 8.0, 2.0)  # length, breadth, width
+_EIGHT = (10.0, 12.0, 2.0)
+_HEIGHT = 2.6
+_REPEAT = 4.0
+_STREET = (600.0, 12.0)  # length, width
+_PASSAGE = 3.0
+
+
+def make_scene(world: SyntheticWorld) -> Scene:
+    """Choose world and way; the world itself is made later, from the seed."""
+    if world is SyntheticWorld.ROOM:
+        return Scene(lambda seed: core.make_room(_ROOM, seed, 10), None)
+    if world in (SyntheticWorld.CORRIDOR, SyntheticWorld.REPEATING_CORRIDOR):
+        repeat = _REPEAT if world is SyntheticWorld.REPEATING_CORRIDOR else 0.0
+        return Scene(
+            lambda seed: core.make_corridor(*_CORRIDOR, _HEIGHT, seed, repeat),
+            core.corridor_way(*_CORRIDOR),
+            laps=1.2,
+        )
+    if world is SyntheticWorld.FIGURE_EIGHT:
+        return Scene(
+            lambda seed: core.make_figure_eight(*_EIGHT, _HEIGHT, seed),
+            core.figure_eight_way(*_EIGHT),
+            laps=1.1,
+        )
+    if world is SyntheticWorld.TWO_ROOMS:
+        return Scene(
+            lambda seed: core.make_two_rooms(_ROOM, _PASSAGE, seed, 8),
+            core.two_rooms_way(_ROOM, _PASSAGE),
+            speed=0.4,
+        )
+    return Scene(
+        lambda seed: core.make_street(*_STREET, seed),
+        core.street_way(_STREET[0]),
+        speed=10.0,
+        outdoors=True,
+    )

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``orbslam2py synthesize``: a sequence with exact ground truth, made on the spot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from orbslam2py.datasets.base import Layout
+from orbslam2py.errors import SettingsError
+from orbslam2py.sensor import Sensor
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence, SyntheticWorld
+
+EXAMPLE = """
+**Example**
+
+    orbslam2py synthesize lap --world corridor --sensor rgbd --layout tum
+
+    orbslam2py run lap --sensor rgbd
+"""
+
+
+def synthesize(
+    folder: Annotated[Path, typer.Argument(help="Folder to write; must be new or empty.")],
+    world: Annotated[
+        SyntheticWorld, typer.Option(help="Where the camera moves.")
+    ] = SyntheticWorld.ROOM,
+    sensor: Annotated[Sensor, typer.Option(help="What delivers the images.")] = Sensor.STEREO,
+    layout: Annotated[
+        Layout | None,
+        typer.Option(
+            help="File names and formats: tum for mono and rgbd, kitti or euroc for mono and "
+            "stereo.  [default: kitti for stereo, else tum]"
+        ),
+    ] = None,
+    frames: Annotated[
+        int | None, typer.Option(help="Number of images.  [default: the whole way]")
+    ] = None,
+    fps: Annotated[
+        float | None, typer.Option(help="Frames per second.  [default: 20; street: 10]")
+    ] = None,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            help="Metres per second, not for room.  [default: 0.7; two-rooms: 0.4; street: 10]"
+        ),
+    ] = None,
+    size: Annotated[
+        str | None,
+        typer.Option(metavar="WxH", help="Pixels.  [default: 640x480; street: 1241x376]"),
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Another seed, another world.")] = 0,
+    noise: Annotated[float, typer.Option(help="Noise of the images [grey levels].")] = 0.0,
+    depth_noise: Annotated[
+        float, typer.Option(help="Noise of the depth at 1 m [m]; grows with its square.")
+    ] = 0.0,
+    exposure: Annotated[float, typer.Option(help="Factor on the grey values.")] = 1.0,
+    lateral: Annotated[float, typer.Option(help="Metres to the right of the usual way.")] = 0.0,
+    yaw: Annotated[float, typer.Option(help="Look so many degrees to the right.")] = 0.0,
+    force: Annotated[
+        bool, typer.Option("--force", help="Replace a synthetic sequence in the folder.")
+    ] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
+) -> None:
+    """Write a synthetic sequence with calibration and exact ground truth."""
+    options = SyntheticOptions(
+        world=world,
+        sensor=sensor,
+        frames=frames,
+        fps=fps,
+        speed=speed,
+        size=None if size is None else parse_size(size),
+        seed=seed,
+        noise=noise,
+        exposure=exposure,
+        depth_noise=depth_noise,
+        lateral=lateral,
+        yaw=yaw,
+    )
+    sequence = SyntheticSequence(options)
+    console = Console(quiet=quiet)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    with Progress(*columns, TimeRemainingColumn(), console=console, transient=True) as bar:
+        task = bar.add_task("Rendering", total=len(sequence))
+        sequence.write(
+            folder,
+            layout,
+            force=force,
+            progress=lambda done, total: bar.update(task, completed=done, total=total),
+        )
+    console.print(f"{len(sequence)} frames are in [bold]{folder}[/]", highlight=False)
+
+
+synthesize.__doc__ = f"{synthesize.__doc__}\n{EXAMPLE}"
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """Read ``640x480``.
+
+    Raises
+    ------
+    SettingsError
+        If the text is anything else.
+    """
+    width, cross, height = text.lower().partition("x")
+    if not (cross and width.isdecimal() and height.isdecimal()):
+        raise SettingsError(f"--size is '{text}'; give width x height like 640x480")
+    return int(width), int(height)
