@@ -125,9 +125,13 @@ def _orb_options(settings: Settings) -> core.OrbOptions:
 def _camera_options(settings: Settings, width: int, height: int) -> core.CameraOptions:
     camera = settings.camera
     return core.CameraOptions(
-        pinhole=core.Pinhole(camera.fx, camera.fy, camera.cx, camera.cy),
-        image_size=(width, height),
-        distortion=[camera.k1, camera.k2, camera.p1, camera.p2, camera.k3],
+        fx=camera.fx,
+        fy=camera.fy,
+        cx=camera.cx,
+        cy=camera.cy,
+        width=width,
+        height=height,
+        distortion=(camera.k1, camera.k2, camera.p1, camera.p2, camera.k3),
         bf=camera.bf,
         depth_ratio=settings.depth.close_factor if settings.depth is not None else 0.0,
     )
