@@ -6,6 +6,7 @@ PYBIND11_MODULE(_core, module) {
   module.doc() = "C++ core of orbslam2py: nouns (Frame, Map, Vocabulary, ...) and verbs over them.";
   // Bottom to top, so that every signature finds its types registered.
   bind_base(module);
+  bind_stop_flag(module);
   bind_features(module);
   bind_camera(module);
   bind_frame(module);
