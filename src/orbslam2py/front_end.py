@@ -82,7 +82,7 @@ class FrontEnd:
             grey = core.to_grey(image, self._settings.camera.rgb)
             extraction = self._extractor.extract(grey)
         with timer("stereo"):
-            metres = core.to_depth_metres(depth, 1.0 / self._settings.depth_scale)
+            metres = core.to_depth_metres(depth, self._settings.depth_factor)
             return core.build_rgbd_frame(context, frame_id, timestamp, extraction, metres)
 
     def _check(self, image: npt.NDArray[np.uint8], what: str) -> None:
