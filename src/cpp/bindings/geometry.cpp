@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "geometry/triangulation.hpp"
-
 #include <pybind11/eigen.h>
 #include <pybind11/stl.h>
 
 #include "bindings/bindings.hpp"
+#include "geometry/triangulation.hpp"
 
 namespace orbslam::bindings {
 
@@ -13,10 +12,12 @@ using namespace py::literals;
 
 void bind_geometry(py::module_& module) {
   module.def("triangulate", &triangulate, "ray_1"_a, "ray_2"_a, "T_1w"_a, "T_2w"_a,
-             "World point (3,) of two normalised rays (x, y, 1) by linear triangulation; None when "
-             "it lies at infinity.");
+             "Linear triangulation of two normalised rays (3,) with z = 1, each in its camera's\n"
+             "frame. Returns the world point (3,) of least algebraic error, or None when it lies\n"
+             "at infinity. It may lie behind a camera: check the depths.");
   module.def("fundamental_matrix", &fundamental_matrix, "T_1w"_a, "T_2w"_a, "K_1"_a, "K_2"_a,
-             "F_12 (3, 3) with x_1^T F_12 x_2 = 0 for homogeneous pixels.");
+             "The (3, 3) matrix F_12 with x_1^T F_12 x_2 = 0 for pixels (u, v, 1) of cameras with\n"
+             "calibration matrices K_1 and K_2.");
 }
 
 }  // namespace orbslam::bindings
