@@ -141,6 +141,10 @@ class SyntheticSequence:
         #: Time stamps, int64 (n,), nanoseconds from the start.
         self.nanoseconds: NDArray[np.int64] = np.rint(nanoseconds).astype(np.int64)
 
+    @property
+    def _size(self) -> tuple[int, int]:
+        return self.options.size or ((1241, 376) if self._scene.outdoors else (640, 480))
+
     def _frames_of_whole_way(self) -> int:
         return math.floor(self._scene.seconds(self._speed) * self._fps) + 1
 
@@ -176,7 +180,7 @@ class SyntheticSequence:
     @property
     def camera(self) -> CameraSettings:
         """The camera; both cameras of a pair are alike."""
-        width, height = self.options.size or ((1241, 376) if self._scene.outdoors else (640, 480))
+        width, height = self._size
         f = (0.58 if self._scene.outdoors else 0.625) * width
         baseline = 0.54 if self._scene.outdoors else 0.1
         return CameraSettings(
@@ -293,7 +297,8 @@ class SyntheticSequence:
         grey, depth = core.render(
             self._built,
             T_cw,
-            *(camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height),
+            *(camera.fx, camera.fy, camera.cx, camera.cy),
+            *self._size,
             noise=self.options.noise,
             exposure=self.options.exposure,
             noise_seed=(self.options.seed << 32) | (2 * index + int(right)),

@@ -113,7 +113,7 @@ TEST(Way, SwaysOncePerStride) {
 }
 
 TEST(Way, GoesFromOneRoomIntoTheOtherWhateverTheirSize) {
-  for (const Eigen::Vector3d size :
+  for (const Eigen::Vector3d& size :
        {Eigen::Vector3d(6, 3, 6), Eigen::Vector3d(5, 3, 12), Eigen::Vector3d(12, 3, 5)}) {
     const Way way = two_rooms_way(size, 3);
     EXPECT_LT(way.T_wc(0).translation().z(), size.z() / 2);
