@@ -2,6 +2,8 @@
 #include <pybind11/eigen.h>
 #include <pybind11/stl.h>
 
+#include <algorithm>
+
 #include "bindings/arrays.hpp"
 #include "bindings/bindings.hpp"
 #include "map/content_hash.hpp"
@@ -54,7 +56,8 @@ auto writer(Result (Map::*method)(Args...)) {
 std::vector<MapPointId> to_point_ids(const IdArray& array) {
   if (array.ndim() != 1) throw py::value_error("point ids must be a 1-D array of int64");
   std::vector<MapPointId> ids(static_cast<std::size_t>(array.size()));
-  if (!ids.empty()) std::memcpy(ids.data(), array.data(), ids.size() * sizeof(MapPointId));
+  std::transform(array.data(), array.data() + array.size(), ids.begin(),
+                 [](std::int64_t id) { return MapPointId(id); });
   return ids;
 }
 
