@@ -15,20 +15,36 @@ namespace {
 __m256i load(const void* p) { return _mm256_loadu_si256(static_cast<const __m256i*>(p)); }
 void store(void* p, __m256i value) { _mm256_storeu_si256(static_cast<__m256i*>(p), value); }
 
-/// Of each lane: the largest over all arcs of 9 of the smallest of 16 differences on the circle.
-__m256i best_arc(const __m256i difference[16]) {
+/// Of each lane: the largest over all arcs of 9 of the smallest of 16 circle pixels.
+__m256i brightest_arc(const __m256i pixel[16]) {
   // Minima over 2, 4, then 8 neighbours that start at odd positions; the arcs e..e+8 and
   // e+1..e+9 (e even) share the 8 from e+1 on.
   __m256i two[8], four[8];
   for (int k = 0; k < 8; ++k) {
-    two[k] = _mm256_min_epu8(difference[2 * k + 1], difference[(2 * k + 2) & 15]);
+    two[k] = _mm256_min_epu8(pixel[2 * k + 1], pixel[(2 * k + 2) & 15]);
   }
   for (int k = 0; k < 8; ++k) four[k] = _mm256_min_epu8(two[k], two[(k + 1) & 7]);
   __m256i best = _mm256_setzero_si256();
   for (int k = 0; k < 8; ++k) {
     const __m256i eight = _mm256_min_epu8(four[k], four[(k + 2) & 7]);
-    const __m256i end = _mm256_max_epu8(difference[2 * k], difference[(2 * k + 9) & 15]);
+    const __m256i end = _mm256_max_epu8(pixel[2 * k], pixel[(2 * k + 9) & 15]);
     best = _mm256_max_epu8(best, _mm256_min_epu8(eight, end));
+  }
+  return best;
+}
+
+/// The same with the roles exchanged: the smallest over all arcs of 9 of the largest pixel.
+__m256i darkest_arc(const __m256i pixel[16]) {
+  __m256i two[8], four[8];
+  for (int k = 0; k < 8; ++k) {
+    two[k] = _mm256_max_epu8(pixel[2 * k + 1], pixel[(2 * k + 2) & 15]);
+  }
+  for (int k = 0; k < 8; ++k) four[k] = _mm256_max_epu8(two[k], two[(k + 1) & 7]);
+  __m256i best = _mm256_set1_epi8(-1);
+  for (int k = 0; k < 8; ++k) {
+    const __m256i eight = _mm256_max_epu8(four[k], four[(k + 2) & 7]);
+    const __m256i end = _mm256_min_epu8(pixel[2 * k], pixel[(2 * k + 9) & 15]);
+    best = _mm256_min_epu8(best, _mm256_max_epu8(eight, end));
   }
   return best;
 }
@@ -46,19 +62,13 @@ __m256i fast_scores_32(const std::uint8_t* centre, const std::ptrdiff_t offsets[
       _mm256_min_epu8(_mm256_max_epu8(south, north), _mm256_max_epu8(east, west)), value);
   const __m256i dark_bound = _mm256_subs_epu8(
       value, _mm256_max_epu8(_mm256_min_epu8(south, north), _mm256_min_epu8(east, west)));
-  const __m256i bright_excess = _mm256_subs_epu8(bright_bound, threshold);
-  const __m256i dark_excess = _mm256_subs_epu8(dark_bound, threshold);
+  const __m256i excess = _mm256_subs_epu8(_mm256_max_epu8(bright_bound, dark_bound), threshold);
+  if (_mm256_testz_si256(excess, excess)) return zero;
 
-  __m256i best = zero;
-  __m256i difference[16];
-  if (!_mm256_testz_si256(bright_excess, bright_excess)) {
-    for (int k = 0; k < 16; ++k) difference[k] = _mm256_subs_epu8(load(centre + offsets[k]), value);
-    best = best_arc(difference);
-  }
-  if (!_mm256_testz_si256(dark_excess, dark_excess)) {
-    for (int k = 0; k < 16; ++k) difference[k] = _mm256_subs_epu8(value, load(centre + offsets[k]));
-    best = _mm256_max_epu8(best, best_arc(difference));
-  }
+  __m256i pixel[16];
+  for (int k = 0; k < 16; ++k) pixel[k] = load(centre + offsets[k]);
+  const __m256i best = _mm256_max_epu8(_mm256_subs_epu8(brightest_arc(pixel), value),
+                                       _mm256_subs_epu8(value, darkest_arc(pixel)));
   const __m256i no_corner = _mm256_cmpeq_epi8(_mm256_subs_epu8(best, threshold), zero);
   return _mm256_andnot_si256(no_corner, _mm256_sub_epi8(best, _mm256_set1_epi8(1)));
 }
@@ -266,20 +276,18 @@ void brief(const std::uint8_t* centre, std::ptrdiff_t stride, float cosine, floa
   const __m256 c = _mm256_set1_ps(cosine), s = _mm256_set1_ps(sine);
   const __m256i step = _mm256_set1_epi32(static_cast<int>(stride));
   alignas(32) std::int32_t first[256], second[256];
-  alignas(32) std::uint8_t p[256], q[256];
   for (int i = 0; i < 256; i += 8) {
     _mm256_store_si256(reinterpret_cast<__m256i*>(first + i),
                        rotated_offsets(pattern.x1 + i, pattern.y1 + i, c, s, step));
     _mm256_store_si256(reinterpret_cast<__m256i*>(second + i),
                        rotated_offsets(pattern.x2 + i, pattern.y2 + i, c, s, step));
   }
-  for (int i = 0; i < 256; ++i) p[i] = centre[first[i]];
-  for (int i = 0; i < 256; ++i) q[i] = centre[second[i]];
-  for (int i = 0; i < 256; i += 32) {
-    const __m256i a = load(p + i), b = load(q + i);
-    const __m256i not_less = _mm256_cmpeq_epi8(_mm256_max_epu8(a, b), a);
-    const int bits = ~_mm256_movemask_epi8(not_less);
-    __builtin_memcpy(descriptor + i / 8, &bits, 4);
+  for (int word = 0; word < 8; ++word) {
+    std::uint32_t bits = 0;
+    for (int i = 32 * word + 31; i >= 32 * word; --i) {
+      bits += bits + (centre[first[i]] < centre[second[i]]);
+    }
+    __builtin_memcpy(descriptor + 4 * word, &bits, 4);
   }
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "features/kernels.hpp"
 #include "features/orb_pattern.hpp"
@@ -13,39 +14,102 @@ constexpr int circle[16][2] = {{0, 3},  {1, 3},  {2, 2},  {3, 1},   {3, 0},   {3
                                {2, -2}, {1, -3}, {0, -3}, {-1, -3}, {-2, -2}, {-3, -1},
                                {-3, 0}, {-3, 1}, {-2, 2}, {-1, 3}};
 
-/// The largest t such that 9 neighbours on the circle all exceed the centre by more than t, or all
-/// fall below it by more than t.
-int fast_score(const std::uint8_t* centre, const std::ptrdiff_t offsets[16]) {
-  int difference[25];
-  for (int k = 0; k < 16; ++k) difference[k] = centre[offsets[k]] - *centre;
-  std::copy_n(difference, 9, difference + 16);
-  int best = 0;
-  // Two arcs that overlap in 8 pixels share the extrema of those.
-  for (int k = 0; k < 16; k += 2) {
-    const auto [low, high] = std::minmax_element(difference + k + 1, difference + k + 9);
-    const int first = difference[k], last = difference[k + 9];
-    best = std::max(
-        {best, std::min(*low, std::max(first, last)), -std::max(*high, std::min(first, last))});
+/// 16 neighbouring pixels. Loops over them are written so that compilers turn them into single
+/// instructions of whatever vector set the processor has.
+struct Lanes {
+  std::uint8_t at[16];
+};
+
+Lanes load(const std::uint8_t* p) {
+  Lanes lanes;
+  std::memcpy(lanes.at, p, sizeof(lanes.at));
+  return lanes;
+}
+
+Lanes lower(const Lanes& a, const Lanes& b) {
+  Lanes out;
+  for (int i = 0; i < 16; ++i) out.at[i] = a.at[i] < b.at[i] ? a.at[i] : b.at[i];
+  return out;
+}
+
+Lanes higher(const Lanes& a, const Lanes& b) {
+  Lanes out;
+  for (int i = 0; i < 16; ++i) out.at[i] = a.at[i] > b.at[i] ? a.at[i] : b.at[i];
+  return out;
+}
+
+/// a - b, or 0 where that would be negative.
+Lanes excess(const Lanes& a, const Lanes& b) {
+  Lanes out = higher(a, b);
+  for (int i = 0; i < 16; ++i) out.at[i] = static_cast<std::uint8_t>(out.at[i] - b.at[i]);
+  return out;
+}
+
+/// Of each lane: the outermost over all arcs of 9 circle pixels of the innermost in the arc. With
+/// (lower, higher) the brightest arc, with (higher, lower) the darkest one.
+template <Lanes (*inner)(const Lanes&, const Lanes&), Lanes (*outer)(const Lanes&, const Lanes&)>
+Lanes best_arc(const Lanes pixel[16]) {
+  // Over 2, 4, then 8 neighbours that start at odd positions; the arcs e..e+8 and e+1..e+9
+  // (e even) share the 8 from e+1 on.
+  Lanes two[8], four[8];
+  for (int k = 0; k < 8; ++k) two[k] = inner(pixel[2 * k + 1], pixel[(2 * k + 2) & 15]);
+  for (int k = 0; k < 8; ++k) four[k] = inner(two[k], two[(k + 1) & 7]);
+  Lanes best{};
+  for (int k = 0; k < 8; ++k) {
+    const Lanes eight = inner(four[k], four[(k + 2) & 7]);
+    const Lanes arc = inner(eight, outer(pixel[2 * k], pixel[(2 * k + 9) & 15]));
+    best = k == 0 ? arc : outer(best, arc);
   }
-  return best - 1;
+  return best;
+}
+
+/// Score: the largest t such that 9 neighbours on the circle all exceed the centre by more than t,
+/// or all fall below it by more than t.
+void fast_scores_16(const std::uint8_t* centre, const std::ptrdiff_t offsets[16], int threshold,
+                    std::uint8_t* scores) {
+  const Lanes value = load(centre);
+  const Lanes south = load(centre + offsets[0]), east = load(centre + offsets[4]);
+  const Lanes north = load(centre + offsets[8]), west = load(centre + offsets[12]);
+  // 9 of 16 neighbours contain two adjacent ones of the four compass points, so these bound the
+  // score from above.
+  const Lanes bright_bound = excess(lower(higher(south, north), higher(east, west)), value);
+  const Lanes dark_bound = excess(value, higher(lower(south, north), lower(east, west)));
+  const Lanes bound = higher(bright_bound, dark_bound);
+  unsigned any = 0;
+  for (int i = 0; i < 16; ++i) any |= static_cast<unsigned>(bound.at[i] > threshold);
+  if (any == 0) {
+    std::memset(scores, 0, 16);
+    return;
+  }
+  Lanes pixel[16];
+  for (int k = 0; k < 16; ++k) pixel[k] = load(centre + offsets[k]);
+  const Lanes best = higher(excess(best_arc<lower, higher>(pixel), value),
+                            excess(value, best_arc<higher, lower>(pixel)));
+  for (int i = 0; i < 16; ++i) {
+    scores[i] = static_cast<std::uint8_t>(best.at[i] > threshold ? best.at[i] - 1 : 0);
+  }
 }
 
 void fast_scores(const std::uint8_t* centre, std::ptrdiff_t stride, int count, int threshold,
                  std::uint8_t* scores) {
   std::ptrdiff_t offsets[16];
   for (int k = 0; k < 16; ++k) offsets[k] = circle[k][1] * stride + circle[k][0];
-  for (int i = 0; i < count; ++i, ++centre) {
-    // 9 of 16 neighbours contain two adjacent ones of the four compass points.
-    const int low = *centre - threshold, high = *centre + threshold;
-    const int south = centre[offsets[0]], east = centre[offsets[4]];
-    const int north = centre[offsets[8]], west = centre[offsets[12]];
-    const bool bright = (south > high || north > high) && (east > high || west > high);
-    const bool dark = (south < low || north < low) && (east < low || west < low);
-    scores[i] = 0;
-    if (!bright && !dark) continue;
-    const int score = fast_score(centre, offsets);
-    if (score >= threshold) scores[i] = static_cast<std::uint8_t>(score);
+  if (count >= 16) {
+    for (int i = 0; i < count; i += 16) {
+      const int begin = i + 16 <= count ? i : count - 16;  // the last run may overlap
+      fast_scores_16(centre + begin, offsets, threshold, scores + begin);
+    }
+    return;
   }
+  // Too short for a run: the 7 rows around the pixels are copied to where a run may be read.
+  std::uint8_t window[7 * 24] = {}, run[16];
+  for (int y = 0; y < 7; ++y) {
+    std::memcpy(window + 24 * y, centre + (y - 3) * stride - 3,
+                static_cast<std::size_t>(count + 6));
+  }
+  for (int k = 0; k < 16; ++k) offsets[k] = circle[k][1] * 24 + circle[k][0];
+  fast_scores_16(window + 3 * 24 + 3, offsets, threshold, run);
+  std::memcpy(scores, run, static_cast<std::size_t>(count));
 }
 
 int local_maxima(const std::uint8_t* scores, std::ptrdiff_t stride, int width, int height,
@@ -82,19 +146,24 @@ void resize_blend(const std::int16_t* upper, const std::int16_t* lower, int uppe
   }
 }
 
+// The taps are symmetric; folding them halves the multiplications.
 void blur_row(const std::uint8_t* padded, int count, std::uint16_t* out) {
   for (int i = 0; i < count; ++i) {
-    int sum = 0;
-    for (int k = 0; k < 7; ++k) sum += blur_taps[k] * padded[i + k];
-    out[i] = static_cast<std::uint16_t>(sum);
+    const std::uint8_t* p = padded + i;
+    // At most 256 * 255, which fits.
+    out[i] =
+        static_cast<std::uint16_t>(blur_taps[0] * (p[0] + p[6]) + blur_taps[1] * (p[1] + p[5]) +
+                                   blur_taps[2] * (p[2] + p[4]) + blur_taps[3] * p[3]);
   }
 }
 
 void blur_columns(const std::uint16_t* const rows[7], int count, std::uint8_t* out) {
+  const std::uint16_t *r0 = rows[0], *r1 = rows[1], *r2 = rows[2], *r3 = rows[3];
+  const std::uint16_t *r4 = rows[4], *r5 = rows[5], *r6 = rows[6];
   for (int i = 0; i < count; ++i) {
-    int sum = 1 << 15;
-    for (int k = 0; k < 7; ++k) sum += blur_taps[k] * rows[k][i];
-    out[i] = static_cast<std::uint8_t>(sum >> 16);
+    const int sum = blur_taps[0] * (r0[i] + r6[i]) + blur_taps[1] * (r1[i] + r5[i]) +
+                    blur_taps[2] * (r2[i] + r4[i]) + blur_taps[3] * r3[i];
+    out[i] = static_cast<std::uint8_t>((sum + (1 << 15)) >> 16);
   }
 }
 

@@ -125,8 +125,8 @@ bool is_corner(const cv::Mat& image, int x, int y, int threshold) {
 TEST(Kernels, FastScoreIsTheLargestThreshold) {
   for (const Kernels* kernels : all_kernels()) {
     SCOPED_TRACE(kernels->name);
-    for (const std::uint64_t seed : {3U, 4U, 5U}) {
-      const cv::Mat image = random_image(71, 20, seed);
+    for (const int width : {7, 17, 22, 38, 39, 71}) {
+      const cv::Mat image = random_image(width, 40, static_cast<std::uint64_t>(width));
       const int count = image.cols - 6;
       std::vector<std::uint8_t> scores(static_cast<std::size_t>(count));
       for (int y = 3; y < image.rows - 3; ++y) {
