@@ -100,6 +100,17 @@ _STREET = (600.0, 12.0)  # length, width
 _PASSAGE = 3.0
 
 
+#: Metres a camera can be moved to either side of the way without leaving the world.
+ROOM_BESIDE = {
+    SyntheticWorld.ROOM: 1.5,
+    SyntheticWorld.CORRIDOR: 0.8,
+    SyntheticWorld.REPEATING_CORRIDOR: 0.8,
+    SyntheticWorld.FIGURE_EIGHT: 0.8,
+    SyntheticWorld.STREET: 3.5,
+    SyntheticWorld.TWO_ROOMS: 0.6,
+}
+
+
 def make_scene(world: SyntheticWorld) -> Scene:
     """Choose world and way; the world itself is made later, from the seed."""
     if world is SyntheticWorld.ROOM:

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from orbslam2py import _core as core
 from orbslam2py._synthetic_files import write_sequence
-from orbslam2py._synthetic_scenes import SyntheticWorld, make_scene
+from orbslam2py._synthetic_scenes import ROOM_BESIDE, SyntheticWorld, make_scene
 from orbslam2py.datasets.base import Images, Layout
 from orbslam2py.errors import SettingsError
 from orbslam2py.sensor import Sensor
@@ -64,7 +64,8 @@ class SyntheticOptions:
     depth_noise
         Standard deviation of the depth [m] at 1 m; it grows with the square of the depth (RGB-D).
     lateral
-        Metres to the right of the way: the same places from other viewpoints.
+        Metres to the right of the way: the same places from other viewpoints. Limited by the
+        walls (0.6 m between the rooms, 3.5 m in the street).
     yaw
         Degrees to the right of the direction of travel.
 
@@ -99,7 +100,8 @@ class SyntheticOptions:
         _check_range("noise", self.noise, 0, 100)
         _check_range("exposure", self.exposure, 0.01, 100)
         _check_range("depth_noise", self.depth_noise, 0, 1)
-        _check_range("lateral", self.lateral, -5, 5)
+        beside = ROOM_BESIDE[SyntheticWorld(self.world)]
+        _check_range("lateral", self.lateral, -beside, beside)
         _check_range("yaw", self.yaw, -180, 180)
         if self.speed is not None and self.world is SyntheticWorld.ROOM:
             raise SettingsError("speed does not apply to the room: one turn takes 30 s")

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from orbslam2py import Sensor, open_sequence
+from orbslam2py._synthetic_scenes import ROOM_BESIDE
 from orbslam2py.cli.synthesize import parse_size, synthesize
 from orbslam2py.datasets.base import Layout
 from orbslam2py.errors import DatasetError, SettingsError
@@ -152,6 +153,19 @@ def test_lateral_moves_the_camera_to_its_right():
         np.testing.assert_allclose(shift, [0.4, 0, 0], atol=0.02)
 
 
+@pytest.mark.parametrize("world", WORLDS)
+def test_no_viewpoint_leaves_the_world(world):
+    for side in (-1, 1):
+        sequence = SyntheticSequence(
+            SyntheticOptions(world=world, size=(64, 64), lateral=side * ROOM_BESIDE[world])
+        )
+        for i in np.linspace(0, len(sequence) - 1, 25).astype(int):
+            depth = sequence.exact_depth(int(i))
+            assert depth[depth > 0].min() > 0.05
+            if world is not SyntheticWorld.STREET:
+                assert depth.min() > 0
+
+
 # ---- files ---------------------------------------------------------------------------------------
 
 
@@ -247,7 +261,8 @@ def test_nothing_is_left_behind_when_writing_fails(tmp_path):
         {"noise": -0.1},
         {"exposure": 0.0},
         {"depth_noise": -1.0},
-        {"lateral": 100.0},
+        {"world": "street", "lateral": 4.0},
+        {"world": "corridor", "lateral": -1.0},
         {"yaw": 999.0},
         {"world": "room", "speed": 1.0},
     ],

@@ -225,6 +225,22 @@ TEST(World, SharesThePicturesOfEqualWalls) {
   EXPECT_NE(&world.texture(0), &world.texture(2));
 }
 
+TEST(World, BoxesLeaveTheMiddleOfARoomFreeAndStayInside) {
+  const Eigen::Vector3d size(6, 3, 8);
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    const World world = make_room(size, seed, 12);
+    ASSERT_EQ(world.rectangles().size(), 6U + 12U * 5U);
+    for (std::size_t i = 6; i < world.rectangles().size(); ++i) {
+      const Rectangle& r = world.rectangles()[i];
+      for (const double f : {0.0, 0.25, 0.5, 0.75, 1.0}) {
+        const Eigen::Vector3d p = r.origin + f * r.width * r.u_axis;
+        EXPECT_TRUE(std::abs(p.x()) > 0.3 * size.x() || std::abs(p.z()) > 0.3 * size.z());
+        EXPECT_TRUE(std::abs(p.x()) < 0.5 * size.x() && std::abs(p.z()) < 0.5 * size.z());
+      }
+    }
+  }
+}
+
 TEST(World, RefusesWhatCannotBe) {
   Rectangle skewed = facing_wall(3);
   skewed.v_axis = Eigen::Vector3d(0.1, 1, 0);
