@@ -116,6 +116,8 @@ void Map::end_lease(KeyFrameId id) {
 }
 
 Pose Map::T_cw(KeyFrameId id) const {
+  // A living one's pose is returned as it is stored: a product with the identity changes bits.
+  if (const KeyFrame* living = find(id)) return living->T_cw;
   Pose T_ck;  // from the keyframe reached so far to the one asked for
   for (KeyFrameId at = id;;) {
     if (const KeyFrame* living = find(at)) return T_ck * living->T_cw;
