@@ -70,7 +70,7 @@ class Similarity:
 
     def apply_to_poses(self, T_wc: Array) -> Array:
         """Transform camera poses (n, 4, 4): positions as points, orientations turned."""
-        moved = T_wc.copy()
+        moved: Array = T_wc.copy()
         moved[:, :3, :3] = self.R @ T_wc[:, :3, :3]
         moved[:, :3, 3] = self.apply(T_wc[:, :3, 3])
         return moved
