@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
-#include <limits>
 #include <string>
 
 #include "base/errors.hpp"
@@ -72,16 +71,19 @@ Judgement judge(const BundleProblem& problem) {
 
 double kernel_width(const Observation& o) { return o.has_depth ? kHuberStereo : kHuberMono; }
 
+double kernel_cost(double q, double width) {
+  return width > 0 && q > width * width ? 2 * width * std::sqrt(q) - width * width : q;
+}
+
 /// Sum of squares of the observations that were usable at the start, robustified if wanted. One
-/// that has fallen behind its camera since costs as much as an infinitely wrong one.
+/// that has fallen behind its camera since is charged what it cost at the start.
 double total_cost(const BundleProblem& problem, const Judgement& start, const Judgement& now,
                   bool robust) {
   double sum = 0;
   for (std::size_t i = 0; i < problem.observations.size(); ++i) {
     if (!start.usable(i)) continue;
-    const double q = now.chi2[i], d = kernel_width(problem.observations[i]);
-    if (!now.usable(i)) return std::numeric_limits<double>::infinity();
-    sum += robust && q > d * d ? 2 * d * std::sqrt(q) - d * d : q;
+    const double width = robust ? kernel_width(problem.observations[i]) : 0.0;
+    sum += kernel_cost(now.usable(i) ? now.chi2[i] : start.chi2[i], width);
   }
   return sum;
 }
@@ -242,6 +244,11 @@ class BundleSolver final : public ceres::EvaluationCallback {
     solver.logging_type = ceres::SILENT;
     solver.jacobi_scaling = false;  // the damping takes care of different units
     // Above some thirty free poses the reduced camera system is sparse enough to gain by it.
+    // Without any, the points do not depend on each other, which only a sparse solver sees.
+    if (free_cameras_.empty()) {
+      solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+      return solver;
+    }
     solver.linear_solver_type =
         free_cameras_.size() <= 30 ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
     auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();

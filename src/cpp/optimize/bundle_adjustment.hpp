@@ -31,23 +31,27 @@ struct BundleProblem {
 };
 
 struct BundleOptions {
-  int robust_iterations = 5;  ///< with Huber kernel
-  int final_iterations = 10;  ///< without kernel, on the inliers of the first stage; 0: no such stage
+  int robust_iterations = 5;  ///< first stage, with Huber kernel if `robust`
+  /// Second stage, without kernel, on the inliers of the first. 0: no such stage.
+  int final_iterations = 10;
   bool robust = true;
   int n_threads = 1;  ///< 1 gives the same bytes in every run
 };
 
 struct BundleSummary {
-  double initial_cost = 0;  ///< sum of (robustified) squared whitened residuals
-  double final_cost = 0;
-  int iterations = 0;
-  bool aborted = false;      ///< the flag was raised; parameters hold what was reached
+  /// Sums of squared whitened residuals over all observations that were in front of their camera at
+  /// the start, robustified if the options say so.
+  double initial_cost = 0, final_cost = 0;
+  int iterations = 0;    ///< accepted steps; each lowered the cost of its stage
+  bool aborted = false;  ///< the flag was raised; parameters hold what was reached
   bool stage_one_done = false;
   std::vector<std::uint8_t> outlier;  ///< per observation, judged at the final estimate
 };
 
 /// Solves in place with Ceres (points eliminated by Schur complement, analytic Jacobians).
-/// `abort` is polled once per iteration; nullptr: never.
+/// `abort` is polled once per iteration; nullptr: never. Observations behind their camera or with
+/// NaN or infinite numbers at the start take no part in the first stage. Throws StateError when an
+/// observation names a camera or point that does not exist.
 BundleSummary solve_bundle(BundleProblem& problem, const BundleOptions& options,
                            const std::atomic<bool>* abort);
 

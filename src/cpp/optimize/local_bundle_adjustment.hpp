@@ -9,15 +9,23 @@
 namespace orbslam {
 
 struct LocalBundleResult {
-  int n_local_keyframes = 0, n_fixed_keyframes = 0, n_points = 0, n_observations = 0;
-  int n_erased = 0;  ///< observations removed as outliers
-  bool committed = false;
+  int n_local_keyframes = 0;  ///< `current` and its neighbours
+  int n_fixed_keyframes = 0;  ///< cameras held still, local or not
+  int n_points = 0, n_observations = 0;
+  int n_erased = 0;        ///< observations removed as outliers
+  bool committed = false;  ///< the map was changed
   BundleSummary summary;
 };
 
 /// Spec 16, section 5: refines `current`, its neighbours and all their points; other observers are
 /// fixed. Gathers under the read lock, solves without a lock, and commits in one write section
-/// that re-checks what has died meanwhile. An epoch change in between drops the result.
+/// that re-checks what has died meanwhile. An epoch change in between drops the result, and a dead
+/// or unknown `current` gives an empty one (a reset may have been faster).
+///
+/// Fixed are keyframe 0, the outer observers and, where that leaves fewer fixed poses than the
+/// gauge needs (two for a single camera because of the scale, else one), the oldest local
+/// keyframes. After an abort the progress is written; observations are erased only if the first
+/// stage was finished.
 LocalBundleResult local_bundle_adjustment(Map& map, KeyFrameId current,
                                           const std::atomic<bool>* abort, bool monocular = false,
                                           int n_threads = 1);

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <unordered_map>
+#include <vector>
+
+#include "map/map.hpp"
+#include "optimize/bundle_adjustment.hpp"
+
+namespace orbslam {
+
+/// Part of a map copied into a BundleProblem, with the ids to find the way back. Filled under the
+/// map's read lock, solved without a lock, committed under the write lock.
+struct GatheredBundle {
+  BundleProblem problem;
+  std::vector<KeyFrameId> keyframes;     ///< per camera of the problem
+  std::vector<MapPointId> points;        ///< per point
+  std::vector<std::uint32_t> keypoints;  ///< per observation: slot of its keyframe
+  std::uint64_t epoch = 0;               ///< of the map when it was gathered
+  std::unordered_map<KeyFrameId, std::uint32_t> camera_of;  ///< for look-ups only
+
+  explicit GatheredBundle(const Map& map) : epoch(map.epoch()) {}
+
+  void add_camera(const KeyFrame& keyframe, bool fixed);
+  /// The point with its observations by the cameras added so far.
+  void add_point(const MapPoint& point, const Map& map);
+  int n_fixed() const;
+};
+
+/// Writes poses of free cameras and positions of points of what still lives, and refreshes the
+/// points' geometry. The caller holds the write lock and has compared epochs.
+void write_back(const GatheredBundle& bundle, Map& map);
+
+/// Erases the flagged observations that are still there. Returns how many. Same conditions.
+int erase_observations(const GatheredBundle& bundle, const std::vector<std::uint8_t>& flags,
+                       Map& map);
+
+}  // namespace orbslam

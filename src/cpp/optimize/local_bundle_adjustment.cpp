@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "optimize/local_bundle_adjustment.hpp"
+
+#include <algorithm>
+#include <vector>
+
+#include "optimize/bundle_gather.hpp"
+
+namespace orbslam {
+namespace {
+
+template <class IdType>
+void sort_unique(std::vector<IdType>& ids) {
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+}
+
+/// The keyframe and its neighbours, by id.
+std::vector<KeyFrameId> local_keyframes(const Map& map, const KeyFrame& current) {
+  std::vector<KeyFrameId> ids = current.neighbours;
+  ids.push_back(current.id);
+  sort_unique(ids);
+  ids.erase(std::remove_if(ids.begin(), ids.end(),
+                           [&](KeyFrameId id) { return map.find(id) == nullptr; }),
+            ids.end());
+  return ids;
+}
+
+std::vector<const MapPoint*> local_points(const Map& map, const std::vector<KeyFrameId>& local) {
+  std::vector<MapPointId> ids;
+  for (const KeyFrameId keyframe : local) {
+    for (const MapPointId id : map.find(keyframe)->map_points) {
+      if (id.valid()) ids.push_back(id);
+    }
+  }
+  sort_unique(ids);
+  std::vector<const MapPoint*> points;
+  for (const MapPointId id : ids) {
+    if (const MapPoint* point = map.find(id)) points.push_back(point);
+  }
+  return points;
+}
+
+/// Observers of the points that are not local, by id.
+std::vector<KeyFrameId> outer_keyframes(const std::vector<const MapPoint*>& points,
+                                        const std::vector<KeyFrameId>& local) {
+  std::vector<KeyFrameId> observers;
+  for (const MapPoint* point : points) {
+    for (const Observation& observation : point->observations) {
+      observers.push_back(observation.keyframe);
+    }
+  }
+  sort_unique(observers);
+  std::vector<KeyFrameId> outer;
+  std::set_difference(observers.begin(), observers.end(), local.begin(), local.end(),
+                      std::back_inserter(outer));
+  return outer;
+}
+
+/// Fixes the oldest free keyframes until the problem has the fixed poses that determine its frame
+/// (and, for a single camera, its scale), as long as more than one stays free.
+void fix_gauge(GatheredBundle& bundle, bool monocular) {
+  auto& cameras = bundle.problem.cameras;
+  const int needed = monocular ? 2 : 1;
+  int n_fixed = bundle.n_fixed();
+  int n_free = static_cast<int>(cameras.size()) - n_fixed;
+  for (auto& camera : cameras) {  // the local ones come first, oldest first
+    if (n_fixed >= needed || n_free <= 1) return;
+    if (camera.fixed) continue;
+    camera.fixed = true;
+    ++n_fixed;
+    --n_free;
+  }
+}
+
+GatheredBundle gather(const Map& map, KeyFrameId current, bool monocular,
+                      LocalBundleResult& result) {
+  const auto lock = map.read_lock();
+  GatheredBundle bundle(map);
+  const KeyFrame* keyframe = map.find(current);
+  if (keyframe == nullptr) return bundle;
+  const std::vector<KeyFrameId> local = local_keyframes(map, *keyframe);
+  const std::vector<const MapPoint*> points = local_points(map, local);
+  for (const KeyFrameId id : local) bundle.add_camera(*map.find(id), id.value == 0);
+  for (const KeyFrameId id : outer_keyframes(points, local)) {
+    bundle.add_camera(*map.find(id), true);
+  }
+  for (const MapPoint* point : points) bundle.add_point(*point, map);
+  fix_gauge(bundle, monocular);
+  result.n_local_keyframes = static_cast<int>(local.size());
+  result.n_fixed_keyframes = bundle.n_fixed();
+  result.n_points = static_cast<int>(bundle.points.size());
+  result.n_observations = static_cast<int>(bundle.problem.observations.size());
+  return bundle;
+}
+
+}  // namespace
+
+LocalBundleResult local_bundle_adjustment(Map& map, KeyFrameId current,
+                                          const std::atomic<bool>* abort, bool monocular,
+                                          int n_threads) {
+  LocalBundleResult result;
+  if (abort != nullptr && abort->load()) {
+    result.summary.aborted = true;
+    return result;
+  }
+  GatheredBundle bundle = gather(map, current, monocular, result);
+  if (bundle.problem.observations.empty()) return result;
+  BundleOptions options;
+  options.n_threads = n_threads;
+  result.summary = solve_bundle(bundle.problem, options, abort);
+  // Every accepted step lowers the cost; without one there is nothing to write.
+  const bool moved = result.summary.iterations > 0;
+  if (!moved && !result.summary.stage_one_done) return result;
+
+  const auto lock = map.write_lock();
+  if (map.epoch() != bundle.epoch) return result;
+  // Unfinished estimates are no ground for erasing anything.
+  if (result.summary.stage_one_done) {
+    result.n_erased = erase_observations(bundle, result.summary.outlier, map);
+  }
+  if (moved) write_back(bundle, map);
+  result.committed = true;
+  return result;
+}
+
+}  // namespace orbslam
