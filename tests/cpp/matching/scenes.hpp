@@ -124,17 +124,23 @@ struct Scene {
     return keyframe;
   }
 
-  /// Lets a keyframe observe the points at its keypoints with index in [begin, end); points are
-  /// made when they are seen for the first time.
+  /// Lets a keyframe observe the points [begin, end) of the cloud as far as it sees them; they
+  /// are added to the map when they are observed for the first time.
   void observe(KeyFrameId keyframe, std::size_t begin, std::size_t end) {
     const ProjectedFrame& seen = projected[static_cast<std::size_t>(keyframe.value)];
-    for (std::size_t i = begin; i < std::min(end, seen.points.size()); ++i) {
+    for (std::size_t i = 0; i < seen.points.size(); ++i) {
+      if (seen.points[i] < begin || seen.points[i] >= end) continue;
       MapPointId& id = points[seen.points[i]];
+      id = map.resolve(id);
       if (!id.valid()) id = map.add_point(cloud.positions[seen.points[i]], keyframe, 0);
       map.add_observation(id, keyframe, i);
       map.update_point(id);
     }
     map.update_connections(keyframe);
+  }
+  /// The next observe() makes new points for [begin, end), duplicates of those in the map.
+  void forget(std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) points[i] = MapPointId();
   }
   void observe_all(KeyFrameId keyframe) { observe(keyframe, 0, cloud.positions.size()); }
 
