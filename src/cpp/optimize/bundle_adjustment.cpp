@@ -135,6 +135,7 @@ class BundleSolver final : public ceres::EvaluationCallback {
     ceres::Solver::Summary report;
     ceres::Solve(solver, &problem_, &report);
     summary.iterations += rules.successful();
+    if (rules.successful() == 0) return rules.aborted();
     for (const std::size_t camera : free_cameras_) {
       views_[camera].move(parameters(camera));
       bundle_.cameras[camera].T_cw = views_[camera].T_cw();

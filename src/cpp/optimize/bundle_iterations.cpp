@@ -11,27 +11,26 @@ constexpr int kRejectedTrials = 10;
 }  // namespace
 
 ceres::CallbackReturnType BundleIterations::operator()(const ceres::IterationSummary& summary) {
-  if (is_raised(abort_)) {
-    aborted_ = true;
-    return ceres::SOLVER_TERMINATE_SUCCESSFULLY;
-  }
-  if (summary.iteration == 0) {
-    cost_ = summary.cost;
-    return ceres::SOLVER_CONTINUE;
-  }
-  if (!summary.step_is_successful) {
-    return ++rejected_ >= kRejectedTrials ? ceres::SOLVER_TERMINATE_SUCCESSFULLY
-                                          : ceres::SOLVER_CONTINUE;
-  }
-  rejected_ = 0;
-  ++successful_;
-  const double decrease = cost_ - summary.cost;
+  const bool done = summary.iteration == 0       ? start(summary.cost)
+                    : summary.step_is_successful ? accept(summary.cost)
+                                                 : ++rejected_ >= kRejectedTrials;
+  aborted_ = is_raised(abort_);
+  return done || aborted_ ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
+}
+
+bool BundleIterations::start(double cost) {
+  cost_ = cost;
+  return false;
+}
+
+bool BundleIterations::accept(double cost) {
+  const double decrease = cost_ - cost;
   const bool converged = decrease < converged_ * cost_;
   small_decreases_ = decrease < kSmallDecrease * cost_ ? small_decreases_ + 1 : 0;
-  cost_ = summary.cost;
-  const bool done =
-      converged || successful_ >= max_successful_ || small_decreases_ >= kSmallDecreases;
-  return done ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
+  cost_ = cost;
+  rejected_ = 0;
+  ++successful_;
+  return converged || successful_ >= max_successful_ || small_decreases_ >= kSmallDecreases;
 }
 
 }  // namespace orbslam

@@ -21,6 +21,10 @@ class BundleIterations final : public ceres::IterationCallback {
   bool aborted() const { return aborted_; }
 
  private:
+  // Both return whether the minimisation is done.
+  bool start(double cost);
+  bool accept(double cost);
+
   int max_successful_;
   double converged_;
   const std::atomic<bool>* abort_;

@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <pybind11/eigen.h>
+#include <pybind11/stl.h>
+
+#include <cmath>
+#include <memory>
+#include <string>
+
+#include "base/stop_flag.hpp"
+#include "bindings/arrays.hpp"
+#include "bindings/bindings.hpp"
+#include "optimize/bundle_adjustment.hpp"
+#include "optimize/local_bundle_adjustment.hpp"
+#include "optimize/pose_optimization.hpp"
+
+namespace orbslam::bindings {
+namespace {
+
+using namespace py::literals;
+template <class Item>
+using Input = py::array_t<Item, py::array::c_style | py::array::forcecast>;
+
+const std::atomic<bool>* flag_of(const std::shared_ptr<StopFlag>& flag) {
+  return flag ? &flag->value() : nullptr;
+}
+
+/// Rows of an (n, columns) array; columns 0: of an (n,) array. Raises ValueError naming it.
+template <class Item>
+std::size_t rows_of(const Input<Item>& array, py::ssize_t columns, const char* name) {
+  const bool fits =
+      columns == 0 ? array.ndim() == 1 : array.ndim() == 2 && array.shape(1) == columns;
+  if (!fits) {
+    const std::string shape = columns == 0 ? "(n,)" : "(n, " + std::to_string(columns) + ")";
+    throw py::value_error(std::string(name) + " must have the shape " + shape);
+  }
+  return static_cast<std::size_t>(array.shape(0));
+}
+
+void check_rows(std::size_t rows, std::size_t wanted, const char* name) {
+  if (rows == wanted) return;
+  throw py::value_error(std::string(name) + " has " + std::to_string(rows) + " rows, expected " +
+                        std::to_string(wanted));
+}
+
+Pinhole pinhole_of(const Eigen::Vector4d& intrinsics) {
+  return {intrinsics[0], intrinsics[1], intrinsics[2], intrinsics[3]};
+}
+
+std::vector<PoseObservation> pose_observations(const Input<double>& points,
+                                               const Input<double>& pixels,
+                                               const Input<double>& inverse_sigma2) {
+  const std::size_t n = rows_of(points, 3, "points");
+  check_rows(rows_of(pixels, 3, "pixels"), n, "pixels");
+  check_rows(rows_of(inverse_sigma2, 0, "inverse_sigma2"), n, "inverse_sigma2");
+  const auto X = points.unchecked<2>(), uvr = pixels.unchecked<2>();
+  const auto weight = inverse_sigma2.unchecked<1>();
+  std::vector<PoseObservation> observations(n);
+  for (std::size_t k = 0; k < n; ++k) {
+    const auto i = static_cast<py::ssize_t>(k);
+    PoseObservation& o = observations[k];
+    o.position = {X(i, 0), X(i, 1), X(i, 2)};
+    o.u = uvr(i, 0);
+    o.v = uvr(i, 1);
+    o.has_depth = !std::isnan(uvr(i, 2));
+    o.right_u = o.has_depth ? uvr(i, 2) : 0;
+    o.inverse_sigma2 = weight(i);
+  }
+  return observations;
+}
+
+void bind_pose_optimization(py::module_& module) {
+  py::class_<PoseEstimate>(module, "PoseEstimate", "Result of optimize_pose.")
+      .def_readonly("T_cw", &PoseEstimate::T_cw, "World to camera.")
+      .def_readonly("n_inliers", &PoseEstimate::n_inliers, "Observations that fit the pose.")
+      .def_property_readonly(
+          "outlier", [](const PoseEstimate& e) { return to_array(e.outlier); },
+          "Per observation (n,) uint8; empty when a frame was given, which holds its own flags.")
+      .def_readonly("covariance", &PoseEstimate::covariance,
+                    "(6, 6) float64 of T_cw, tangent order (rotation [rad], translation), left\n"
+                    "perturbation, scaled by the residual variance. Zero: nothing estimated.")
+      .def_readonly("iterations", &PoseEstimate::iterations, "Of all rounds together.");
+
+  module.def(
+      "optimize_pose", [](TrackedFrame& frame) { return optimize_pose(frame); }, "frame"_a,
+      py::call_guard<py::gil_scoped_release>(),
+      "Pose of a frame from its associated points, starting at its T_cw; writes T_cw and the\n"
+      "outlier flags. Four rounds of damped least squares with a Huber kernel (off in the last);\n"
+      "outliers are judged anew after each. Fewer than 3 associations: pose unchanged, no\n"
+      "inliers. Raises StateError when the frame has no pose.");
+  module.def(
+      "optimize_pose",
+      [](const Pose& T_cw, const Eigen::Vector4d& intrinsics, double bf,
+         const Input<double>& points, const Input<double>& pixels,
+         const Input<double>& inverse_sigma2) {
+        const auto observations = pose_observations(points, pixels, inverse_sigma2);
+        const py::gil_scoped_release release;
+        return optimize_pose(T_cw, pinhole_of(intrinsics), bf, observations);
+      },
+      "T_cw"_a, "intrinsics"_a, "bf"_a, "points"_a, "pixels"_a, "inverse_sigma2"_a,
+      "The same from arrays.\n\n"
+      "`intrinsics`: fx, fy, cx, cy [pixels]. `bf`: baseline times fx [pixel metre]. `points`:\n"
+      "(n, 3) float64, world. `pixels`: (n, 3) float64, undistorted u, v and the right column,\n"
+      "NaN without depth. `inverse_sigma2`: (n,) [pixels^-2]. Raises ValueError for bad shapes.");
+}
+
+struct BundleArrays {
+  Input<std::int64_t> camera, point;
+  Input<double> pixels, inverse_sigma2;
+};
+
+BundleProblem bundle_problem(const std::vector<Pose>& T_cw, const std::vector<bool>& fixed,
+                             const Eigen::Vector4d& intrinsics, double bf,
+                             const Input<double>& points, const BundleArrays& observed) {
+  check_rows(fixed.size(), T_cw.size(), "fixed");
+  BundleProblem problem;
+  for (std::size_t i = 0; i < T_cw.size(); ++i) {
+    problem.cameras.push_back({T_cw[i], pinhole_of(intrinsics), bf, fixed[i]});
+  }
+  const std::size_t n_points = rows_of(points, 3, "points");
+  const auto X = points.unchecked<2>();
+  for (py::ssize_t i = 0; i < static_cast<py::ssize_t>(n_points); ++i) {
+    problem.points.emplace_back(X(i, 0), X(i, 1), X(i, 2));
+  }
+  const std::size_t n = rows_of(observed.camera, 0, "camera_index");
+  check_rows(rows_of(observed.point, 0, "point_index"), n, "point_index");
+  check_rows(rows_of(observed.pixels, 3, "pixels"), n, "pixels");
+  check_rows(rows_of(observed.inverse_sigma2, 0, "inverse_sigma2"), n, "inverse_sigma2");
+  const auto camera = observed.camera.unchecked<1>(), point = observed.point.unchecked<1>();
+  const auto uvr = observed.pixels.unchecked<2>();
+  const auto weight = observed.inverse_sigma2.unchecked<1>();
+  for (py::ssize_t i = 0; i < static_cast<py::ssize_t>(n); ++i) {
+    const bool known = camera(i) >= 0 && camera(i) < static_cast<std::int64_t>(T_cw.size()) &&
+                       point(i) >= 0 && point(i) < static_cast<std::int64_t>(n_points);
+    if (!known) {
+      throw py::value_error("observation " + std::to_string(i) +
+                            ": camera_index or point_index out of range");
+    }
+    BundleProblem::Observation o;
+    o.camera = static_cast<std::uint32_t>(camera(i));
+    o.point = static_cast<std::uint32_t>(point(i));
+    o.u = static_cast<float>(uvr(i, 0));
+    o.v = static_cast<float>(uvr(i, 1));
+    o.has_depth = !std::isnan(uvr(i, 2));
+    o.right_u = o.has_depth ? static_cast<float>(uvr(i, 2)) : 0.0F;
+    o.inverse_sigma2 = static_cast<float>(weight(i));
+    problem.observations.push_back(o);
+  }
+  return problem;
+}
+
+py::tuple solve_bundle_arrays(const std::vector<Pose>& T_cw, const std::vector<bool>& fixed,
+                              const Eigen::Vector4d& intrinsics, double bf,
+                              const Input<double>& points, const Input<std::int64_t>& camera_index,
+                              const Input<std::int64_t>& point_index, const Input<double>& pixels,
+                              const Input<double>& inverse_sigma2, const BundleOptions& options,
+                              const std::shared_ptr<StopFlag>& abort) {
+  BundleProblem problem = bundle_problem(T_cw, fixed, intrinsics, bf, points,
+                                         {camera_index, point_index, pixels, inverse_sigma2});
+  BundleSummary summary;
+  {
+    const py::gil_scoped_release release;
+    summary = solve_bundle(problem, options, flag_of(abort));
+  }
+  std::vector<Pose> poses;
+  for (const auto& camera : problem.cameras) poses.push_back(camera.T_cw);
+  const auto n = static_cast<py::ssize_t>(problem.points.size());
+  return py::make_tuple(poses, copy_to_array<double>(problem.points.data(), {n, 3}), summary);
+}
+
+void bind_bundle(py::module_& module) {
+  py::class_<BundleOptions>(module, "BundleOptions", "How solve_bundle works.")
+      .def(py::init([](int robust_iterations, int final_iterations, bool robust, int n_threads) {
+             return BundleOptions{robust_iterations, final_iterations, robust, n_threads};
+           }),
+           "robust_iterations"_a = 5, "final_iterations"_a = 10, "robust"_a = true,
+           "n_threads"_a = 1)
+      .def_readwrite("robust_iterations", &BundleOptions::robust_iterations,
+                     "Steps of the first stage, with Huber kernel if `robust`.")
+      .def_readwrite("final_iterations", &BundleOptions::final_iterations,
+                     "Steps of the second stage, on the inliers, without kernel. 0: none.")
+      .def_readwrite("robust", &BundleOptions::robust, "Kernel in the first stage.")
+      .def_readwrite("n_threads", &BundleOptions::n_threads,
+                     "1 gives the same bytes in every run.");
+  py::class_<BundleSummary>(module, "BundleSummary", "What solve_bundle did.")
+      .def_readonly("initial_cost", &BundleSummary::initial_cost,
+                    "Sum of (robustified) squared whitened residuals at the start.")
+      .def_readonly("final_cost", &BundleSummary::final_cost, "The same at the end.")
+      .def_readonly("iterations", &BundleSummary::iterations, "Accepted steps.")
+      .def_readonly("aborted", &BundleSummary::aborted, "The flag was raised.")
+      .def_readonly("stage_one_done", &BundleSummary::stage_one_done,
+                    "The first stage ran to its end.")
+      .def_property_readonly(
+          "outlier", [](const BundleSummary& s) { return to_array(s.outlier); },
+          "Per observation (n,) uint8, judged at the final estimate.");
+  module.def(
+      "solve_bundle", &solve_bundle_arrays, "T_cw"_a, "fixed"_a, "intrinsics"_a, "bf"_a, "points"_a,
+      "camera_index"_a, "point_index"_a, "pixels"_a, "inverse_sigma2"_a,
+      "options"_a = BundleOptions(), "abort"_a = py::none(),
+      "Bundle adjustment of arrays. Returns (poses, points (m, 3) float64, BundleSummary).\n\n"
+      "`T_cw`: list of Pose; `fixed`: list of bool. `intrinsics`: fx, fy, cx, cy [pixels], `bf`\n"
+      "[pixel metre], of all cameras. `points`: (m, 3) float64, world. `camera_index`,\n"
+      "`point_index`: (n,) int64. `pixels`: (n, 3) undistorted u, v and the right column, NaN\n"
+      "without depth. `inverse_sigma2`: (n,) [pixels^-2]. `abort`: StopFlag or None. Raises\n"
+      "ValueError for bad shapes or indices.");
+}
+
+void bind_local_bundle(py::module_& module) {
+  py::class_<LocalBundleResult>(module, "LocalBundleResult", "What local_bundle_adjustment did.")
+      .def_readonly("n_local_keyframes", &LocalBundleResult::n_local_keyframes,
+                    "The keyframe and its neighbours.")
+      .def_readonly("n_fixed_keyframes", &LocalBundleResult::n_fixed_keyframes,
+                    "Cameras held still, local or not.")
+      .def_readonly("n_points", &LocalBundleResult::n_points, "Points refined.")
+      .def_readonly("n_observations", &LocalBundleResult::n_observations, "Observations used.")
+      .def_readonly("n_erased", &LocalBundleResult::n_erased, "Observations erased as outliers.")
+      .def_readonly("committed", &LocalBundleResult::committed, "Whether the map was changed.")
+      .def_readonly("summary", &LocalBundleResult::summary, "Of the solver.");
+  module.def(
+      "local_bundle_adjustment",
+      [](Map& map, KeyFrameId keyframe, const std::shared_ptr<StopFlag>& abort, bool monocular,
+         int n_threads) {
+        return local_bundle_adjustment(map, keyframe, flag_of(abort), monocular, n_threads);
+      },
+      "map"_a, "keyframe"_a, "abort"_a = py::none(), "monocular"_a = false, "n_threads"_a = 1,
+      py::call_guard<py::gil_scoped_release>(),
+      "Refine a keyframe, its neighbours and all their points; other observers are fixed.\n\n"
+      "`abort`: a StopFlag polled once per iteration, or None. `monocular`: fix two poses, for\n"
+      "the scale. Takes the map's locks for short sections only. A dead or unknown keyframe\n"
+      "gives an empty result, a reset meanwhile drops it.");
+}
+
+}  // namespace
+
+void bind_optimize(py::module_& module) {
+  bind_pose_optimization(module);
+  bind_bundle(module);
+  bind_local_bundle(module);
+}
+
+}  // namespace orbslam::bindings
