@@ -10,7 +10,7 @@ namespace {
 
 [[noreturn]] void throw_dead(const char* what, std::int64_t id) {
   throw StateError(std::string(what) + " " + std::to_string(id) +
-                   " is not in the map; look it up with find() under the lock before changing it");
+                   " is not in the map: it was culled or never added; use the id of a living one");
 }
 
 }  // namespace
