@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+import os
 import pickle
+import subprocess
+import sys
 import threading
 
 import numpy as np
@@ -45,6 +48,50 @@ def test_result_keeps_its_own_pixels() -> None:
     np.testing.assert_array_equal(result.pyramid[0], before)
 
 
+def test_window_of_a_larger_image() -> None:
+    large = noise(300, 400)
+    window = large[20:270, 31:361]
+    plain = _core.OrbExtractor().extract(window.copy())
+    np.testing.assert_array_equal(_core.OrbExtractor().extract(window).keypoints, plain.keypoints)
+
+
+def test_portable_kernels_by_environment() -> None:
+    code = "from orbslam2py import _core; print(_core.OrbExtractor().kernel_name)"
+    environment = {**os.environ, "ORBSLAM2PY_PORTABLE_KERNELS": "1"}
+    run = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
+    )
+    assert run.stdout.strip() == "portable"
+
+
+def test_one_extractor_refuses_a_second_thread() -> None:
+    extractor = _core.OrbExtractor()
+    large, small = noise(3000, 4000), noise(100, 100)
+    refused = threading.Event()
+
+    def work() -> None:
+        while not refused.is_set():
+            try:
+                extractor.extract(large)
+            except errors.StateError:
+                refused.set()
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    for _ in range(100_000):
+        if refused.is_set():
+            break
+        try:
+            extractor.extract(small)
+        except errors.StateError:
+            refused.set()
+    found = refused.is_set()
+    refused.set()
+    thread.join()
+    assert found
+    assert len(extractor.extract(small)) > 0
+
+
 def test_mask() -> None:
     image = noise(240, 320)
     mask = np.full(image.shape, 255, np.uint8)
@@ -66,7 +113,6 @@ def test_mask() -> None:
         np.zeros((50, 50, 3), np.uint8),
         np.zeros(50, np.uint8),
         np.zeros((50, 50), np.float32),
-        np.zeros((50, 100), np.uint8)[:, ::2],
     ],
 )
 def test_bad_images(image: np.ndarray) -> None:

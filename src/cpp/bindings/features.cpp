@@ -50,6 +50,11 @@ KernelChoice kernel_choice(const std::string& name) {
   throw SettingsError("kernels must be automatic, portable or avx2, got '" + name + "'");
 }
 
+/// Also of arrays that are not contiguous, such as a window of a larger image.
+cv::Mat copy_of(const py::array& array, const char* what) {
+  return view_uint8(py::array::ensure(array, py::array::c_style), what).clone();
+}
+
 /// Refuses a second thread instead of letting two share the scratch buffers.
 struct SharedExtractor {
   OrbExtractor extractor;
@@ -64,9 +69,8 @@ struct SharedExtractor {
     }
     // Level 0 of the result shares the pixels it was made from, which must outlive the caller's
     // array and not change while other Python threads run.
-    const cv::Mat pixels = view_uint8(image, "the image").clone();
-    const cv::Mat allowed =
-        mask.is_none() ? cv::Mat() : view_uint8(py::array(mask), "the mask").clone();
+    const cv::Mat pixels = copy_of(image, "the image");
+    const cv::Mat allowed = mask.is_none() ? cv::Mat() : copy_of(py::array(mask), "the mask");
     if (!mask.is_none() && allowed.empty()) throw ImageError("the mask is empty; pass None");
     struct Busy {
       bool& flag;
