@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import typer
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
+from orbslam2py.cli import main
 from orbslam2py.cli.evaluate import evaluate
 from orbslam2py.errors import DatasetError
 from orbslam2py.evaluation import Alignment, evaluate_trajectory
@@ -138,3 +140,16 @@ def test_command_on_bad_input(arguments: list[str], expected: str) -> None:
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code != 0
     assert expected in result.output + str(result.exception)
+
+
+def test_bad_input_ends_with_status_2(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_tum(tmp_path / "a.txt", wander(5))
+    (tmp_path / "b.txt").write_text("1 2 3 4 5 6 7 x\n")
+    paths = [str(tmp_path / "a.txt"), str(tmp_path / "b.txt")]
+    monkeypatch.setattr(sys, "argv", ["orbslam2py", "evaluate", *paths])
+    with pytest.raises(SystemExit) as caught:
+        main()
+    assert caught.value.code == 2
+    assert "b.txt:1: 'x' is not a number" in capsys.readouterr().err

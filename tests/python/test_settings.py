@@ -154,6 +154,13 @@ def test_keys_of_orb_slam3_are_read_past(tmp_path: Path) -> None:
     assert Settings.load(write(tmp_path / "a.yaml", MONO, extra), Sensor.MONOCULAR)
 
 
+def test_opencv_reads_the_spelling_without_a_blank_alike(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.yaml", MONO, "Viewer.PointSize:2\n")
+    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
+    ours = Settings.load(path, Sensor.MONOCULAR).viewer.point_size
+    assert ours == storage.getNode("Viewer.PointSize").real() == 2
+
+
 def test_scalars_are_those_of_opencv(tmp_path: Path) -> None:
     values = {**MONO, **DEPTH, "Camera.k1": "-1.5e-05", "Camera.k2": "+0.25", "Camera.p1": "7"}
     path = write(tmp_path / "a.yaml", values, MATRIX + MATRIX.replace("LEFT", "RIGHT"))
@@ -433,6 +440,51 @@ def test_published_baselines(
     settings = builtin_settings(name, sensor)
     assert settings.baseline == pytest.approx(baseline, rel=2e-6)
     assert settings.close_depth == pytest.approx(close_depth, rel=2e-6)
+
+
+TUM_FIGURES = {
+    "tum1": (517.306408, 516.469215, 318.643040, 255.313989, 1.163314, 5000),
+    "tum2": (520.908620, 521.007327, 325.141442, 249.701764, 0.917205, 5208),
+    "tum3": (535.4, 539.2, 320.1, 247.6, 0.0, 5000),
+}
+KITTI_FIGURES = {
+    "kitti00-02": (718.856, 718.856, 607.1928, 185.2157, 386.1448, 35),
+    "kitti03": (721.5377, 721.5377, 609.5593, 172.854, 387.5744, 40),
+    "kitti04-12": (707.0912, 707.0912, 601.8873, 183.1104, 379.8145, 40),
+}
+
+
+@pytest.mark.parametrize("name", sorted(TUM_FIGURES))
+def test_published_figures_of_tum(name: str) -> None:
+    settings = builtin_settings(name, Sensor.RGBD)
+    camera = settings.camera
+    assert (camera.fx, camera.fy, camera.cx, camera.cy, camera.k3) == TUM_FIGURES[name][:5]
+    assert settings.depth == DepthSettings(40.0, TUM_FIGURES[name][5])
+    assert (camera.width, camera.height, camera.fps, camera.bf, camera.rgb) == (
+        *(640, 480, 30.0, 40.0),
+        True,
+    )
+    assert settings.orb == OrbSettings(1000, 1.2, 8, 20, 7)
+    assert settings.viewer == ViewerSettings()
+    mono = builtin_settings(name, Sensor.MONOCULAR)
+    np.testing.assert_array_equal(mono.camera.distortion, camera.distortion)
+    np.testing.assert_array_equal(mono.camera.matrix, camera.matrix)
+    assert (mono.orb, mono.depth, mono.camera.bf) == (settings.orb, None, 0.0)
+
+
+@pytest.mark.parametrize("name", sorted(KITTI_FIGURES))
+def test_published_figures_of_kitti(name: str) -> None:
+    settings = builtin_settings(name, Sensor.STEREO)
+    camera = settings.camera
+    assert (camera.fx, camera.fy, camera.cx, camera.cy, camera.bf) == KITTI_FIGURES[name][:5]
+    assert settings.depth == DepthSettings(KITTI_FIGURES[name][5])
+    assert (camera.width, camera.height, camera.fps, camera.rgb) == (1241, 376, 10.0, True)
+    assert not camera.is_distorted
+    assert (settings.orb.n_features, settings.orb.min_th_fast) == (2000, 7)
+    assert (settings.viewer.keyframe_size, settings.viewer.viewpoint_y) == (0.6, -100)
+    mono = builtin_settings(name, Sensor.MONOCULAR)
+    assert mono.orb == OrbSettings(2000, 1.2, 8, 20, 7)
+    assert (mono.viewer.keyframe_size, mono.viewer.viewpoint_y) == (0.1, -10)
 
 
 def test_variants_of_a_name_differ_by_sensor() -> None:
