@@ -11,11 +11,12 @@ import threading
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from orbslam2py import _core, errors
 
 
-def noise(height: int, width: int, seed: int = 0) -> np.ndarray:
+def noise(height: int, width: int, seed: int = 0) -> NDArray[np.generic]:
     """Reproducible random grey image."""
     return np.random.default_rng(seed).integers(0, 256, (height, width), dtype=np.uint8)
 
@@ -115,13 +116,13 @@ def test_mask() -> None:
         np.zeros((50, 50), np.float32),
     ],
 )
-def test_bad_images(image: np.ndarray) -> None:
+def test_bad_images(image: NDArray[np.generic]) -> None:
     with pytest.raises(errors.ImageError, match="image"):
         _core.OrbExtractor().extract(image)
 
 
 @pytest.mark.parametrize("mask", [np.zeros((50, 49), np.uint8), np.zeros((50, 50), bool)])
-def test_bad_masks(mask: np.ndarray) -> None:
+def test_bad_masks(mask: NDArray[np.generic]) -> None:
     with pytest.raises(errors.ImageError, match="mask"):
         _core.OrbExtractor().extract(noise(50, 50), mask=mask)
 
@@ -139,7 +140,7 @@ def test_options_out_of_range_are_settings_errors() -> None:
 def test_extractors_in_threads_agree_with_one_alone() -> None:
     images = [noise(240, 320, seed) for seed in range(4)]
     alone = [_core.OrbExtractor().extract(image).descriptors for image in images]
-    found: dict[int, np.ndarray] = {}
+    found: dict[int, NDArray[np.generic]] = {}
 
     def work(index: int) -> None:
         found[index] = _core.OrbExtractor().extract(images[index]).descriptors
@@ -201,7 +202,7 @@ def test_pose_pickles_and_prints() -> None:
 
 
 @pytest.mark.parametrize("bad", [np.zeros((4, 4)), np.full((4, 4), np.nan)])
-def test_pose_refuses_what_is_no_pose(bad: np.ndarray) -> None:
+def test_pose_refuses_what_is_no_pose(bad: NDArray[np.generic]) -> None:
     with pytest.raises(ValueError, match="last row"):
         _core.Pose.from_matrix(bad)
     with pytest.raises(ValueError, match="quaternion"):
