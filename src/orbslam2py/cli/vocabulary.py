@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``orbslam2py vocabulary``: train, convert and inspect vocabularies."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from orbslam2py import __version__
+from orbslam2py import _core as core
+from orbslam2py.errors import VocabularyError
+from orbslam2py.vocabulary import (
+    convert_vocabulary,
+    read_training_images,
+    save_vocabulary,
+    train_vocabulary,
+    vocabulary_info,
+)
+
+app = typer.Typer(
+    help="Train, convert and inspect vocabularies.",
+    no_args_is_help=True,
+    rich_markup_mode="markdown",
+)
+Quiet = Annotated[bool, typer.Option("--quiet", help="Only errors.")]
+
+
+@contextmanager
+def _progress_bar(console: Console) -> Iterator[Callable[[str, float], None]]:
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
+    with Progress(*columns, TimeElapsedColumn(), console=console, transient=True) as bar:
+        tasks: dict[str, int] = {}
+
+        def show(step: str, fraction: float) -> None:
+            if step not in tasks:
+                tasks[step] = bar.add_task(step, total=1.0)
+            bar.update(tasks[step], completed=fraction)  # type: ignore[arg-type]
+
+        yield show
+
+
+def train(
+    images: Annotated[Path, typer.Argument(help="Folder with images, searched with subfolders.")],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="File to write: .bvoc, .txt or .txt.gz.")
+    ],
+    branching: Annotated[int, typer.Option(help="Children per node, 2 to 20.")] = 10,
+    depth: Annotated[int, typer.Option(help="Levels, 1 to 10; at most branching^depth words.")] = 5,
+    features: Annotated[int, typer.Option(help="Features per image.")] = 2000,
+    seed: Annotated[int, typer.Option(min=0, help="Of the random generator.")] = 0,
+    threads: Annotated[
+        int, typer.Option(help="0: one per core. The result does not depend on it.")
+    ] = 0,
+    note: Annotated[
+        str, typer.Option(help="Kept in a .bvoc file: licence, where the images come from.")
+    ] = "",
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+    quiet: Quiet = False,
+) -> None:
+    """Train a vocabulary on a folder of images."""
+    _check_target(output, force=force)
+    options = core.TrainingOptions()
+    options.branching = branching
+    options.depth = depth
+    options.seed = seed
+    options.n_threads = threads
+    paths = read_training_images(images)
+    comment = (
+        f"Trained by orbslam2py {__version__} on {len(paths)} images with {features} features "
+        f"each, seed {seed}. {note}"
+    ).strip()
+
+    console = Console(quiet=quiet)
+    begin = time.perf_counter()
+    with _progress_bar(console) as show:
+        vocabulary = train_vocabulary(
+            paths, options, features=core.OrbOptions(n_features=features), progress=show
+        )
+        if vocabulary is None:
+            raise VocabularyError("the training was cancelled")
+        save_vocabulary(vocabulary, output, comment=comment)
+    console.print(
+        f"{vocabulary.n_words} words from {len(paths)} images are in [bold]{output}[/] "
+        f"({output.stat().st_size / 1e6:.1f} MB, {time.perf_counter() - begin:.0f} s)",
+        highlight=False,
+    )
+
+
+def convert(
+    source: Annotated[Path, typer.Argument(help="Vocabulary in any format, also packed.")],
+    target: Annotated[Path, typer.Argument(help="File to write: .bvoc, .txt or .txt.gz.")],
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing file.")] = False,
+    quiet: Quiet = False,
+) -> None:
+    """Convert a vocabulary between the binary and the text format."""
+    _check_target(target, force=force)
+    console = Console(quiet=quiet)
+    with _progress_bar(console) as show:
+        vocabulary = convert_vocabulary(
+            source, target, progress=lambda fraction: show("Converting", fraction)
+        )
+    console.print(f"{vocabulary.n_words} words are in [bold]{target}[/]", highlight=False)
+
+
+def info(
+    path: Annotated[
+        Path | None, typer.Argument(help="Vocabulary in any format; default: the package's.")
+    ] = None,
+) -> None:
+    """Check a vocabulary as a whole and show what it holds."""
+    facts = vocabulary_info(path)
+    table = Table(show_header=False, box=None)
+    for name, value in (
+        ("path", facts.path),
+        ("format", facts.format.value),
+        ("size", f"{facts.size / 1e6:.2f} MB"),
+        ("branching, depth", f"{facts.branching}, {facts.depth}"),
+        ("scoring, weighting", f"{facts.scoring}, {facts.weighting}"),
+        ("nodes", f"{facts.n_nodes} (with the root)"),
+        ("words", f"{facts.n_words} ({facts.n_stopped} of weight 0)"),
+        ("hash", f"{facts.hash:016x}"),
+        ("comment", facts.comment),
+    ):
+        table.add_row(name, str(value))
+    Console(highlight=False, soft_wrap=True).print(table)
+
+
+def _check_target(path: Path, *, force: bool) -> None:
+    if not path.name.endswith((".bvoc", ".txt", ".txt.gz")):
+        raise VocabularyError(f"{path}: the name must end with .bvoc, .txt or .txt.gz")
+    if path.exists() and not force:
+        raise VocabularyError(f"{path} exists; use --force to replace it")
+    if not path.absolute().parent.is_dir():
+        raise VocabularyError(f"{path.absolute().parent}: no such folder")
+
+
+EXAMPLES = {
+    train: "orbslam2py vocabulary train photographs -o mine.bvoc --depth 5",
+    convert: "orbslam2py vocabulary convert ORBvoc.txt.tar.gz ORBvoc.bvoc",
+    info: "orbslam2py vocabulary info ORBvoc.bvoc",
+}
+for verb, example in EXAMPLES.items():
+    verb.__doc__ = f"{verb.__doc__}\n\n**Example**\n\n    {example}\n"
+    app.command(verb.__name__)(verb)
