@@ -3,18 +3,19 @@
 
 from __future__ import annotations
 
+import logging
 import resource
 import sys
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
 from orbslam2py import __version__
+from orbslam2py.errors import DatasetError
 from orbslam2py.evaluation import Evaluation, evaluate_trajectory
 from orbslam2py.runner import RunResult
-from orbslam2py.sensor import Sensor
+from orbslam2py.trajectory import Trajectory
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -22,15 +23,31 @@ class RunEvaluation:
     """A run against ground truth."""
 
     figures: Evaluation
-    truth_timestamps: npt.NDArray[np.float64]
-    """(n,) seconds."""
-    truth_positions: npt.NDArray[np.float64]
-    """(n, 3) in the estimate's frame [m]."""
+    truth: Trajectory
+    """Ground truth over the time of the run, in the estimate's frame."""
 
 
 def evaluate_run(result: RunResult) -> RunEvaluation | None:
-    """Compare the last map's trajectory with the sequence's ground truth, if it has one."""
-    raise NotImplementedError
+    """Compare the last map's trajectory with the sequence's ground truth.
+
+    Returns
+    -------
+    RunEvaluation or None
+        None if there is no ground truth, or too few poses have a partner in it.
+    """
+    estimate = result.tracked_trajectory()
+    try:
+        truth = result.sequence.ground_truth()
+        if truth is None or not len(estimate):
+            return None
+        figures = evaluate_trajectory(estimate, truth)
+    except DatasetError as error:
+        _log.warning("no comparison with ground truth: %s", error)
+        return None
+    begin, end = estimate.timestamps[0] - 0.02, estimate.timestamps[-1] + 0.02
+    during = truth.select((truth.timestamps >= begin) & (truth.timestamps <= end))
+    T_wc = figures.transform.inverse().apply_to_poses(during.T_wc)
+    return RunEvaluation(figures, Trajectory(during.timestamps, T_wc))
 
 
 def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str, Any]:
@@ -78,5 +95,3 @@ def peak_memory_mb() -> float:
 def _rate(count: int, seconds: float) -> float:
     return count / seconds if seconds > 0 else 0.0
 
-
-__all__ = ["RunEvaluation", "Sensor", "evaluate_run", "make_report", "peak_memory_mb"]

@@ -47,9 +47,9 @@ template <class Tag>
 struct type_caster<orbslam::Id<Tag>> {
   PYBIND11_TYPE_CASTER(orbslam::Id<Tag>, const_name("int"));
   bool load(handle source, bool convert) {
-    make_caster<std::int64_t> value;
-    if (!value.load(source, convert)) return false;
-    this->value = orbslam::Id<Tag>(cast_op<std::int64_t>(value));
+    make_caster<std::int64_t> number;
+    if (!number.load(source, convert)) return false;
+    value = orbslam::Id<Tag>(cast_op<std::int64_t>(number));
     return true;
   }
   static handle cast(orbslam::Id<Tag> id, return_value_policy, handle) {

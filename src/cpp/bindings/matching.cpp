@@ -22,7 +22,8 @@ using FeaturePairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
 std::vector<MapPointId> to_point_ids(const IdArray& array) {
   if (array.ndim() != 1) throw py::value_error("point ids must be a 1-D array of int64");
   std::vector<MapPointId> ids(static_cast<std::size_t>(array.size()));
-  if (!ids.empty()) std::memcpy(ids.data(), array.data(), ids.size() * sizeof(MapPointId));
+  if (!ids.empty())
+    std::memcpy(static_cast<void*>(ids.data()), array.data(), ids.size() * sizeof(MapPointId));
   return ids;
 }
 

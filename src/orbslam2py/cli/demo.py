@@ -32,14 +32,7 @@ def demo(
     if sensor is Sensor.MONOCULAR:
         raise SettingsError("the demo runs with --sensor stereo or rgbd")
     sequence = SyntheticSequence(SyntheticOptions(sensor=sensor, world="room", frames=frames))
-    code = run_and_write(
-        sequence,
-        sequence.default_settings(),
-        RunOptions(sensor),
-        output=output,
-        force=True,
-        quiet=quiet,
-    )
+    code = run_and_write(sequence, RunOptions(sensor), output=output, force=True, quiet=quiet)
     if not quiet:
         typer.echo(f"Look at {output / 'trajectory.png'}.")
     raise typer.Exit(code)

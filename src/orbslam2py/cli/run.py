@@ -13,7 +13,6 @@ from rich.logging import RichHandler
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
 from rich.table import Table
 
-from orbslam2py.builtin_settings import resolve_settings
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.datasets import open_sequence
 from orbslam2py.datasets.base import Sequence
@@ -21,7 +20,6 @@ from orbslam2py.outputs import OutputWriter, link_latest, prepare_output_folder
 from orbslam2py.report import evaluate_run, make_report
 from orbslam2py.runner import FrameRow, RunOptions, RunResult, SequenceRunner
 from orbslam2py.sensor import Sensor
-from orbslam2py.settings import Settings
 from orbslam2py.system import System
 from orbslam2py.vocabulary import load_vocabulary
 
@@ -72,15 +70,12 @@ def run(
     quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
 ) -> None:
     """Track a recorded sequence; write trajectory, map and report."""
-    images = open_sequence(sequence, sensor)
-    chosen = images.default_settings() if settings is None else resolve_settings(settings, sensor)
-    images = images.rectified(chosen)
+    images = open_sequence(sequence, sensor, settings=settings)
     options = RunOptions(sensor, deterministic, realtime, start, stride, max_frames, seed)
-    raise typer.Exit(
-        run_and_write(
-            images, chosen, options, vocabulary=vocabulary, output=output, force=force, quiet=quiet
-        )
+    code = run_and_write(
+        images, options, vocabulary=vocabulary, output=output, force=force, quiet=quiet
     )
+    raise typer.Exit(code)
 
 
 run.__doc__ = f"{run.__doc__}\n{EXAMPLE}"
@@ -88,7 +83,6 @@ run.__doc__ = f"{run.__doc__}\n{EXAMPLE}"
 
 def run_and_write(
     sequence: Sequence,
-    settings: Settings,
     options: RunOptions,
     *,
     vocabulary: Path | None = None,
@@ -100,7 +94,7 @@ def run_and_write(
     console = Console(quiet=quiet)
     errors = Console(stderr=True)
     _log_to(errors, quiet=quiet)
-    runner = SequenceRunner(sequence, settings, load_vocabulary(vocabulary), options)
+    runner = SequenceRunner(sequence, sequence.settings, load_vocabulary(vocabulary), options)
     folder = prepare_output_folder(output, sequence.name, force=force)
     if output is None:
         link_latest(folder)
