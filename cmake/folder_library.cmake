@@ -8,10 +8,14 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   # A portable baseline for every translation unit that sees Eigen types; the AVX2 kernels are
   # compiled with their own flags and include neither Eigen nor Ceres.
   target_compile_options(orbslam_options INTERFACE -march=x86-64-v2)
+else()
+  # Where fused multiply-add is part of the baseline, contraction would change results.
+  target_compile_options(orbslam_options INTERFACE -ffp-contract=off)
 endif()
 if(ORBSLAM2PY_SANITIZE)
   target_compile_options(orbslam_options INTERFACE
-    -fsanitize=${ORBSLAM2PY_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+    -fsanitize=${ORBSLAM2PY_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer
+    -Wno-maybe-uninitialized)  # GCC 12 reports false ones inside instrumented library headers
   target_link_options(orbslam_options INTERFACE -fsanitize=${ORBSLAM2PY_SANITIZE})
 endif()
 
