@@ -173,7 +173,7 @@ def test_new_points(scene: Scene) -> None:
     options = core.NewPointOptions(monocular=False, n_neighbours=5)
     flag = core.StopFlag()
     created = core.create_new_points(scene.map, c, options, flag)
-    assert 0 < len(created)
+    assert len(created) > 0
     depths = np.array([scene.map.point_position(point)[2] for point in created])
     assert np.median(depths) == pytest.approx(DEPTH, rel=0.01)
     assert np.abs(depths / DEPTH - 1).max() < 0.1  # corners of coarse levels are off by a pixel
