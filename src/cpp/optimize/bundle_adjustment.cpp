@@ -240,7 +240,9 @@ class BundleSolver final : public ceres::EvaluationCallback {
     ceres::Solver::Options solver;
     solver.max_num_iterations = 2 * iterations;
     solver.function_tolerance = 0;  // would throw the last step away; BundleIterations keeps it
-    solver.initial_trust_region_radius = 1e6;
+    // More than the default, but not so much that depths of small parallax shoot beyond their mark
+    // and the step is rejected.
+    solver.initial_trust_region_radius = 1e5;
     solver.num_threads = options_.n_threads;
     solver.logging_type = ceres::SILENT;
     solver.jacobi_scaling = false;  // the damping takes care of different units
