@@ -218,6 +218,22 @@ def test_truncated_jpeg(tum: Path, fraction: float) -> None:
         sequence.load(0)
 
 
+@pytest.mark.parametrize("suffix", [".png", ".jpg"])
+def test_truncated_image_that_the_decoder_completes(
+    tum: Path, suffix: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Older versions of OpenCV fill the rest with grey."""
+    path = tum / "rgb" / f"a{suffix}"
+    save(path, image(0, (*SIZE, 3)))
+    (tum / "rgb.txt").write_text(f"1.0 rgb/{path.name}\n")
+    monkeypatch.setattr(cv2, "imdecode", lambda *_: image(0, (*SIZE, 3)))
+    sequence = open_sequence(tum, Sensor.MONOCULAR)
+    assert sequence.load(0).image.shape == (*SIZE, 3)
+    path.write_bytes(path.read_bytes()[:-20])
+    with pytest.raises(ImageError, match="is truncated"):
+        sequence.load(0)
+
+
 def test_file_that_is_no_image(tum: Path) -> None:
     (tum / "rgb" / "100.100000.png").write_text("no image at all")
     with pytest.raises(ImageError, match=r"100\.100000\.png is no readable image"):
@@ -600,9 +616,15 @@ def test_euroc_ground_truth_is_moved_to_the_camera(euroc: Path) -> None:
     np.testing.assert_allclose(truth.positions[0], [1 - 0.02, 2 + 0.01, 3.03], atol=1e-12)
     np.testing.assert_allclose(truth.T_wc[0, :3, :3], np.diag([-1, -1, 1]), atol=1e-12)
 
+    # A right camera turned by 0.1 rad about its z axis makes the rectification turn the left one.
+    path = euroc / "mav0" / "cam1" / "sensor.yaml"
+    c, s = np.cos(0.1), np.sin(0.1)
+    text = path.read_text().replace("[0.0, -1.0, 0.0,", f"[{-s}, {-c}, 0.0,")
+    path.write_text(text.replace("         1.0, 0.0, 0.0,", f"         {c}, {-s}, 0.0,"))
     sequence = open_sequence(euroc, Sensor.STEREO)
     assert sequence.settings.rectification is not None
     R = sequence.settings.rectification.left.R
+    assert np.abs(R - np.eye(3)).max() > 0.03
     rectified = sequence.ground_truth()
     assert rectified is not None
     np.testing.assert_allclose(rectified.T_wc[0, :3, :3] @ R, np.diag([-1, -1, 1]), atol=1e-12)

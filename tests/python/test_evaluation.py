@@ -191,6 +191,12 @@ def test_straight_lines_and_single_points(n: int, with_scale: bool) -> None:
     assert np.linalg.det(found.R) == pytest.approx(1.0)
 
 
+def test_paths_that_have_nothing_in_common_keep_their_scale() -> None:
+    points = np.array([[-1.0, 0, 0], [1, 0, 0], [-1, 0, 0], [1, 0, 0]])
+    targets = np.array([[-1.0, 0, 0], [-1, 0, 0], [1, 0, 0], [1, 0, 0]])
+    assert align(points, targets, with_scale=True).scale == 1.0
+
+
 # ---- one second ----------------------------------------------------------------------------------
 
 
