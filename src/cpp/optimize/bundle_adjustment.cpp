@@ -175,12 +175,10 @@ class BundleSolver final : public ceres::EvaluationCallback {
       m.point = bundle_.points[o.point].data();
       m.has_depth = o.has_depth;
       m.huber = options_.robust ? kernel_width(o) : 0.0;
-      m.scale = 0;
-      if (!start.usable(i)) continue;  // its numbers stay away: zero times NaN would still be NaN
       m.u = o.u;
       m.v = o.v;
       m.right_u = o.right_u;
-      m.scale = deviation(o);
+      m.scale = start.usable(i) ? deviation(o) : 0.0;
     }
   }
 

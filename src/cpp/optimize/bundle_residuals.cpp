@@ -98,9 +98,14 @@ double BundleMeasurement::evaluate() {
   for (int i = 0; i < 3; ++i) {
     p_c[i] = R(i, 0) * point[0] + R(i, 1) * point[1] + R(i, 2) * point[2] + t(i);
   }
-  const bool projects = std::abs(p_c[2]) > kTinyDepth;
-  inverse_z = projects ? 1 / p_c[2] : 0;
-  factor = projects ? scale : 0;
+  if (!(scale > 0 && std::abs(p_c[2]) > kTinyDepth)) {  // also when the point is NaN
+    std::fill_n(p_c, 3, 0.0);
+    std::fill_n(residual, 3, 0.0);
+    inverse_z = factor = 0;
+    return 0;
+  }
+  inverse_z = 1 / p_c[2];
+  factor = scale;
   const Pinhole& k = view->pinhole();
   const double predicted_u = k.fx * p_c[0] * inverse_z + k.cx;
   residual[0] = factor * (u - predicted_u);

@@ -240,6 +240,32 @@ TEST(SolveBundle, BrokenNumbersAndPointsBehindTheCamera) {
   EXPECT_TRUE(all_finite(problem));
 }
 
+TEST(SolveBundle, PointThatComesToTheFrontTakesPartInTheSecondStage) {
+  BundleProblem problem = random_bundle(14, 6, 60, 2, false);
+  // A fixed camera further ahead sees a point 0.5 m away, which starts 0.2 m behind it.
+  problem.cameras.push_back({Pose(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 0, -2.5)),
+                             {500, 500, 320, 240},
+                             40,
+                             true});
+  const Eigen::Vector3d truth(0.1, 0.05, 3.0);
+  problem.points.emplace_back(0.1, 0.05, 2.3);
+  for (std::uint32_t c : {0u, 1u, 2u, 3u, 4u, 5u, 6u}) {
+    const Pose T_cw = c == 6
+                          ? problem.cameras[6].T_cw
+                          : Pose(Eigen::Quaterniond::Identity(), Eigen::Vector3d(-0.3 * c, 0, 0));
+    const Eigen::Vector2d pixel = problem.cameras[c].pinhole.project(T_cw * truth);
+    BundleProblem::Observation o;
+    o.camera = c;
+    o.point = 60;
+    o.u = static_cast<float>(pixel.x());
+    o.v = static_cast<float>(pixel.y());
+    problem.observations.push_back(o);
+  }
+  const BundleSummary summary = solve_bundle(problem, BundleOptions(), nullptr);
+  EXPECT_EQ(summary.outlier.back(), 0);
+  EXPECT_LT((problem.points[60] - truth).norm(), 0.01);
+}
+
 TEST(SolveBundle, RaisedFlagStopsBeforeAnything) {
   BundleProblem problem = random_bundle(12, 5, 60, 2, true);
   const std::vector<double> start = numbers(problem);
