@@ -17,9 +17,9 @@ import re
 import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
 
 import cv2
 import numpy as np
@@ -180,7 +180,7 @@ def save_vocabulary(
     elif target.suffix == ".txt":
         _write_text(vocabulary, target, Path.open, progress)
     elif target.name.endswith(".txt.gz"):
-        _write_text(vocabulary, target, gzip.open, progress)
+        _write_text(vocabulary, target, gzip.GzipFile, progress)
     else:
         raise VocabularyError(f"{target}: the name must end with .bvoc, .txt or .txt.gz")
     if progress is not None:
@@ -190,7 +190,7 @@ def save_vocabulary(
 def _write_text(
     vocabulary: core.Vocabulary,
     target: Path,
-    opener: Callable[[Path, str], IO[bytes]],
+    opener: Callable[[Path, str], AbstractContextManager[_textio._Target]],
     progress: Progress | None,
 ) -> None:
     header = (
