@@ -616,11 +616,11 @@ def test_euroc_ground_truth_is_moved_to_the_camera(euroc: Path) -> None:
     np.testing.assert_allclose(truth.positions[0], [1 - 0.02, 2 + 0.01, 3.03], atol=1e-12)
     np.testing.assert_allclose(truth.T_wc[0, :3, :3], np.diag([-1, -1, 1]), atol=1e-12)
 
-    # A right camera turned by 0.1 rad about its z axis makes the rectification turn the left one.
+    # A right camera nodding by 0.1 rad about its x axis: the rectification nods the left by half.
     path = euroc / "mav0" / "cam1" / "sensor.yaml"
     c, s = np.cos(0.1), np.sin(0.1)
-    text = path.read_text().replace("[0.0, -1.0, 0.0,", f"[{-s}, {-c}, 0.0,")
-    path.write_text(text.replace("         1.0, 0.0, 0.0,", f"         {c}, {-s}, 0.0,"))
+    text = path.read_text().replace("[0.0, -1.0, 0.0,", f"[0.0, {-c}, {s},")
+    path.write_text(text.replace("0.0, 0.0, 1.0, 0.03", f"0.0, {s}, {c}, 0.03"))
     sequence = open_sequence(euroc, Sensor.STEREO)
     assert sequence.settings.rectification is not None
     R = sequence.settings.rectification.left.R
