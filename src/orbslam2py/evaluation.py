@@ -179,12 +179,7 @@ def evaluate_trajectory(
     """
     estimate = estimate.select(~estimate.lost)
     truth = truth.select(~truth.lost)
-    i, j = associate(estimate.timestamps, truth.timestamps, max_difference)
-    if not len(i):
-        raise DatasetError(
-            f"no poses to compare: no time stamps of estimate ({_span(estimate)}) and ground truth "
-            f"({_span(truth)}) differ by less than {max_difference} s"
-        )
+    i, j = _match(estimate, truth, max_difference)
     transform = Similarity.identity()
     if alignment is not Alignment.NONE:
         transform = align(
@@ -312,6 +307,18 @@ def segment_errors(estimate: Array, truth: Array) -> Array:
         translation, rotation = relative_errors(estimate, truth, (starts[inside], ends[inside]))
         errors.append(np.stack([translation / length, rotation / length], axis=1))
     return np.concatenate(errors)
+
+
+def _match(
+    estimate: Trajectory, truth: Trajectory, max_difference: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    i, j = associate(estimate.timestamps, truth.timestamps, max_difference)
+    if not len(i):
+        raise DatasetError(
+            f"no poses to compare: no time stamps of estimate ({_span(estimate)}) and ground truth "
+            f"({_span(truth)}) differ by less than {max_difference} s"
+        )
+    return i, j
 
 
 def _relative_statistics(
