@@ -63,6 +63,24 @@ void add_row(Sums& sums, const std::array<Lanes, 6>& jacobian, Lanes weight, Lan
   }
 }
 
+/// Adds the rows u, v and, with depth, right u of points at (x, y) on the normalised image plane.
+template <bool kStereo>
+inline void add_points(Sums& sums, Lanes x, Lanes y, Lanes inverse_z, Lanes base,
+                       const std::array<Lanes, 3>& errors, Lanes weight_u, Lanes weight_v) {
+  const Lanes one = both(1.0), xy = x * y;
+  const std::array<Lanes, 6> row_u{xy, -(one + x * x), y, -inverse_z, Lanes{}, x * inverse_z};
+  const std::array<Lanes, 6> row_v{one + y * y, -xy, -x, Lanes{}, -inverse_z, y * inverse_z};
+  add_row<4>(sums, row_u, weight_u, errors[0]);
+  add_row<3>(sums, row_v, weight_v, errors[1]);
+  if constexpr (kStereo) {
+    const Lanes beta = base * inverse_z;
+    const std::array<Lanes, 6> row_right{
+        row_u[0] - beta * y,        row_u[1] + beta * x, y, -inverse_z, Lanes{},
+        row_u[5] - beta * inverse_z};
+    add_row<4>(sums, row_right, weight_u, errors[2]);
+  }
+}
+
 /// The loops over a group work on the normalised image plane: every residual is in units of the
 /// focal length of its row, which moves into the weight of the row.
 template <bool kStereo, bool kRobust, bool kSystem>
@@ -109,18 +127,8 @@ double accumulate(const Group& group, const Projection& projection, const Pose& 
       cost += q;
     }
     if constexpr (kSystem) {
-      const Lanes xy = x * y;
-      const std::array<Lanes, 6> row_u{xy, -(one + x * x), y, -inverse_z, Lanes{}, x * inverse_z};
-      const std::array<Lanes, 6> row_v{one + y * y, -xy, -x, Lanes{}, -inverse_z, y * inverse_z};
-      add_row<4>(sums, row_u, weight_u, error_u);
-      add_row<3>(sums, row_v, weight_v, error_v);
-      if constexpr (kStereo) {
-        const Lanes beta = base * inverse_z;
-        const std::array<Lanes, 6> row_r{
-            row_u[0] - beta * y,        row_u[1] + beta * x, y, -inverse_z, Lanes{},
-            row_u[5] - beta * inverse_z};
-        add_row<4>(sums, row_r, weight_u, error_r);
-      }
+      add_points<kStereo>(sums, x, y, inverse_z, base, {error_u, error_v, error_r}, weight_u,
+                          weight_v);
     }
   }
   if constexpr (kSystem) *out = sums;
