@@ -7,6 +7,7 @@
 #include "base/errors.hpp"
 #include "bindings/arrays.hpp"
 #include "bindings/bindings.hpp"
+#include "places/place_recognition.hpp"
 #include "places/vocabulary.hpp"
 #include "places/vocabulary_training.hpp"
 
@@ -237,12 +238,46 @@ void bind_vocabulary_class(py::module_& module) {
            "Word vector and direct index of an image. descriptors: (n, 32) uint8.");
 }
 
+void bind_keyframe_index(py::module_& module) {
+  py::class_<PlaceCandidate>(module, "PlaceCandidate",
+                             "A keyframe that may show the same place as the query.")
+      .def_readonly("keyframe", &PlaceCandidate::keyframe)
+      .def_readonly("common_words", &PlaceCandidate::common_words)
+      .def_readonly("score", &PlaceCandidate::score, "L1 score with the query, 0 to 1.")
+      .def_readonly("group_score", &PlaceCandidate::group_score,
+                    "Sum of the scores of its group of covisible keyframes.");
+  using unlocked = py::call_guard<py::gil_scoped_release>;
+  py::class_<KeyFrameIndex, std::shared_ptr<KeyFrameIndex>>(
+      module, "KeyFrameIndex",
+      "Inverted file: which keyframes contain a word. Safe to use from several threads.")
+      .def(py::init<>())
+      .def("__len__", &KeyFrameIndex::size, unlocked())
+      .def("__contains__", &KeyFrameIndex::contains, py::arg("id"), unlocked())
+      .def("erase", &KeyFrameIndex::erase, py::arg("id"), unlocked(),
+           "Forgets a keyframe; call it after its death in the map.")
+      .def("clear", &KeyFrameIndex::clear, unlocked());
+  module.def("index_keyframe", &index_keyframe, py::arg("index"), py::arg("map"), py::arg("id"),
+             unlocked(), "Adds a living, described keyframe; a dead one is left out.");
+  module.def(
+      "lowest_neighbour_score", &lowest_neighbour_score, py::arg("map"), py::arg("id"), unlocked(),
+      "The lowest score of a keyframe with a covisible neighbour: what a loop candidate must "
+      "reach. 1 without neighbours.");
+  module.def("find_loop_candidates", &find_loop_candidates, py::arg("index"), py::arg("map"),
+             py::arg("id"), py::arg("min_score"), unlocked(),
+             "Keyframes not connected to this one that look like it, by ascending id. Raises "
+             "StateError when it is dead.");
+  module.def("find_relocalization_candidates", &find_relocalization_candidates, py::arg("index"),
+             py::arg("map"), py::arg("frame"), unlocked(),
+             "Keyframes that look like a described frame, by ascending id.");
+}
+
 }  // namespace
 
 void bind_places(py::module_& module) {
   bind_vocabulary_types(module);
   bind_vocabulary_class(module);
   bind_words(module);
+  bind_keyframe_index(module);
   module.def(
       "find_problem",
       [](int branching, int depth, const Column<std::uint32_t>& parents,
