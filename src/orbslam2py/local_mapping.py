@@ -17,7 +17,7 @@ from orbslam2py.timing import StageStatistics, StageTimer
 class LocalMapping:
     """Integrates keyframes: points, fusion, bundle adjustment, culling.
 
-    A waiting keyframe goes before fusion, bundle adjustment and keyframe culling of the present one.
+    A waiting keyframe goes before fusion, bundle adjustment and culling of the present one.
 
     Parameters
     ----------

@@ -83,7 +83,7 @@ def link_latest(folder: Path) -> None:
 
 
 class OutputWriter:
-    """Writes every result file of a run; one that fails does not keep the others from being written.
+    """Writes every result file of a run; one that fails does not hinder the others.
 
     Parameters
     ----------
@@ -119,9 +119,7 @@ class OutputWriter:
         self._write_tum("trajectory.txt", result, last)
         self._write_tum("trajectory_online.txt", result, result.online_trajectory())
         self._write_tum("keyframes.txt", result, result.keyframes)
-        self._write(
-            "trajectory_kitti.txt", lambda path: write_kitti(path, last, len(result.rows))
-        )
+        self._write("trajectory_kitti.txt", lambda path: write_kitti(path, last, len(result.rows)))
 
     def _write_tum(self, name: str, result: RunResult, trajectory: Trajectory) -> None:
         texts = [result.rows[int(i)].timestamp for i in trajectory.indices]
@@ -133,9 +131,7 @@ class OutputWriter:
         except OSError as error:
             self._keep_elsewhere(name, write, error)
 
-    def _keep_elsewhere(
-        self, name: str, write: Callable[[Path], object], error: OSError
-    ) -> None:
+    def _keep_elsewhere(self, name: str, write: Callable[[Path], object], error: OSError) -> None:
         message = f"cannot write {self.folder / name}: {error.strerror or error}"
         try:
             if self._rescue is None:

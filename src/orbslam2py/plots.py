@@ -18,7 +18,9 @@ FloatArray = npt.NDArray[np.float64]
 
 _ESTIMATE = "#1f5fa8"
 _TRUTH = "#9a9a9a"
-_POINTS = "#d8cfc0"
+_POINTS = "#c9b99a"
+#: Width by height of the view from above.
+_SHAPE = 1.85
 
 
 def draw_trajectory(
@@ -88,30 +90,50 @@ def _draw_above(
 ) -> None:
     path = positions if truth is None else np.vstack([positions, truth[1]])
     low, high = path[:, [0, 2]].min(axis=0), path[:, [0, 2]].max(axis=0)
-    # Points far from the path would shrink it to a dot.
-    margin = max(1.0, 0.6 * float((high - low).max()))
+    # The window follows the path with room for the points around it: points far away would shrink
+    # the path to a dot. It has the shape of the axes, so that metres are equal on both.
+    center, half = (
+        0.5 * (low + high),
+        0.5 * (high - low) + max(1.2, 0.4 * float((high - low).max())),
+    )
+    half = np.array([max(half[0], half[1] * _SHAPE), max(half[1], half[0] / _SHAPE)])
+    low, high = center - half, center + half
     if len(points):
-        inside = np.all(
-            (points[:, [0, 2]] > low - margin) & (points[:, [0, 2]] < high + margin), axis=1
-        )
+        inside = np.all((points[:, [0, 2]] > low) & (points[:, [0, 2]] < high), axis=1)
         axes.scatter(
-            points[inside, 0], points[inside, 2], s=1.0, color=_POINTS, linewidths=0,
-            label="map points", rasterized=True,
+            points[inside, 0],
+            points[inside, 2],
+            s=2.0,
+            color=_POINTS,
+            linewidths=0,
+            label="map points",
+            rasterized=True,
         )
     if truth is not None:
         axes.plot(truth[1][:, 0], truth[1][:, 2], color=_TRUTH, linewidth=3.0, label="ground truth")
     axes.plot(positions[:, 0], positions[:, 2], color=_ESTIMATE, linewidth=1.4, label="estimate")
     axes.scatter(
-        keyframes[:, 0], keyframes[:, 2], s=14, facecolors="white", edgecolors=_ESTIMATE,
-        linewidths=0.9, zorder=3, label="keyframes",
+        keyframes[:, 0],
+        keyframes[:, 2],
+        s=14,
+        facecolors="white",
+        edgecolors=_ESTIMATE,
+        linewidths=0.9,
+        zorder=3,
+        label="keyframes",
     )
     axes.scatter(
-        positions[:1, 0], positions[:1, 2], s=50, marker="s", color=_ESTIMATE, zorder=4,
+        positions[:1, 0],
+        positions[:1, 2],
+        s=50,
+        marker="s",
+        color=_ESTIMATE,
+        zorder=4,
         label="start",
     )
-    axes.set_xlim(low[0] - margin, high[0] + margin)
-    axes.set_ylim(low[1] - margin, high[1] + margin)
-    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    axes.set_aspect("equal", adjustable="box")
     axes.set_xlabel("x (right) [m]")
     axes.set_ylabel("z (forward) [m]")
     axes.legend(loc="best", fontsize=9, framealpha=0.9, markerscale=1.2)

@@ -9,16 +9,16 @@ from collections.abc import Iterator, Sequence
 from typing import Generic, Protocol, TypeVar
 
 Item = TypeVar("Item")
-Loaded = TypeVar("Loaded", covariant=True)
+Loaded_co = TypeVar("Loaded_co", covariant=True)
 
 #: Seconds between two looks at whether the other side is still there.
 _WAIT_SLICE = 0.2
 
 
-class Loader(Protocol[Loaded]):
+class Loader(Protocol[Loaded_co]):
     """What a `Prefetcher` reads from."""
 
-    def load(self, index: int, /) -> Loaded:
+    def load(self, index: int, /) -> Loaded_co:
         """Load one item."""
         ...
 

@@ -94,4 +94,3 @@ def peak_memory_mb() -> float:
 
 def _rate(count: int, seconds: float) -> float:
     return count / seconds if seconds > 0 else 0.0
-

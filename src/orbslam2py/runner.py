@@ -55,7 +55,11 @@ class RunOptions:
             raise DatasetError(
                 "--deterministic and --realtime exclude each other: dropping frames depends on time"
             )
-        if self.start < 0 or self.stride < 1 or (self.max_frames is not None and self.max_frames < 1):
+        if (
+            self.start < 0
+            or self.stride < 1
+            or (self.max_frames is not None and self.max_frames < 1)
+        ):
             raise DatasetError("--start must be 0 or more, --stride and --max-frames 1 or more")
         indices = list(range(self.start, n_frames, self.stride))
         if not indices:
@@ -231,9 +235,7 @@ class SequenceRunner:
         return result
 
     # ---- one pass over the frames ----------------------------------------------------------------
-    def _feed(
-        self, system: System, images: Prefetcher[Images], progress: Progress | None
-    ) -> None:
+    def _feed(self, system: System, images: Prefetcher[Images], progress: Progress | None) -> None:
         clock = _Clock(self._sequence.timestamps, self._indices) if self._options.realtime else None
         for position, (index, item) in enumerate(images):
             if clock is not None and clock.must_drop(position):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Workers: one thread around one step, with counted pauses, a reset that is served in every
-state, bounded waits, and errors that reach the caller.
+"""Workers: one thread around one step.
+
+With counted pauses, a reset that is served in every state, bounded waits, and errors that reach
+the caller.
 
 The protocol follows section 6 of the thread specification: nobody waits for somebody who waits
 for him, because pauses are counted tickets, a reset is acknowledged while paused as well, and no

@@ -195,7 +195,7 @@ void bind_bundle(py::module_& module) {
   module.def(
       "solve_bundle", &solve_bundle_arrays, "T_cw"_a, "fixed"_a, "intrinsics"_a, "bf"_a, "points"_a,
       "camera_index"_a, "point_index"_a, "pixels"_a, "inverse_sigma2"_a,
-      "options"_a = BundleOptions(), "abort"_a = py::none(),
+      py::arg_v("options", BundleOptions(), "BundleOptions()"), "abort"_a = py::none(),
       "Bundle adjustment of arrays. Returns (poses, points (m, 3) float64, BundleSummary).\n\n"
       "`T_cw`: list of Pose; `fixed`: list of bool. `intrinsics`: fx, fy, cx, cy [pixels], `bf`\n"
       "[pixel metre], of all cameras. `points`: (m, 3) float64, world. `camera_index`,\n"

@@ -110,7 +110,7 @@ std::shared_ptr<Vocabulary> train(const Column<std::uint8_t>& rows,
   return unconst(train_vocabulary(images, options, listener));
 }
 
-void bind_words(py::module_& module) {
+void bind_word_types(py::module_& module) {
   py::class_<WordVector>(module, "WordVector",
                          "Bag of words of an image: ascending word ids and their weights, which "
                          "sum to 1. Arrays are copies.")
@@ -135,6 +135,9 @@ void bind_words(py::module_& module) {
           "offsets", [](const DirectIndex& d) { return to_array(d.offsets); }, "(g + 1,) uint32.")
       .def_property_readonly(
           "indices", [](const DirectIndex& d) { return to_array(d.indices); }, "(k,) uint32.");
+}
+
+void bind_words(py::module_& module) {
   module.def("similarity", &similarity, py::arg("a"), py::arg("b"),
              "L1 score of two word vectors, 0 (disjoint) to 1 (identical).");
   module.def(
@@ -274,6 +277,7 @@ void bind_keyframe_index(py::module_& module) {
 }  // namespace
 
 void bind_places(py::module_& module) {
+  bind_word_types(module);
   bind_vocabulary_types(module);
   bind_vocabulary_class(module);
   bind_words(module);

@@ -20,7 +20,8 @@ void count_sightings(Map& map, const TrackedFrame& frame, const std::vector<MapP
     if (map.find(id)) map.count_visible(id);
   }
   for (std::size_t i = 0; i < frame.map_points.size(); ++i) {
-    if (frame.outlier[i] == 0 && map.find(frame.map_points[i])) map.count_found(frame.map_points[i]);
+    if (frame.outlier[i] == 0 && map.find(frame.map_points[i]))
+      map.count_found(frame.map_points[i]);
   }
 }
 

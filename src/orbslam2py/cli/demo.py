@@ -18,9 +18,7 @@ from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 def demo(
     sensor: Annotated[Sensor, typer.Option(help="stereo or rgbd.")] = Sensor.STEREO,
     frames: Annotated[int, typer.Option(help="Number of images.", min=10)] = 300,
-    output: Annotated[
-        Path, typer.Option(help="Folder for the results.")
-    ] = Path("runs/demo"),
+    output: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("runs/demo"),
     quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
 ) -> None:
     """Track a camera through a synthetic room: needs no data.

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 from rich.logging import RichHandler
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
 from rich.table import Table
 
@@ -108,16 +109,16 @@ def run_and_write(
     writer = OutputWriter(folder)
     writer.write_all(result, report, evaluation)
     console.print(_table(report))
-    console.print(f"Results are in [bold]{folder}[/]", highlight=False)
+    console.print(f"Results are in [bold]{escape(str(folder))}[/]", highlight=False)
     return _conclude(result, writer, errors)
 
 
 def _conclude(result: RunResult, writer: OutputWriter, errors: Console) -> ExitCode:
     for problem in writer.problems:
-        errors.print(f"[bold red]Error:[/] {problem}", highlight=False, soft_wrap=True)
+        errors.print(f"[bold red]Error:[/] {escape(problem)}", highlight=False, soft_wrap=True)
     if result.error is not None:
         errors.print(
-            f"[bold red]Error:[/] {result.error} (what was done until then is saved)",
+            f"[bold red]Error:[/] {escape(str(result.error))} (what was done until then is saved)",
             highlight=False,
             soft_wrap=True,
         )
@@ -128,7 +129,7 @@ def _conclude(result: RunResult, writer: OutputWriter, errors: Console) -> ExitC
         return ExitCode.BAD_INPUT
     if result.n_tracked == 0:
         errors.print(
-            f"[bold red]Nothing could be tracked:[/] {result.why_nothing_was_tracked()}",
+            f"[bold red]Nothing could be tracked:[/] {escape(result.why_nothing_was_tracked())}",
             highlight=False,
             soft_wrap=True,
         )
@@ -196,4 +197,3 @@ def _table(report: dict[str, Any]) -> Table:
             f"median {numbers['median']:.2f}  mean {numbers['mean']:.2f}  p99 {numbers['p99']:.2f}",
         )
     return table
-
