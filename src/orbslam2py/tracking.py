@@ -195,23 +195,23 @@ class Tracking:
             no pose was found.
         """
         with timer("predict"):
-            last = self._update_last_frame()
+            last, T_lw = self._update_last_frame()
             just_relocalized = frame.id < self._last_relocalization_frame_id + 2
             discarded = None
             if self._velocity is not None and not just_relocalized:
-                frame.T_cw = self._velocity @ last.T_cw
+                frame.T_cw = self._velocity @ T_lw
                 discarded = self._track_with_motion_model(frame, last, outcome)
             if discarded is None:
-                frame.T_cw = last.T_cw
+                frame.T_cw = T_lw
                 discarded = self._track_reference_keyframe(frame, outcome)
         return discarded
 
-    def _update_last_frame(self) -> core.TrackedFrame:
-        """The last frame where mapping has moved it since: pose and points."""
+    def _update_last_frame(self) -> tuple[core.TrackedFrame, core.Pose]:
+        """Express the last frame by its reference keyframe, which mapping may have moved."""
         assert self._last is not None and self._last_T_cr is not None
-        last = self._last
-        last.T_cw = self._last_T_cr @ self._map.keyframe_pose(last.reference_keyframe)
-        return last
+        T_lw = self._last_T_cr @ self._map.keyframe_pose(self._last.reference_keyframe)
+        self._last.T_cw = T_lw
+        return self._last, T_lw
 
     def _track_with_motion_model(
         self, frame: core.TrackedFrame, last: core.TrackedFrame, outcome: TrackingOutcome
