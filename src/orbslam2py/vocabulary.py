@@ -225,13 +225,14 @@ def convert_vocabulary(
     VocabularyError
         If one cannot be read or the other not be written.
     """
-    halves = (None, None)
-    if progress is not None:
-        halves = (lambda f: progress(f / 2), lambda f: progress((1 + f) / 2))
-    vocabulary = load_vocabulary(source, cache=False, progress=halves[0])
+    vocabulary = load_vocabulary(source, cache=False, progress=_half(progress, 0.0))
     comment = vocabulary.comment or f"Converted from {Path(source).name}."
-    save_vocabulary(vocabulary, target, comment=comment, progress=halves[1])
+    save_vocabulary(vocabulary, target, comment=comment, progress=_half(progress, 0.5))
     return vocabulary
+
+
+def _half(progress: Progress | None, begin: float) -> Progress | None:
+    return None if progress is None else lambda done: progress(begin + done / 2)
 
 
 # ---- look ----------------------------------------------------------------------------------------

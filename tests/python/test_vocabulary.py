@@ -122,11 +122,9 @@ def to_yaml(vocabulary: core.Vocabulary) -> str:
     order = list(range(len(parents)))
     random.Random(3).shuffle(order)
     for row in order:
-        bytes_ = " ".join(map(str, centres[row]))
-        lines.append(
-            f"      - {{ nodeId:{row + 1}, parentId:{parents[row]}, weight:{weights[row]!r},"
-        )
-        lines.append(f'          descriptor:"{bytes_} " }}'.replace("np.float64", ""))
+        numbers = f"nodeId:{row + 1}, parentId:{parents[row]}, weight:{float(weights[row])!r}"
+        centre = " ".join(map(str, centres[row]))
+        lines += [f"      - {{ {numbers},", f'          descriptor:"{centre} " }}']
     lines.append("   words:")
     for word, row in enumerate(np.flatnonzero(is_word)):
         lines.append(f"      - {{ wordId:{word}, nodeId:{row + 1} }}")

@@ -12,7 +12,6 @@ from typing import Annotated
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
-from rich.table import Table
 
 from orbslam2py import __version__
 from orbslam2py import _core as core
@@ -117,7 +116,7 @@ def info(
 ) -> None:
     """Check a vocabulary as a whole and show what it holds."""
     facts = vocabulary_info(path)
-    table = Table(show_header=False, box=None)
+    console = Console(highlight=False, soft_wrap=True)
     for name, value in (
         ("path", facts.path),
         ("format", facts.format.value),
@@ -129,8 +128,7 @@ def info(
         ("hash", f"{facts.hash:016x}"),
         ("comment", facts.comment),
     ):
-        table.add_row(name, str(value))
-    Console(highlight=False, soft_wrap=True).print(table)
+        console.print(f"{name:20}{value}", markup=False)
 
 
 def _check_target(path: Path, *, force: bool) -> None:
@@ -142,11 +140,10 @@ def _check_target(path: Path, *, force: bool) -> None:
         raise VocabularyError(f"{path.absolute().parent}: no such folder")
 
 
-EXAMPLES = {
-    train: "orbslam2py vocabulary train photographs -o mine.bvoc --depth 5",
-    convert: "orbslam2py vocabulary convert ORBvoc.txt.tar.gz ORBvoc.bvoc",
-    info: "orbslam2py vocabulary info ORBvoc.bvoc",
-}
-for verb, example in EXAMPLES.items():
-    verb.__doc__ = f"{verb.__doc__}\n\n**Example**\n\n    {example}\n"
-    app.command(verb.__name__)(verb)
+EXAMPLE = "{}\n\n**Example**\n\n    orbslam2py vocabulary {}\n"
+train.__doc__ = EXAMPLE.format(train.__doc__, "train photographs -o mine.bvoc --depth 5")
+convert.__doc__ = EXAMPLE.format(convert.__doc__, "convert ORBvoc.txt.tar.gz ORBvoc.bvoc")
+info.__doc__ = EXAMPLE.format(info.__doc__, "info ORBvoc.bvoc")
+app.command("train")(train)
+app.command("convert")(convert)
+app.command("info")(info)

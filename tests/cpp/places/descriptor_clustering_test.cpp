@@ -12,7 +12,8 @@ namespace {
 
 Descriptor noise(std::mt19937_64& random) { return {{random(), random(), random(), random()}}; }
 
-Descriptor flip(Descriptor descriptor, std::mt19937_64& random, int n_bits) {
+Descriptor flip(const Descriptor& middle, std::mt19937_64& random, int n_bits) {
+  Descriptor descriptor = middle;
   for (int i = 0; i < n_bits; ++i) {
     const auto bit = random() % 256;
     descriptor.words[bit / 64] ^= std::uint64_t{1} << (bit % 64);
