@@ -120,17 +120,19 @@ class Worker(Generic[Job]):
         ----------
         drain : bool
             Process the waiting jobs first; otherwise they are dropped and the running step is
-            asked to end early.
+            asked to end early. A paused worker does not wait for its resumption: it drops them.
         timeout : float, optional
-            Seconds to wait for the thread.
+            Seconds to wait for the jobs, and again for the thread.
 
         Raises
         ------
         WorkerError
             If a step failed, now or earlier, or the thread did not end in time.
         """
-        if drain:
-            self.wait_until(lambda: self._error is not None or self._is_idle(), timeout)
+        if drain and self._thread is not None:
+            self.wait_until(
+                lambda: self._error is not None or self._is_idle() or self._pauses > 0, timeout
+            )
         with self._condition:
             self._finish_requested = True
             self._queue.clear()
@@ -256,8 +258,14 @@ class Worker(Generic[Job]):
 
     def raise_if_failed(self) -> None:
         """Raise `WorkerError`, with the original as its cause, if a step has failed."""
-        if self._error is not None:
-            raise WorkerError(f"{self.name} stopped: {self._error}") from self._error
+        error = self._error
+        if isinstance(error, WorkerError):
+            # A later worker has failed, and this one when it handed a job on.
+            raise WorkerError(str(error)) from error.__cause__
+        if error is not None:
+            raise WorkerError(
+                f"{self.name} stopped: {str(error) or type(error).__name__}"
+            ) from error
 
     def wait_until(self, condition: Callable[[], bool], timeout: float | None = None) -> bool:
         """Wait for a condition on the worker's state; False on time-out."""

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A test that hangs fails, with the stacks of all threads."""
+
+from __future__ import annotations
+
+import faulthandler
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+
+class HangError(Exception):
+    """The time of a test is over."""
+
+
+@contextmanager
+def watchdog(seconds: float) -> Iterator[None]:
+    """Raise in the main thread after `seconds`; end the process if that does not help either."""
+
+    def expired(_signal: int, _frame: FrameType | None) -> None:
+        faulthandler.dump_traceback()
+        raise HangError(f"not done after {seconds} s")
+
+    before = signal.signal(signal.SIGALRM, expired)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    faulthandler.dump_traceback_later(2 * seconds + 10, exit=True)
+    try:
+        yield
+    finally:
+        faulthandler.cancel_dump_traceback_later()
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def worker_threads() -> list[str]:
+    """Names of the living threads that this package starts."""
+    names = {"local mapping", "loop closing", "image loader", "worker under test"}
+    return [thread.name for thread in threading.enumerate() if thread.name in names]
