@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the original ORB-SLAM2 measured, and what is asked of this implementation.
+
+Measured with the original at commit f2e6f51 (-O3 -march=native, OpenCV 4.6, no viewer) on two
+virtual cores of a Zen 4 server; medians; vocabulary of 825 000 words (branching 10, depth 6). The
+yardstick was measured on the same machine in the same minute and carries the figures to others.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+#: ``cv2.ORB_create(n, 1.2, 8).detectAndCompute`` with one thread, by image: (n, ms there).
+YARDSTICK = {"tum_a": (1000, 4.1), "euroc_a": (1000, 4.2), "kitti_a": (2000, 7.8)}
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One step of the reference and the target.
+
+    Attributes
+    ----------
+    name
+        Of the step.
+    milliseconds
+        The reference's median; None where only an absolute limit is asked for.
+    ratio
+        Most times the reference's time; None for an absolute limit.
+    limit
+        Milliseconds on the reference's machine.
+    yardstick
+        The image whose yardstick carries the figure.
+    """
+
+    name: str
+    milliseconds: float | None
+    ratio: float | None = None
+    limit: float | None = None
+    yardstick: str = "tum_a"
+
+    @property
+    def target(self) -> float | None:
+        """Most milliseconds on the reference's machine; None: no target."""
+        if self.limit is not None:
+            return self.limit
+        if self.ratio is None or self.milliseconds is None:
+            return None
+        return self.ratio * self.milliseconds
+
+
+EXTRACTION_STRETCH = 0.33
+EXTRACTION = {
+    "tum_a": Figure("extraction 640x480, 1000", 7.7, 0.5),
+    "euroc_a": Figure("extraction 752x480, 1000", 9.9, 0.5, yardstick="euroc_a"),
+    "kitti_a": Figure("extraction 1241x376, 2000", 13.3, 0.5, yardstick="kitti_a"),
+}
+STEREO = {
+    "euroc": Figure("stereo matching 752x480, 1200", 7.8, 0.4),
+    "kitti": Figure("stereo matching 1241x376, 2000", 12.7, 0.4),
+}
+POSE = {
+    "poseopt_mono": Figure("pose, 200 monocular", 0.44, 0.6),
+    "poseopt_stereo": Figure("pose, 350 mixed", 1.15, 0.6),
+}
+BUNDLE = {
+    "lba_stereo": Figure("local BA, stereo", 75.0, 0.6),
+    "lba_mono": Figure("local BA, monocular", 56.0, 0.6),
+}
+#: Sum of squared whitened residuals over the observations that the reference keeps, and the most
+#: that ours may be times that.
+BUNDLE_COST = {"lba_stereo": 5434.80, "lba_mono": 3771.96}
+BUNDLE_COST_RATIO = 1.001
+WORDS = {
+    1000: Figure("words and direct index, 1000", 0.75),
+    2000: Figure("words and direct index, 2000", 2.7),
+}
+#: 26 to 53 ms in the reference.
+FUSE = Figure("fuse keyframe with neighbours", 26.0, limit=10.0)
+VOCABULARY_BINARY = Figure("binary vocabulary, 10^6 words", None, limit=50.0)
+VOCABULARY_TEXT = Figure("text vocabulary, 10^6 words", 6300.0, limit=4000.0)
+VOCABULARY_TEXT_PEAK_MB = (413.0, 200.0)
+"""The reference's peak memory and the most that ours may have."""
+
+
+@dataclass(frozen=True)
+class SequenceFigure:
+    """A whole sequence in the reference.
+
+    Attributes
+    ----------
+    folder, sensor
+        Which.
+    ate, ate_range
+        RMSE [m] after SE(3) alignment over all frames, offline: median and range.
+    keyframes
+        Left in the map.
+    track_ms
+        Median and 99th percentile of tracking.
+    frames_per_second
+        Frames / (sum of tracking + sum of mapping time), offline.
+    period_ms
+        Between two images.
+    """
+
+    folder: str
+    sensor: str
+    ate: float
+    ate_range: tuple[float, float]
+    keyframes: int
+    track_ms: tuple[float, float]
+    frames_per_second: float
+    period_ms: float
+
+
+SEQUENCES = [
+    SequenceFigure(
+        "7scenes_redkitchen_head250",
+        "rgbd",
+        0.0493,
+        (0.0493, 0.0493),
+        19,
+        (12.7, 15.5),
+        55.7,
+        33.3,
+    ),
+    SequenceFigure(
+        "kitti_06_head51_stereo", "stereo", 0.0455, (0.0354, 0.0542), 24, (35.0, 51.0), 14.1, 100.0
+    ),
+]
+#: Measured for accuracy only: the camera stands still.
+STILL = SequenceFigure(
+    "euroc_V1_01_still8", "stereo", 0.0008, (0.0008, 0.0008), 1, (25.0, 32.0), 38.7, 50.0
+)
+SEQUENCE_SPEED_RATIO = 1.5
+PYTHON_SHARE = 0.03
+#: Longest write sections [ms]: a local window, a whole map of 1000 keyframes.
+LOCK_HOLD_MS = (2.0, 20.0)

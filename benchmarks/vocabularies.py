@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How long vocabularies take to be ready, and with how much memory: in processes of their own.
+
+    python benchmarks/vocabularies.py FILE [--cache]
+
+opens FILE once and prints milliseconds and megabytes as JSON.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import reference
+from steps import Row
+from yardstick import Yardstick
+
+from orbslam2py import _core as core
+from orbslam2py.vocabulary import load_vocabulary, save_vocabulary
+
+BRANCHING, DEPTH = 10, 6
+
+
+def make_large_vocabulary() -> core.Vocabulary:
+    """A complete tree with 10^6 words and random centres: as large as the best-known one."""
+    sizes = [BRANCHING**level for level in range(1, DEPTH + 1)]
+    parents = [np.zeros(BRANCHING, np.uint32)]
+    first = 1
+    for size in sizes[:-1]:
+        parents.append(np.repeat(np.arange(first, first + size, dtype=np.uint32), BRANCHING))
+        first += size
+    n_nodes = sum(sizes)
+    random = np.random.default_rng(0)
+    is_word = np.zeros(n_nodes, np.uint8)
+    is_word[-sizes[-1] :] = 1
+    return core.Vocabulary.from_table(
+        BRANCHING,
+        DEPTH,
+        core.Scoring.L1,
+        core.Weighting.TF_IDF,
+        np.concatenate(parents),
+        is_word,
+        random.integers(0, 256, (n_nodes, 32), dtype=np.uint8),
+        np.where(is_word, random.uniform(1, 12, n_nodes), 0.0),
+    )
+
+
+@dataclass(frozen=True)
+class VocabularyFiles:
+    """The large vocabulary in two formats."""
+
+    binary: Path
+    text: Path
+
+    @staticmethod
+    def write(vocabulary: core.Vocabulary, folder: Path) -> VocabularyFiles:
+        files = VocabularyFiles(folder / "large.bvoc", folder / "large_text.txt")
+        save_vocabulary(vocabulary, files.binary)
+        save_vocabulary(vocabulary, files.text)
+        return files
+
+
+def open_in_new_process(path: Path, *, cache: bool = False) -> dict[str, float]:
+    """Milliseconds until the first image can be described, and the process's memory [MB]."""
+    command = [sys.executable, __file__, str(path), *(["--cache"] if cache else [])]
+    environment = {**os.environ, "XDG_CACHE_HOME": str(path.parent / "cache")}
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
+    return json.loads(done.stdout)
+
+
+def vocabulary_rows(yardstick: Yardstick, files: VocabularyFiles) -> Iterator[Row]:
+    peaks: list[dict[str, float]] = []
+
+    def repeat(path: Path, times: int, *, cache: bool = False) -> Callable[[], list[float]]:
+        def work() -> list[float]:
+            peaks[:] = [open_in_new_process(path, cache=cache) for _ in range(times)]
+            return [peak["ms"] for peak in peaks]
+
+        return work
+
+    binary = yardstick.around(repeat(files.binary, 7))
+    note = "open and describe the first 1000 features, file in the page cache"
+    yield Row(reference.VOCABULARY_BINARY.name, reference.VOCABULARY_BINARY, binary, note)
+
+    text = yardstick.around(repeat(files.text, 3))
+    peak = max(p["peak_mb"] for p in peaks)
+    before = max(p["before_mb"] for p in peaks)
+    theirs, limit = reference.VOCABULARY_TEXT_PEAK_MB
+    met = "met" if peak <= limit else "NOT met"
+    size = files.text.stat().st_size / 1e6
+    note = (
+        f"{size:.0f} MB of text; peak of the process {peak:.0f} MB ({before:.0f} before), "
+        f"reference {theirs:.0f}, target {limit:.0f}: {met}"
+    )
+    yield Row(reference.VOCABULARY_TEXT.name, reference.VOCABULARY_TEXT, text, note)
+
+
+def peak_mb() -> float:
+    """Largest resident memory of this program; unlike getrusage not that of the one before exec."""
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith("VmHWM"):
+            return float(line.split()[1]) * 1.024e-3
+    raise OSError("/proc/self/status has no VmHWM")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("file", type=Path)
+    parser.add_argument("--cache", action="store_true", help="keep and use a binary copy")
+    arguments = parser.parse_args()
+    before = peak_mb()
+    descriptors = np.random.default_rng(1).integers(0, 256, (1000, 32), dtype=np.uint8)
+    begin = time.perf_counter()
+    vocabulary = load_vocabulary(arguments.file, cache=arguments.cache)
+    vocabulary.transform(descriptors)
+    elapsed = 1e3 * (time.perf_counter() - begin)
+    print(json.dumps({"ms": elapsed, "before_mb": before, "peak_mb": peak_mb()}))
+
+
+if __name__ == "__main__":
+    main()
