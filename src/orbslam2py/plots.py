@@ -90,12 +90,14 @@ def _draw_above(
 ) -> None:
     path = positions if truth is None else np.vstack([positions, truth[1]])
     low, high = path[:, [0, 2]].min(axis=0), path[:, [0, 2]].max(axis=0)
-    # The window follows the path with room for the points around it: points far away would shrink
-    # the path to a dot. It has the shape of the axes, so that metres are equal on both.
-    center, half = (
-        0.5 * (low + high),
-        0.5 * (high - low) + max(1.2, 0.4 * float((high - low).max())),
-    )
+    # The window follows the path and shows the points around it, but not those so far away that they
+    # would shrink the path to a dot. It has the shape of the axes: metres are equal on both.
+    extent = float((high - low).max())
+    if len(points):
+        near, far = np.quantile(points[:, [0, 2]], [0.03, 0.97], axis=0)
+        low = np.clip(near, low - 2.0 - 0.5 * extent, low)
+        high = np.clip(far, high, high + 2.0 + 0.5 * extent)
+    center, half = 0.5 * (low + high), 0.5 * (high - low) + 0.1 + 0.05 * extent
     half = np.array([max(half[0], half[1] * _SHAPE), max(half[1], half[0] / _SHAPE)])
     low, high = center - half, center + half
     if len(points):

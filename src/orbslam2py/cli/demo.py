@@ -17,11 +17,13 @@ from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
 def demo(
     sensor: Annotated[Sensor, typer.Option(help="stereo or rgbd.")] = Sensor.STEREO,
-    frames: Annotated[int, typer.Option(help="Number of images.", min=10)] = 300,
+    frames: Annotated[
+        int | None, typer.Option(help="Number of images [one lap and a bit].", min=10)
+    ] = None,
     output: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("runs/demo"),
     quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
 ) -> None:
-    """Track a camera through a synthetic room: needs no data.
+    """Track a camera once around a synthetic corridor: needs no data.
 
     **Example**
 
@@ -29,7 +31,8 @@ def demo(
     """
     if sensor is Sensor.MONOCULAR:
         raise SettingsError("the demo runs with --sensor stereo or rgbd")
-    sequence = SyntheticSequence(SyntheticOptions(sensor=sensor, world="room", frames=frames))
+    options = SyntheticOptions(world="corridor", sensor=sensor, frames=frames, speed=1.4, noise=2)
+    sequence = SyntheticSequence(options)
     code = run_and_write(sequence, RunOptions(sensor), output=output, force=True, quiet=quiet)
     if not quiet:
         typer.echo(f"Look at {output / 'trajectory.png'}.")
