@@ -592,9 +592,9 @@ class PairExtractor:
     """
     def __init__(self, options: OrbOptions) -> None:
         ...
-    def extract(self, left: numpy.ndarray, right: numpy.ndarray) -> tuple[Extraction, Extraction]:
+    def extract(self, left: numpy.ndarray, right: numpy.ndarray, left_mask: typing.Any = None, right_mask: typing.Any = None) -> tuple[Extraction, Extraction]:
         """
-        Extractions (left, right) of two grey images (h, w) uint8 of one size. Raises ImageError for anything else, StateError while another thread uses this object.
+        Extractions (left, right) of two grey images (h, w) uint8 of one size. A mask is None, or uint8 of the same shape with 0 where no keypoint may lie. Raises ImageError for anything else, StateError while another thread uses this object.
         """
 class Map:
     """

@@ -13,6 +13,11 @@ from orbslam2py.settings import Settings
 from orbslam2py.timing import StageTimer
 
 
+Mask = npt.NDArray[np.uint8]
+#: For a pair: one mask for both images, or (left, right), either of which may be None.
+PairMask = Mask | tuple[Mask | None, Mask | None]
+
+
 class FrontEnd:
     """Builds frames from images; the first image fixes the size.
 
@@ -40,6 +45,7 @@ class FrontEnd:
         frame_id: int,
         timestamp: float,
         timer: StageTimer,
+        mask: PairMask | None = None,
     ) -> core.Frame:
         """Frame of a rectified pair."""
         assert self._pair_extractor is not None
@@ -47,11 +53,16 @@ class FrontEnd:
         self._check(right, "right image")
         if left.shape != right.shape:
             raise ImageError(f"left and right image differ: shapes {left.shape} and {right.shape}")
+        left_mask, right_mask = mask if isinstance(mask, tuple) else (mask, mask)
+        _check_mask(left_mask, left, "left mask")
+        _check_mask(right_mask, right, "right mask")
         context = self._context_for(left)
         with timer("extract"):
             left_grey = core.to_grey(left, self._settings.camera.rgb)
             right_grey = core.to_grey(right, self._settings.camera.rgb)
-            features_left, features_right = self._pair_extractor.extract(left_grey, right_grey)
+            features_left, features_right = self._pair_extractor.extract(
+                left_grey, right_grey, left_mask, right_mask
+            )
         with timer("stereo"):
             return core.build_stereo_frame(
                 context, frame_id, timestamp, features_left, features_right
@@ -64,6 +75,7 @@ class FrontEnd:
         frame_id: int,
         timestamp: float,
         timer: StageTimer,
+        mask: Mask | None = None,
     ) -> core.Frame:
         """Frame of a colour image with registered depth."""
         self._check(image, "image")
@@ -77,10 +89,11 @@ class FrontEnd:
             )
         if depth.dtype.kind not in "uif":
             raise ImageError(f"depth must hold numbers (uint16, float32...), got {depth.dtype}")
+        _check_mask(mask, image, "mask")
         context = self._context_for(image)
         with timer("extract"):
             grey = core.to_grey(image, self._settings.camera.rgb)
-            extraction = self._extractor.extract(grey)
+            extraction = self._extractor.extract(grey, mask)
         with timer("stereo"):
             metres = core.to_depth_metres(depth, self._settings.depth_factor)
             return core.build_rgbd_frame(context, frame_id, timestamp, extraction, metres)
@@ -110,6 +123,18 @@ class FrontEnd:
             self._context = core.FrameContext(camera, self._extractor.scales)
             self._size = (height, width)
         return self._context
+
+
+def _check_mask(mask: Mask | None, image: npt.NDArray[np.uint8], what: str) -> None:
+    if mask is None:
+        return
+    if not isinstance(mask, np.ndarray) or mask.dtype != np.uint8:
+        kind = mask.dtype if isinstance(mask, np.ndarray) else type(mask).__name__
+        raise ImageError(f"{what} must be a NumPy array of uint8 (0: ignore), got {kind}")
+    if mask.shape != image.shape[:2]:
+        raise ImageError(
+            f"{what} has shape {mask.shape}; it must be that of the image, {image.shape[:2]}"
+        )
 
 
 def _orb_options(settings: Settings) -> core.OrbOptions:

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from orbslam2py import _core as core
 from orbslam2py.builtin_settings import resolve_settings
 from orbslam2py.errors import ImageError, StateError
-from orbslam2py.front_end import FrontEnd
+from orbslam2py.front_end import FrontEnd, Mask, PairMask
 from orbslam2py.local_mapping import LocalMapping
 from orbslam2py.loop_closing import LoopClosing
 from orbslam2py.records import FrameFeatures, TrackingRecord, TrackingState
@@ -139,6 +139,7 @@ class System:
         right: npt.NDArray[np.uint8],
         timestamp: float,
         *,
+        mask: PairMask | None = None,
         details: bool = False,
     ) -> TrackingRecord:
         """Track one rectified, synchronised stereo pair.
@@ -149,6 +150,8 @@ class System:
             Grey or colour (order by ``Camera.RGB`` of the settings), equal size.
         timestamp : float
             Seconds; must grow from call to call.
+        mask : array of uint8 (h, w), or two of them (left, right), optional
+            No keypoint lies where it is 0; one array serves both images.
         details : bool
             Also return the frame's keypoints and matches.
 
@@ -170,7 +173,7 @@ class System:
         return self._track(
             timestamp,
             details,
-            lambda i, timer: self._front_end.stereo(left, right, i, timestamp, timer),
+            lambda i, timer: self._front_end.stereo(left, right, i, timestamp, timer, mask),
         )
 
     def track_rgbd(
@@ -179,6 +182,7 @@ class System:
         depth: npt.NDArray[np.generic],
         timestamp: float,
         *,
+        mask: Mask | None = None,
         details: bool = False,
     ) -> TrackingRecord:
         """Track one image with registered depth.
@@ -191,6 +195,8 @@ class System:
             Raw depth; divided by ``DepthMapFactor`` it is metres. 0, negative or NaN: unknown.
         timestamp : float
             Seconds; must grow from call to call.
+        mask : array of uint8 (h, w), optional
+            No keypoint lies where it is 0.
         details : bool
             Also return the frame's keypoints and matches.
 
@@ -208,11 +214,16 @@ class System:
         return self._track(
             timestamp,
             details,
-            lambda i, timer: self._front_end.rgbd(image, depth, i, timestamp, timer),
+            lambda i, timer: self._front_end.rgbd(image, depth, i, timestamp, timer, mask),
         )
 
     def track_monocular(
-        self, image: npt.NDArray[np.uint8], timestamp: float, *, details: bool = False
+        self,
+        image: npt.NDArray[np.uint8],
+        timestamp: float,
+        *,
+        mask: Mask | None = None,
+        details: bool = False,
     ) -> TrackingRecord:
         """Track one image of a single camera: not available in this version.
 

@@ -42,6 +42,14 @@ cv::Mat view_image(const py::array& array, int depth) {
           CV_MAKETYPE(depth, static_cast<int>(channels)), const_cast<void*>(array.data())};
 }
 
+/// Empty for None; a copy of its own otherwise, which no Python thread can change.
+cv::Mat copy_of_mask(const py::object& mask, const char* what) {
+  if (mask.is_none()) return {};
+  const cv::Mat copy = view_uint8(normal_form(py::array(mask)), what).clone();
+  if (copy.empty()) throw ImageError(std::string(what) + " is empty; pass None");
+  return copy;
+}
+
 template <class Item>
 bool holds(const py::array& array) {
   return array.dtype().kind() == py::dtype::of<Item>().kind() &&
@@ -298,16 +306,21 @@ void bind_frame(py::module_& module) {
       .def(py::init<const OrbOptions&>(), py::arg("options"))
       .def(
           "extract",
-          [](PairExtractor& self, const py::array& left, const py::array& right) {
+          [](PairExtractor& self, const py::array& left, const py::array& right,
+             const py::object& left_mask, const py::object& right_mask) {
             // Level 0 of a pyramid shares the image's pixels and outlives the arrays: copy them.
             const cv::Mat left_pixels = view_uint8(left, "left image").clone();
             const cv::Mat right_pixels = view_uint8(right, "right image").clone();
+            const cv::Mat left_allowed = copy_of_mask(left_mask, "left mask");
+            const cv::Mat right_allowed = copy_of_mask(right_mask, "right mask");
             const py::gil_scoped_release release;
-            return self.extract(left_pixels, right_pixels);
+            return self.extract(left_pixels, right_pixels, left_allowed, right_allowed);
           },
-          py::arg("left"), py::arg("right"),
-          "Extractions (left, right) of two grey images (h, w) uint8 of one size. Raises "
-          "ImageError for anything else, StateError while another thread uses this object.");
+          py::arg("left"), py::arg("right"), py::arg("left_mask") = py::none(),
+          py::arg("right_mask") = py::none(),
+          "Extractions (left, right) of two grey images (h, w) uint8 of one size. A mask is None, "
+          "or uint8 of the same shape with 0 where no keypoint may lie. Raises ImageError for "
+          "anything else, StateError while another thread uses this object.");
 
   module.def("to_grey", &grey_of, py::arg("image"), py::arg("is_rgb"),
              "Grey image (h, w) uint8 of a grey, colour (h, w, 3) or colour + alpha (h, w, 4) "

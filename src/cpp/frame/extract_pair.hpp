@@ -28,8 +28,10 @@ class PairExtractor {
   explicit PairExtractor(const OrbOptions& options) : left_(options), right_(options) {}
 
   /// Extractions of (left, right); see extract_pair().
-  std::pair<Extraction, Extraction> extract(const cv::Mat& left, const cv::Mat& right) {
-    return extract_pair(left_, right_, helper_, left, right);
+  std::pair<Extraction, Extraction> extract(const cv::Mat& left, const cv::Mat& right,
+                                            const cv::Mat& left_mask = {},
+                                            const cv::Mat& right_mask = {}) {
+    return extract_pair(left_, right_, helper_, left, right, left_mask, right_mask);
   }
 
  private:
