@@ -24,7 +24,7 @@ class LoopClosing:
 
     def __init__(self, world: core.Map, *, threaded: bool) -> None:
         self._map = world
-        #: Loops closed so far.
+        #: Loops closed so far, over all maps.
         self.n_loops = 0
         #: The last keyframe that arrived, -1 before the first.
         self.last_keyframe = -1
@@ -37,7 +37,6 @@ class LoopClosing:
     def reset(self) -> None:
         """Drop waiting keyframes."""
         self.worker.reset()
-        self.n_loops = 0
         self.last_keyframe = -1
 
     def process(self, keyframe: int) -> None:

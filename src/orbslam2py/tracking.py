@@ -96,6 +96,8 @@ class Tracking:
         self._max_frames = max_frames
         self._limits = thresholds or TrackingThresholds()
         self._initializer = DepthInitializer(world, vocabulary, mapping)
+        #: How often tracking was found again, over all maps.
+        self.n_relocalizations = 0
         self.reset()
 
     def reset(self) -> None:
@@ -109,7 +111,6 @@ class Tracking:
         self._last_keyframe_frame_id = 0
         # 0 acts as "relocalized at the first frame": a young map has to prove itself.
         self._last_relocalization_frame_id = 0
-        self.n_relocalizations = 0
 
     # ---- one image -------------------------------------------------------------------------------
     def track(self, frame: core.TrackedFrame, timer: StageTimer) -> TrackingOutcome:
@@ -171,6 +172,7 @@ class Tracking:
         self.state = outcome.state = TrackingState.LOST
         self._velocity = None
         frame.clear_associations()
+        frame.T_cw = None
         outcome.reset_needed = self._map.n_keyframes <= _SMALL_MAP
         # The last pose stays where tracking was lost: the reference keyframe is tried from there.
         self._last_tracked = False
