@@ -153,6 +153,17 @@ void bind_frame_class(py::module_& module) {
           "levels", [](const Frame& f) { return field_of(f.keypoints, &Keypoint::level); },
           "(n,) int32, pyramid levels.")
       .def_property_readonly(
+          "sigma2",
+          [](const Frame& f) {
+            py::array_t<float> array(static_cast<py::ssize_t>(f.size()));
+            for (std::size_t i = 0; i < f.size(); ++i) {
+              array.mutable_at(static_cast<py::ssize_t>(i)) =
+                  f.scales->sigma2(f.keypoints[i].level);
+            }
+            return array;
+          },
+          "(n,) float32, variance of the keypoints by their levels [px^2].")
+      .def_property_readonly(
           "angles", [](const Frame& f) { return field_of(f.keypoints, &Keypoint::angle); },
           "(n,) float32, degrees in [0, 360).")
       .def_property_readonly(
@@ -224,6 +235,19 @@ void bind_tracked_frame(py::module_& module) {
           py::arg("i"), "Removes the map point of keypoint i.")
       .def("clear_associations", &TrackedFrame::clear_associations,
            "Removes all map points, positions and outlier flags; keeps the pose.")
+      .def(
+          "copy_associations",
+          [](TrackedFrame& t, const TrackedFrame& from, const py::array_t<bool>& keep) {
+            if (keep.ndim() != 1) throw py::value_error("keep must be a 1-D array of bool");
+            std::vector<std::uint8_t> flags(static_cast<std::size_t>(keep.size()));
+            for (py::ssize_t i = 0; i < keep.size(); ++i) {
+              flags[static_cast<std::size_t>(i)] = keep.at(i) ? 1 : 0;
+            }
+            t.copy_associations(from, flags);
+          },
+          py::arg("from_frame"), py::arg("keep"),
+          "Takes over the associations of another version of the same frame where keep (n,) bool "
+          "is true; drops all others. Raises StateError for another frame.")
       .def(
           "discard_outliers", [](TrackedFrame& t) { return to_array(t.discard_outliers()); },
           "Dissociates the outliers; ids (int64) of their points, ascending.")

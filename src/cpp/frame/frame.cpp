@@ -3,12 +3,28 @@
 
 #include <algorithm>
 
+#include "base/errors.hpp"
+
 namespace orbslam {
 
 void TrackedFrame::clear_associations() {
   std::fill(map_points.begin(), map_points.end(), MapPointId());
   std::fill(positions.begin(), positions.end(), Eigen::Vector3d::Zero());
   std::fill(outlier.begin(), outlier.end(), std::uint8_t{0});
+}
+
+void TrackedFrame::copy_associations(const TrackedFrame& from,
+                                     const std::vector<std::uint8_t>& keep) {
+  if (from.frame != frame || keep.size() != map_points.size()) {
+    throw StateError("associations can be copied only between versions of one frame");
+  }
+  for (std::size_t i = 0; i < map_points.size(); ++i) {
+    if (keep[i] != 0 && from.map_points[i].valid()) {
+      associate(i, from.map_points[i], from.positions[i]);
+    } else {
+      dissociate(i);
+    }
+  }
 }
 
 std::vector<MapPointId> TrackedFrame::discard_outliers() {

@@ -80,6 +80,9 @@ struct TrackedFrame {
     outlier[i] = 0;
   }
   void clear_associations();
+  /// Takes over the associations of another tracked version of the same frame where `keep` is not
+  /// 0; all others are dropped. Throws StateError when it is another frame.
+  void copy_associations(const TrackedFrame& from, const std::vector<std::uint8_t>& keep);
   /// Dissociates the outliers. Returns the ids of their points, ascending.
   std::vector<MapPointId> discard_outliers();
 

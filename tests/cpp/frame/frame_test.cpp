@@ -5,6 +5,8 @@
 
 #include <utility>
 
+#include "base/errors.hpp"
+
 namespace orbslam {
 namespace {
 
@@ -69,6 +71,22 @@ TEST(TrackedFrame, DiscardingReturnsTheOutliersPointsAndKeepsTheInliers) {
   EXPECT_EQ(tracked.map_points[1], MapPointId(5));
   EXPECT_EQ(tracked.outlier[0], 0);
   EXPECT_TRUE(tracked.discard_outliers().empty());
+}
+
+TEST(TrackedFrame, CopiesChosenAssociationsOfAnotherVersionOfItsFrame) {
+  const auto frame = frame_with_depths({1, 2, 3});
+  TrackedFrame from(frame), to(frame);
+  from.associate(0, MapPointId(5), {1, 2, 3});
+  from.associate(1, MapPointId(6), {4, 5, 6});
+  to.associate(2, MapPointId(9), {7, 8, 9});
+
+  to.copy_associations(from, {0, 1, 1});
+
+  EXPECT_EQ(to.map_points, (std::vector<MapPointId>{MapPointId(), MapPointId(6), MapPointId()}));
+  EXPECT_EQ(to.positions[1], Eigen::Vector3d(4, 5, 6));
+  EXPECT_THROW(to.copy_associations(TrackedFrame(frame_with_depths({1, 2, 3})), {1, 1, 1}),
+               StateError);
+  EXPECT_THROW(to.copy_associations(from, {1}), StateError);
 }
 
 TEST(TrackedFrame, CloseCountsTellInliersFromTheRest) {
