@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How much of a frame's time is Python between the C++ steps.
 
-Every function and method of the extension that orchestration calls is replaced by one that also
-notes its time; the rest of the track call is Python. Mapping runs inline (deterministic mode), so
-that no other thread's use of the interpreter is counted on either side. What the noting itself
-costs, and properties of extension objects, count as Python: the share is an upper bound.
+Every function, method and property of the extension that orchestration uses is replaced by one that
+also notes its time; the rest of the track call is Python. Mapping runs inline (deterministic mode),
+so that no other thread's use of the interpreter is counted on either side. What the noting
+itself costs outside the noted time is measured with a function that does nothing and taken off;
+destructors of C++ objects count as Python.
 
     python benchmarks/python_share.py FOLDER rgbd
 """
@@ -20,6 +21,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from orbslam2py import _core as core
 from orbslam2py.datasets import open_sequence
 from orbslam2py.records import TrackingRecord
@@ -29,6 +32,10 @@ from orbslam2py.system import System
 
 _CLASSES = (
     core.Map,
+    core.Frame,
+    core.LocalMap,
+    core.LocalMapMatches,
+    core.PoseEstimate,
     core.TrackedFrame,
     core.OrbExtractor,
     core.PairExtractor,
@@ -60,26 +67,50 @@ class CoreClock:
 
         return call
 
+    def cost_outside(self) -> float:
+        """Seconds a noted call costs outside the noted time."""
+        seconds, calls = self.seconds, self.calls
+        nothing = self.timed(abs)
+        n = 20_000
+        least = float("inf")
+        for _ in range(5):
+            self.seconds = 0.0
+            begin = time.perf_counter()
+            for _ in range(n):
+                nothing(0)
+            noted = time.perf_counter() - begin - self.seconds
+            begin = time.perf_counter()
+            for _ in range(n):
+                pass
+            least = min(least, noted - (time.perf_counter() - begin))
+        self.seconds, self.calls = seconds, calls
+        return least / n
+
     def install(self) -> None:
         """Replace the functions and methods of the extension, for the rest of the process."""
         for name, function in list(vars(core).items()):
             if inspect.isbuiltin(function):
                 setattr(core, name, self.timed(function))
         for kind in _CLASSES:
-            for name, method in list(vars(kind).items()):
-                plain = not name.startswith("_") or name == "__matmul__"
-                if plain and not isinstance(method, (property, staticmethod)) and callable(method):
-                    setattr(kind, name, self.timed(method))
+            for name, member in list(vars(kind).items()):
+                if isinstance(member, property):
+                    setattr(kind, name, property(self.timed(member.fget), member.fset))
+                elif name in ("__init__", "__matmul__") or (
+                    not name.startswith("_") and not isinstance(member, staticmethod)
+                ):
+                    setattr(kind, name, self.timed(member))
 
 
 @dataclass(frozen=True)
 class PythonShare:
-    """Averages over the frames of a sequence."""
+    """Medians over the frames of a sequence."""
 
     frames: int
     milliseconds: float
     """Of a track call."""
     python_milliseconds: float
+    noting_milliseconds: float
+    """Cost of the measurement, already taken off both."""
     calls: float
     """Of the extension, per frame."""
 
@@ -93,27 +124,28 @@ def measure(folder: Path, sensor: Sensor, *, tracking_only: bool) -> PythonShare
     sequence = open_sequence(folder, sensor)
     clock = CoreClock()
     clock.install()
-    total, inside, calls, frames = 0.0, 0.0, 0, 0
+    frames: list[tuple[float, float, int]] = []
     name = "track_stereo" if sensor is Sensor.STEREO else "track_rgbd"
     track = getattr(System, name)
 
     def timed_track(*arguments: Any, **options: Any) -> TrackingRecord:
-        nonlocal total, inside, calls, frames
         core_before, calls_before = clock.seconds, clock.calls
         begin = time.perf_counter()
         record: TrackingRecord = track(*arguments, **options)
         elapsed = time.perf_counter() - begin
         if not (tracking_only and record.is_keyframe):
-            total += elapsed
-            inside += clock.seconds - core_before
-            calls += clock.calls - calls_before
-            frames += 1
+            between = elapsed - (clock.seconds - core_before)
+            frames.append((elapsed, between, clock.calls - calls_before))
         return record
 
     setattr(System, name, timed_track)
     images = _Loaded(sequence)
     SequenceRunner(images, sequence.settings, None, RunOptions(sensor, deterministic=True)).run()
-    return PythonShare(frames, 1e3 * total / frames, 1e3 * (total - inside) / frames, calls / frames)
+    elapsed, between, calls = (float(value) for value in np.median(frames, axis=0))
+    noting = clock.cost_outside() * calls
+    return PythonShare(
+        len(frames), 1e3 * (elapsed - noting), 1e3 * (between - noting), 1e3 * noting, calls
+    )
 
 
 class _Loaded:

@@ -88,7 +88,7 @@ class SequenceFigure:
 
     Attributes
     ----------
-    folder, sensor
+    name, folder, sensor
         Which.
     ate, ate_range
         RMSE [m] after SE(3) alignment over all frames, offline: median and range.
@@ -102,6 +102,7 @@ class SequenceFigure:
         Between two images.
     """
 
+    name: str
     folder: str
     sensor: str
     ate: float
@@ -114,6 +115,7 @@ class SequenceFigure:
 
 SEQUENCES = [
     SequenceFigure(
+        "redkitchen RGB-D",
         "7scenes_redkitchen_head250",
         "rgbd",
         0.0493,
@@ -124,12 +126,28 @@ SEQUENCES = [
         33.3,
     ),
     SequenceFigure(
-        "kitti_06_head51_stereo", "stereo", 0.0455, (0.0354, 0.0542), 24, (35.0, 51.0), 14.1, 100.0
+        "KITTI 06 stereo",
+        "kitti_06_head51_stereo",
+        "stereo",
+        0.0455,
+        (0.0354, 0.0542),
+        24,
+        (35.0, 51.0),
+        14.1,
+        100.0,
     ),
 ]
 #: Measured for accuracy only: the camera stands still.
 STILL = SequenceFigure(
-    "euroc_V1_01_still8", "stereo", 0.0008, (0.0008, 0.0008), 1, (25.0, 32.0), 38.7, 50.0
+    "EuRoC still stereo",
+    "euroc_V1_01_still8",
+    "stereo",
+    0.0008,
+    (0.0008, 0.0008),
+    1,
+    (25.0, 32.0),
+    38.7,
+    50.0,
 )
 SEQUENCE_SPEED_RATIO = 1.5
 PYTHON_SHARE = 0.03

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Our speed beside the original's, carried to this machine by a yardstick.
+
+The yardstick is OpenCV's own ORB in one thread. It is measured in turns with each step, so that
+both see the same state of the machine; "there" means the machine of the reference's figures.
+
+    python benchmarks/compare.py                 everything that this checkout allows
+    python benchmarks/compare.py --only steps    steps, vocabularies, sequences, python, locks
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import reference
+import steps
+import vocabularies
+from rich.console import Console
+from sequences import lock_tables, python_table, sequence_tables
+from steps import Row
+from tables import new_table, verdict
+from yardstick import Yardstick
+
+PARTS = ("steps", "vocabularies", "sequences", "python", "locks")
+
+
+def steps_table(title: str, rows: list[Row]) -> object:
+    table = new_table(
+        title,
+        ["step"],
+        [
+            "here ms\nmedian (min)",
+            "yardsticks\nours",
+            "there ms\nours",
+            "there ms\nreference",
+            "yardsticks\nreference",
+            "ours /\nreference",
+            "there ms\ntarget",
+            "met",
+        ],
+    )
+    notes = []
+    for row in rows:
+        m, figure = row.measured, row.figure
+        theirs, target = figure.milliseconds, figure.target
+        unit = m.yardstick_there
+        table.add_row(
+            row.name,
+            f"{m.ours.median:.3g} ({m.ours.least:.3g})",
+            f"{m.ours.median / m.yardstick.median:.3g}",
+            f"{m.carried:.3g}",
+            f"{theirs:.4g}" if theirs else "",
+            f"{theirs / unit:.3g}" if theirs else "",
+            f"{m.carried / theirs:.2f}" if theirs else "",
+            f"{target:.3g}" if target else "",
+            verdict(m.carried <= target) if target else "",
+        )
+        if row.note:
+            notes.append(f"{row.name}: {row.note}")
+    table.caption = "\n".join(notes)
+    table.caption_justify = "left"
+    return table
+
+
+def machine(console: Console, yardstick: Yardstick) -> None:
+    """What the figures were measured on."""
+    model = next(
+        (
+            line.split(":", 1)[1].strip()
+            for line in Path("/proc/cpuinfo").read_text().splitlines()
+            if line.startswith("model name")
+        ),
+        platform.processor(),
+    )
+    load = ", ".join(f"{value:.1f}" for value in os.getloadavg())
+    console.print(
+        f"{model}, {os.cpu_count()} processors, load {load}; Python {platform.python_version()}, "
+        f"opencv-python {cv2.__version__}"
+    )
+    for name, (n, there) in reference.YARDSTICK.items():
+        measured = yardstick.compare(lambda name=name: yardstick.run(name), name, 15)  # type: ignore[misc]
+        console.print(
+            f"yardstick {name} ({n} features): {measured.yardstick.median:.2f} ms here "
+            f"(least {measured.yardstick.least:.2f}), {there} there"
+        )
+    if not yardstick.exact:
+        console.print(
+            "[yellow]The extra data are missing (ORBSLAM2PY_SHARED): synthetic images stand in for "
+            "the photographs, and the sequences are left out. Figures carried over are rough."
+        )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument(
+        "--only", choices=PARTS, action="append", help="only this part (repeatable)"
+    )
+    parser.add_argument("--runs", type=int, default=5, help="runs of each sequence")
+    parser.add_argument(
+        "--build", type=Path, default=Path("build/release"), help="build folder of the benchmarks"
+    )
+    parser.add_argument("--width", type=int, default=150, help="columns of the output")
+    arguments = parser.parse_args()
+    chosen = set(arguments.only or PARTS)
+    console = Console(width=arguments.width)
+    yardstick = Yardstick()
+    machine(console, yardstick)
+
+    with tempfile.TemporaryDirectory() as folder:
+        large = None
+        if chosen & {"steps", "vocabularies"}:
+            large = vocabularies.make_large_vocabulary()
+        if "steps" in chosen:
+            sources: list[Callable[[Yardstick], object]] = [
+                steps.extraction_rows,
+                steps.stereo_rows,
+                steps.pose_rows,
+                steps.bundle_rows,
+                lambda y: steps.words_rows(y, large),
+            ]
+            rows = [row for source in sources for row in source(yardstick)]  # type: ignore[attr-defined]
+            console.print(steps_table("Single steps, one thread", rows))
+        if "vocabularies" in chosen and large is not None:
+            files = vocabularies.VocabularyFiles.write(large, Path(folder))
+            rows = list(vocabularies.vocabulary_rows(yardstick, files))
+            console.print(steps_table("Vocabulary until the first image is described", rows))
+    library = arguments.build / "benchmarks" / "liblock_times.so"
+    for part, tables in (
+        ("sequences", lambda: sequence_tables(yardstick, arguments.runs)),
+        ("python", python_table),
+        ("locks", lambda: lock_tables(library)),
+    ):
+        if part in chosen:
+            for table in tables():
+                console.print(table)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
