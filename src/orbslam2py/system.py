@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from orbslam2py import _core as core
 from orbslam2py.builtin_settings import resolve_settings
-from orbslam2py.errors import ImageError, StateError
+from orbslam2py.errors import ImageError, StateError, WorkerError
 from orbslam2py.front_end import FrontEnd, Mask, PairMask
 from orbslam2py.local_mapping import LocalMapping
 from orbslam2py.loop_closing import LoopClosing
@@ -339,7 +339,7 @@ class System:
         return self._loop_closing.worker.wait_until_idle(timeout) and done
 
     def shutdown(self, *, drain: bool = True, timeout: float | None = None) -> None:
-        """Stop the workers and join their threads; idempotent.
+        """Stop the workers and join their threads; idempotent, to be repeated after a time-out.
 
         Results remain available. Also called at the end of a ``with`` block.
 
@@ -355,16 +355,18 @@ class System:
         WorkerError
             If a worker has failed, or does not end in time.
         """
-        if self._shut_down:
-            return
         self._shut_down = True
-        self._finalizer.detach()
+        if not self._finalizer.alive:
+            return
         errors = []
         for worker in self._workers:
             try:
                 worker.finish(drain=drain, timeout=timeout)
             except Exception as error:
                 errors.append(error)
+        # Only now: should a Ctrl-C come before, the threads are still ended with the interpreter.
+        if all(worker.ended for worker in self._workers):
+            self._finalizer.detach()
         if errors:
             raise errors[0]
 
@@ -382,7 +384,8 @@ class System:
         except Exception:
             if error is None:
                 raise
-            _log.exception("shutdown after an error failed as well")
+            if not isinstance(error, WorkerError):  # else it is the same one
+                _log.exception("shutdown after an error failed as well")
 
     @property
     def _workers(self) -> tuple[Worker[int], Worker[int]]:

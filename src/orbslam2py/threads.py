@@ -233,6 +233,11 @@ class Worker(Generic[Job]):
             return WorkerState.PAUSED if self._pauses else WorkerState.IDLE
 
     @property
+    def ended(self) -> bool:
+        """`finish` was called and no thread is left."""
+        return self._finish_requested and self._thread is None
+
+    @property
     def n_waiting(self) -> int:
         """Number of jobs not yet begun."""
         return len(self._queue)

@@ -298,8 +298,10 @@ def test_finish_says_who_is_late_and_can_be_repeated(gate: Gate) -> None:
     gate.wait_begun()
     with pytest.raises(WorkerError, match=f"{NAME} did not end within"):
         worker.finish(timeout=0.05)
+    assert not worker.ended
     gate.open()
     worker.finish(timeout=10)
+    assert worker.ended
 
 
 def test_drain_gives_up_at_its_time_limit(gate: Gate) -> None:

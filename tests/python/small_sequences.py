@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Short synthetic sequences of small images, rendered once per test run."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+from orbslam2py.datasets.base import Images
+from orbslam2py.records import TrackingRecord
+from orbslam2py.sensor import Sensor
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+from orbslam2py.system import System
+
+SIZE = (320, 240)
+
+
+@lru_cache
+def sequence(sensor: Sensor, frames: int = 80) -> SyntheticSequence:
+    return SyntheticSequence(
+        SyntheticOptions(world="corridor", sensor=sensor, frames=frames, size=SIZE)
+    )
+
+
+@lru_cache
+def images(sensor: Sensor, index: int) -> Images:
+    return sequence(sensor).load(index)
+
+
+def new_system(sensor: Sensor, **options: object) -> System:
+    return System(sequence(sensor).settings, sensor, **options)  # type: ignore[arg-type]
+
+
+def track(
+    system: System,
+    index: int,
+    *,
+    timestamp: float | None = None,
+    shown: Images | None = None,
+    details: bool = False,
+) -> TrackingRecord:
+    """Track a frame, or other images in its place."""
+    sensor = system.sensor
+    shown = shown or images(sensor, index)
+    seconds = float(sequence(sensor).timestamps[index]) if timestamp is None else timestamp
+    if sensor is Sensor.STEREO:
+        assert shown.right is not None
+        return system.track_stereo(shown.image, shown.right, seconds, details=details)
+    assert shown.depth is not None
+    return system.track_rgbd(shown.image, shown.depth, seconds, details=details)
+
+
+def play(system: System, n_frames: int, first: int = 0) -> list[TrackingRecord]:
+    return [track(system, i) for i in range(first, first + n_frames)]
+
+
+def black(sensor: Sensor) -> Images:
+    """Images in which nothing can be seen."""
+    shown = images(sensor, 0)
+    right = None if shown.right is None else 0 * shown.right
+    depth = None if shown.depth is None else 0 * shown.depth  # type: ignore[operator]
+    return Images(0 * shown.image, right, depth)
