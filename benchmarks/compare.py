@@ -15,7 +15,7 @@ import os
 import platform
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import cv2
@@ -23,7 +23,7 @@ import reference
 import steps
 import vocabularies
 from rich.console import Console
-from sequences import lock_tables, python_table, sequence_tables
+from sequences import lock_tables, program_rows, python_table, sequence_tables
 from steps import Row
 from tables import new_table, verdict
 from yardstick import Yardstick
@@ -118,14 +118,15 @@ def main() -> None:
         if chosen & {"steps", "vocabularies"}:
             large = vocabularies.make_large_vocabulary()
         if "steps" in chosen:
-            sources: list[Callable[[Yardstick], object]] = [
+            sources: list[Callable[[Yardstick], Iterator[Row]]] = [
                 steps.extraction_rows,
                 steps.stereo_rows,
                 steps.pose_rows,
                 steps.bundle_rows,
                 lambda y: steps.words_rows(y, large),
+                lambda y: program_rows(y, arguments.build),
             ]
-            rows = [row for source in sources for row in source(yardstick)]  # type: ignore[attr-defined]
+            rows = [row for source in sources for row in source(yardstick)]
             console.print(steps_table("Single steps, one thread", rows))
         if "vocabularies" in chosen and large is not None:
             files = vocabularies.VocabularyFiles.write(large, Path(folder))

@@ -8,6 +8,7 @@ import statistics
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ import reference
 import runs
 from reference import SequenceFigure
 from rich.table import Table
+from steps import Row
 from tables import new_table, verdict
 from yardstick import Times, Yardstick, shared_folder
 
@@ -124,6 +126,26 @@ def _add_realtime(table: Table, figure: SequenceFigure, folder: Path, n_runs: in
     )
 
 
+def program_rows(yardstick: Yardstick, build: Path) -> Iterator[Row]:
+    """Fusing in a dense made-up map where everything is covisible: the worst case, from C++."""
+    program = build / "benchmarks" / "matching_bench"
+    if not program.is_file():
+        return
+    command = [str(program), "--benchmark_format=json", "--benchmark_filter=fuse"]
+    found: dict[str, float] = {}
+
+    def work() -> list[float]:
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        for one in json.loads(done.stdout)["benchmarks"]:
+            found[one["name"].split("/")[1]] = one["median_ms"]
+        return [1.0]
+
+    unit = yardstick.around(work)
+    for name, value in found.items():
+        measured = replace(unit, ours=Times(value, value))
+        yield Row(f"fuse, dense made-up map ({name})", reference.FUSE, measured)
+
+
 def _add_fusing(table: Table, yardstick: Yardstick, figure: SequenceFigure, folder: Path) -> None:
     stages: dict[str, float] = {}
 
@@ -154,8 +176,9 @@ def python_table() -> Iterator[object]:
     )
     table.caption = (
         "Medians over frames. Every function, method and property of the extension is wrapped to\n"
-        "note its time, the rest of the track call is Python (benchmarks/python_share.py). Mapping\n"
-        "inline: no other thread uses the interpreter. Destructors of C++ objects count as Python."
+        "note its time, the rest of the track call is Python (benchmarks/python_share.py).\n"
+        "Mapping inline: no other thread uses the interpreter. Destructors of C++ objects count as "
+        "Python."
     )
     table.caption_justify = "left"
     script = Path(__file__).with_name("python_share.py")
