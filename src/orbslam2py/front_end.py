@@ -12,7 +12,6 @@ from orbslam2py.sensor import Sensor
 from orbslam2py.settings import Settings
 from orbslam2py.timing import StageTimer
 
-
 Mask = npt.NDArray[np.uint8]
 #: For a pair: one mask for both images, or (left, right), either of which may be None.
 PairMask = Mask | tuple[Mask | None, Mask | None]

@@ -31,6 +31,9 @@ class DepthInitializer:
         self._vocabulary = vocabulary
         self._mapping = mapping
 
+    def reset(self) -> None:
+        """Nothing is kept from frame to frame."""
+
     def try_initialize(self, frame: core.TrackedFrame) -> Reason:
         """Make the frame keyframe 0, with a map point for every depth; or say why not."""
         if frame.frame.size <= _MIN_KEYPOINTS:

@@ -3,16 +3,22 @@
 
 from __future__ import annotations
 
+import logging
 import queue
 import threading
 from collections.abc import Iterator, Sequence
 from typing import Generic, Protocol, TypeVar
+
+_log = logging.getLogger(__name__)
 
 Item = TypeVar("Item")
 Loaded_co = TypeVar("Loaded_co", covariant=True)
 
 #: Seconds between two looks at whether the other side is still there.
 _WAIT_SLICE = 0.2
+
+#: Seconds that the end waits for an item that is being loaded, say from a network that is gone.
+_PATIENCE = 3.0
 
 
 class Loader(Protocol[Loaded_co]):
@@ -37,11 +43,20 @@ class Prefetcher(Generic[Item]):
         What to load, in order.
     ahead : int
         Items held at most.
+    stop : threading.Event, optional
+        Ends the iteration when it is set, also while an item is being waited for.
     """
 
-    def __init__(self, loader: Loader[Item], indices: Sequence[int], ahead: int = 4) -> None:
+    def __init__(
+        self,
+        loader: Loader[Item],
+        indices: Sequence[int],
+        ahead: int = 4,
+        stop: threading.Event | None = None,
+    ) -> None:
         self._loader = loader
         self._indices = indices
+        self._stop = stop or threading.Event()
         self._queue: queue.Queue[tuple[int, Item | Exception]] = queue.Queue(ahead)
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._run, name="image loader", daemon=True)
@@ -52,17 +67,21 @@ class Prefetcher(Generic[Item]):
 
     def __exit__(self, *_: object) -> None:
         self._stopped.set()
-        self._thread.join()
+        self._thread.join(_PATIENCE)
+        if self._thread.is_alive():
+            _log.warning("an image is still being read; it is not waited for")
 
     def __iter__(self) -> Iterator[tuple[int, Item | Exception]]:
         for _ in self._indices:
-            while True:
+            while not self._stop.is_set():
                 try:
                     yield self._queue.get(timeout=_WAIT_SLICE)
                     break
                 except queue.Empty:
                     if not self._thread.is_alive() and self._queue.empty():
                         return
+            if self._stop.is_set():
+                return
 
     def _run(self) -> None:
         for index in self._indices:

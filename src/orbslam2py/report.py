@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from orbslam2py import __version__
-from orbslam2py.errors import DatasetError
+from orbslam2py.errors import OrbSlamError
 from orbslam2py.evaluation import Evaluation, evaluate_trajectory
 from orbslam2py.runner import RunResult
 from orbslam2py.trajectory import Trajectory
@@ -41,7 +41,7 @@ def evaluate_run(result: RunResult) -> RunEvaluation | None:
         if truth is None or not len(estimate):
             return None
         figures = evaluate_trajectory(estimate, truth)
-    except DatasetError as error:
+    except (OrbSlamError, OSError) as error:
         _log.warning("no comparison with ground truth: %s", error)
         return None
     begin, end = estimate.timestamps[0] - 0.02, estimate.timestamps[-1] + 0.02

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import logging
+import threading
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -88,6 +89,9 @@ class FrameRow:
         return self.record.state.name
 
 
+#: Seconds between two looks at whether to stop.
+_WAIT_SLICE = 0.2
+
 #: Reason of a frame that real time left no room for.
 DROPPED = "dropped to keep up with real time"
 
@@ -127,7 +131,9 @@ class RunResult:
     n_relocalizations: int = 0
     n_loops_closed: int = 0
     interrupted: bool = False
-    error: BaseException | None = None
+    """The run was stopped before its end."""
+    error: Exception | None = None
+    """What ended it."""
 
     @property
     def n_tracked(self) -> int:
@@ -179,7 +185,7 @@ Progress = Callable[[FrameRow, System], None]
 class SequenceRunner:
     """Feeds a sequence to a `System` and collects the results.
 
-    A Ctrl-C, or an exception, ends the run early; what was computed is in the result.
+    A Ctrl-C, or a failure, ends the run early; what was computed is in the result.
 
     Parameters
     ----------
@@ -206,8 +212,24 @@ class SequenceRunner:
         self._options = options
         self.result = RunResult(sequence, settings, options, len(self._indices))
 
-    def run(self, progress: Progress | None = None) -> RunResult:
-        """Process the frames; returns the result also after Ctrl-C."""
+    def run(
+        self, progress: Progress | None = None, stop: threading.Event | None = None
+    ) -> RunResult:
+        """Process the frames.
+
+        Parameters
+        ----------
+        progress : callable, optional
+            Called after every frame.
+        stop : threading.Event, optional
+            Ends the run after the present frame when it is set.
+
+        Returns
+        -------
+        RunResult
+            Also when the run was stopped, by Ctrl-C as well, or something failed: see
+            `RunResult.interrupted` and `RunResult.error`.
+        """
         result, options = self.result, self._options
         begin = time.perf_counter()
         system = System(
@@ -218,28 +240,39 @@ class SequenceRunner:
             wait_for_mapping=not options.realtime,
             seed=options.seed,
         )
+        stop = stop or threading.Event()
         try:
-            try:
-                with Prefetcher[Images](self._sequence, self._indices) as images:
-                    self._feed(system, images, progress)
-                self._wait_for_mapping(system)
-            except KeyboardInterrupt:
-                _log.warning("interrupted; saving what was done so far")
-                result.interrupted = True
-            except OrbSlamError as error:
-                result.error = error
-            self._shut_down(system)
-        finally:
-            self._collect(system)
-            result.seconds = time.perf_counter() - begin
+            with Prefetcher[Images](self._sequence, self._indices, stop=stop) as images:
+                self._feed(system, images, progress, stop)
+            self._wait_for_mapping(system, stop)
+        except KeyboardInterrupt:
+            stop.set()
+        except Exception as error:
+            self._take_note(error)
+        result.interrupted = stop.is_set()
+        if result.interrupted:
+            _log.warning("interrupted; saving what was done so far")
+        self._shut_down(system)
+        self._collect(system)
+        result.seconds = time.perf_counter() - begin
         return result
 
     # ---- one pass over the frames ----------------------------------------------------------------
-    def _feed(self, system: System, images: Prefetcher[Images], progress: Progress | None) -> None:
-        clock = _Clock(self._sequence.timestamps, self._indices) if self._options.realtime else None
+    def _feed(
+        self,
+        system: System,
+        images: Prefetcher[Images],
+        progress: Progress | None,
+        stop: threading.Event,
+    ) -> None:
+        clock = None
+        if self._options.realtime:
+            clock = _Clock(self._sequence.timestamps, self._indices, stop)
         for position, (index, item) in enumerate(images):
             if clock is not None and clock.must_drop(position):
                 row = self._row(index, None, DROPPED)
+            elif stop.is_set():
+                return
             else:
                 row = self._track(system, index, item)
             self.result.rows.append(row)
@@ -275,16 +308,23 @@ class SequenceRunner:
         return FrameRow(index, self._sequence.timestamp_text(index), record, reason)
 
     # ---- the end ---------------------------------------------------------------------------------
-    def _wait_for_mapping(self, system: System) -> None:
+    def _wait_for_mapping(self, system: System, stop: threading.Event) -> None:
         begin = time.perf_counter()
-        system.wait_until_idle()
+        while not (system.wait_until_idle(_WAIT_SLICE) or stop.is_set()):
+            pass
         self.result.slam_seconds += time.perf_counter() - begin
 
     def _shut_down(self, system: System) -> None:
         try:
             system.shutdown(drain=not self.result.interrupted and self.result.error is None)
-        except OrbSlamError as error:
-            self.result.error = self.result.error or error
+        except Exception as error:
+            if self.result.error is None:
+                self._take_note(error)
+
+    def _take_note(self, error: Exception) -> None:
+        self.result.error = error
+        if not isinstance(error, OrbSlamError):
+            _log.error("unexpected error; please report it", exc_info=error)
 
     def _collect(self, system: System) -> None:
         result = self.result
@@ -321,8 +361,11 @@ def _renumber(trajectory: Trajectory, positions: list[int]) -> Trajectory:
 class _Clock:
     """Plays time stamps: a frame is dropped when the next one has come before it was taken."""
 
-    def __init__(self, timestamps: npt.NDArray[np.float64], indices: list[int]) -> None:
+    def __init__(
+        self, timestamps: npt.NDArray[np.float64], indices: list[int], stop: threading.Event
+    ) -> None:
         self._due = np.asarray(timestamps)[indices]
+        self._stop = stop
         self._offset: float | None = None
 
     def must_drop(self, position: int) -> bool:
@@ -333,7 +376,7 @@ class _Clock:
             return False
         early = float(self._due[position]) + self._offset - now
         if early > 0:
-            time.sleep(early)
+            self._stop.wait(early)
             return False
         has_next = position + 1 < len(self._due)
         return has_next and now >= float(self._due[position + 1]) + self._offset

@@ -8,57 +8,26 @@ section V; Mur-Artal and Tardos, "ORB-SLAM2", 2017, section III.
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
 from orbslam2py.initialization import DepthInitializer
 from orbslam2py.local_mapping import LocalMapping
-from orbslam2py.records import FloatArray, Reason, TrackingState
+from orbslam2py.monocular_initialization import MonocularInitializer
+from orbslam2py.records import Reason, TrackingState
+from orbslam2py.relocalization import Relocalizer
 from orbslam2py.sensor import Sensor
 from orbslam2py.timing import StageTimer
+from orbslam2py.tracking_types import TrackingOutcome, TrackingThresholds
 
 _log = logging.getLogger(__name__)
 
 #: A map with so few keyframes is given up when tracking is lost, and a new one is begun.
 _SMALL_MAP = 5
 
-
-@dataclass(frozen=True)
-class TrackingThresholds:
-    """The limits of tracking; the defaults are the published system's."""
-
-    motion_model_matches: int = 20
-    """Fewest matches with the last frame; the search window is doubled once."""
-    reference_matches: int = 15
-    """Fewest matches with the reference keyframe."""
-    map_matches: int = 10
-    """Fewest inliers of the first pose estimate."""
-    local_map_inliers: int = 30
-    """Fewest inliers in the local map."""
-    local_map_inliers_after_relocalization: int = 50
-    """The same for the first second after a relocalization."""
-    few_close_points: int = 100
-    """With fewer close points tracked than this ..."""
-    many_untracked_close_points: int = 70
-    """... and more close points than this not in the map, a keyframe is needed."""
-    keyframe_queue: int = 3
-    """A busy mapper is given a keyframe only if fewer than this wait."""
-
-
-@dataclass
-class TrackingOutcome:
-    """What tracking one frame gave."""
-
-    state: TrackingState
-    reason: Reason = Reason.NONE
-    n_matches: int = 0
-    n_inliers: int = 0
-    is_keyframe: bool = False
-    covariance: FloatArray | None = None
-    reset_needed: bool = False
+#: No point was thrown out.
+_NOTHING = np.zeros(0, np.int64)
 
 
 class Tracking:
@@ -73,9 +42,13 @@ class Tracking:
     mapping : LocalMapping
         Takes the keyframes.
     sensor : Sensor
-        Stereo or RGB-D.
+        What the images come from.
     max_frames : int
         Largest spacing of keyframes in frames: one second.
+    initializer : DepthInitializer or MonocularInitializer, optional
+        How a map begins; `DepthInitializer` if None.
+    relocalizer : Relocalizer, optional
+        Finds lost frames in the map; without it only the reference keyframe is tried.
     thresholds : TrackingThresholds, optional
         Limits.
     """
@@ -87,6 +60,9 @@ class Tracking:
         mapping: LocalMapping,
         sensor: Sensor,
         max_frames: int,
+        *,
+        initializer: DepthInitializer | MonocularInitializer | None = None,
+        relocalizer: Relocalizer | None = None,
         thresholds: TrackingThresholds | None = None,
     ) -> None:
         self._map = world
@@ -95,7 +71,10 @@ class Tracking:
         self._sensor = sensor
         self._max_frames = max_frames
         self._limits = thresholds or TrackingThresholds()
-        self._initializer = DepthInitializer(world, vocabulary, mapping)
+        self._initializer = initializer or DepthInitializer(world, vocabulary, mapping)
+        self._relocalizer = relocalizer
+        #: Pose only: no keyframes, no new points. A choice of the user, kept over resets.
+        self.localization_only = False
         #: How often tracking was found again, over all maps.
         self.n_relocalizations = 0
         self.reset()
@@ -111,6 +90,9 @@ class Tracking:
         self._last_keyframe_frame_id = 0
         # 0 acts as "relocalized at the first frame": a young map has to prove itself.
         self._last_relocalization_frame_id = 0
+        # In localization mode: the last frame hangs on its own depths more than on the map.
+        self._visual_odometry = False
+        self._initializer.reset()
 
     # ---- one image -------------------------------------------------------------------------------
     def track(self, frame: core.TrackedFrame, timer: StageTimer) -> TrackingOutcome:
@@ -125,11 +107,16 @@ class Tracking:
             return self._initialize(frame, timer)
 
         outcome = TrackingOutcome(TrackingState.LOST)
-        discarded = self._predict_pose(frame, outcome, timer)
+        with timer("predict"):
+            if self.localization_only:
+                discarded = self._predict_pose_in_fixed_map(frame, outcome)
+            else:
+                discarded = self._predict_pose(frame, outcome)
         if discarded is not None:
             frame.reference_keyframe = self.reference_keyframe
-            with timer("local_map"):
-                self._track_local_map(frame, discarded, outcome)
+            if not self._visual_odometry:
+                with timer("local_map"):
+                    self._track_local_map(frame, discarded, outcome)
         if outcome.reason is not Reason.NONE:
             return self._lose(frame, outcome)
 
@@ -138,10 +125,13 @@ class Tracking:
             self.n_relocalizations += 1
         self.state = outcome.state = TrackingState.OK
         self._update_velocity(frame)
-        with timer("keyframe"):
-            if self._needs_keyframe(frame, outcome.n_inliers):
-                self._create_keyframe(frame)
-                outcome.is_keyframe = True
+        if self.localization_only:
+            core.discard_temporary(frame)
+        else:
+            with timer("keyframe"):
+                if self._needs_keyframe(frame, outcome.n_inliers):
+                    self._create_keyframe(frame)
+                    outcome.is_keyframe = True
         # Outliers went into the keyframe, where bundle adjustment decides about them; the next
         # frame must not start from them.
         frame.discard_outliers()
@@ -152,7 +142,8 @@ class Tracking:
         with timer("keyframe"):
             reason = self._initializer.try_initialize(frame)
         if reason is not Reason.NONE:
-            return TrackingOutcome(TrackingState.NOT_INITIALIZED, reason)
+            spoilt = reason is Reason.INITIAL_MAP_FAILED
+            return TrackingOutcome(TrackingState.NOT_INITIALIZED, reason, reset_needed=spoilt)
         self.state = TrackingState.OK
         self.reference_keyframe = frame.reference_keyframe
         self._last_keyframe_frame_id = frame.id
@@ -173,7 +164,9 @@ class Tracking:
         self._velocity = None
         frame.clear_associations()
         frame.T_cw = None
-        outcome.reset_needed = self._map.n_keyframes <= _SMALL_MAP
+        # In localization mode the map is the user's, however small.
+        outcome.reset_needed = self._map.n_keyframes <= _SMALL_MAP and not self.localization_only
+        self._visual_odometry = False
         # The last pose stays where tracking was lost: the reference keyframe is tried from there.
         self._last_tracked = False
         return outcome
@@ -186,9 +179,9 @@ class Tracking:
 
     # ---- first estimate of the pose --------------------------------------------------------------
     def _predict_pose(
-        self, frame: core.TrackedFrame, outcome: TrackingOutcome, timer: StageTimer
+        self, frame: core.TrackedFrame, outcome: TrackingOutcome
     ) -> npt.NDArray[np.int64] | None:
-        """First pose from the last frame or the reference keyframe.
+        """First pose: by the motion model, the reference keyframe, or anywhere in the map.
 
         Returns
         -------
@@ -196,17 +189,69 @@ class Tracking:
             Ids of the points that were matched and thrown out as outliers, ascending; None when
             no pose was found.
         """
-        with timer("predict"):
-            last, T_lw = self._update_last_frame()
-            just_relocalized = frame.id < self._last_relocalization_frame_id + 2
-            discarded = None
-            if self._velocity is not None and not just_relocalized:
-                frame.T_cw = self._velocity @ T_lw
-                discarded = self._track_with_motion_model(frame, last, outcome)
-            if discarded is None:
-                frame.T_cw = T_lw
-                discarded = self._track_reference_keyframe(frame, outcome)
+        if self.state == TrackingState.LOST and self._relocalize(frame, outcome):
+            return _NOTHING
+        last, T_lw = self._update_last_frame()
+        just_relocalized = frame.id < self._last_relocalization_frame_id + 2
+        discarded = None
+        if self._velocity is not None and not just_relocalized:
+            frame.T_cw = self._velocity @ T_lw
+            discarded = self._track_with_motion_model(frame, last, outcome)
+        if discarded is None:
+            frame.T_cw = T_lw
+            discarded = self._track_reference_keyframe(frame, outcome)
         return discarded
+
+    def _predict_pose_in_fixed_map(
+        self, frame: core.TrackedFrame, outcome: TrackingOutcome
+    ) -> npt.NDArray[np.int64] | None:
+        """First pose in localization mode, where the map may end.
+
+        Where it does, the pose hangs on the depths of the frame before (visual odometry), while
+        every frame is also searched in the map.
+        """
+        if self.state == TrackingState.LOST:
+            return _NOTHING if self._relocalize(frame, outcome) else None
+        last, T_lw = self._update_last_frame()
+        if self._visual_odometry:
+            return self._follow_visual_odometry(frame, last, T_lw, outcome)
+        if self._velocity is not None:
+            frame.T_cw = self._velocity @ T_lw
+            return self._track_with_motion_model(frame, last, outcome)
+        frame.T_cw = T_lw
+        return self._track_reference_keyframe(frame, outcome)
+
+    def _follow_visual_odometry(
+        self,
+        frame: core.TrackedFrame,
+        last: core.TrackedFrame,
+        T_lw: core.Pose,
+        outcome: TrackingOutcome,
+    ) -> npt.NDArray[np.int64] | None:
+        discarded = None
+        if self._velocity is not None:
+            frame.T_cw = self._velocity @ T_lw
+            discarded = self._track_with_motion_model(frame, last, outcome)
+        if not self._visual_odometry:  # enough of the map is in view again
+            return discarded
+        found = core.TrackedFrame(frame.frame)
+        reason = outcome.reason
+        if self._relocalize(found, outcome):
+            frame.copy_associations(found, np.ones(len(frame.frame), bool))
+            frame.T_cw = found.T_cw
+            self._visual_odometry = False
+            self._last_relocalization_frame_id = frame.id
+            return _NOTHING
+        outcome.reason = reason
+        return discarded
+
+    def _relocalize(self, frame: core.TrackedFrame, outcome: TrackingOutcome) -> bool:
+        if self._relocalizer is None:
+            return False
+        core.describe(frame.frame, self._vocabulary)
+        outcome.n_inliers = outcome.n_matches = self._relocalizer.relocalize(frame)
+        outcome.reason = Reason.NONE if outcome.n_inliers else Reason.NOT_FOUND_IN_MAP
+        return outcome.n_inliers > 0
 
     def _update_last_frame(self) -> tuple[core.TrackedFrame, core.Pose]:
         """Express the last frame by its reference keyframe, which mapping may have moved."""
@@ -220,6 +265,8 @@ class Tracking:
     ) -> npt.NDArray[np.int64] | None:
         core.refresh_associations(self._map, last)
         points = core.gather_points(self._map, last.map_points)
+        if self.localization_only and self._sensor.has_depth:
+            core.add_temporary_points(last, points)
         stereo = self._sensor is Sensor.STEREO
         radius = 7.0 if stereo else 15.0
         for window in (radius, 2.0 * radius):
@@ -232,7 +279,14 @@ class Tracking:
         else:
             outcome.reason = Reason.FEW_MATCHES_LAST_FRAME
             return None
-        return self._estimate_pose(frame, outcome, Reason.FEW_MATCHES_LAST_FRAME)
+        if not self.localization_only:
+            return self._estimate_pose(frame, outcome, Reason.FEW_MATCHES_LAST_FRAME)
+        discarded = self._estimate_pose(frame, outcome, Reason.FEW_MATCHES_LAST_FRAME)
+        if discarded is None or outcome.n_inliers <= self._limits.localization_matches:
+            outcome.reason = Reason.FEW_MATCHES_LAST_FRAME
+            return None
+        self._visual_odometry = core.count_map_points(frame) < self._limits.map_matches
+        return discarded
 
     def _track_reference_keyframe(
         self, frame: core.TrackedFrame, outcome: TrackingOutcome
@@ -311,15 +365,19 @@ class Tracking:
             self._map, self.reference_keyframe, min_observations
         )
         tracked_close, untracked_close = frame.n_close_tracked_untracked()
-        needs_close_points = (
+        needs_close_points = self._sensor.has_depth and (
             tracked_close < self._limits.few_close_points
             and untracked_close > self._limits.many_untracked_close_points
         )
         idle = self._mapping.worker.idle
         ratio = 0.4 if n_keyframes < 2 else 0.75
+        if not self._sensor.has_depth:
+            ratio = 0.9
 
         one_second_passed = frame.id >= self._last_keyframe_frame_id + self._max_frames
-        tracking_is_weak = n_inliers < 0.25 * n_reference or needs_close_points
+        tracking_is_weak = self._sensor.has_depth and (
+            n_inliers < 0.25 * n_reference or needs_close_points
+        )
         sees_new_things = n_inliers < ratio * n_reference or needs_close_points
         wanted = (one_second_passed or idle or tracking_is_weak) and (
             sees_new_things and n_inliers > self._limits.reference_matches
@@ -327,7 +385,9 @@ class Tracking:
         if not wanted or idle:
             return wanted
         self._mapping.worker.interrupt()
-        return self._mapping.worker.n_waiting < self._limits.keyframe_queue
+        # A busy mapper gets no keyframes of a single camera: they would come at every frame.
+        queue = self._limits.keyframe_queue if self._sensor.has_depth else 0
+        return self._mapping.worker.n_waiting < queue
 
     def _create_keyframe(self, frame: core.TrackedFrame) -> None:
         core.describe(frame.frame, self._vocabulary)

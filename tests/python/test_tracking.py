@@ -173,6 +173,9 @@ class FakeInitializer:
     def __init__(self, refusals: int = 0) -> None:
         self.refusals = refusals
 
+    def reset(self) -> None:
+        self.refusals = 0
+
     def try_initialize(self, frame: FakeFrame) -> Reason:
         if self.refusals:
             self.refusals -= 1

@@ -1,6 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The command ``orbslam2py``."""
 
-from orbslam2py.cli.app import main
+from __future__ import annotations
+
+import sys
+
+from orbslam2py.cli.exit_codes import ExitCode
+
+
+def main() -> None:
+    """Run the command line; errors a person can act on become one message and an exit code."""
+    try:
+        # Loading the libraries takes long enough for a Ctrl-C.
+        from orbslam2py.cli.app import run_app  # noqa: PLC0415
+
+        run_app()
+    except KeyboardInterrupt:
+        sys.exit(ExitCode.INTERRUPTED)
+
 
 __all__ = ["main"]

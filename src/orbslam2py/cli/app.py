@@ -48,8 +48,8 @@ app.command("evaluate")(evaluate.evaluate)
 app.add_typer(vocabulary.app, name="vocabulary")
 
 
-def main() -> None:
-    """Run the command line; errors a person can act on become one message and an exit code."""
+def run_app() -> None:
+    """Run the subcommand; errors a person can act on become one message and an exit code."""
     try:
         app()
     except (OrbSlamError, OSError) as error:
@@ -57,5 +57,3 @@ def main() -> None:
             f"[bold red]Error:[/] {escape(str(error))}", highlight=False, soft_wrap=True
         )
         sys.exit(ExitCode.BAD_INPUT)
-    except KeyboardInterrupt:
-        sys.exit(ExitCode.INTERRUPTED)

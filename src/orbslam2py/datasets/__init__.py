@@ -1,19 +1,34 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Recorded sequences: TUM RGB-D, KITTI odometry, EuRoC; recognised by their files."""
+"""Images: TUM RGB-D, KITTI odometry, EuRoC, folders of images, videos, cameras."""
 
-from orbslam2py.datasets.base import Images, Layout, Sequence
+from orbslam2py.datasets.base import Images, Layout, LiveFrame, LiveSource, Sequence, Source
 from orbslam2py.datasets.euroc import EurocSequence
+from orbslam2py.datasets.image_folder import ImageFolder
 from orbslam2py.datasets.kitti import KittiSequence
+from orbslam2py.datasets.live import LiveCamera
+from orbslam2py.datasets.masks import MaskedCamera, MaskedSequence
+from orbslam2py.datasets.open_source import open_source
 from orbslam2py.datasets.recognise import open_sequence, recognise
 from orbslam2py.datasets.tum import TumSequence
+from orbslam2py.datasets.video import VideoReader, VideoSequence
 
 __all__ = [
     "EurocSequence",
+    "ImageFolder",
     "Images",
     "KittiSequence",
     "Layout",
+    "LiveCamera",
+    "LiveFrame",
+    "LiveSource",
+    "MaskedCamera",
+    "MaskedSequence",
     "Sequence",
+    "Source",
     "TumSequence",
+    "VideoReader",
+    "VideoSequence",
     "open_sequence",
+    "open_source",
     "recognise",
 ]

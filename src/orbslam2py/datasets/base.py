@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -44,28 +45,29 @@ class Images:
         Right image of a rectified pair (stereo), else None.
     depth
         Raw depth registered to `image`, single channel (h, w) (RGB-D), else None.
+    mask
+        uint8 (h, w): no keypoint lies in `image` where it is 0. None: anywhere.
     """
 
     image: NDArray[np.uint8]
     right: NDArray[np.uint8] | None = None
     depth: NDArray[np.generic] | None = None
+    mask: NDArray[np.uint8] | None = None
 
 
-class Sequence(Protocol):
-    """A sequence of images opened for one sensor, recorded or made up.
+class Source(Protocol):
+    """Where images come from, opened for one sensor.
 
     Attributes
     ----------
     name
-        Name of the folder or of the world.
+        Name of the folder, the file, the camera or the world.
     layout
-        How it lies on disk.
+        How it lies on disk, or ``camera``.
     sensor
         What it delivers images for.
     settings
-        Given by the caller, or `default_settings`.
-    timestamps
-        Time of every frame in seconds, float64 (n,).
+        Given by the caller, or chosen by what comes with the images.
     """
 
     @property
@@ -76,6 +78,87 @@ class Sequence(Protocol):
     def sensor(self) -> Sensor: ...  # noqa: D102
     @property
     def settings(self) -> Settings: ...  # noqa: D102
+
+    def ground_truth(self) -> Trajectory | None:
+        """Return the true poses ``T_wc`` of the only, left (rectified) or colour camera.
+
+        Returns
+        -------
+        Trajectory or None
+            None if there are none.
+
+        Raises
+        ------
+        DatasetError
+            If there is a file but it is malformed.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class LiveFrame:
+    """An image from a camera.
+
+    Attributes
+    ----------
+    timestamp
+        Seconds since 1970 when it came; grows from image to image whatever the system's clock does.
+    text
+        The same as text.
+    images
+        The image.
+    """
+
+    timestamp: float
+    text: str
+    images: Images
+
+
+class LiveSource(Source, Protocol):
+    """Images without a known end, as long as it is entered as a context; see `Source`.
+
+    Attributes
+    ----------
+    n_dropped
+        Images so far that came while nobody had taken the one before, which was then lost.
+    """
+
+    @property
+    def n_dropped(self) -> int: ...  # noqa: D102
+
+    def open(self) -> None:
+        """Open the camera; entering the context does it if this did not.
+
+        Raises
+        ------
+        DatasetError
+            If it cannot be opened, with the cameras there are.
+        """
+        ...
+
+    def __enter__(self) -> LiveSource: ...
+    def __exit__(self, *_: object) -> None: ...
+
+    def __iter__(self) -> Iterator[LiveFrame]:
+        """Yield the newest image, as soon as there is one that was not yielded yet.
+
+        Raises
+        ------
+        DatasetError
+            If no more images come.
+        """
+        ...
+
+
+class Sequence(Source, Protocol):
+    """A sequence of known length, recorded or made up; see `Source`.
+
+    Attributes
+    ----------
+    timestamps
+        Time of every frame in seconds, float64 (n,).
+    """
+
     @property
     def timestamps(self) -> NDArray[np.float64]: ...  # noqa: D102
 
@@ -108,21 +191,6 @@ class Sequence(Protocol):
             If a file is missing.
         ImageError
             If a file is no readable image of the right type.
-        """
-        ...
-
-    def ground_truth(self) -> Trajectory | None:
-        """Return the true poses ``T_wc`` of the only, left (rectified) or colour camera.
-
-        Returns
-        -------
-        Trajectory or None
-            None if there are none.
-
-        Raises
-        ------
-        DatasetError
-            If there is a file but it is malformed.
         """
         ...
 

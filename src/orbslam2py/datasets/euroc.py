@@ -113,6 +113,10 @@ class EurocSequence(RecordedSequence):
         )
         self._stamps.warn_unless_increasing(left.source)
 
+    def image_path(self, index: int, /) -> Path:
+        """Return the file of the left image of a frame."""
+        return self._left[self._nanoseconds[index]]
+
     def load(self, index: int, /) -> Images:
         """Read and rectify the images of a frame; see `datasets.base.Sequence.load`."""
         stamp = self._nanoseconds[index]

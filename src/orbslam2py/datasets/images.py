@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
@@ -14,6 +16,17 @@ from orbslam2py.errors import DatasetError, ImageError
 _PNG, _PNG_END = b"\x89PNG", b"IEND"
 _JPEG, _JPEG_END = b"\xff\xd8", b"\xff\xd9"
 _TAIL = 4096  # where the end mark must be; some cameras append a few bytes after it
+
+
+@contextlib.contextmanager
+def quiet_opencv() -> Iterator[None]:
+    """Keep OpenCV from printing warnings: what goes wrong is said by an exception."""
+    level = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    try:
+        yield
+    finally:
+        cv2.utils.logging.setLogLevel(level)
 
 
 def read_image(path: Path, *, rgb: bool) -> NDArray[np.uint8]:

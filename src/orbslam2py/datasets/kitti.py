@@ -65,6 +65,10 @@ class KittiSequence(RecordedSequence):
         require_frames(times, len(self))
         self._stamps.warn_unless_increasing(times)
 
+    def image_path(self, index: int, /) -> Path:
+        """Return the file of the left image of a frame."""
+        return self._path("image_0", index)
+
     def load(self, index: int, /) -> Images:
         """Read the images of a frame; see `datasets.base.Sequence.load`."""
         image = self._read("image_0", index)
@@ -88,13 +92,16 @@ class KittiSequence(RecordedSequence):
         return Trajectory(self.timestamps[:n], poses.T_wc[:n])
 
     def _read(self, camera: str, index: int) -> NDArray[np.uint8]:
+        return read_image(self._path(camera, index), rgb=self.settings.camera.rgb)
+
+    def _path(self, camera: str, index: int) -> Path:
         if not 0 <= index < len(self):
             raise IndexError(f"frame {index} of {len(self)}")
         folder = self.folder / camera
         path = folder / f"{index:06d}.png"
         if not path.is_file() and path.with_suffix(".jpg").is_file():
             path = path.with_suffix(".jpg")
-        return read_image(path, rgb=self.settings.camera.rgb)
+        return path
 
     def _ground_truth_path(self) -> Path | None:
         candidates = [self.folder / "poses.txt"]

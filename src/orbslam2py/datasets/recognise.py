@@ -45,6 +45,11 @@ def recognise(folder: str | Path) -> Layout:
     raise DatasetError(message)
 
 
+def has_layout(folder: Path) -> bool:
+    """Tell whether a folder has the files of a layout."""
+    return folder.is_dir() and bool(_layouts(folder))
+
+
 def open_sequence(
     folder: str | Path,
     sensor: Sensor | None = None,

@@ -85,9 +85,13 @@ class TumSequence(RecordedSequence):
         colour.stamps.warn_unless_increasing(source)
         self._colour_paths, self._stamps = colour.paths, colour.stamps
 
+    def image_path(self, index: int, /) -> Path:
+        """Return the file of the colour image of a frame."""
+        return self.folder / self._colour_paths[index]
+
     def load(self, index: int, /) -> Images:
         """Read the images of a frame; see `datasets.base.Sequence.load`."""
-        image = read_image(self.folder / self._colour_paths[index], rgb=self.settings.camera.rgb)
+        image = read_image(self.image_path(index), rgb=self.settings.camera.rgb)
         if self._depth_paths is None:
             return Images(image)
         return Images(image, depth=read_depth(self.folder / self._depth_paths[index]))
