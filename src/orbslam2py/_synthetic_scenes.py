@@ -62,9 +62,7 @@ class Scene:
         """Time that the whole way takes."""
         return _LOOKING_AROUND if self.way is None else self.laps * self.way.length() / speed
 
-    def T_wc(  # noqa: N802 - the field's notation
-        self, seconds: float, speed: float, lateral: float, yaw: float
-    ) -> NDArray[np.float64]:
+    def T_wc(self, seconds: float, speed: float, lateral: float, yaw: float) -> NDArray[np.float64]:
         """Camera to world (4, 4) at a time.
 
         Parameters

@@ -90,8 +90,8 @@ def _draw_above(
 ) -> None:
     path = positions if truth is None else np.vstack([positions, truth[1]])
     low, high = path[:, [0, 2]].min(axis=0), path[:, [0, 2]].max(axis=0)
-    # The window follows the path and shows the points around it, but not those so far away that they
-    # would shrink the path to a dot. It has the shape of the axes: metres are equal on both.
+    # The window follows the path and shows the points around it, but not those so far away that
+    # they would shrink the path to a dot. It has the shape of the axes: metres are equal on both.
     extent = float((high - low).max())
     if len(points):
         near, far = np.quantile(points[:, [0, 2]], [0.03, 0.97], axis=0)

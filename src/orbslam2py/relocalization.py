@@ -113,9 +113,7 @@ class Relocalizer:
                 candidates.append(_Candidate(place.keyframe, matches, seed))
         return candidates
 
-    def _verify(
-        self, frame: core.TrackedFrame, candidate: _Candidate, pose: core.PnpPose
-    ) -> int:
+    def _verify(self, frame: core.TrackedFrame, candidate: _Candidate, pose: core.PnpPose) -> int:
         """Optimise the pose, add matches by projection; the number of inliers."""
         limits = self._limits
         keep = np.zeros(len(frame.frame), bool)

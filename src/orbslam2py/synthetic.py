@@ -239,7 +239,7 @@ class SyntheticSequence:
         return Images(image)
 
     # ---- what only a made-up world knows ---------------------------------------------------------
-    def T_wc(self, index: int) -> Array:  # noqa: N802 - the field's notation
+    def T_wc(self, index: int) -> Array:
         """Exact pose of the (left) camera, camera to world, (4, 4)."""
         if not 0 <= index < len(self):
             raise IndexError(f"frame {index} of {len(self)}")

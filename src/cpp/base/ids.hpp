@@ -28,6 +28,12 @@ struct Id {
 using KeyFrameId = Id<struct KeyFrameTag>;
 using MapPointId = Id<struct MapPointTag>;
 
+/// Ids from here on belong to temporary points: made of the last frame's depths in localization
+/// mode, not part of the map (which never finds them), without observations. A keypoint that holds
+/// one can still be taken by another point.
+inline constexpr MapPointId kFirstTemporaryPoint{std::int64_t{1} << 62};
+constexpr bool is_temporary(MapPointId id) { return id >= kFirstTemporaryPoint; }
+
 /// Frames are numbered by the tracker: every image consumes exactly one id, so differences of
 /// frame ids serve as a clock (keyframe spacing, grace period after a relocalization).
 using FrameId = std::int64_t;

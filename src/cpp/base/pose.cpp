@@ -62,10 +62,10 @@ Vector6d Pose::log() const {
       sin_half < 1e-8 ? Eigen::Vector3d(2.0 * imaginary) : (angle / sin_half) * imaginary;
 
   // V^-1 = I - [omega]/2 + d [omega]^2
-  const double d = angle < 1e-3
-                       ? 1.0 / 12.0 + angle * angle / 720.0
-                       : (1.0 - 0.5 * angle * std::cos(0.5 * angle) / std::sin(0.5 * angle)) /
-                             (angle * angle);
+  const double d =
+      angle < 1e-3
+          ? 1.0 / 12.0 + angle * angle / 720.0
+          : (1.0 - 0.5 * angle * std::cos(0.5 * angle) / std::sin(0.5 * angle)) / (angle * angle);
   const Eigen::Vector3d cross = omega.cross(translation_);
   Vector6d xi;
   xi << omega, translation_ - 0.5 * cross + d * omega.cross(cross);

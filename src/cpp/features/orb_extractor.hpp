@@ -12,7 +12,7 @@
 namespace orbslam {
 
 struct OrbOptions {
-  int n_features = 1000;     ///< keypoints wanted per image, all levels together
+  int n_features = 1000;      ///< keypoints wanted per image, all levels together
   float scale_factor = 1.2F;  ///< ratio between levels
   int n_levels = 8;
   int initial_threshold = 20;  ///< FAST threshold, grey levels

@@ -58,8 +58,8 @@ Array<T> read_npy(const std::string& path) {
     if (item.find_first_not_of(' ') != std::string::npos) array.shape.push_back(std::stoul(item));
     begin = end + 1;
   }
-  const std::size_t count = std::accumulate(array.shape.begin(), array.shape.end(),
-                                            std::size_t{1}, std::multiplies<>());
+  const std::size_t count =
+      std::accumulate(array.shape.begin(), array.shape.end(), std::size_t{1}, std::multiplies<>());
   const std::string type = text_of(header, "'descr': *'[<|=]?([a-z][0-9])'", path);
   const std::size_t item_size = static_cast<std::size_t>(type[1] - '0');
   std::vector<char> bytes(count * item_size);
