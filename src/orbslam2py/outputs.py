@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import json
@@ -71,8 +72,10 @@ def prepare_output_folder(folder: Path | None, name: str, *, force: bool) -> Pat
 
 
 def link_latest(folder: Path) -> None:
-    """Point ``runs/latest`` to the newest run (where links are possible)."""
+    """Point ``runs/latest`` to the newest run in ``runs`` (where links are possible)."""
     link = Path("runs") / "latest"
+    if folder.resolve().parent != link.parent.resolve():
+        return
     try:
         link.parent.mkdir(exist_ok=True)
         temporary = link.with_name(f".latest-{os.getpid()}")
@@ -96,6 +99,7 @@ class OutputWriter:
         #: Messages about files that could not be written, with the place of their copy.
         self.problems: list[str] = []
         self._rescue: Path | None = None
+        self._written: set[str] = set()
 
     def write_all(
         self, result: RunResult, report: dict[str, Any], evaluation: RunEvaluation | None
@@ -111,6 +115,14 @@ class OutputWriter:
         self._write(
             "report.json", lambda path: _write_text(path, json.dumps(report, indent=2) + "\n")
         )
+        self._remove_stale()
+
+    def _remove_stale(self) -> None:
+        """Remove what an earlier run left in the folder and this one has no counterpart of."""
+        for path in [self.folder / "trajectory.png", *self.folder.glob("trajectory_map*.txt")]:
+            if path.name not in self._written:
+                with contextlib.suppress(OSError):
+                    path.unlink()
 
     def _write_trajectories(self, result: RunResult) -> None:
         *earlier, last = result.trajectories
@@ -126,10 +138,14 @@ class OutputWriter:
         self._write(name, lambda path: write_tum(path, trajectory, texts))
 
     def _write(self, name: str, write: Callable[[Path], object]) -> None:
+        self._written.add(name)
         try:
             write(self.folder / name)
         except OSError as error:
             self._keep_elsewhere(name, write, error)
+        except Exception as error:
+            _log.exception("unexpected error; please report it")
+            self.problems.append(f"cannot make {name}: {str(error) or type(error).__name__}")
 
     def _keep_elsewhere(self, name: str, write: Callable[[Path], object], error: OSError) -> None:
         message = f"cannot write {self.folder / name}: {error.strerror or error}"

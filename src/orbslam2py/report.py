@@ -55,6 +55,7 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
     options = result.options
     n_done = len(result.rows)
     n_tracked = result.n_tracked
+    n_frames = n_done if result.n_frames is None else result.n_frames
     report: dict[str, Any] = {
         "version": __version__,
         "sequence": result.sequence.name,
@@ -64,9 +65,9 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "deterministic": options.deterministic,
         "realtime": options.realtime,
         "seed": options.seed,
-        "frames": result.n_frames,
+        "frames": n_frames,
         "tracked": n_tracked,
-        "tracked_fraction": n_tracked / result.n_frames,
+        "tracked_fraction": n_tracked / n_frames if n_frames else 0.0,
         "skipped_frames": result.n_skipped,
         "dropped_frames": result.n_dropped,
         "keyframes": len(result.keyframes),

@@ -9,10 +9,11 @@ from typing import Annotated
 import typer
 
 from orbslam2py.cli.run import run_and_write
-from orbslam2py.errors import SettingsError
 from orbslam2py.runner import RunOptions
 from orbslam2py.sensor import Sensor
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+
+DEFAULT_OUTPUT = Path("runs/demo")
 
 
 def demo(
@@ -20,7 +21,7 @@ def demo(
     frames: Annotated[
         int | None, typer.Option(help="Number of images [one lap and a bit].", min=10)
     ] = None,
-    output: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("runs/demo"),
+    output: Annotated[Path, typer.Option(help="Folder for the results.")] = DEFAULT_OUTPUT,
     quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
 ) -> None:
     """Track a camera once around a synthetic corridor: needs no data.
@@ -29,11 +30,11 @@ def demo(
 
         orbslam2py demo --sensor rgbd
     """
-    if sensor is Sensor.MONOCULAR:
-        raise SettingsError("the demo runs with --sensor stereo or rgbd")
     options = SyntheticOptions(world="corridor", sensor=sensor, frames=frames, speed=1.4, noise=2)
     sequence = SyntheticSequence(options)
-    code = run_and_write(sequence, RunOptions(sensor), output=output, force=True, quiet=quiet)
+    # Results of an earlier demo are replaced, other files are not.
+    force = output == DEFAULT_OUTPUT or (output / "report.json").is_file()
+    code = run_and_write(sequence, RunOptions(sensor), output=output, force=force, quiet=quiet)
     if not quiet:
         typer.echo(f"Look at {output / 'trajectory.png'}.")
     raise typer.Exit(code)

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from orbslam2py._files import atomic_write
@@ -88,7 +89,8 @@ def _of_camera(path: Path, body: Trajectory) -> Trajectory:
 
 
 def _table(figures: dict[str, Any], trajectory: Path, ground_truth: Path) -> Table:
-    table = Table(title=f"{trajectory.name} against {ground_truth.name}", show_header=False)
+    title = escape(f"{trajectory.name} against {ground_truth.name}")
+    table = Table(title=title, show_header=False)
     table.add_column("figure")
     table.add_column("value", justify="right")
     table.add_column("unit")

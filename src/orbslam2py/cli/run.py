@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``orbslam2py run``: the system over a recorded sequence."""
+"""``orbslam2py run``: the system over a recorded sequence, a video or a camera."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.logging import RichHandler
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
 from rich.table import Table
 
 from orbslam2py.cli.exit_codes import ExitCode
-from orbslam2py.datasets import open_sequence
-from orbslam2py.datasets.base import Sequence
+from orbslam2py.cli.interrupts import StopOnInterrupt
+from orbslam2py.datasets import open_source
+from orbslam2py.datasets.base import LiveSource, Sequence
+from orbslam2py.errors import SettingsError
 from orbslam2py.outputs import OutputWriter, link_latest, prepare_output_folder
 from orbslam2py.report import evaluate_run, make_report
 from orbslam2py.runner import FrameRow, RunOptions, RunResult, SequenceRunner
@@ -30,12 +31,20 @@ EXAMPLE = """
     orbslam2py run rgbd_dataset_freiburg1_desk --sensor rgbd
 
     orbslam2py run dataset/sequences/06 --sensor stereo --output runs/06
+
+    orbslam2py run video.mp4 --sensor mono --settings my.yaml
+
+    orbslam2py run 0 --sensor mono --settings my.yaml
 """
 
 
 def run(
     sequence: Annotated[
-        Path, typer.Argument(help="Folder of a TUM RGB-D, KITTI odometry or EuRoC sequence.")
+        str,
+        typer.Argument(
+            help="Folder of a TUM RGB-D, KITTI odometry or EuRoC sequence; folder of images; "
+            "video file; number of a camera (ends with Ctrl-C)."
+        ),
     ],
     sensor: Annotated[Sensor, typer.Option(help="What the images come from.")],
     settings: Annotated[
@@ -64,14 +73,35 @@ def run(
     max_frames: Annotated[
         int | None, typer.Option(help="Take at most so many frames.", min=1)
     ] = None,
+    fps: Annotated[
+        float | None,
+        typer.Option(
+            help="Images per second of a folder of images [that of the settings] or a video [its "
+            "own time stamps]; what a camera is asked for.",
+        ),
+    ] = None,
+    times: Annotated[
+        Path | None,
+        typer.Option(
+            help="File with a time stamp per image of a folder or video: decimal seconds or whole "
+            "nanoseconds."
+        ),
+    ] = None,
+    mask: Annotated[
+        Path | None,
+        typer.Option(
+            help="Where to look: an 8-bit image, 0 = ignore, or a folder with one per image.",
+            metavar="FILE_OR_FOLDER",
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of all random draws.", min=0)] = 0,
     force: Annotated[
         bool, typer.Option("--force", help="Write into an output folder that is not empty.")
     ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
 ) -> None:
-    """Track a recorded sequence; write trajectory, map and report."""
-    images = open_sequence(sequence, sensor, settings=settings)
+    """Track a recorded sequence, a video or a camera; write trajectory, map and report."""
+    images = open_source(sequence, sensor, settings=settings, fps=fps, times=times, mask=mask)
     options = RunOptions(sensor, deterministic, realtime, start, stride, max_frames, seed)
     code = run_and_write(
         images, options, vocabulary=vocabulary, output=output, force=force, quiet=quiet
@@ -83,7 +113,7 @@ run.__doc__ = f"{run.__doc__}\n{EXAMPLE}"
 
 
 def run_and_write(
-    sequence: Sequence,
+    sequence: Sequence | LiveSource,
     options: RunOptions,
     *,
     vocabulary: Path | None = None,
@@ -92,55 +122,69 @@ def run_and_write(
     quiet: bool = False,
 ) -> ExitCode:
     """Run, write all files, show a table; returns the exit code."""
+    if options.sensor is Sensor.MONOCULAR:
+        raise SettingsError(
+            "tracking with a single camera is not available in this version; "
+            "use --sensor stereo or rgbd"
+        )
     console = Console(quiet=quiet)
     errors = Console(stderr=True)
     _log_to(errors, quiet=quiet)
     runner = SequenceRunner(sequence, sequence.settings, load_vocabulary(vocabulary), options)
     folder = prepare_output_folder(output, sequence.name, force=force)
-    if output is None:
-        link_latest(folder)
+    link_latest(folder)
 
-    with _progress_bar(console) as bar:
-        display = _Display(bar, runner.result.n_frames)
-        result = runner.run(display.show)
-
-    evaluation = evaluate_run(result)
-    report = make_report(result, evaluation)
     writer = OutputWriter(folder)
-    writer.write_all(result, report, evaluation)
+    with StopOnInterrupt() as interrupt:
+        with _progress_bar(console) as bar:
+            display = _Display(bar, runner.result.n_frames)
+            result = runner.run(display.show, interrupt.event)
+        evaluation = evaluate_run(result)
+        report = make_report(result, evaluation)
+        writer.write_all(result, report, evaluation)
     console.print(_table(report))
-    console.print(f"Results are in [bold]{escape(str(folder))}[/]", highlight=False)
-    return _conclude(result, writer, errors)
+    console.print(f"Results are in [bold]{escape(str(folder))}[/]", highlight=False, soft_wrap=True)
+    code = _conclude(result, writer, errors)
+    if code is not ExitCode.FAILED and interrupt.event.is_set():  # also while writing
+        return ExitCode.INTERRUPTED
+    return code
 
 
 def _conclude(result: RunResult, writer: OutputWriter, errors: Console) -> ExitCode:
     for problem in writer.problems:
-        errors.print(f"[bold red]Error:[/] {escape(problem)}", highlight=False, soft_wrap=True)
+        _print_error(errors, "Error", problem)
     if result.error is not None:
-        errors.print(
-            f"[bold red]Error:[/] {escape(str(result.error))} (what was done until then is saved)",
-            highlight=False,
-            soft_wrap=True,
-        )
+        what = str(result.error) or type(result.error).__name__
+        _print_error(errors, "Error", f"{what} (what was done until then is saved)")
+    if result.error is not None or writer.problems:
         return ExitCode.FAILED
-    if result.interrupted:
-        return ExitCode.INTERRUPTED
-    if writer.problems:
-        return ExitCode.BAD_INPUT
-    if result.n_tracked == 0:
-        errors.print(
-            f"[bold red]Nothing could be tracked:[/] {escape(result.why_nothing_was_tracked())}",
-            highlight=False,
-            soft_wrap=True,
-        )
+    if result.n_tracked == 0 and not result.interrupted:
+        _print_error(errors, "Nothing could be tracked", result.why_nothing_was_tracked())
         return ExitCode.NOTHING_TRACKED
     return ExitCode.OK
 
 
+def _print_error(console: Console, title: str, text: str) -> None:
+    console.print(f"[bold red]{title}:[/] {escape(text)}", highlight=False, soft_wrap=True)
+
+
+class _ConsoleHandler(logging.Handler):
+    """Prints warnings like errors, in one line each: paths can be copied from it."""
+
+    def __init__(self, console: Console) -> None:
+        super().__init__()
+        self._console = console
+
+    def emit(self, record: logging.LogRecord) -> None:
+        colour = "red" if record.levelno >= logging.ERROR else "yellow"
+        title = f"[bold {colour}]{record.levelname.capitalize()}:[/]"
+        text = escape(self.format(record))
+        self._console.print(f"{title} {text}", highlight=False, soft_wrap=True)
+
+
 def _log_to(console: Console, *, quiet: bool) -> None:
-    handler = RichHandler(console=console, show_path=False, show_time=False, markup=False)
     logger = logging.getLogger("orbslam2py")
-    logger.handlers = [handler]
+    logger.handlers = [_ConsoleHandler(console)]
     logger.propagate = False
     logger.setLevel(logging.ERROR if quiet else logging.WARNING)
 
@@ -159,7 +203,7 @@ def _progress_bar(console: Console) -> Progress:
 class _Display:
     """Keeps the progress bar up to date, at most ten times a second."""
 
-    def __init__(self, bar: Progress, total: int) -> None:
+    def __init__(self, bar: Progress, total: int | None) -> None:
         self._bar = bar
         self._task: TaskID = bar.add_task("tracking", total=total, status="")
         self._done = 0
@@ -182,14 +226,15 @@ class _Display:
 
 
 def _table(report: dict[str, Any]) -> Table:
-    table = Table(title=f"{report['sequence']} ({report['sensor']})", show_header=False)
+    title = escape(f"{report['sequence']} ({report['sensor']})")
+    table = Table(title=title, show_header=False)
     table.add_column(justify="left")
     table.add_column(justify="right")
     for key, value in report.items():
         if key in {"sequence", "sensor", "milliseconds", "settings"} or value is None:
             continue
         text = f"{value:.4f}" if isinstance(value, float) else str(value)
-        table.add_row(key.replace("_", " "), text)
+        table.add_row(key.replace("_", " "), escape(text))
     table.add_section()
     for stage, numbers in report["milliseconds"].items():
         table.add_row(

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from orbslam2py.datasets.base import Layout
@@ -92,7 +93,11 @@ def synthesize(
             force=force,
             progress=lambda done, total: bar.update(task, completed=done, total=total),
         )
-    console.print(f"{len(sequence)} frames are in [bold]{folder}[/]", highlight=False)
+    console.print(
+        f"{len(sequence)} frames are in [bold]{escape(str(folder))}[/]",
+        highlight=False,
+        soft_wrap=True,
+    )
 
 
 synthesize.__doc__ = f"{synthesize.__doc__}\n{EXAMPLE}"

@@ -11,6 +11,7 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
 from orbslam2py import __version__
@@ -87,9 +88,11 @@ def train(
             raise VocabularyError("the training was cancelled")
         save_vocabulary(vocabulary, output, comment=comment)
     console.print(
-        f"{vocabulary.n_words} words from {len(paths)} images are in [bold]{output}[/] "
-        f"({output.stat().st_size / 1e6:.1f} MB, {time.perf_counter() - begin:.0f} s)",
+        f"{vocabulary.n_words} words from {len(paths)} images are in "
+        f"[bold]{escape(str(output))}[/] ({output.stat().st_size / 1e6:.1f} MB, "
+        f"{time.perf_counter() - begin:.0f} s)",
         highlight=False,
+        soft_wrap=True,
     )
 
 
@@ -106,7 +109,11 @@ def convert(
         vocabulary = convert_vocabulary(
             source, target, progress=lambda fraction: show("Converting", fraction)
         )
-    console.print(f"{vocabulary.n_words} words are in [bold]{target}[/]", highlight=False)
+    console.print(
+        f"{vocabulary.n_words} words are in [bold]{escape(str(target))}[/]",
+        highlight=False,
+        soft_wrap=True,
+    )
 
 
 def info(
