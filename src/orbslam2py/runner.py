@@ -1,23 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Run the system over a recorded sequence."""
+"""Run the system over a recorded sequence, or on a camera."""
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import threading
 import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
-from orbslam2py.datasets.base import Images, Sequence
+from orbslam2py.datasets.base import Images, LiveSource, Sequence, Source
 from orbslam2py.errors import DatasetError, ImageError, OrbSlamError
-from orbslam2py.prefetch import Prefetcher
+from orbslam2py.feeds import FedFrame, LiveFeed, RecordedFeed, is_sequence
 from orbslam2py.records import TrackingRecord, TrackingState
 from orbslam2py.sensor import Sensor
 from orbslam2py.settings import Settings
@@ -67,6 +68,23 @@ class RunOptions:
             raise DatasetError(f"--start {self.start} is past the end: {n_frames} frames")
         return indices[: self.max_frames]
 
+    def check_for_camera(self) -> None:
+        """See that the options make sense for a camera.
+
+        Raises
+        ------
+        DatasetError
+            Naming the option that does not.
+        """
+        if self.deterministic or self.realtime:
+            name = "--deterministic" if self.deterministic else "--realtime"
+            raise DatasetError(f"{name} is for recorded images: a camera always goes in real time")
+        if self.start != 0 or self.stride != 1:
+            name = "--start" if self.start != 0 else "--stride"
+            raise DatasetError(f"{name} is for recorded images, not for a camera")
+        if self.max_frames is not None and self.max_frames < 1:
+            raise DatasetError("--max-frames must be 1 or more")
+
 
 @dataclass(frozen=True)
 class FrameRow:
@@ -111,11 +129,12 @@ def empty_snapshot() -> MapSnapshot:
 class RunResult:
     """Everything a run gives, whether it ended or was interrupted."""
 
-    sequence: Sequence
+    sequence: Source
     settings: Settings
     options: RunOptions
-    n_frames: int
-    """Frames that were to be processed."""
+    n_frames: int | None
+    """Frames that were to be processed; None for a camera as long as it runs, then those that
+    were."""
     rows: list[FrameRow] = field(default_factory=list)
     trajectories: list[Trajectory] = field(default_factory=list)
     """One per map, lost frames included; `Trajectory.indices` are positions in `rows`."""
@@ -130,8 +149,12 @@ class RunResult:
     n_resets: int = 0
     n_relocalizations: int = 0
     n_loops_closed: int = 0
+    n_lost_by_camera: int = 0
+    """Images of a camera that came while an earlier one was being tracked."""
+    is_live: bool = False
+    """The images came from a camera."""
     interrupted: bool = False
-    """The run was stopped before its end."""
+    """The run was stopped before its end; never for a camera, which has none."""
     error: Exception | None = None
     """What ended it."""
 
@@ -148,7 +171,7 @@ class RunResult:
     @property
     def n_dropped(self) -> int:
         """Frames that real time left no room for."""
-        return sum(row.state == "DROPPED" for row in self.rows)
+        return self.n_lost_by_camera + sum(row.state == "DROPPED" for row in self.rows)
 
     def tracked_trajectory(self) -> Trajectory:
         """Frames of the last map that have a pose, after the last optimisation."""
@@ -183,13 +206,13 @@ Progress = Callable[[FrameRow, System], None]
 
 
 class SequenceRunner:
-    """Feeds a sequence to a `System` and collects the results.
+    """Feeds a sequence or a camera's images to a `System` and collects the results.
 
     A Ctrl-C, or a failure, ends the run early; what was computed is in the result.
 
     Parameters
     ----------
-    sequence : Sequence
+    sequence : Sequence or LiveSource
         Images and time stamps.
     settings : Settings
         For the system.
@@ -201,16 +224,23 @@ class SequenceRunner:
 
     def __init__(
         self,
-        sequence: Sequence,
+        sequence: Sequence | LiveSource,
         settings: Settings,
         vocabulary: core.Vocabulary | None,
         options: RunOptions,
     ) -> None:
-        self._sequence = sequence
         self._vocabulary = vocabulary
-        self._indices = options.indices(len(sequence))
         self._options = options
-        self.result = RunResult(sequence, settings, options, len(self._indices))
+        self._feed: RecordedFeed | LiveFeed
+        if is_sequence(sequence):
+            indices = options.indices(len(sequence))
+            self._feed = RecordedFeed(sequence, indices, realtime=options.realtime)
+        else:
+            options.check_for_camera()
+            self._feed = LiveFeed(cast(LiveSource, sequence), options.max_frames)
+        self.result = RunResult(
+            *(sequence, settings, options, self._feed.n_frames), is_live=self._feed.is_live
+        )
 
     def run(
         self, progress: Progress | None = None, stop: threading.Event | None = None
@@ -222,7 +252,8 @@ class SequenceRunner:
         progress : callable, optional
             Called after every frame.
         stop : threading.Event, optional
-            Ends the run after the present frame when it is set.
+            Ends the run after the present frame when it is set: the only end of a camera's run
+            unless `RunOptions.max_frames` tells one.
 
         Returns
         -------
@@ -237,19 +268,18 @@ class SequenceRunner:
             options.sensor,
             self._vocabulary,
             deterministic=options.deterministic,
-            wait_for_mapping=not options.realtime,
+            wait_for_mapping=not (options.realtime or self._feed.is_live),
             seed=options.seed,
         )
         stop = stop or threading.Event()
         try:
-            with Prefetcher[Images](self._sequence, self._indices, stop=stop) as images:
-                self._feed(system, images, progress, stop)
+            self._process(system, progress, stop)
             self._wait_for_mapping(system, stop)
         except KeyboardInterrupt:
             stop.set()
         except Exception as error:
             self._take_note(error)
-        result.interrupted = stop.is_set()
+        result.interrupted = stop.is_set() and not result.is_live
         if result.interrupted:
             _log.warning("interrupted; saving what was done so far")
         self._shut_down(system)
@@ -258,54 +288,56 @@ class SequenceRunner:
         return result
 
     # ---- one pass over the frames ----------------------------------------------------------------
-    def _feed(
-        self,
-        system: System,
-        images: Prefetcher[Images],
-        progress: Progress | None,
-        stop: threading.Event,
-    ) -> None:
-        clock = None
-        if self._options.realtime:
-            clock = _Clock(self._sequence.timestamps, self._indices, stop)
-        for position, (index, item) in enumerate(images):
-            if clock is not None and clock.must_drop(position):
-                row = self._row(index, None, DROPPED)
-            elif stop.is_set():
-                return
-            else:
-                row = self._track(system, index, item)
-            self.result.rows.append(row)
-            if progress is not None:
-                progress(row, system)
+    def _process(self, system: System, progress: Progress | None, stop: threading.Event) -> None:
+        result = self.result
+        try:
+            with contextlib.closing(self._feed.frames(stop)) as frames:
+                for frame in frames:
+                    row = self._track(system, frame)
+                    result.rows.append(row)
+                    if progress is not None:
+                        progress(row, system)
+        finally:
+            if result.is_live:
+                result.n_frames = len(result.rows)
+                result.n_lost_by_camera = self._feed.n_lost
 
-    def _track(self, system: System, index: int, item: Images | Exception) -> FrameRow:
-        if isinstance(item, Exception):
-            if not isinstance(item, (OrbSlamError, OSError)):
-                raise item
-            return self._skip(index, item)
+    def _track(self, system: System, frame: FedFrame) -> FrameRow:
+        if frame.item is None:
+            return _row(frame, None, DROPPED)
+        if isinstance(frame.item, Exception):
+            if not isinstance(frame.item, (OrbSlamError, OSError)):
+                raise frame.item
+            return self._skip(frame, frame.item)
         begin = time.perf_counter()
         try:
-            record = self._call(system, item, float(self._sequence.timestamps[index]))
+            record = self._call(system, frame.item, frame.timestamp)
         except ImageError as error:
-            return self._skip(index, error)
+            return self._skip(frame, error)
         finally:
             self.result.slam_seconds += time.perf_counter() - begin
-        return self._row(index, record, str(record.reason))
+        return _row(frame, record, str(record.reason))
 
     def _call(self, system: System, images: Images, timestamp: float) -> TrackingRecord:
+        mask = images.mask
         if self._options.sensor is Sensor.STEREO:
-            return system.track_stereo(images.image, _second(images.right), timestamp)
+            right = _second(images.right)
+            if mask is None:
+                return system.track_stereo(images.image, right, timestamp)
+            # The mask is the left image's; what it hides there needs no partner.
+            return system.track_stereo(images.image, right, timestamp, mask=(mask, None))
         if self._options.sensor is Sensor.RGBD:
-            return system.track_rgbd(images.image, _second(images.depth), timestamp)
-        return system.track_monocular(images.image, timestamp)
+            depth = _second(images.depth)
+            if mask is None:
+                return system.track_rgbd(images.image, depth, timestamp)
+            return system.track_rgbd(images.image, depth, timestamp, mask=mask)
+        if mask is None:
+            return system.track_monocular(images.image, timestamp)
+        return system.track_monocular(images.image, timestamp, mask=mask)
 
-    def _skip(self, index: int, error: Exception) -> FrameRow:
-        _log.warning("frame %d skipped: %s", index, error)
-        return self._row(index, None, str(error))
-
-    def _row(self, index: int, record: TrackingRecord | None, reason: str) -> FrameRow:
-        return FrameRow(index, self._sequence.timestamp_text(index), record, reason)
+    def _skip(self, frame: FedFrame, error: Exception) -> FrameRow:
+        _log.warning("frame %d skipped: %s", frame.index, error)
+        return _row(frame, None, str(error))
 
     # ---- the end ---------------------------------------------------------------------------------
     def _wait_for_mapping(self, system: System, stop: threading.Event) -> None:
@@ -358,28 +390,8 @@ def _renumber(trajectory: Trajectory, positions: list[int]) -> Trajectory:
     return replace(trajectory, indices=indices).select(indices >= 0)
 
 
-class _Clock:
-    """Plays time stamps: a frame is dropped when the next one has come before it was taken."""
-
-    def __init__(
-        self, timestamps: npt.NDArray[np.float64], indices: list[int], stop: threading.Event
-    ) -> None:
-        self._due = np.asarray(timestamps)[indices]
-        self._stop = stop
-        self._offset: float | None = None
-
-    def must_drop(self, position: int) -> bool:
-        """Wait until the frame is due; True if its successor is already there."""
-        now = time.perf_counter()
-        if self._offset is None:
-            self._offset = now - float(self._due[position])
-            return False
-        early = float(self._due[position]) + self._offset - now
-        if early > 0:
-            self._stop.wait(early)
-            return False
-        has_next = position + 1 < len(self._due)
-        return has_next and now >= float(self._due[position + 1]) + self._offset
+def _row(frame: FedFrame, record: TrackingRecord | None, reason: str) -> FrameRow:
+    return FrameRow(frame.index, frame.text, record, reason)
 
 
 def _second(array: npt.NDArray[Any] | None) -> npt.NDArray[Any]:

@@ -145,7 +145,8 @@ def run_and_write(
     console.print(_table(report))
     console.print(f"Results are in [bold]{escape(str(folder))}[/]", highlight=False, soft_wrap=True)
     code = _conclude(result, writer, errors)
-    if code is not ExitCode.FAILED and interrupt.event.is_set():  # also while writing
+    interrupted = interrupt.event.is_set() and not result.is_live  # also while writing
+    if code is not ExitCode.FAILED and interrupted:
         return ExitCode.INTERRUPTED
     return code
 

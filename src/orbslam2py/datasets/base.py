@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -139,8 +138,18 @@ class LiveSource(Source, Protocol):
     def __enter__(self) -> LiveSource: ...
     def __exit__(self, *_: object) -> None: ...
 
-    def __iter__(self) -> Iterator[LiveFrame]:
-        """Yield the newest image, as soon as there is one that was not yielded yet.
+    def take(self, timeout: float, /) -> LiveFrame | None:
+        """Take the newest image that was not taken yet, or wait for one.
+
+        Parameters
+        ----------
+        timeout
+            Seconds to wait at most.
+
+        Returns
+        -------
+        LiveFrame or None
+            None if none came in that time.
 
         Raises
         ------

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A folder of images of one camera, in the order of their names."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbslam2py.datasets.base import Images
+from orbslam2py.datasets.choose_settings import SettingsChoice
+from orbslam2py.datasets.images import read_image
+from orbslam2py.datasets.unposed import UnposedSource, chosen_stamps
+from orbslam2py.errors import DatasetError
+from orbslam2py.sensor import Sensor
+from orbslam2py.settings import Settings
+
+IMAGE_SUFFIXES = frozenset(
+    {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm", ".jp2"}
+)
+_SETTINGS_FILE = "settings.yaml"
+
+
+def natural_key(name: str) -> tuple[tuple[int, int, str], ...]:
+    """Sort key in which numbers count as numbers: ``2.png`` comes before ``10.png``."""
+    parts = re.findall(r"[0-9]+|[^0-9]+", name)
+    return tuple((0, int(p), p) if p[0] in "0123456789" else (1, 0, p.lower()) for p in parts)
+
+
+def image_files(folder: Path) -> list[Path]:
+    """Find the images of a folder (without its subfolders) in natural order of their names.
+
+    Raises
+    ------
+    DatasetError
+        If the folder cannot be listed.
+    """
+    try:
+        found = [
+            path
+            for path in folder.iterdir()
+            if path.suffix.lower() in IMAGE_SUFFIXES and not path.name.startswith(".")
+        ]
+    except OSError as error:
+        raise DatasetError(f"cannot list {folder}: {error.strerror or error}") from error
+    return sorted(found, key=lambda path: (natural_key(path.name), path.name))
+
+
+class ImageFolder(UnposedSource):
+    """The images of a folder; see `datasets.base.Sequence`.
+
+    Parameters
+    ----------
+    folder
+        Where the images are; its subfolders are not looked at.
+    sensor
+        Monocular.
+    settings
+        Settings, a file, a built-in name, or None for ``settings.yaml`` in the folder.
+    fps
+        Images per second; by default that of the settings.
+    times
+        File with one time stamp per image, in the order of the images.
+
+    Raises
+    ------
+    DatasetError
+        If there are no images, or the time stamps do not fit them.
+    SettingsError
+        If there are no settings, or they are wrong.
+    """
+
+    layout = "images"
+
+    def __init__(
+        self,
+        folder: str | Path,
+        sensor: Sensor | None = None,
+        *,
+        settings: SettingsChoice = None,
+        fps: float | None = None,
+        times: str | Path | None = None,
+    ) -> None:
+        self.folder = Path(folder)
+        self.paths = image_files(self.folder)
+        if not self.paths:
+            raise DatasetError(
+                f"no images in {self.folder}: looked for {', '.join(sorted(IMAGE_SUFFIXES))}"
+            )
+        own = self.folder / _SETTINGS_FILE
+        if settings is None and own.is_file():
+            settings = own
+        super().__init__(self.folder, self.folder.resolve().name, sensor, settings, fps)
+        self._stamps = chosen_stamps(len(self.paths), fps, times, self.settings.camera.fps)
+
+    def __len__(self) -> int:
+        return len(self.paths)
+
+    @property
+    def timestamps(self) -> NDArray[np.float64]:
+        """Time of every frame in seconds, float64 (n,)."""
+        return self._stamps.seconds
+
+    def timestamp_text(self, index: int, /) -> str:
+        """Return the time of a frame in seconds, with all digits of the source."""
+        return self._stamps.texts[index]
+
+    def default_settings(self) -> Settings:
+        """Return the settings: an image folder has no others."""
+        return self.settings
+
+    def image_path(self, index: int, /) -> Path:
+        """Return the file of a frame."""
+        return self.paths[index]
+
+    def load(self, index: int, /) -> Images:
+        """Read the image of a frame; see `datasets.base.Sequence.load`."""
+        return Images(self._ordered(read_image(self.paths[index], rgb=False)))

@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Masks: where in the images keypoints may lie."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbslam2py.datasets.base import Images, LiveFrame, LiveSource, Sequence
+from orbslam2py.datasets.image_folder import image_files
+from orbslam2py.datasets.images import read_image
+from orbslam2py.errors import DatasetError, ImageError
+from orbslam2py.sensor import Sensor
+from orbslam2py.settings import Settings
+from orbslam2py.trajectory import Trajectory
+
+Mask = NDArray[np.uint8]
+
+
+class StaticMask:
+    """One mask for all images.
+
+    Parameters
+    ----------
+    path
+        An image file with one channel of 8 bits: 0 where no keypoint may lie.
+
+    Raises
+    ------
+    DatasetError
+        If there is no such file.
+    ImageError
+        If it is no readable mask.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._mask = read_mask(path)
+
+    def mask(self, index: int, image: NDArray[np.uint8]) -> Mask:
+        """Return the mask of an image.
+
+        Raises
+        ------
+        ImageError
+            If it has another size than the image.
+        """
+        return _fitting(self._path, self._mask, image)
+
+
+class MaskFolder:
+    """One mask per image.
+
+    If every image's file has a mask of the same name (apart from the ending), the names count.
+    Otherwise there must be as many masks as images, and they belong together by their order.
+
+    Parameters
+    ----------
+    folder
+        Where the masks are.
+    sequence
+        The images.
+
+    Raises
+    ------
+    DatasetError
+        If the masks cannot be assigned.
+    """
+
+    def __init__(self, folder: Path, sequence: Sequence) -> None:
+        files = image_files(folder)
+        if not files:
+            raise DatasetError(f"no masks in {folder}")
+        n = len(sequence)
+        by_stem = {path.stem: path for path in files}
+        path_of = getattr(sequence, "image_path", None)
+        stems = [path_of(i).stem for i in range(n)] if path_of is not None else []
+        missing = [stem for stem in stems if stem not in by_stem]
+        if stems and not missing:
+            self._paths = [by_stem[stem] for stem in stems]
+        elif len(files) == n:
+            self._paths = files
+        else:
+            example = f" (the first without one is {missing[0]})" if missing else ""
+            raise DatasetError(
+                f"{folder} holds {len(files)} masks for {n} images: give one per image, with its "
+                f"name{example} or in the same order, or a single file"
+            )
+
+    def mask(self, index: int, image: NDArray[np.uint8]) -> Mask:
+        """Read the mask of an image.
+
+        Raises
+        ------
+        ImageError
+            If it is no readable mask, or has another size than the image.
+        """
+        return _fitting(self._paths[index], read_mask(self._paths[index]), image)
+
+
+def read_mask(path: Path) -> Mask:
+    """Read a mask: uint8 (h, w), 0 where no keypoint may lie.
+
+    Images with several equal channels are taken as well.
+
+    Raises
+    ------
+    DatasetError
+        If there is no such file.
+    ImageError
+        If it is no image of 8 bits, or its channels differ.
+    """
+    if not path.exists():
+        raise DatasetError(f"mask {path} does not exist")
+    image = read_image(path, rgb=False)
+    if image.ndim == 2:
+        return image
+    colour = image[:, :, :3]
+    if (colour != colour[:, :, :1]).any():
+        raise ImageError(f"mask {path} is coloured; a mask has one channel, 0 where to ignore")
+    return np.ascontiguousarray(colour[:, :, 0])
+
+
+def _fitting(path: Path, mask: Mask, image: NDArray[np.uint8]) -> Mask:
+    if mask.shape != image.shape[:2]:
+        raise ImageError(
+            f"mask {path} is {mask.shape[1]} x {mask.shape[0]}, "
+            f"but its image {image.shape[1]} x {image.shape[0]}"
+        )
+    return mask
+
+
+class _Masked:
+    """What masked sources share: everything but the images comes from the source."""
+
+    def __init__(self, source: Sequence | LiveSource, masks: StaticMask | MaskFolder) -> None:
+        self._inner = source
+        self._masks = masks
+
+    @property
+    def name(self) -> str:
+        """Name of the source."""
+        return self._inner.name
+
+    @property
+    def layout(self) -> str:
+        """How it lies on disk, or ``camera``."""
+        return self._inner.layout
+
+    @property
+    def sensor(self) -> Sensor:
+        """What it delivers images for."""
+        return self._inner.sensor
+
+    @property
+    def settings(self) -> Settings:
+        """Settings of the source."""
+        return self._inner.settings
+
+    def ground_truth(self) -> Trajectory | None:
+        """Return the true poses; see `datasets.base.Source.ground_truth`."""
+        return self._inner.ground_truth()
+
+    def _with_mask(self, index: int, images: Images) -> Images:
+        return replace(images, mask=self._masks.mask(index, images.image))
+
+
+class MaskedSequence(_Masked):
+    """A sequence whose images come with masks; see `datasets.base.Sequence`.
+
+    Parameters
+    ----------
+    sequence
+        The images. For a pair the masks belong to the left ones, as `load` delivers them
+        (rectified).
+    masks
+        A file, or a folder with one per image.
+
+    Raises
+    ------
+    DatasetError
+        If there is no such file or folder, or its masks cannot be assigned.
+    ImageError
+        If the file is no readable mask.
+    """
+
+    def __init__(self, sequence: Sequence, masks: str | Path) -> None:
+        path = Path(masks)
+        super().__init__(
+            sequence, MaskFolder(path, sequence) if path.is_dir() else StaticMask(path)
+        )
+        self._sequence = sequence
+
+    def __len__(self) -> int:
+        return len(self._sequence)
+
+    @property
+    def timestamps(self) -> NDArray[np.float64]:
+        """Time of every frame in seconds, float64 (n,)."""
+        return self._sequence.timestamps
+
+    def timestamp_text(self, index: int, /) -> str:
+        """Return the time of a frame in seconds, with all digits of the source."""
+        return self._sequence.timestamp_text(index)
+
+    def default_settings(self) -> Settings:
+        """Choose settings by what comes with the images."""
+        return self._sequence.default_settings()
+
+    def load(self, index: int, /) -> Images:
+        """Read the images and the mask of a frame; see `datasets.base.Sequence.load`."""
+        return self._with_mask(index, self._sequence.load(index))
+
+
+class MaskedCamera(_Masked):
+    """A camera with one mask for all images; see `datasets.base.LiveSource`.
+
+    Parameters
+    ----------
+    camera
+        The images.
+    mask
+        A file.
+
+    Raises
+    ------
+    DatasetError
+        If there is no such file, or it is a folder.
+    ImageError
+        If it is no readable mask.
+    """
+
+    def __init__(self, camera: LiveSource, mask: str | Path) -> None:
+        path = Path(mask)
+        if path.is_dir():
+            raise DatasetError(f"{path} is a folder; a camera takes a single mask file")
+        super().__init__(camera, StaticMask(path))
+        self._camera = camera
+
+    @property
+    def n_dropped(self) -> int:
+        """Images that the camera lost so far."""
+        return self._camera.n_dropped
+
+    def open(self) -> None:
+        """Open the camera."""
+        self._camera.open()
+
+    def __enter__(self) -> MaskedCamera:
+        self._camera.__enter__()
+        return self
+
+    def __exit__(self, *details: object) -> None:
+        self._camera.__exit__(*details)
+
+    def take(self, timeout: float, /) -> LiveFrame | None:
+        """Take the newest image, with the mask."""
+        frame = self._camera.take(timeout)
+        return frame and replace(frame, images=self._with_mask(0, frame.images))

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What images of one camera without any other data have in common."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from orbslam2py.builtin_settings import BUILTIN_NAMES, resolve_settings
+from orbslam2py.datasets.base import Stamps, choose_sensor
+from orbslam2py.datasets.choose_settings import SettingsChoice
+from orbslam2py.datasets.time_files import read_time_file, stamps_of_rate
+from orbslam2py.errors import DatasetError, SettingsError
+from orbslam2py.sensor import Sensor
+from orbslam2py.settings import CameraSettings, Settings
+from orbslam2py.trajectory import Trajectory
+
+_log = logging.getLogger(__name__)
+
+
+class UnposedSource:
+    """Images of a single camera, of which nothing else is known.
+
+    Parameters
+    ----------
+    what
+        Name of the source for messages.
+    name
+        Name of the source for results.
+    sensor
+        Must be monocular if given.
+    settings
+        Settings, a file or a built-in name.
+    fps
+        Images per second; replaces that of the settings if given.
+
+    Raises
+    ------
+    DatasetError
+        For another sensor.
+    SettingsError
+        If there are no settings, or they or the rate are wrong.
+    """
+
+    def __init__(
+        self,
+        what: str | Path,
+        name: str,
+        sensor: Sensor | None,
+        settings: SettingsChoice,
+        fps: float | None,
+    ) -> None:
+        self.name = name
+        self.sensor = choose_sensor(Path(what), sensor, (Sensor.MONOCULAR,))
+        if settings is None:
+            raise SettingsError(
+                f"no settings for {what}: nothing tells what camera it is from. Give --settings "
+                f"with a file or a built-in name ({', '.join(BUILTIN_NAMES)}). Make a file with "
+                "'orbslam2py calibrate' from images of a chessboard, or with 'orbslam2py "
+                "import-camera' from a calibration you have"
+            )
+        self.settings: Settings = resolve_settings(settings, self.sensor)
+        if fps is not None:
+            self.settings = replace(self.settings, camera=_with_rate(self.settings.camera, fps))
+        self._what = what
+        self._size_checked = False
+
+    def ground_truth(self) -> Trajectory | None:
+        """Return None: there are no true poses."""
+        return None
+
+    def _ordered(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Give OpenCV's image the colour order of the settings; look at the size of the first."""
+        if not self._size_checked:
+            self._size_checked = True
+            self._warn_of_size(image)
+        if image.ndim == 3 and self.settings.camera.rgb:
+            image = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), dtype=np.uint8)
+        return np.ascontiguousarray(image)
+
+    def _warn_of_size(self, image: NDArray[np.uint8]) -> None:
+        camera = self.settings.camera
+        given, found = (camera.width, camera.height), (image.shape[1], image.shape[0])
+        if None not in given and given != found:
+            _log.warning(
+                "%s has images of %d x %d pixels, but the settings are for %d x %d: "
+                "focal lengths and distortion do not fit",
+                *(self._what, *found, *given),
+            )
+
+
+def _with_rate(camera: CameraSettings, fps: float) -> CameraSettings:
+    try:
+        return replace(camera, fps=fps)
+    except SettingsError as error:
+        raise SettingsError(f"--fps: {error}") from None
+
+
+def chosen_stamps(
+    n: int, fps: float | None, times: str | Path | None, otherwise: Stamps | float
+) -> Stamps:
+    """Take the time stamps that were asked for.
+
+    Parameters
+    ----------
+    n
+        Number of images.
+    fps
+        Constant rate, or None.
+    times
+        File with a time stamp per image, or None.
+    otherwise
+        Time stamps, or a rate, if neither is given.
+
+    Raises
+    ------
+    DatasetError
+        If both are given, or the file does not fit.
+    """
+    if fps is not None and times is not None:
+        raise DatasetError("--fps and --times exclude each other: both tell the time stamps")
+    if times is not None:
+        return read_time_file(Path(times), n)
+    if fps is not None:
+        return stamps_of_rate(n, fps)
+    return otherwise if isinstance(otherwise, Stamps) else stamps_of_rate(n, otherwise)

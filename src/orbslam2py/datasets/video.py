@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Video files."""
+
+from __future__ import annotations
+
+import logging
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from orbslam2py.datasets.base import Images, Stamps
+from orbslam2py.datasets.choose_settings import SettingsChoice
+from orbslam2py.datasets.image_folder import IMAGE_SUFFIXES
+from orbslam2py.datasets.images import quiet_opencv
+from orbslam2py.datasets.time_files import stamps_of_rate, stamps_of_seconds
+from orbslam2py.datasets.unposed import UnposedSource, chosen_stamps
+from orbslam2py.errors import DatasetError, ImageError
+from orbslam2py.sensor import Sensor
+from orbslam2py.settings import Settings
+
+_log = logging.getLogger(__name__)
+
+
+class VideoReader:
+    """Frames of a video file by their number, exact whatever the distance of its key frames.
+
+    Frames are decoded one after the other. Going forward decodes what lies between, going back
+    begins anew: seeking in compressed video may end at another frame than the one asked for.
+
+    Parameters
+    ----------
+    path
+        Any file that OpenCV's video input reads.
+
+    Raises
+    ------
+    DatasetError
+        If there is no such file, or it is no video.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        if not self.path.is_file():
+            raise DatasetError(f"video {self.path} does not exist")
+        self._capture = self._open()
+        self._next = 0
+        #: Frames per second as the file tells; 0 if it does not.
+        self.fps = _rate(self._capture)
+
+    def scan(self) -> NDArray[np.float64]:
+        """Decode the file once and return the time of every frame in seconds, float64 (n,).
+
+        What files say about their number of frames is often wrong.
+
+        Raises
+        ------
+        DatasetError
+            If there are no frames.
+        """
+        self._rewind()
+        seconds = []
+        while self._capture.grab():
+            seconds.append(self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3)
+        self._rewind()
+        if not seconds:
+            raise DatasetError(f"video {self.path} has no frames that can be decoded")
+        return np.array(seconds, dtype=np.float64)
+
+    def read(self, index: int) -> NDArray[np.uint8]:
+        """Decode a frame.
+
+        Returns
+        -------
+        NDArray[np.uint8]
+            (h, w, 3) in the order BGR, or (h, w).
+
+        Raises
+        ------
+        ImageError
+            If it cannot be decoded.
+        """
+        if index < self._next:
+            self._rewind()
+        good = True
+        while good and self._next <= index:
+            good = bool(self._capture.grab())
+            self._next += 1
+        good, image = self._capture.retrieve() if good else (False, None)
+        if not good or image is None:
+            raise ImageError(f"frame {index} of video {self.path} cannot be decoded")
+        if image.dtype != np.uint8:
+            raise ImageError(f"video {self.path} has {image.dtype} pixels; 8 bits are needed")
+        return np.asarray(image, dtype=np.uint8)
+
+    def close(self) -> None:
+        """Give the file free."""
+        self._capture.release()
+
+    def _open(self) -> cv2.VideoCapture:
+        if self.path.suffix.lower() in IMAGE_SUFFIXES:
+            raise DatasetError(f"{self.path} is an image, no video; give the folder it is in")
+        with quiet_opencv():
+            capture = cv2.VideoCapture(str(self.path))
+        if not capture.isOpened():
+            raise DatasetError(
+                f"{self.path} is no video that can be read; convert it, for example to MP4 (H.264)"
+            )
+        return capture
+
+    def _rewind(self) -> None:
+        if self._next or self._capture.get(cv2.CAP_PROP_POS_FRAMES):
+            self._capture.release()
+            self._capture = self._open()
+        self._next = 0
+
+
+def _rate(capture: cv2.VideoCapture) -> float:
+    fps = float(capture.get(cv2.CAP_PROP_FPS))
+    return fps if math.isfinite(fps) and 0 < fps <= 1e5 else 0.0
+
+
+class VideoSequence(UnposedSource):
+    """The frames of a video file; see `datasets.base.Sequence`.
+
+    Parameters
+    ----------
+    path
+        The file.
+    sensor
+        Monocular.
+    settings
+        Settings, a file or a built-in name.
+    fps
+        Frames per second; by default the time stamps of the file count.
+    times
+        File with one time stamp per frame.
+
+    Raises
+    ------
+    DatasetError
+        If the file is no video or has no frames, or the time stamps do not fit.
+    SettingsError
+        If there are no settings, or they are wrong.
+    """
+
+    layout = "video"
+
+    def __init__(
+        self,
+        path: str | Path,
+        sensor: Sensor | None = None,
+        *,
+        settings: SettingsChoice = None,
+        fps: float | None = None,
+        times: str | Path | None = None,
+    ) -> None:
+        self._reader = VideoReader(path)
+        self.path = self._reader.path
+        super().__init__(self.path, self.path.stem, sensor, settings, fps)
+        own = self._reader.scan()
+        if fps is None and times is None:
+            self._stamps = self._own_stamps(own)
+        else:
+            self._stamps = chosen_stamps(len(own), fps, times, 0.0)
+
+    def __len__(self) -> int:
+        return len(self._stamps.texts)
+
+    @property
+    def timestamps(self) -> NDArray[np.float64]:
+        """Time of every frame in seconds, float64 (n,)."""
+        return self._stamps.seconds
+
+    def timestamp_text(self, index: int, /) -> str:
+        """Return the time of a frame in seconds."""
+        return self._stamps.texts[index]
+
+    def default_settings(self) -> Settings:
+        """Return the settings: a video has no others."""
+        return self.settings
+
+    def load(self, index: int, /) -> Images:
+        """Decode a frame; see `datasets.base.Sequence.load`. Fast only in order."""
+        return Images(self._ordered(self._reader.read(index)))
+
+    def _own_stamps(self, seconds: NDArray[np.float64]) -> Stamps:
+        if np.isfinite(seconds).all() and (np.diff(seconds) > 0).all():
+            return stamps_of_seconds(seconds)
+        if not self._reader.fps:
+            raise DatasetError(
+                f"video {self.path} tells neither time stamps nor a frame rate; give --fps"
+            )
+        _log.warning(
+            "the time stamps of %s do not grow; taking a constant %g frames per second",
+            *(self.path, self._reader.fps),
+        )
+        return stamps_of_rate(len(seconds), self._reader.fps)
