@@ -3,9 +3,11 @@
 
 Every function, method and property of the extension that orchestration uses is replaced by one that
 also notes its time; the rest of the track call is Python. Mapping runs inline (deterministic mode),
-so that no other thread's use of the interpreter is counted on either side. What the noting
-itself costs outside the noted time is measured with a function that does nothing and taken off;
-destructors of C++ objects count as Python.
+so that no other thread's use of the interpreter is counted on either side. The noting itself costs
+time outside the noted time as well: in every second frame each call is followed by a noted call
+that does nothing, and by how much that makes the frame's Python longer is taken off once.
+C++ objects are kept alive until the call is over, so that freeing their memory, which is no work of
+Python's, counts on neither side.
 
     python benchmarks/python_share.py FOLDER rgbd
 """
@@ -25,8 +27,6 @@ import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py.datasets import open_sequence
-from orbslam2py.records import TrackingRecord
-from orbslam2py.runner import RunOptions, SequenceRunner
 from orbslam2py.sensor import Sensor
 from orbslam2py.system import System
 
@@ -47,44 +47,41 @@ _CLASSES = (
 )
 
 
+def _nothing() -> None:
+    pass
+
+
 class CoreClock:
     """Seconds spent inside the extension."""
 
     def __init__(self) -> None:
         self.seconds = 0.0
         self.calls = 0
+        self.kept: list[object] = []
+        self.note_twice = False
+        self._note_nothing = self._noted(_nothing)
 
-    def timed(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        """The same function, noting its time."""
-
+    def _noted(self, function: Callable[..., Any]) -> Callable[..., Any]:
         def call(*arguments: Any, **options: Any) -> Any:
             begin = time.perf_counter()
-            try:
-                return function(*arguments, **options)
-            finally:
-                self.seconds += time.perf_counter() - begin
-                self.calls += 1
+            result = function(*arguments, **options)
+            self.seconds += time.perf_counter() - begin
+            self.calls += 1
+            self.kept.append((arguments, result))
+            return result
 
         return call
 
-    def cost_outside(self) -> float:
-        """Seconds a noted call costs outside the noted time."""
-        seconds, calls = self.seconds, self.calls
-        nothing = self.timed(abs)
-        n = 20_000
-        least = float("inf")
-        for _ in range(5):
-            self.seconds = 0.0
-            begin = time.perf_counter()
-            for _ in range(n):
-                nothing(0)
-            noted = time.perf_counter() - begin - self.seconds
-            begin = time.perf_counter()
-            for _ in range(n):
-                pass
-            least = min(least, noted - (time.perf_counter() - begin))
-        self.seconds, self.calls = seconds, calls
-        return least / n
+    def timed(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        """The same function, noting its time."""
+        noted = self._noted(function)
+
+        def call(*arguments: Any, **options: Any) -> Any:
+            if self.note_twice:
+                self._note_nothing()
+            return noted(*arguments, **options)
+
+        return call
 
     def install(self) -> None:
         """Replace the functions and methods of the extension, for the rest of the process."""
@@ -103,7 +100,7 @@ class CoreClock:
 
 @dataclass(frozen=True)
 class PythonShare:
-    """Medians over the frames of a sequence."""
+    """Medians over the frames of a sequence; means with the keyframes."""
 
     frames: int
     milliseconds: float
@@ -122,47 +119,31 @@ class PythonShare:
 def measure(folder: Path, sensor: Sensor, *, tracking_only: bool) -> PythonShare:
     """Track a sequence; with `tracking_only` leave out the frames that became keyframes."""
     sequence = open_sequence(folder, sensor)
+    # All images first: no decoding thread competes.
+    images = [sequence.load(i) for i in range(len(sequence))]
     clock = CoreClock()
     clock.install()
-    frames: list[tuple[float, float, int]] = []
-    name = "track_stereo" if sensor is Sensor.STEREO else "track_rgbd"
-    track = getattr(System, name)
-
-    def timed_track(*arguments: Any, **options: Any) -> TrackingRecord:
-        core_before, calls_before = clock.seconds, clock.calls
-        begin = time.perf_counter()
-        record: TrackingRecord = track(*arguments, **options)
-        elapsed = time.perf_counter() - begin
-        if not (tracking_only and record.is_keyframe):
-            between = elapsed - (clock.seconds - core_before)
-            frames.append((elapsed, between, clock.calls - calls_before))
-        return record
-
-    setattr(System, name, timed_track)
-    images = _Loaded(sequence)
-    SequenceRunner(images, sequence.settings, None, RunOptions(sensor, deterministic=True)).run()
-    elapsed, between, calls = (float(value) for value in np.median(frames, axis=0))
-    noting = clock.cost_outside() * calls
+    once: list[tuple[float, float, int]] = []
+    twice: list[tuple[float, float, int]] = []
+    with System(sequence.settings, sensor, deterministic=True) as system:
+        track = system.track_stereo if sensor is Sensor.STEREO else system.track_rgbd
+        for i, (image, timestamp) in enumerate(zip(images, sequence.timestamps, strict=True)):
+            second = image.right if sensor is Sensor.STEREO else image.depth
+            clock.seconds, clock.calls, clock.note_twice = 0.0, 0, bool(i % 2)
+            begin = time.perf_counter()
+            record = track(image.image, second, float(timestamp))
+            elapsed = time.perf_counter() - begin
+            clock.kept.clear()
+            if not (tracking_only and record.is_keyframe):
+                frames = twice if clock.note_twice else once
+                frames.append((elapsed, elapsed - clock.seconds, clock.calls))
+    # Mapping happens at keyframes only: medians would not see it.
+    average = np.median if tracking_only else np.mean
+    elapsed, between, calls = (float(value) for value in average(once, axis=0))
+    noting = max(0.0, float(np.median(twice, axis=0)[1] - np.median(once, axis=0)[1]))
     return PythonShare(
-        len(frames), 1e3 * (elapsed - noting), 1e3 * (between - noting), 1e3 * noting, calls
+        len(once), 1e3 * (elapsed - noting), 1e3 * (between - noting), 1e3 * noting, calls
     )
-
-
-class _Loaded:
-    """A sequence whose images are in memory, so that no decoding thread competes."""
-
-    def __init__(self, sequence: Any) -> None:
-        self._sequence = sequence
-        self._images = [sequence.load(i) for i in range(len(sequence))]
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._sequence, name)
-
-    def __len__(self) -> int:
-        return len(self._images)
-
-    def load(self, index: int, /) -> Any:
-        return self._images[index]
 
 
 def main() -> None:
