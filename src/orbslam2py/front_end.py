@@ -35,7 +35,29 @@ class FrontEnd:
         self._size: tuple[int, int] | None = None
         options = _orb_options(settings)
         self._extractor = core.OrbExtractor(options)
+        self._initial_extractor = core.OrbExtractor(_orb_options(settings, factor=2))
         self._pair_extractor = core.PairExtractor(options) if sensor is Sensor.STEREO else None
+
+    def monocular(
+        self,
+        image: npt.NDArray[np.uint8],
+        frame_id: int,
+        timestamp: float,
+        timer: StageTimer,
+        mask: Mask | None = None,
+        *,
+        initializing: bool = False,
+    ) -> core.Frame:
+        """Frame of a single camera; with twice as many features while the map begins."""
+        self._check(image, "image")
+        _check_mask(mask, image, "mask")
+        context = self._context_for(image)
+        with timer("extract"):
+            grey = core.to_grey(image, self._settings.camera.rgb)
+            extractor = self._initial_extractor if initializing else self._extractor
+            return core.build_monocular_frame(
+                context, frame_id, timestamp, extractor.extract(grey, mask)
+            )
 
     def stereo(
         self,
@@ -136,9 +158,9 @@ def _check_mask(mask: Mask | None, image: npt.NDArray[np.uint8], what: str) -> N
         )
 
 
-def _orb_options(settings: Settings) -> core.OrbOptions:
+def _orb_options(settings: Settings, factor: int = 1) -> core.OrbOptions:
     return core.OrbOptions(
-        n_features=settings.orb.n_features,
+        n_features=factor * settings.orb.n_features,
         scale_factor=settings.orb.scale_factor,
         n_levels=settings.orb.n_levels,
         initial_threshold=settings.orb.ini_th_fast,

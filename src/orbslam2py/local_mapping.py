@@ -25,6 +25,8 @@ class LocalMapping:
         The map.
     sensor : Sensor
         Decides thresholds.
+    index : orbslam2py._core.KeyFrameIndex
+        Forgets the keyframes that are culled.
     threaded : bool
         In a thread of its own, or inline at `insert_keyframe`.
     on_done : callable
@@ -35,11 +37,13 @@ class LocalMapping:
         self,
         world: core.Map,
         sensor: Sensor,
+        index: core.KeyFrameIndex,
         *,
         threaded: bool,
         on_done: Callable[[int], None],
     ) -> None:
         self._map = world
+        self._index = index
         self._monocular = sensor is Sensor.MONOCULAR
         self._on_done = on_done
         self._recent_points = core.RecentPoints()
@@ -90,4 +94,6 @@ class LocalMapping:
                     self._map, keyframe, self.worker.interrupt_flag, self._monocular
                 )
         with timer("mapping.cull_keyframes"):
-            core.cull_keyframes(self._map, keyframe, only_close=not self._monocular)
+            culled = core.cull_keyframes(self._map, keyframe, only_close=not self._monocular)
+            for dead in culled.tolist():
+                self._index.erase(dead)

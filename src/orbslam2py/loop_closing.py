@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Loop closing: takes every keyframe that local mapping has finished.
 
-The worker exists so that keyframes flow through all three stages; recognising places and
-correcting loops are not part of this version, and `n_loops` stays 0.
+It enters them into the index by which lost frames are found again. Correcting loops is not part of
+this version, and `n_loops` stays 0.
 """
 
 from __future__ import annotations
@@ -12,18 +12,21 @@ from orbslam2py.threads import Worker
 
 
 class LoopClosing:
-    """Third stage of the pipeline: receives finished keyframes in order.
+    """Third stage of the pipeline: indexes finished keyframes in order.
 
     Parameters
     ----------
     world : orbslam2py._core.Map
         The map.
+    index : orbslam2py._core.KeyFrameIndex
+        Which keyframes contain which words.
     threaded : bool
         In a thread of its own, or inline.
     """
 
-    def __init__(self, world: core.Map, *, threaded: bool) -> None:
+    def __init__(self, world: core.Map, index: core.KeyFrameIndex, *, threaded: bool) -> None:
         self._map = world
+        self._index = index
         #: Loops closed so far, over all maps.
         self.n_loops = 0
         #: The last keyframe that arrived, -1 before the first.
@@ -41,4 +44,5 @@ class LoopClosing:
 
     def process(self, keyframe: int) -> None:
         """Take note of one keyframe."""
+        core.index_keyframe(self._index, self._map, keyframe)
         self.last_keyframe = keyframe

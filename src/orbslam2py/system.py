@@ -19,12 +19,15 @@ from orbslam2py import _core as core
 from orbslam2py.builtin_settings import resolve_settings
 from orbslam2py.errors import ImageError, StateError, WorkerError
 from orbslam2py.front_end import FrontEnd, Mask, PairMask
+from orbslam2py.initialization import DepthInitializer
 from orbslam2py.local_mapping import LocalMapping
 from orbslam2py.loop_closing import LoopClosing
+from orbslam2py.monocular_initialization import MonocularInitializer
 from orbslam2py.records import FrameFeatures, TrackingRecord, TrackingState
+from orbslam2py.relocalization import Relocalizer
 from orbslam2py.sensor import Sensor
 from orbslam2py.settings import Settings
-from orbslam2py.threads import CallGuard, Worker
+from orbslam2py.threads import CallGuard, PauseTicket, Worker
 from orbslam2py.timing import StageStatistics, StageTimer
 from orbslam2py.tracking import Tracking, TrackingOutcome
 from orbslam2py.trajectory import Trajectory
@@ -53,7 +56,7 @@ class MapSnapshot:
 
 
 class System:
-    """Visual SLAM for a stereo pair or an RGB-D camera.
+    """Visual SLAM for one camera, a stereo pair or an RGB-D camera.
 
     Parameters
     ----------
@@ -61,7 +64,7 @@ class System:
         Calibration and extractor settings: an object, the name of a built-in (``"tum1"``,
         ``"kitti04-12"``, ``"euroc"``...), or a file in the ORB-SLAM YAML format.
     sensor : Sensor or str
-        ``"stereo"`` or ``"rgbd"`` (``"mono"`` is reserved).
+        ``"mono"``, ``"stereo"`` or ``"rgbd"``.
     vocabulary : Vocabulary or path, optional
         Visual words; the one shipped with the package if None.
     deterministic : bool
@@ -107,16 +110,26 @@ class System:
         self._map = core.Map()
         self._front_end = FrontEnd(settings, self.sensor)
         threaded = not deterministic
-        self._loop_closing = LoopClosing(self._map, threaded=threaded)
+        self._index = core.KeyFrameIndex()
+        self._loop_closing = LoopClosing(self._map, self._index, threaded=threaded)
         self._mapping = LocalMapping(
             self._map,
             self.sensor,
+            self._index,
             threaded=threaded,
             on_done=self._loop_closing.insert_keyframe,
         )
         self._tracking = Tracking(
-            self._map, vocabulary, self._mapping, self.sensor, settings.max_frames
+            self._map,
+            vocabulary,
+            self._mapping,
+            self.sensor,
+            settings.max_frames,
+            initializer=self._initializer(),
+            relocalizer=Relocalizer(self._map, self._index, seed) if hasattr(core, "PnpRansac") else None,
         )
+        self._mode_tickets: list[PauseTicket] = []
+        self._wanted_localization_mode = False
         self._recorder = core.TrajectoryRecorder()
         self._finished_trajectories: list[Trajectory] = []
         self._statistics = StageStatistics()
@@ -225,17 +238,48 @@ class System:
         mask: Mask | None = None,
         details: bool = False,
     ) -> TrackingRecord:
-        """Track one image of a single camera: not available in this version.
+        """Track one image of a single camera.
+
+        Parameters
+        ----------
+        image : array of uint8, (h, w) or (h, w, 3) or (h, w, 4)
+            Grey or colour (order by ``Camera.RGB`` of the settings).
+        timestamp : float
+            Seconds; must grow from call to call.
+        mask : array of uint8 (h, w), optional
+            No keypoint lies where it is 0.
+        details : bool
+            Also return the frame's keypoints and matches.
+
+        Returns
+        -------
+        TrackingRecord
+            State and, if it is OK, the pose of the camera. The unit of length is the median depth
+            of the first view; until the map begins, `TrackingRecord.reason` tells what it waits
+            for.
 
         Raises
         ------
-        StateError
-            Always.
+        StateError, ImageError, WorkerError
+            As for `track_stereo`.
         """
-        raise StateError(
-            "tracking with a single camera is not available in this version; "
-            "use a stereo or an RGB-D sensor"
+        self._require(Sensor.MONOCULAR, "track_monocular")
+        initializing = self._tracking.state in (
+            TrackingState.NO_IMAGES_YET,
+            TrackingState.NOT_INITIALIZED,
         )
+        return self._track(
+            timestamp,
+            details,
+            lambda i, timer: self._front_end.monocular(
+                image, i, timestamp, timer, mask, initializing=initializing
+            ),
+        )
+
+    def _initializer(self) -> DepthInitializer | MonocularInitializer:
+        if self.sensor is Sensor.MONOCULAR:
+            return MonocularInitializer(self._map, self.vocabulary, self._mapping, self.seed)
+        return DepthInitializer(self._map, self.vocabulary, self._mapping)
 
     def _require(self, sensor: Sensor, call: str) -> None:
         if self.sensor is not sensor:
@@ -258,6 +302,7 @@ class System:
             self._check_timestamp(timestamp)
             if self._reset_requested.is_set():
                 self._reset_now()
+            self._switch_mode()
             timer = StageTimer()
             if self._wait_for_mapping:
                 with timer("wait"):
@@ -311,6 +356,36 @@ class System:
         )
 
     # ---- control ---------------------------------------------------------------------------------
+    @property
+    def localization_mode(self) -> bool:
+        """Pose only, in the map as it is: no keyframes, no new points, mapping paused.
+
+        Assign to switch; carried out at the beginning of the next track call, and the last
+        assignment before it counts. Leaving the map, the camera is followed by the depths of the
+        frame before (stereo, RGB-D) until a mapped place comes into view again. Keyframes that wait
+        for mapping are processed when it goes on.
+        """
+        return self._wanted_localization_mode
+
+    @localization_mode.setter
+    def localization_mode(self, wanted: bool) -> None:
+        self._wanted_localization_mode = bool(wanted)
+
+    def _switch_mode(self) -> None:
+        wanted = self._wanted_localization_mode
+        if wanted == self._tracking.localization_only:
+            return
+        if wanted:
+            self._mode_tickets = [worker.pause() for worker in self._workers]
+            for ticket in self._mode_tickets:
+                ticket.wait()
+        else:
+            for ticket in self._mode_tickets:
+                ticket.release()
+            self._mode_tickets = []
+        self._tracking.localization_only = wanted
+        _log.info("localization mode %s", "on" if wanted else "off")
+
     def reset(self) -> None:
         """Ask for a new map; carried out at the beginning of the next track call.
 
@@ -326,6 +401,7 @@ class System:
         self._finished_trajectories.append(self._current_trajectory())
         self._mapping.reset()
         self._loop_closing.reset()
+        self._index.clear()
         self._map.clear()
         self._recorder.clear()
         self._tracking.reset()

@@ -8,6 +8,7 @@ section V; Mur-Artal and Tardos, "ORB-SLAM2", 2017, section III.
 from __future__ import annotations
 
 import logging
+
 import numpy as np
 import numpy.typing as npt
 

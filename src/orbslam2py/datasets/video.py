@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
@@ -66,7 +67,7 @@ class VideoReader:
             seconds.append(self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3)
         self._rewind()
         if not seconds:
-            raise DatasetError(f"video {self.path} has no frames that can be decoded")
+            raise self._no_frames()
         return np.array(seconds, dtype=np.float64)
 
     def read(self, index: int) -> NDArray[np.uint8]:
@@ -95,9 +96,33 @@ class VideoReader:
             raise ImageError(f"video {self.path} has {image.dtype} pixels; 8 bits are needed")
         return np.asarray(image, dtype=np.uint8)
 
+    def frames(self, step: int = 1) -> Iterator[NDArray[np.uint8] | ImageError]:
+        """Yield every so many frames from the beginning; an error in the place of a bad one.
+
+        Raises
+        ------
+        DatasetError
+            If there are no frames.
+        """
+        self._rewind()
+        while self._capture.grab():
+            self._next += 1
+            if (self._next - 1) % step:
+                continue
+            good, image = self._capture.retrieve()
+            if good and image is not None:
+                yield np.asarray(image, dtype=np.uint8)
+            else:
+                yield ImageError(f"frame {self._next - 1} of {self.path} cannot be decoded")
+        if not self._next:
+            raise self._no_frames()
+
     def close(self) -> None:
         """Give the file free."""
         self._capture.release()
+
+    def _no_frames(self) -> DatasetError:
+        return DatasetError(f"video {self.path} has no frames that can be decoded")
 
     def _open(self) -> cv2.VideoCapture:
         if self.path.suffix.lower() in IMAGE_SUFFIXES:
