@@ -141,6 +141,10 @@ def main() -> None:
         if part in chosen:
             for table in tables():
                 console.print(table)
+    console.print(
+        "Not here, because they take minutes: benchmarks/memory.py (memory over 100 000 frames), "
+        "benchmarks/accuracy.py (errors of all sequences), benchmarks/place_recognition.py"
+    )
 
 
 if __name__ == "__main__":

@@ -87,11 +87,11 @@ def _add_offline(
 ) -> None:
     reports: list[dict[str, Any]] = []
 
-    def work() -> list[float]:
-        reports[:] = [runs.run(folder, figure.sensor) for _ in range(n_runs)]
-        return [1e3 / report["slam_frames_per_second"] for report in reports]
+    def work() -> float:
+        reports.append(runs.run(folder, figure.sensor))
+        return 1e3 / float(reports[-1]["slam_frames_per_second"])
 
-    measured = yardstick.around(work)
+    measured = yardstick.around([work] * n_runs)
     here = Times.of([report["slam_frames_per_second"] for report in reports])
     there = 1e3 / measured.carried
     ratio = there / figure.frames_per_second
@@ -134,13 +134,13 @@ def program_rows(yardstick: Yardstick, build: Path) -> Iterator[Row]:
     command = [str(program), "--benchmark_format=json", "--benchmark_filter=fuse"]
     found: dict[str, float] = {}
 
-    def work() -> list[float]:
+    def work() -> float:
         done = subprocess.run(command, capture_output=True, text=True, check=True)
         for one in json.loads(done.stdout)["benchmarks"]:
             found[one["name"].split("/")[1]] = one["median_ms"]
-        return [1.0]
+        return max(found.values())
 
-    unit = yardstick.around(work)
+    unit = yardstick.around([work])
     for name, value in found.items():
         measured = replace(unit, ours=Times(value, value))
         yield Row(f"fuse, dense made-up map ({name})", reference.FUSE, measured)
@@ -149,12 +149,12 @@ def program_rows(yardstick: Yardstick, build: Path) -> Iterator[Row]:
 def _add_fusing(table: Table, yardstick: Yardstick, figure: SequenceFigure, folder: Path) -> None:
     stages: dict[str, float] = {}
 
-    def work() -> list[float]:
+    def work() -> float:
         report = runs.run(folder, figure.sensor, "--deterministic")
         stages.update(report["milliseconds"]["mapping.fuse"])
-        return [stages["median"]]
+        return stages["median"]
 
-    measured = yardstick.around(work)
+    measured = yardstick.around([work])
     limit = reference.FUSE.limit or 0
     table.add_row(
         figure.name,

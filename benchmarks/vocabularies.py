@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How long vocabularies take to be ready, and with how much memory: in processes of their own.
 
-    python benchmarks/vocabularies.py FILE [--cache]
+    python benchmarks/vocabularies.py FILE
 
 opens FILE once and prints milliseconds and megabytes as JSON.
 """
@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import subprocess
 import sys
 import time
@@ -68,31 +67,31 @@ class VocabularyFiles:
         return files
 
 
-def open_in_new_process(path: Path, *, cache: bool = False) -> dict[str, float]:
+def open_in_new_process(path: Path) -> dict[str, float]:
     """Milliseconds until the first image can be described, and the process's memory [MB]."""
-    command = [sys.executable, __file__, str(path), *(["--cache"] if cache else [])]
-    environment = {**os.environ, "XDG_CACHE_HOME": str(path.parent / "cache")}
-    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
+    command = [sys.executable, __file__, str(path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
     return json.loads(done.stdout)
 
 
 def vocabulary_rows(yardstick: Yardstick, files: VocabularyFiles) -> Iterator[Row]:
-    peaks: list[dict[str, float]] = []
+    opened: list[dict[str, float]] = []
 
-    def repeat(path: Path, times: int, *, cache: bool = False) -> Callable[[], list[float]]:
-        def work() -> list[float]:
-            peaks[:] = [open_in_new_process(path, cache=cache) for _ in range(times)]
-            return [peak["ms"] for peak in peaks]
+    def open_once(path: Path) -> Callable[[], float]:
+        def work() -> float:
+            opened.append(open_in_new_process(path))
+            return opened[-1]["ms"]
 
         return work
 
-    binary = yardstick.around(repeat(files.binary, 7))
+    binary = yardstick.around([open_once(files.binary)] * 7)
     note = "open and describe the first 1000 features, file in the page cache"
     yield Row(reference.VOCABULARY_BINARY.name, reference.VOCABULARY_BINARY, binary, note)
 
-    text = yardstick.around(repeat(files.text, 3))
-    peak = max(p["peak_mb"] for p in peaks)
-    before = max(p["before_mb"] for p in peaks)
+    opened.clear()
+    text = yardstick.around([open_once(files.text)] * 3)
+    peak = max(one["peak_mb"] for one in opened)
+    before = max(one["before_mb"] for one in opened)
     theirs, limit = reference.VOCABULARY_TEXT_PEAK_MB
     met = "met" if peak <= limit else "NOT met"
     size = files.text.stat().st_size / 1e6
@@ -114,12 +113,11 @@ def peak_mb() -> float:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("file", type=Path)
-    parser.add_argument("--cache", action="store_true", help="keep and use a binary copy")
     arguments = parser.parse_args()
     before = peak_mb()
     descriptors = np.random.default_rng(1).integers(0, 256, (1000, 32), dtype=np.uint8)
     begin = time.perf_counter()
-    vocabulary = load_vocabulary(arguments.file, cache=arguments.cache)
+    vocabulary = load_vocabulary(arguments.file, cache=False)
     vocabulary.transform(descriptors)
     elapsed = 1e3 * (time.perf_counter() - begin)
     print(json.dumps({"ms": elapsed, "before_mb": before, "peak_mb": peak_mb()}))

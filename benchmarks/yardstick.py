@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -107,12 +107,15 @@ class Yardstick:
         return Measurement(Times.of(ours), Times.of(units), YARDSTICK[name][1])
 
     def around(
-        self, work: Callable[[], list[float]], name: str = "tum_a", repeat: int = 15
+        self, works: Sequence[Callable[[], float]], name: str = "tum_a", repeat: int = 7
     ) -> Measurement:
-        """Measure the yardstick before and after something long that reports its own times."""
-        units = [milliseconds_of(lambda: self.run(name)) for _ in range(repeat)]
-        ours = work()
-        units += [milliseconds_of(lambda: self.run(name)) for _ in range(repeat)]
+        """Measure the yardstick before, between and after long works that report their own times."""
+        units, ours = [], []
+        for work in (*works, None):
+            self.run(name)
+            units += [milliseconds_of(lambda: self.run(name)) for _ in range(repeat)]
+            if work is not None:
+                ours.append(work())
         return Measurement(Times.of(ours), Times.of(units), YARDSTICK[name][1])
 
 
