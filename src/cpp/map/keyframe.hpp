@@ -31,7 +31,8 @@ struct KeyFrame {
   std::set<KeyFrameId> children;
   std::set<KeyFrameId> loop_edges;
 
-  bool published = false;  ///< processed by local mapping, part of the map's keyframe set
+  bool published = false;  ///< part of the map's keyframe set
+  bool processed = false;  ///< local mapping has taken it in (process_new_keyframe)
   int leases = 0;          ///< while > 0 a death is deferred (loop closing works on it)
   bool to_be_erased = false;
 

@@ -2,39 +2,26 @@
 #include "map/keyframe_insertion.hpp"
 
 #include <algorithm>
-#include <utility>
+#include <string>
 
 #include "base/errors.hpp"
+#include "frame/nearest_keypoints.hpp"
 
 namespace orbslam {
 namespace {
 
-/// Keypoints with depth, nearest first, ties by index.
-std::vector<std::pair<float, std::uint32_t>> by_depth(const Frame& frame) {
-  std::vector<std::pair<float, std::uint32_t>> sorted;
-  sorted.reserve(frame.size());
-  for (std::size_t i = 0; i < frame.size(); ++i) {
-    if (frame.has_depth(i)) sorted.emplace_back(frame.depth[i], static_cast<std::uint32_t>(i));
-  }
-  std::sort(sorted.begin(), sorted.end());
-  return sorted;
-}
-
 void create_depth_points(Map& map, KeyFrameId id, TrackedFrame& tracked, std::size_t n_minimum) {
   const Frame& frame = *tracked.frame;
   const Pose T_wc = tracked.T_cw->inverse();
-  const double close_depth = frame.camera->close_depth();
-  std::size_t n_visited = 0;
-  for (const auto& [depth, i] : by_depth(frame)) {
-    if (!tracked.map_points[i].valid()) {
-      const Eigen::Vector3d position = T_wc * frame.unproject(i);
-      const MapPointId point = map.add_point(position, id, frame.id);
-      map.add_observation(point, id, i);
-      map.update_point(point);
-      tracked.associate(i, point, position);
-    }
-    // Tested after the point was made: one far point beyond the minimum (spec 08, defect 13).
-    if (++n_visited > n_minimum && depth > close_depth) break;
+  std::vector<std::uint32_t> nearest;
+  nearest_keypoints(frame, n_minimum, nearest);
+  for (const std::uint32_t i : nearest) {
+    if (tracked.map_points[i].valid()) continue;
+    const Eigen::Vector3d position = T_wc * frame.unproject(i);
+    const MapPointId point = map.add_point(position, id, frame.id);
+    map.add_observation(point, id, i);
+    map.update_point(point);
+    tracked.associate(i, point, position);
   }
 }
 
@@ -85,7 +72,7 @@ KeyFrameId insert_keyframe(Map& map, TrackedFrame& frame, bool create_points,
 void process_new_keyframe(Map& map, KeyFrameId id, std::vector<MapPointId>& recent) {
   const auto lock = map.write_lock();
   const KeyFrame* keyframe = map.find(id);
-  if (!keyframe || keyframe->published) {
+  if (!keyframe || keyframe->processed) {
     throw StateError("keyframe " + std::to_string(id.value) +
                      " is dead or was processed before; process each new keyframe once");
   }
@@ -94,6 +81,7 @@ void process_new_keyframe(Map& map, KeyFrameId id, std::vector<MapPointId>& rece
   }
   map.update_connections(id);
   map.publish(id);
+  map.mark_processed(id);
 }
 
 int count_tracked_points(const Map& map, KeyFrameId id, int min_observations) {

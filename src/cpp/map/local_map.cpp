@@ -14,7 +14,7 @@ constexpr std::size_t kTriedNeighbours = 10;
 void refresh_locked(const Map& map, TrackedFrame& frame) {
   for (std::size_t i = 0; i < frame.map_points.size(); ++i) {
     const MapPointId id = frame.map_points[i];
-    if (!id.valid()) continue;
+    if (!id.valid() || is_temporary(id)) continue;
     const MapPoint* point = map.find(id);
     if (!point) {
       const MapPointId successor = map.resolve(id);

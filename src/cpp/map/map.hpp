@@ -69,6 +69,8 @@ class Map {
   /// Makes the keyframe part of the keyframe set (idempotent). A keyframe that has no parent yet
   /// hangs provisionally under the published keyframe before it, so that the tree spans all.
   void publish(KeyFrameId id);
+  /// Notes that process_new_keyframe() is through with the keyframe.
+  void mark_processed(KeyFrameId id) { keyframe(id).processed = true; }
   /// Only for a keyframe not yet published: notes a match (or its absence, with an invalid id)
   /// whose observation process_new_keyframe() adds later. The slot must not hold an observation.
   void set_slot(KeyFrameId id, std::size_t index, MapPointId point);

@@ -11,12 +11,6 @@ namespace orbslam {
 inline constexpr int kDescriptorHigh = 100;  ///< most differing bits when geometry guides
 inline constexpr int kDescriptorLow = 50;    ///< most differing bits otherwise
 
-/// Ids from here on belong to temporary points: made of the last frame's depths in localization
-/// mode, not part of the map, without observations. A keypoint that holds one can still be taken
-/// by another point.
-inline constexpr MapPointId kFirstTemporaryPoint{std::int64_t{1} << 62};
-inline bool is_temporary(MapPointId id) { return id >= kFirstTemporaryPoint; }
-
 /// Spec 06, 2.4. `current` has a predicted pose; matches of the last frame's points are written
 /// into its associations. Window: `radius` level-0 pixels times the keypoint's scale.
 /// `use_depth`: the sensor sees depth, so moving forwards or backwards restricts the levels.

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "geometry/triangulation.hpp"
+#include "map/scene_depth.hpp"
 #include "matching/by_projection.hpp"
 #include "matching/common_nodes.hpp"
 #include "matching/pair_triangulation.hpp"
@@ -112,26 +113,12 @@ FeaturePairs find_pairs(const FreeFeatures& a, FreeFeatures& b) {
   return pairs;
 }
 
-// Lower median of the depths of a keyframe's points; nothing when it has none.
-std::optional<double> median_depth(const Map& map, const KeyFrame& keyframe) {
-  std::vector<double> depths;
-  for (const MapPointId id : keyframe.map_points) {
-    if (const MapPoint* point = map.find(id)) {
-      depths.push_back((keyframe.T_cw * point->position).z());
-    }
-  }
-  if (depths.empty()) return std::nullopt;
-  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>((depths.size() - 1) / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
-  return *middle;
-}
-
 // Whether the cameras are far enough apart for new points to have a reliable depth.
 bool wide_enough(const Map& map, const KeyFrame& current, const KeyFrame& neighbour,
                  bool monocular) {
   const double distance = (neighbour.center() - current.center()).norm();
   if (!monocular) return distance >= neighbour.frame->camera->baseline();
-  const std::optional<double> depth = median_depth(map, neighbour);
+  const std::optional<double> depth = median_scene_depth(map, neighbour);
   return depth && distance / *depth >= kLeastBaselinePerDepth;
 }
 

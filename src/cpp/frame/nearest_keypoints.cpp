@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "frame/nearest_keypoints.hpp"
+
+#include <algorithm>
+
+namespace orbslam {
+
+void nearest_keypoints(const Frame& frame, std::size_t n_minimum,
+                       std::vector<std::uint32_t>& indices) {
+  indices.clear();
+  for (std::size_t i = 0; i < frame.size(); ++i) {
+    if (frame.has_depth(i)) indices.push_back(static_cast<std::uint32_t>(i));
+  }
+  std::sort(indices.begin(), indices.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return frame.depth[a] != frame.depth[b] ? frame.depth[a] < frame.depth[b] : a < b;
+  });
+  const double close_depth = frame.camera->close_depth();
+  // The first far one beyond the minimum is still taken (spec 08, defect 13).
+  for (std::size_t n = n_minimum; n < indices.size(); ++n) {
+    if (frame.depth[indices[n]] > close_depth) {
+      indices.resize(n + 1);
+      return;
+    }
+  }
+}
+
+}  // namespace orbslam

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "frame/frame.hpp"
+
+namespace orbslam {
+
+/// The keypoints whose depths are worth a 3-D point, nearest first, ties by index: all close ones
+/// and, up to `n_minimum`, far ones; then one far one more if there is any (spec 08, 4.2 and
+/// section 10). Replaces the content of `indices`, whose memory is reused.
+void nearest_keypoints(const Frame& frame, std::size_t n_minimum,
+                       std::vector<std::uint32_t>& indices);
+
+}  // namespace orbslam

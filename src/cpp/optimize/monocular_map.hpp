@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <limits>
+#include <vector>
+
+#include "frame/frame.hpp"
+#include "map/map.hpp"
+#include "optimize/bundle_adjustment.hpp"
+
+namespace orbslam {
+
+enum class MonocularMapFailure {
+  kNone,
+  kFewPoints,   ///< fewer than `min_points` points in the second keyframe
+  kBadDepth,    ///< the median depth is not a positive number
+  kMapCleared,  ///< somebody cleared the map meanwhile
+};
+
+struct MonocularMap {
+  bool ok = false;
+  MonocularMapFailure failure = MonocularMapFailure::kNone;
+  KeyFrameId first, second;  ///< keyframe 0 and 1
+  int n_points = 0;          ///< points of the second keyframe
+  /// Median depth in the first keyframe before it was scaled to 1, in units of |t_21|; NaN without
+  /// points.
+  double median_depth = std::numeric_limits<double>::quiet_NaN();
+  BundleSummary summary;  ///< of the bundle adjustment
+};
+
+/// Spec 07, B.8: makes the first map of a single camera from two frames whose relative pose is
+/// known up to scale. Keyframe 0 (the world's frame) and 1 are made, the matched points are added
+/// with both observations, everything is refined by full bundle adjustment (20 iterations, robust),
+/// and the map is scaled so that the median depth in keyframe 0 is 1. Both keyframes are connected
+/// and published at the end, in one section with the scaling: nobody sees the map before. Local
+/// mapping takes them both, in order, afterwards; the points then enter its list of recent points
+/// with the second.
+///
+/// `matches`: per keypoint of `initial` its partner in `current` or -1. `points`: per keypoint of
+/// `initial` its position in the frame of the initial camera, read where matched; matches whose
+/// point is not finite are left out. `T_21` maps the initial camera's frame to the current one's.
+///
+/// On success both frames have the final pose, associations with all points and their keyframe as
+/// reference. On failure they are unchanged, and the keyframes and points made stay in the map,
+/// unpublished: the caller must clear it. Throws StateError when the map is not empty, a frame is
+/// not described, or the lists do not fit the frames (sizes, indices, one-to-one).
+MonocularMap create_monocular_map(Map& map, TrackedFrame& initial, TrackedFrame& current,
+                                  const Pose& T_21, const std::vector<int>& matches,
+                                  const std::vector<Eigen::Vector3d>& points,
+                                  std::size_t min_points = 100);
+
+}  // namespace orbslam
