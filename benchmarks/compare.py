@@ -60,13 +60,20 @@ def steps_table(title: str, rows: list[Row]) -> object:
             f"{theirs / unit:.3g}" if theirs else "",
             f"{m.carried / theirs:.2f}" if theirs else "",
             f"{target:.3g}" if target else "",
-            verdict(m.carried <= target) if target else "",
+            _verdict(row),
         )
         if row.note:
             notes.append(f"{row.name}: {row.note}")
     table.caption = "\n".join(notes)
     table.caption_justify = "left"
     return table
+
+
+def _verdict(row: Row) -> str:
+    target = row.figure.target
+    if target is None:
+        return ""
+    return "stand-in" if row.stand_in else verdict(row.measured.carried <= target)
 
 
 def machine(console: Console, yardstick: Yardstick) -> None:

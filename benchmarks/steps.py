@@ -30,6 +30,8 @@ class Row:
     figure: Figure
     measured: Measurement
     note: str = ""
+    stand_in: bool = False
+    """Measured on other images than the reference's figure: no verdict."""
 
 
 @cache
@@ -54,7 +56,13 @@ def extraction_rows(yardstick: Yardstick) -> Iterator[Row]:
             stretch = reference.EXTRACTION_STRETCH * (figure.milliseconds or 0)
             reached = "stretch goal reached" if measured.carried <= stretch else ""
             if kernels == "automatic":
-                yield Row(f"{figure.name} ({extractor.kernel_name})", figure, measured, reached)
+                yield Row(
+                    f"{figure.name} ({extractor.kernel_name})",
+                    figure,
+                    measured,
+                    reached,
+                    not yardstick.exact,
+                )
             elif extractor.kernel_name != core.OrbExtractor(options).kernel_name:
                 untargeted = Figure(figure.name, figure.milliseconds, yardstick=image)
                 yield Row(f"{figure.name} (portable)", untargeted, measured)
@@ -85,7 +93,7 @@ def stereo_rows(yardstick: Yardstick) -> Iterator[Row]:
         )
         matched = int(np.count_nonzero(core.match_stereo(first, second, scales, bf, fx)[1] > 0))
         note = note or f"{len(first)} keypoints, {matched} with depth"
-        yield Row(figure.name, figure, measured, note)
+        yield Row(figure.name, figure, measured, note, not yardstick.exact)
 
 
 # ---- optimisation --------------------------------------------------------------------------------

@@ -109,7 +109,7 @@ class Yardstick:
     def around(
         self, works: Sequence[Callable[[], float]], name: str = "tum_a", repeat: int = 7
     ) -> Measurement:
-        """Measure the yardstick before, between and after long works that report their own times."""
+        """Measure the yardstick before, between and after works that report their own times."""
         units, ours = [], []
         for work in (*works, None):
             self.run(name)
