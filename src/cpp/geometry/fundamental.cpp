@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "geometry/fundamental.hpp"
+
+#include <Eigen/QR>
+#include <Eigen/SVD>
+
+#include "geometry/model_scoring.hpp"
+
+namespace orbslam {
+namespace {
+
+// Limit: chi-square, 1 degree of freedom, 95 %; credit: that of a homography's directions.
+constexpr ErrorGate epipolar_gate{3.841, 5.991};
+
+/// Squared distances of the points (target_u, target_v) from the lines F (u, v).
+void line_errors(const Eigen::Matrix3d& F, const Eigen::ArrayXd& u, const Eigen::ArrayXd& v,
+                 const Eigen::ArrayXd& target_u, const Eigen::ArrayXd& target_v,
+                 Eigen::ArrayXd& errors) {
+  errors.resize(u.size());
+  for (Eigen::Index i = 0; i < u.size(); ++i) {
+    const double a = F(0, 0) * u[i] + F(0, 1) * v[i] + F(0, 2);
+    const double b = F(1, 0) * u[i] + F(1, 1) * v[i] + F(1, 2);
+    const double c = F(2, 0) * u[i] + F(2, 1) * v[i] + F(2, 2);
+    const double residual = a * target_u[i] + b * target_v[i] + c;
+    errors[i] = residual * residual / (a * a + b * b);
+  }
+}
+
+Eigen::Matrix3d nearest_of_rank_2(const Eigen::Matrix3d& matrix) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Vector3d& d = svd.singularValues();
+  return svd.matrixU() * Eigen::Vector3d(d[0], d[1], 0).asDiagonal() * svd.matrixV().transpose();
+}
+
+}  // namespace
+
+Eigen::Matrix3d fit_fundamental(const PointPairs& pairs, const EightPairs& sample,
+                                const Normalization& normalization_1,
+                                const Normalization& normalization_2) {
+  using Column = Eigen::Matrix<double, 9, 1>;
+  Eigen::Matrix<double, 9, 8> A;  // transposed: an equation per column
+  for (std::size_t k = 0; k < sample.size(); ++k) {
+    const Eigen::Index i = sample[k];
+    const double u_1 = normalization_1.u(pairs.u_1[i]), v_1 = normalization_1.v(pairs.v_1[i]);
+    const double u_2 = normalization_2.u(pairs.u_2[i]), v_2 = normalization_2.v(pairs.v_2[i]);
+    A.col(static_cast<Eigen::Index>(k)) =
+        (Column() << u_2 * u_1, u_2 * v_1, u_2, v_2 * u_1, v_2 * v_1, v_2, u_1, v_1, 1).finished();
+  }
+  // Eight equations leave one direction of R^9: the last column of Q is orthogonal to all.
+  const Eigen::HouseholderQR<Eigen::Matrix<double, 9, 8>> qr(A);
+  const Column f = qr.householderQ() * Column::Unit(8);
+  const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> F_normalized(f.data());
+  return normalization_2.matrix().transpose() * nearest_of_rank_2(F_normalized) *
+         normalization_1.matrix();
+}
+
+ScoredModel best_fundamental(const PointPairs& pairs, const std::vector<EightPairs>& samples,
+                             const Normalization& normalization_1,
+                             const Normalization& normalization_2, double sigma) {
+  const auto fit = [&](const EightPairs& sample) {
+    return fit_fundamental(pairs, sample, normalization_1, normalization_2);
+  };
+  const auto measure = [&](const Eigen::Matrix3d& F_21, PairErrors& errors) {
+    line_errors(F_21.transpose(), pairs.u_2, pairs.v_2, pairs.u_1, pairs.v_1, errors.in_1);
+    line_errors(F_21, pairs.u_1, pairs.v_1, pairs.u_2, pairs.v_2, errors.in_2);
+  };
+  return best_model(samples, sigma, epipolar_gate, fit, measure);
+}
+
+}  // namespace orbslam

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "geometry/motion_check.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+namespace orbslam {
+namespace {
+
+constexpr double min_parallax_cosine = 0.99998;
+constexpr double degrees_per_radian = 57.29577951308232;
+constexpr std::size_t parallax_rank = 50;
+
+/// Two cameras with the same intrinsics; camera 1 is the world.
+struct CameraPair {
+  CameraPair(const Motion& motion, const Pinhole& camera)
+      : pinhole(camera), R(motion.R), t(motion.t) {
+    P.leftCols<3>() = R;
+    P.col(3) = t;
+    center_2 = -R.transpose() * t;
+  }
+
+  /// Linear triangulation of pixels, weighted by the focal lengths as if in pixel units.
+  Eigen::Vector3d triangulate(double u_1, double v_1, double u_2, double v_2) const {
+    const double fx = pinhole.fx, fy = pinhole.fy;
+    Eigen::Matrix4d A;
+    A.row(0) << -fx, 0, u_1 - pinhole.cx, 0;
+    A.row(1) << 0, -fy, v_1 - pinhole.cy, 0;
+    A.row(2) = (u_2 - pinhole.cx) * P.row(2) - fx * P.row(0);
+    A.row(3) = (v_2 - pinhole.cy) * P.row(2) - fy * P.row(1);
+    const Eigen::Matrix4d normal = A.transpose() * A;
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(normal);
+    const Eigen::Vector4d point = solver.eigenvectors().col(0);
+    return point.head<3>() / point.w();
+  }
+
+  double squared_error(const Eigen::Vector3d& p_c, double u, double v) const {
+    return (pinhole.project(p_c) - Eigen::Vector2d(u, v)).squaredNorm();
+  }
+
+  Pinhole pinhole;
+  Eigen::Matrix3d R;
+  Eigen::Vector3d t, center_2;
+  Eigen::Matrix<double, 3, 4> P;  // of camera 2, normalised
+};
+
+struct Judgement {
+  bool good = false;
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();
+  double parallax_cosine = 0;
+};
+
+Judgement judge(const CameraPair& cameras, double u_1, double v_1, double u_2, double v_2,
+                double max_squared_error) {
+  Judgement judgement;
+  const Eigen::Vector3d p_1 = cameras.triangulate(u_1, v_1, u_2, v_2);
+  if (!p_1.allFinite()) return judgement;
+  const Eigen::Vector3d ray_2 = p_1 - cameras.center_2;
+  const double cosine = p_1.dot(ray_2) / (p_1.norm() * ray_2.norm());
+  const bool far = !(cosine < min_parallax_cosine);
+  const Eigen::Vector3d p_2 = cameras.R * p_1 + cameras.t;
+  if ((p_1.z() <= 0 || p_2.z() <= 0) && !far) return judgement;
+  const bool fits = cameras.squared_error(p_1, u_1, v_1) <= max_squared_error &&
+                    cameras.squared_error(p_2, u_2, v_2) <= max_squared_error;
+  if (!fits || !std::isfinite(cosine)) return judgement;
+  judgement.good = true;
+  judgement.point = p_1;
+  judgement.parallax_cosine = cosine;
+  return judgement;
+}
+
+double parallax_of(std::vector<double>& cosines) {
+  if (cosines.empty()) return 0;
+  const auto at =
+      cosines.begin() + static_cast<std::ptrdiff_t>(std::min(parallax_rank, cosines.size() - 1));
+  std::nth_element(cosines.begin(), at, cosines.end());
+  return std::acos(std::clamp(*at, -1.0, 1.0)) * degrees_per_radian;
+}
+
+}  // namespace
+
+MotionSupport check_motion(const Motion& motion, const PointPairs& pairs,
+                           const std::vector<std::uint8_t>& inliers, const Pinhole& pinhole,
+                           double max_squared_error) {
+  const CameraPair cameras(motion, pinhole);
+  MotionSupport support;
+  support.points.assign(pairs.size(), Eigen::Vector3d::Zero());
+  support.good.assign(pairs.size(), 0);
+  support.triangulated.assign(pairs.size(), 0);
+  std::vector<double> cosines;
+  cosines.reserve(pairs.size());
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (!inliers[i]) continue;
+    const auto k = static_cast<Eigen::Index>(i);
+    const Judgement judgement =
+        judge(cameras, pairs.u_1[k], pairs.v_1[k], pairs.u_2[k], pairs.v_2[k], max_squared_error);
+    if (!judgement.good) continue;
+    support.points[i] = judgement.point;
+    support.good[i] = 1;
+    support.triangulated[i] = judgement.parallax_cosine < min_parallax_cosine ? 1 : 0;
+    cosines.push_back(judgement.parallax_cosine);
+  }
+  support.n_good = cosines.size();
+  support.parallax = parallax_of(cosines);
+  return support;
+}
+
+}  // namespace orbslam

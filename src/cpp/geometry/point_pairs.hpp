@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <vector>
+
+namespace orbslam {
+
+/// Matched pixels of two views, undistorted, one pair per index.
+struct PointPairs {
+  Eigen::ArrayXd u_1, v_1, u_2, v_2;
+
+  std::size_t size() const { return static_cast<std::size_t>(u_1.size()); }
+  void resize(std::size_t count);
+};
+
+/// The pairs of all initial points i with matches[i] >= 0, ascending by i.
+/// Throws std::invalid_argument when a match is out of range or the lengths differ.
+PointPairs gather_pairs(const std::vector<Eigen::Vector2f>& initial,
+                        const std::vector<Eigen::Vector2f>& current,
+                        const std::vector<int>& matches);
+
+/// Indices of the pairs from which one model is estimated.
+using EightPairs = std::array<int, 8>;
+
+/// Scaling and shift of pixels to mean 0 and mean absolute deviation 1 in each direction.
+struct Normalization {
+  double scale_u = 1, scale_v = 1, shift_u = 0, shift_v = 0;
+
+  double u(double pixel) const { return scale_u * pixel + shift_u; }
+  double v(double pixel) const { return scale_v * pixel + shift_v; }
+  /// Maps homogeneous pixels to normalised ones.
+  Eigen::Matrix3d matrix() const;
+  Eigen::Matrix3d inverse() const;
+};
+
+/// False when the points lie on one column or row, or there are none: nothing to scale by.
+bool normalize(const std::vector<Eigen::Vector2f>& points, Normalization& normalization);
+
+/// A model and what it explains.
+struct ScoredModel {
+  Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();
+  double score = 0;                   ///< 0: no model explains anything
+  std::vector<std::uint8_t> inliers;  ///< per pair
+  std::size_t n_inliers = 0;
+};
+
+}  // namespace orbslam
