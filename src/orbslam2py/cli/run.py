@@ -101,6 +101,7 @@ def run(
     quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
 ) -> None:
     """Track a recorded sequence, a video or a camera; write trajectory, map and report."""
+    log_to(Console(stderr=True), quiet=quiet)  # opening warns already
     images = open_source(sequence, sensor, settings=settings, fps=fps, times=times, mask=mask)
     options = RunOptions(sensor, deterministic, realtime, start, stride, max_frames, seed)
     code = run_and_write(
@@ -129,7 +130,7 @@ def run_and_write(
         )
     console = Console(quiet=quiet)
     errors = Console(stderr=True)
-    _log_to(errors, quiet=quiet)
+    log_to(errors, quiet=quiet)
     runner = SequenceRunner(sequence, sequence.settings, load_vocabulary(vocabulary), options)
     folder = prepare_output_folder(output, sequence.name, force=force)
     link_latest(folder)
@@ -183,7 +184,8 @@ class _ConsoleHandler(logging.Handler):
         self._console.print(f"{title} {text}", highlight=False, soft_wrap=True)
 
 
-def _log_to(console: Console, *, quiet: bool) -> None:
+def log_to(console: Console, *, quiet: bool) -> None:
+    """Print the package's warnings (errors, if quiet) on a console."""
     logger = logging.getLogger("orbslam2py")
     logger.handlers = [_ConsoleHandler(console)]
     logger.propagate = False
