@@ -11,6 +11,7 @@
 #include "map/invariants.hpp"
 #include "map/keyframe_insertion.hpp"
 #include "map/local_map.hpp"
+#include "map/scene_depth.hpp"
 #include "map/sightings.hpp"
 
 namespace orbslam::bindings {
@@ -299,6 +300,14 @@ void bind_keyframe_verbs(py::module_& module) {
       "Add the observations of matched points, connect and publish the keyframe.");
   module.def("count_tracked_points", &count_tracked_points, "map"_a, "id"_a, "min_observations"_a,
              Release(), "Living points of a keyframe with at least so many observations.");
+  module.def(
+      "median_scene_depth",
+      [](const Map& map, KeyFrameId id) {
+        const auto lock = map.read_lock();
+        return median_scene_depth(map, living(map, id));
+      },
+      "map"_a, "id"_a, Release(),
+      "Lower median of the depths of a living keyframe's points; None without points.");
   module.def(
       "cull_recent_points",
       [](Map& map, KeyFrameId current, int min_observations, RecentPoints& recent) {

@@ -9,6 +9,7 @@
 #include "matching/for_initialization.hpp"
 #include "matching/for_triangulation.hpp"
 #include "matching/fuse.hpp"
+#include "matching/temporary_points.hpp"
 
 namespace orbslam::bindings {
 namespace {
@@ -208,6 +209,22 @@ void bind_fuse(py::module_& module) {
              "refresh its points and connections. Returns the number of changes.");
 }
 
+void bind_temporary_points(py::module_& module) {
+  module.attr("FIRST_TEMPORARY_POINT") = kFirstTemporaryPoint.value;
+  module.def(
+      "add_temporary_points", &add_temporary_points, "last"_a, "points"_a,
+      "n_minimum"_a = std::size_t{100}, Release(),
+      "Give the last frame's depths without a map point temporary points (localization).\n\n"
+      "All close ones, and far ones until `n_minimum` keypoints have been visited, nearest\n"
+      "first. They are appended to `points` (gather_points of the last frame) and associated\n"
+      "with `last`; temporary points left there are dropped first. Their ids start at\n"
+      "FIRST_TEMPORARY_POINT. Returns the number made. Raises StateError without a pose.");
+  module.def("discard_temporary", &discard_temporary, "frame"_a,
+             "Drop the frame's associations with temporary points; their number.");
+  module.def("count_map_points", &count_map_points, "frame"_a,
+             "Number of associations with points of the map, not temporary, outliers included.");
+}
+
 }  // namespace
 
 void bind_matching(py::module_& module) {
@@ -216,6 +233,7 @@ void bind_matching(py::module_& module) {
   bind_for_initialization(module);
   bind_for_triangulation(module);
   bind_fuse(module);
+  bind_temporary_points(module);
 }
 
 }  // namespace orbslam::bindings

@@ -10,7 +10,9 @@
 #include "bindings/arrays.hpp"
 #include "bindings/bindings.hpp"
 #include "optimize/bundle_adjustment.hpp"
+#include "optimize/global_bundle_adjustment.hpp"
 #include "optimize/local_bundle_adjustment.hpp"
+#include "optimize/monocular_map.hpp"
 #include "optimize/pose_optimization.hpp"
 
 namespace orbslam::bindings {
@@ -229,12 +231,92 @@ void bind_local_bundle(py::module_& module) {
       "gives an empty result, a reset meanwhile drops it.");
 }
 
+void bind_global_bundle(py::module_& module) {
+  py::class_<GlobalBundleOptions>(module, "GlobalBundleOptions",
+                                  "How global_bundle_adjustment works.")
+      .def(py::init([](int iterations, bool robust) {
+             return GlobalBundleOptions{iterations, robust};
+           }),
+           "iterations"_a = 10, "robust"_a = true)
+      .def_readwrite("iterations", &GlobalBundleOptions::iterations, "Accepted steps at most.")
+      .def_readwrite("robust", &GlobalBundleOptions::robust, "Huber kernel on all observations.");
+  py::class_<GlobalBundleResult>(module, "GlobalBundleResult", "What global_bundle_adjustment did.")
+      .def_readonly("n_keyframes", &GlobalBundleResult::n_keyframes,
+                    "Keyframes, fixed ones included.")
+      .def_readonly("n_points", &GlobalBundleResult::n_points, "Points refined.")
+      .def_readonly("n_observations", &GlobalBundleResult::n_observations, "Observations used.")
+      .def_readonly("committed", &GlobalBundleResult::committed, "Whether the map was changed.")
+      .def_readonly("summary", &GlobalBundleResult::summary, "Of the solver.");
+  module.def(
+      "global_bundle_adjustment",
+      [](Map& map, const GlobalBundleOptions& options, const std::shared_ptr<StopFlag>& abort,
+         int n_threads) {
+        return global_bundle_adjustment(map, options, flag_of(abort), n_threads);
+      },
+      "map"_a, py::arg_v("options", GlobalBundleOptions(), "GlobalBundleOptions()"),
+      "abort"_a = py::none(), "n_threads"_a = 1, py::call_guard<py::gil_scoped_release>(),
+      "Refine all keyframes (but 0), unpublished ones included, and all points.\n\n"
+      "`abort`: a StopFlag polled once per iteration, or None. After an abort, or when the map\n"
+      "was cleared meanwhile, the map stays as it was. No observation is erased. Takes the map's\n"
+      "locks for short sections only; a commit counts as a big change.");
+}
+
+void bind_monocular_map(py::module_& module) {
+  py::enum_<MonocularMapFailure>(module, "MonocularMapFailure",
+                                 "Why create_monocular_map made no map.")
+      .value("NONE", MonocularMapFailure::kNone, "It did.")
+      .value("FEW_POINTS", MonocularMapFailure::kFewPoints,
+             "Fewer than `min_points` points in the second keyframe.")
+      .value("BAD_DEPTH", MonocularMapFailure::kBadDepth,
+             "The median depth is not a positive number.")
+      .value("MAP_CLEARED", MonocularMapFailure::kMapCleared,
+             "Somebody cleared the map meanwhile.");
+  py::class_<MonocularMap>(module, "MonocularMap", "What create_monocular_map did.")
+      .def_readonly("ok", &MonocularMap::ok, "There is a map. Otherwise: clear the Map.")
+      .def_readonly("failure", &MonocularMap::failure, "Why not.")
+      .def_readonly("first", &MonocularMap::first, "Keyframe of the initial frame: 0.")
+      .def_readonly("second", &MonocularMap::second, "Keyframe of the current frame: 1.")
+      .def_readonly("n_points", &MonocularMap::n_points, "Points of the second keyframe.")
+      .def_readonly("median_depth", &MonocularMap::median_depth,
+                    "Median depth in the first keyframe before it was scaled to 1, in units of\n"
+                    "the given baseline; NaN without points.")
+      .def_readonly("summary", &MonocularMap::summary, "Of the bundle adjustment.");
+  module.def(
+      "create_monocular_map",
+      [](Map& map, TrackedFrame& initial, TrackedFrame& current, const Pose& T_21,
+         const Input<std::int32_t>& matches, const Input<double>& points, std::size_t min_points) {
+        const std::size_t n = rows_of(matches, 0, "matches");
+        check_rows(rows_of(points, 3, "points"), n, "points");
+        const std::vector<int> partners(matches.data(), matches.data() + n);
+        std::vector<Eigen::Vector3d> positions(n);
+        for (std::size_t i = 0; i < n; ++i) {
+          positions[i] = Eigen::Map<const Eigen::Vector3d>(points.data() + 3 * i);
+        }
+        const py::gil_scoped_release release;
+        return create_monocular_map(map, initial, current, T_21, partners, positions, min_points);
+      },
+      "map"_a, "initial"_a, "current"_a, "T_21"_a, "matches"_a, "points"_a,
+      "min_points"_a = std::size_t{100},
+      "Make the first map of a single camera from two described frames.\n\n"
+      "`T_21`: initial to current camera, up to scale. `matches`: (n,) int32, per initial "
+      "keypoint\n"
+      "its partner in `current` or -1, one to one. `points`: (n, 3) float64, per initial keypoint\n"
+      "its position in the initial camera, in the units of `T_21`; read where matched. Keyframes\n"
+      "0 and 1 and their points are refined together, scaled to median depth 1 in keyframe 0,\n"
+      "and published; local mapping takes both, in order, afterwards. On success both frames\n"
+      "have final poses, points and reference keyframes. On failure they are unchanged and the\n"
+      "map must be cleared. Returns MonocularMap. Raises StateError when the map is not empty, a\n"
+      "frame is not described or the matches do not fit the frames.");
+}
+
 }  // namespace
 
 void bind_optimize(py::module_& module) {
   bind_pose_optimization(module);
   bind_bundle(module);
   bind_local_bundle(module);
+  bind_global_bundle(module);
+  bind_monocular_map(module);
 }
 
 }  // namespace orbslam::bindings
