@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from orbslam2py import __version__
-from orbslam2py.cli import demo, evaluate, run, synthesize, vocabulary
+from orbslam2py.cli import calibrate, demo, evaluate, run, synthesize, vocabulary
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.errors import OrbSlamError
 
@@ -45,6 +45,8 @@ app.command("run")(run.run)
 app.command("demo")(demo.demo)
 app.command("synthesize")(synthesize.synthesize)
 app.command("evaluate")(evaluate.evaluate)
+app.command("calibrate")(calibrate.calibrate)
+app.command("import-camera")(calibrate.import_camera)
 app.add_typer(vocabulary.app, name="vocabulary")
 
 

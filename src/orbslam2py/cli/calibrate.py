@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``orbslam2py calibrate`` and ``orbslam2py import-camera``: settings files for own cameras."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from orbslam2py.calibration import Calibration
+from orbslam2py.calibration import calibrate as calibrate_views
+from orbslam2py.calibration_plot import draw_residuals
+from orbslam2py.camera_files import CameraFileFormat, read_camera_file
+from orbslam2py.chessboard_views import Board, BoardViews, find_views
+from orbslam2py.errors import SettingsError
+
+Output = Annotated[Path, typer.Option("--output", "-o", help="Settings file to write.")]
+Fps = Annotated[
+    float | None, typer.Option(help="Frames per second of the camera [that of the video, or 30].")
+]
+Features = Annotated[
+    int | None,
+    typer.Option(help="ORB features per image [1000, or 2000 above 0.6 megapixels]."),
+]
+Force = Annotated[bool, typer.Option("--force", help="Replace existing files.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Only errors.")]
+
+
+def calibrate(
+    source: Annotated[
+        Path, typer.Argument(help="Video, or folder of images, of a chessboard seen by the camera.")
+    ],
+    board: Annotated[
+        str, typer.Option(metavar="CxR", help="Inner corners of the board, such as 9x6.")
+    ],
+    square: Annotated[float, typer.Option(help="Side of a square [m].")],
+    output: Output,
+    fps: Fps = None,
+    features: Features = None,
+    every: Annotated[
+        int | None,
+        typer.Option(
+            help="Look at every so many images [all of a folder, four per second of a video].",
+            min=1,
+        ),
+    ] = None,
+    max_views: Annotated[
+        int, typer.Option(help="Use at most so many views, those that differ most.", min=4)
+    ] = 40,
+    k3: Annotated[bool, typer.Option("--k3", help="Estimate k3 as well: for wide lenses.")] = False,
+    plot: Annotated[
+        Path | None, typer.Option(help="PNG file for a picture of the residuals.")
+    ] = None,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Calibrate a camera with a chessboard; write a settings file that run takes."""
+    model = Board.parse(board, square)
+    for path in (output, plot):
+        _check_target(path, force=force)
+    console = Console(quiet=quiet)
+    found = _search(source, model, every, console)
+    result = calibrate_views(found, model, max_views=max_views, k3=k3)
+    result.save(output, fps=fps or found.fps or 30.0, n_features=features)
+    if plot is not None:
+        draw_residuals(plot, result, title=f"Calibration from {source.name}")
+    console.print(_table(result, source))
+    for warning in result.warnings():
+        console.print(f"[bold yellow]Warning:[/] {escape(warning)}", highlight=False)
+    console.print(f"Settings are in [bold]{escape(str(output))}[/]", highlight=False)
+    if plot is not None:
+        console.print(f"Look at [bold]{escape(str(plot))}[/]", highlight=False)
+
+
+def import_camera(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            help="OpenCV YAML or XML, Kalibr camchain, ROS camera_info, COLMAP cameras.txt."
+        ),
+    ],
+    output: Output,
+    file_format: Annotated[
+        CameraFileFormat, typer.Option("--format", help="Who wrote the file.")
+    ] = CameraFileFormat.AUTO,
+    camera: Annotated[
+        int | None,
+        typer.Option(
+            help="Number of the camera in a file of several; without it, the pair of a Kalibr "
+            "camchain.",
+            min=0,
+        ),
+    ] = None,
+    right: Annotated[
+        Path | None,
+        typer.Option(help="ROS: camera_info of the right camera, to get settings for a pair."),
+    ] = None,
+    fps: Annotated[float, typer.Option(help="Frames per second of the camera.")] = 30.0,
+    features: Annotated[int, typer.Option(help="ORB features per image.")] = 1000,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Turn another program's calibration into a settings file."""
+    _check_target(output, force=force)
+    settings = read_camera_file(
+        file, file_format, camera=camera, right=right, fps=fps, n_features=features
+    )
+    settings.save(output)
+    console = Console(quiet=quiet)
+    for line in settings.describe():
+        console.print(line, highlight=False, markup=False)
+    console.print(f"Settings are in [bold]{escape(str(output))}[/]", highlight=False)
+
+
+def _search(source: Path, board: Board, every: int | None, console: Console) -> BoardViews:
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("looking for the board", total=None)
+
+        def show(searched: int, seen: int) -> None:
+            bar.update(task, description=f"board seen in {seen} of {searched} images")
+
+        return find_views(source, board, every=every, progress=show)
+
+
+def _check_target(path: Path | None, *, force: bool) -> None:
+    if path is None:
+        return
+    if path.exists() and not force:
+        raise SettingsError(f"{path} exists; use --force to replace it")
+    if not path.absolute().parent.is_dir():
+        raise SettingsError(f"{path.absolute().parent}: no such folder")
+
+
+def _table(result: Calibration, source: Path) -> Table:
+    table = Table(title=escape(f"{source.name}, board {result.board}"), show_header=False)
+    table.add_column(justify="left")
+    table.add_column(justify="right")
+    nearest, farthest = result.distances
+    width, height = result.size
+    table.add_row("images searched, with board", f"{result.n_searched}, {result.n_found}")
+    table.add_row("views used, left out", f"{len(result.views)}, {len(result.left_out)}")
+    table.add_row("image size", f"{width} x {height}")
+    table.add_row("image covered", f"{result.coverage:.0%}")
+    table.add_row("distance of the board [m]", f"{nearest:.2f} to {farthest:.2f}")
+    table.add_row("reprojection error (RMS) [pixels]", f"{result.rms:.3f}")
+    table.add_section()
+    values = [result.K[0, 0], result.K[1, 1], result.K[0, 2], result.K[1, 2], *result.distortion]
+    names = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
+    for i, (name, value, sigma) in enumerate(
+        zip(names, values, result.deviations.tolist(), strict=True)
+    ):
+        digits = 2 if i < 4 else 5
+        if value or sigma:
+            table.add_row(name, f"{value:.{digits}f} +- {sigma:.{digits}f}")
+    return table
+
+
+EXAMPLE = "{}\n\n**Example**\n\n    orbslam2py {}\n"
+calibrate.__doc__ = EXAMPLE.format(
+    calibrate.__doc__,
+    "calibrate board.mp4 --board 9x6 --square 0.025 --output my.yaml --plot residuals.png",
+)
+import_camera.__doc__ = EXAMPLE.format(
+    import_camera.__doc__, "import-camera camchain.yaml --output my.yaml --fps 20"
+)
