@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= $(shell nproc)
 
-.PHONY: demo test bench lint types stubs format sanitize wheel install clean \
+.PHONY: demo test bench lint types stubs format sanitize tidy wheel install clean \
   test-cpp test-python help
 
 help:
@@ -68,6 +68,12 @@ types: install
 # The stubs of the C++ extension are part of the source; they must say what the build says.
 stubs: install
 	@$(BIN)/python scripts/generate_stubs.py --check
+
+# Slow (minutes), so not part of `make test`.
+tidy: build/.system-packages
+	@cmake --preset release >/dev/null
+	@find src/cpp -name '*.cpp' -not -path '*/bindings/*' | \
+	  xargs -P $(JOBS) -n 1 clang-tidy -p build/release --quiet
 
 sanitize: build/.system-packages
 	@cmake --preset asan >/dev/null && cmake --build build/asan -j $(JOBS)
