@@ -12,7 +12,7 @@ Poses are named by frames: ``T_cw`` maps world to camera, ``T_wc`` camera to wor
 along +z, x points right, y down. Lengths are metres, times seconds, angles radians.
 """
 
-from importlib.metadata import version as _version
+from typing import TYPE_CHECKING
 
 from orbslam2py.errors import (
     DatasetError,
@@ -24,11 +24,17 @@ from orbslam2py.errors import (
     VocabularyError,
     WorkerError,
 )
-from orbslam2py.records import FrameFeatures, Reason, TrackingRecord, TrackingState
-from orbslam2py.sensor import Sensor
-from orbslam2py.settings import Settings
 
-__version__ = _version("orbslam2py")
+if TYPE_CHECKING:
+    from orbslam2py.datasets import open_sequence
+    from orbslam2py.records import FrameFeatures, Reason, TrackingRecord, TrackingState
+    from orbslam2py.sensor import Sensor
+    from orbslam2py.settings import Settings
+    from orbslam2py.system import MapSnapshot, System
+    from orbslam2py.trajectory import Trajectory
+    from orbslam2py.vocabulary import load_vocabulary
+
+    __version__: str
 
 __all__ = [
     "DatasetError",
@@ -54,18 +60,34 @@ __all__ = [
 ]
 
 
+_MODULES = {
+    "FrameFeatures": "records",
+    "MapSnapshot": "system",
+    "Reason": "records",
+    "Sensor": "sensor",
+    "Settings": "settings",
+    "System": "system",
+    "TrackingRecord": "records",
+    "TrackingState": "records",
+    "Trajectory": "trajectory",
+    "load_vocabulary": "vocabulary",
+    "open_sequence": "datasets",
+}
+
+
 def __getattr__(name: str) -> object:
     # The C++ extension imports orbslam2py.errors while it is being loaded, and the command line
-    # should show its help without it: what needs the extension is imported on first use.
+    # wants to be in charge before libraries are loaded: everything else comes on first use.
     import importlib  # noqa: PLC0415
 
-    modules = {
-        "MapSnapshot": "system",
-        "System": "system",
-        "Trajectory": "trajectory",
-        "load_vocabulary": "vocabulary",
-        "open_sequence": "datasets",
-    }
-    if name in modules:
-        return getattr(importlib.import_module(f"orbslam2py.{modules[name]}"), name)
+    if name == "__version__":
+        import importlib.metadata  # noqa: PLC0415
+
+        return importlib.metadata.version("orbslam2py")
+    if name in _MODULES:
+        return getattr(importlib.import_module(f"orbslam2py.{_MODULES[name]}"), name)
     raise AttributeError(f"module 'orbslam2py' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

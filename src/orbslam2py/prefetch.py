@@ -18,7 +18,7 @@ Loaded_co = TypeVar("Loaded_co", covariant=True)
 _WAIT_SLICE = 0.2
 
 #: Seconds that the end waits for an item that is being loaded, say from a network that is gone.
-_PATIENCE = 3.0
+_PATIENCE = 1.0
 
 
 class Loader(Protocol[Loaded_co]):
