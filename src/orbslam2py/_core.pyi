@@ -13,7 +13,7 @@ from orbslam2py.errors import SettingsError
 from orbslam2py.errors import StateError
 from orbslam2py.errors import VocabularyError
 import typing
-__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'DirectIndex', 'EdgeSnapshot', 'Extraction', 'Frame', 'FrameContext', 'ImageBounds', 'ImageError', 'KeyFrameIndex', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Map', 'MapFileError', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'check_invariants', 'corridor_way', 'count_sightings', 'count_tracked_points', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'describe', 'direct_index_of', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'fundamental_matrix', 'fuse_points', 'fuse_with_neighbours', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_two_rooms', 'match_for_initialization', 'match_for_triangulation', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'optimize_pose', 'process_new_keyframe', 'project_into', 'refresh_associations', 'render', 'room_T_wc', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_observations', 'snapshot_points', 'solve_bundle', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'words_of']
+__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'DirectIndex', 'EdgeSnapshot', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'GlobalBundleOptions', 'GlobalBundleResult', 'ImageBounds', 'ImageError', 'KeyFrameIndex', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Map', 'MapFileError', 'MonocularMap', 'MonocularMapFailure', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'check_invariants', 'corridor_way', 'count_map_points', 'count_sightings', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'describe', 'direct_index_of', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'fundamental_matrix', 'fuse_points', 'fuse_with_neighbours', 'gather_points', 'global_bundle_adjustment', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_two_rooms', 'match_for_initialization', 'match_for_triangulation', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'median_scene_depth', 'optimize_pose', 'process_new_keyframe', 'project_into', 'refresh_associations', 'render', 'room_T_wc', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_observations', 'snapshot_points', 'solve_bundle', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'words_of']
 class Pose:
     """
     Rigid transform. `T_ab` maps coordinates of frame b into frame a.
@@ -491,6 +491,11 @@ class Frame:
         (n,) float32, column in the right image [px]; meaningful where depth > 0.
         """
     @property
+    def sigma2(self) -> numpy.typing.NDArray[numpy.float32]:
+        """
+        (n,) float32, variance of the keypoints by their levels [px^2].
+        """
+    @property
     def size(self) -> int:
         """
         Number n of keypoints.
@@ -513,6 +518,10 @@ class TrackedFrame:
     def clear_associations(self) -> None:
         """
         Removes all map points, positions and outlier flags; keeps the pose.
+        """
+    def copy_associations(self, from_frame: TrackedFrame, keep: typing.Annotated[numpy.typing.ArrayLike, numpy.bool]) -> None:
+        """
+        Takes over the associations of another version of the same frame where keep (n,) bool is true; drops all others. Raises StateError for another frame.
         """
     def discard_outliers(self) -> numpy.typing.NDArray[numpy.int64]:
         """
@@ -1505,6 +1514,150 @@ class LocalBundleResult:
         """
         Of the solver.
         """
+class GlobalBundleOptions:
+    """
+    How global_bundle_adjustment works.
+    """
+    def __init__(self, iterations: typing.SupportsInt | typing.SupportsIndex = 10, robust: bool = True) -> None:
+        ...
+    @property
+    def iterations(self) -> int:
+        """
+        Accepted steps at most.
+        """
+    @iterations.setter
+    def iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def robust(self) -> bool:
+        """
+        Huber kernel on all observations.
+        """
+    @robust.setter
+    def robust(self, arg0: bool) -> None:
+        ...
+class GlobalBundleResult:
+    """
+    What global_bundle_adjustment did.
+    """
+    @property
+    def committed(self) -> bool:
+        """
+        Whether the map was changed.
+        """
+    @property
+    def n_keyframes(self) -> int:
+        """
+        Keyframes, fixed ones included.
+        """
+    @property
+    def n_observations(self) -> int:
+        """
+        Observations used.
+        """
+    @property
+    def n_points(self) -> int:
+        """
+        Points refined.
+        """
+    @property
+    def summary(self) -> BundleSummary:
+        """
+        Of the solver.
+        """
+class MonocularMapFailure:
+    """
+    Why create_monocular_map made no map.
+
+    Members:
+
+      NONE : It did.
+
+      FEW_POINTS : Fewer than `min_points` points in the second keyframe.
+
+      BAD_DEPTH : The median depth is not a positive number.
+
+      MAP_CLEARED : Somebody cleared the map meanwhile.
+    """
+    BAD_DEPTH: typing.ClassVar[MonocularMapFailure]
+    FEW_POINTS: typing.ClassVar[MonocularMapFailure]
+    MAP_CLEARED: typing.ClassVar[MonocularMapFailure]
+    NONE: typing.ClassVar[MonocularMapFailure]
+    __members__: typing.ClassVar[dict[str, MonocularMapFailure]]
+    @typing.overload
+    def __eq__(self, other: MonocularMapFailure) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: MonocularMapFailure) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class MonocularMap:
+    """
+    What create_monocular_map did.
+    """
+    @property
+    def failure(self) -> MonocularMapFailure:
+        """
+        Why not.
+        """
+    @property
+    def first(self) -> int:
+        """
+        Keyframe of the initial frame: 0.
+        """
+    @property
+    def median_depth(self) -> float:
+        """
+        Median depth in the first keyframe before it was scaled to 1, in units of
+        the given baseline; NaN without points.
+        """
+    @property
+    def n_points(self) -> int:
+        """
+        Points of the second keyframe.
+        """
+    @property
+    def ok(self) -> bool:
+        """
+        There is a map. Otherwise: clear the Map.
+        """
+    @property
+    def second(self) -> int:
+        """
+        Keyframe of the current frame: 1.
+        """
+    @property
+    def summary(self) -> BundleSummary:
+        """
+        Of the bundle adjustment.
+        """
 class Rectangle:
     """
     A textured rectangle: origin + a u_axis + b v_axis, a in [0, width], b in [0, height]; world frame, metres. Both sides are visible.
@@ -1620,6 +1773,15 @@ class Way:
         """
         Metres; of one lap if closed.
         """
+def add_temporary_points(last: TrackedFrame, points: PointBatch, n_minimum: typing.SupportsInt | typing.SupportsIndex = 100) -> int:
+    """
+    Give the last frame's depths without a map point temporary points (localization).
+
+    All close ones, and far ones until `n_minimum` keypoints have been visited, nearest
+    first. They are appended to `points` (gather_points of the last frame) and associated
+    with `last`; temporary points left there are dropped first. Their ids start at
+    FIRST_TEMPORARY_POINT. Returns the number made. Raises StateError without a pose.
+    """
 def build_monocular_frame(context: FrameContext, id: typing.SupportsInt | typing.SupportsIndex, timestamp: typing.SupportsFloat | typing.SupportsIndex, extraction: Extraction) -> Frame:
     """
     Frame of a single camera: undistorted keypoints, no depth.
@@ -1640,6 +1802,10 @@ def corridor_way(length: typing.SupportsFloat | typing.SupportsIndex, breadth: t
     """
     The lap through make_corridor with the same sizes.
     """
+def count_map_points(frame: TrackedFrame) -> int:
+    """
+    Number of associations with points of the map, not temporary, outliers included.
+    """
 def count_sightings(map: Map, frame: TrackedFrame, in_view: typing.Annotated[numpy.typing.ArrayLike, numpy.int64]) -> None:
     """
     Count which points were visible ((n,) int64 and the associated) and which were found.
@@ -1647,6 +1813,19 @@ def count_sightings(map: Map, frame: TrackedFrame, in_view: typing.Annotated[num
 def count_tracked_points(map: Map, id: int, min_observations: typing.SupportsInt | typing.SupportsIndex) -> int:
     """
     Living points of a keyframe with at least so many observations.
+    """
+def create_monocular_map(map: Map, initial: TrackedFrame, current: TrackedFrame, T_21: Pose, matches: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], min_points: typing.SupportsInt | typing.SupportsIndex = 100) -> MonocularMap:
+    """
+    Make the first map of a single camera from two described frames.
+
+    `T_21`: initial to current camera, up to scale. `matches`: (n,) int32, per initial keypoint
+    its partner in `current` or -1, one to one. `points`: (n, 3) float64, per initial keypoint
+    its position in the initial camera, in the units of `T_21`; read where matched. Keyframes
+    0 and 1 and their points are refined together, scaled to median depth 1 in keyframe 0,
+    and published; local mapping takes both, in order, afterwards. On success both frames
+    have final poses, points and reference keyframes. On failure they are unchanged and the
+    map must be cleared. Returns MonocularMap. Raises StateError when the map is not empty, a
+    frame is not described or the matches do not fit the frames.
     """
 def create_new_points(map: Map, current: int, options: NewPointOptions, should_stop: StopFlag | None = None) -> numpy.typing.NDArray[numpy.int64]:
     """
@@ -1670,6 +1849,10 @@ def describe(frame: Frame, vocabulary: Vocabulary) -> None:
 def direct_index_of(frame: Frame) -> DirectIndex:
     """
     The direct index of a described frame (a copy).
+    """
+def discard_temporary(frame: TrackedFrame) -> int:
+    """
+    Drop the frame's associations with temporary points; their number.
     """
 def figure_eight_way(length: typing.SupportsFloat | typing.SupportsIndex, breadth: typing.SupportsFloat | typing.SupportsIndex, width: typing.SupportsFloat | typing.SupportsIndex) -> Way:
     """
@@ -1706,6 +1889,14 @@ def fuse_with_neighbours(map: Map, current: int, n_neighbours: typing.SupportsIn
 def gather_points(map: Map, ids: typing.Annotated[numpy.typing.ArrayLike, numpy.int64]) -> PointBatch:
     """
     The living points among `ids` ((n,) int64), in that order.
+    """
+def global_bundle_adjustment(map: Map, options: GlobalBundleOptions = ..., abort: StopFlag | None = None, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> GlobalBundleResult:
+    """
+    Refine all keyframes (but 0), unpublished ones included, and all points.
+
+    `abort`: a StopFlag polled once per iteration, or None. After an abort, or when the map
+    was cleared meanwhile, the map stays as it was. No observation is erased. Takes the map's
+    locks for short sections only; a commit counts as a big change.
     """
 def hamming_distances(a: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8], b: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8]) -> numpy.typing.NDArray[numpy.int32]:
     """
@@ -1806,6 +1997,10 @@ def match_local_map(frame: TrackedFrame, local_points: PointBatch, exclude: typi
 def match_stereo(left: Extraction, right: Extraction, scales: ScalePyramid, bf: typing.SupportsFloat | typing.SupportsIndex, max_disparity: typing.SupportsFloat | typing.SupportsIndex) -> tuple[numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32]]:
     """
     (right_u [px], depth [m]) of the left keypoints, float32, -1: none. bf in px m, max_disparity in px.
+    """
+def median_scene_depth(map: Map, id: int) -> float | None:
+    """
+    Lower median of the depths of a living keyframe's points; None without points.
     """
 @typing.overload
 def optimize_pose(frame: TrackedFrame) -> PoseEstimate:
@@ -1912,3 +2107,4 @@ def words_of(frame: Frame) -> WordVector:
     """
     The word vector of a described frame (a copy).
     """
+FIRST_TEMPORARY_POINT: int = 4611686018427387904
