@@ -76,13 +76,14 @@ def link_latest(folder: Path) -> None:
     link = Path("runs") / "latest"
     if folder.resolve().parent != link.parent.resolve():
         return
+    temporary = link.with_name(f".latest-{os.getpid()}")
     try:
-        link.parent.mkdir(exist_ok=True)
-        temporary = link.with_name(f".latest-{os.getpid()}")
         temporary.symlink_to(os.path.relpath(folder.resolve(), link.parent.resolve()))
         temporary.replace(link)
     except OSError as error:
         _log.debug("no link runs/latest: %s", error)
+        with contextlib.suppress(OSError):
+            temporary.unlink()
 
 
 class OutputWriter:
