@@ -27,10 +27,11 @@ from orbslam2py.errors import (
 
 if TYPE_CHECKING:
     from orbslam2py.datasets import open_sequence
+    from orbslam2py.map_views import MapSnapshot
     from orbslam2py.records import FrameFeatures, Reason, TrackingRecord, TrackingState
     from orbslam2py.sensor import Sensor
     from orbslam2py.settings import Settings
-    from orbslam2py.system import MapSnapshot, System
+    from orbslam2py.system import System
     from orbslam2py.trajectory import Trajectory
     from orbslam2py.vocabulary import load_vocabulary
 
@@ -62,7 +63,7 @@ __all__ = [
 
 _MODULES = {
     "FrameFeatures": "records",
-    "MapSnapshot": "system",
+    "MapSnapshot": "map_views",
     "Reason": "records",
     "Sensor": "sensor",
     "Settings": "settings",

@@ -44,18 +44,18 @@ def draw_residuals(path: str | PathLike[str], calibration: Calibration, *, title
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
     from matplotlib.figure import Figure  # noqa: PLC0415
 
-    figure = Figure(figsize=(11, 7.5), dpi=110, layout="constrained")
+    figure = Figure(figsize=(11, 7.6), dpi=110, layout="constrained")
     FigureCanvasAgg(figure)
-    grid = figure.add_gridspec(2, 2, width_ratios=[1.75, 1], height_ratios=[1.6, 1])
+    grid = figure.add_gridspec(2, 2, width_ratios=[1.6, 1], height_ratios=[2.9, 1])
     K, n = calibration.K, len(calibration.views)
     figure.suptitle(
         f"{title}\nreprojection error {calibration.rms:.3f} pixels (RMS), {n} views, fx "
         f"{K[0, 0]:.1f}, fy {K[1, 1]:.1f}, cx {K[0, 2]:.1f}, cy {K[1, 2]:.1f}",
         fontsize=11,
     )
-    _draw_image(figure.add_subplot(grid[:, 0]), calibration)
+    _draw_image(figure.add_subplot(grid[0, 0]), calibration)
     _draw_cloud(figure.add_subplot(grid[0, 1]), calibration)
-    _draw_views(figure.add_subplot(grid[1, 1]), calibration)
+    _draw_views(figure.add_subplot(grid[1, :]), calibration)
     with atomic_write(path, binary=True) as stream:
         figure.savefig(stream, format="png")
 
@@ -81,15 +81,18 @@ def _draw_image(axes: Axes, calibration: Calibration) -> None:
     axes.plot(*calibration.K[:2, 2], "+", color="black", markersize=11, label="principal point")
     axes.set_xlim(-0.5, width - 0.5)
     axes.set_ylim(height - 0.5, -0.5)
-    axes.set_aspect("equal", adjustable="box", anchor="N")
+    axes.set_aspect(
+        "equal",
+        adjustable="box",
+    )
     axes.set_title(
-        f"corners and residuals (arrows {scale} times longer), "
-        f"{calibration.coverage:.0%} of the image covered",
+        f"corners and residuals ({scale} times as long); {calibration.coverage:.0%} of the image "
+        "covered",
         fontsize=10,
     )
     axes.set_xlabel("u [pixels]")
     axes.set_ylabel("v [pixels]")
-    axes.legend(loc="upper left", bbox_to_anchor=(0, -0.09), fontsize=9, frameon=False)
+    axes.legend(loc="upper right", fontsize=9)
 
 
 def _draw_cloud(axes: Axes, calibration: Calibration) -> None:

@@ -19,10 +19,11 @@ from orbslam2py import _core as core
 from orbslam2py.datasets.base import Images, LiveSource, Sequence, Source
 from orbslam2py.errors import DatasetError, ImageError, OrbSlamError
 from orbslam2py.feeds import FedFrame, LiveFeed, RecordedFeed, is_sequence
+from orbslam2py.map_views import MapSnapshot
 from orbslam2py.records import TrackingRecord, TrackingState
 from orbslam2py.sensor import Sensor
 from orbslam2py.settings import Settings
-from orbslam2py.system import MapSnapshot, System
+from orbslam2py.system import System
 from orbslam2py.trajectory import Trajectory
 
 _log = logging.getLogger(__name__)

@@ -8,7 +8,6 @@ import math
 import threading
 import weakref
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
@@ -21,15 +20,24 @@ from orbslam2py.errors import ImageError, StateError, WorkerError
 from orbslam2py.front_end import FrontEnd, Mask, PairMask
 from orbslam2py.initialization import DepthInitializer
 from orbslam2py.local_mapping import LocalMapping
+from orbslam2py.localization_mode import LocalizationSwitch
 from orbslam2py.loop_closing import LoopClosing
+from orbslam2py.map_views import (
+    MapSnapshot,
+    frame_features,
+    frame_trajectory,
+    keyframe_trajectory,
+    take_snapshot,
+)
 from orbslam2py.monocular_initialization import MonocularInitializer
-from orbslam2py.records import FrameFeatures, TrackingRecord, TrackingState
+from orbslam2py.records import TrackingRecord, TrackingState
 from orbslam2py.relocalization import Relocalizer
 from orbslam2py.sensor import Sensor
 from orbslam2py.settings import Settings
-from orbslam2py.threads import CallGuard, PauseTicket, Worker
+from orbslam2py.threads import CallGuard, Worker
 from orbslam2py.timing import StageStatistics, StageTimer
-from orbslam2py.tracking import Tracking, TrackingOutcome
+from orbslam2py.tracking import Tracking
+from orbslam2py.tracking_types import TrackingOutcome
 from orbslam2py.trajectory import Trajectory
 from orbslam2py.vocabulary import load_vocabulary
 
@@ -37,22 +45,6 @@ _log = logging.getLogger(__name__)
 
 #: Seconds that a reset or a shutdown waits for a worker before it says who is late.
 _PATIENCE = 60.0
-
-
-@dataclass(frozen=True)
-class MapSnapshot:
-    """A consistent copy of the map, in the frame of keyframe 0's first pose (the world)."""
-
-    keyframe_ids: npt.NDArray[np.int64]
-    """(k,) ascending."""
-    keyframe_timestamps: npt.NDArray[np.float64]
-    """(k,) seconds."""
-    keyframe_T_wc: npt.NDArray[np.float64]
-    """(k, 4, 4) camera to world."""
-    point_ids: npt.NDArray[np.int64]
-    """(p,) ascending."""
-    point_positions: npt.NDArray[np.float64]
-    """(p, 3) world [m]."""
 
 
 class System:
@@ -126,10 +118,11 @@ class System:
             self.sensor,
             settings.max_frames,
             initializer=self._initializer(),
-            relocalizer=Relocalizer(self._map, self._index, seed) if hasattr(core, "PnpRansac") else None,
+            relocalizer=Relocalizer(self._map, self._index, seed)
+            if hasattr(core, "PnpRansac")
+            else None,
         )
-        self._mode_tickets: list[PauseTicket] = []
-        self._wanted_localization_mode = False
+        self._localization = LocalizationSwitch(self._tracking, self._workers)
         self._recorder = core.TrajectoryRecorder()
         self._finished_trajectories: list[Trajectory] = []
         self._statistics = StageStatistics()
@@ -302,7 +295,7 @@ class System:
             self._check_timestamp(timestamp)
             if self._reset_requested.is_set():
                 self._reset_now()
-            self._switch_mode()
+            self._localization.apply()
             timer = StageTimer()
             if self._wait_for_mapping:
                 with timer("wait"):
@@ -352,7 +345,7 @@ class System:
             is_keyframe=outcome.is_keyframe,
             reference_keyframe=self._tracking.reference_keyframe,
             milliseconds=timer.milliseconds,
-            features=_features(frame) if details else None,
+            features=frame_features(frame) if details else None,
         )
 
     # ---- control ---------------------------------------------------------------------------------
@@ -365,26 +358,11 @@ class System:
         frame before (stereo, RGB-D) until a mapped place comes into view again. Keyframes that wait
         for mapping are processed when it goes on.
         """
-        return self._wanted_localization_mode
+        return self._localization.wanted
 
     @localization_mode.setter
     def localization_mode(self, wanted: bool) -> None:
-        self._wanted_localization_mode = bool(wanted)
-
-    def _switch_mode(self) -> None:
-        wanted = self._wanted_localization_mode
-        if wanted == self._tracking.localization_only:
-            return
-        if wanted:
-            self._mode_tickets = [worker.pause() for worker in self._workers]
-            for ticket in self._mode_tickets:
-                ticket.wait()
-        else:
-            for ticket in self._mode_tickets:
-                ticket.release()
-            self._mode_tickets = []
-        self._tracking.localization_only = wanted
-        _log.info("localization mode %s", "on" if wanted else "off")
+        self._localization.wanted = bool(wanted)
 
     def reset(self) -> None:
         """Ask for a new map; carried out at the beginning of the next track call.
@@ -508,29 +486,15 @@ class System:
         return [*self._finished_trajectories, self._current_trajectory()]
 
     def _current_trajectory(self) -> Trajectory:
-        poses = self._recorder.rebuild(self._map)
-        return Trajectory(
-            timestamps=poses.timestamps, T_wc=poses.T_wc, lost=poses.lost, indices=poses.frames
-        )
+        return frame_trajectory(self._recorder, self._map)
 
     def keyframe_trajectory(self) -> Trajectory:
         """Poses of the keyframes, relative to keyframe 0."""
-        snapshot = self.map_snapshot()
-        T_wc = snapshot.keyframe_T_wc
-        if len(T_wc):
-            T_wc = np.linalg.inv(T_wc[0]) @ T_wc
-        return Trajectory(timestamps=snapshot.keyframe_timestamps, T_wc=T_wc)
+        return keyframe_trajectory(self._map)
 
     def map_snapshot(self) -> MapSnapshot:
         """A copy of keyframe poses and points; may be called while the system runs."""
-        keyframes, points = core.snapshot_keyframes(self._map), core.snapshot_points(self._map)
-        return MapSnapshot(
-            keyframe_ids=keyframes.ids,
-            keyframe_timestamps=keyframes.timestamps,
-            keyframe_T_wc=keyframes.T_wc,
-            point_ids=points.ids,
-            point_positions=points.positions,
-        )
+        return take_snapshot(self._map)
 
     def map_hash(self) -> int:
         """Hash over poses, points and observations: equal for equal maps."""
@@ -543,17 +507,6 @@ class System:
     def stage_statistics(self) -> dict[str, dict[str, float]]:
         """Median, mean and p99 milliseconds per stage of tracking and mapping."""
         return {**self._statistics.summary(), **self._mapping.statistics.summary()}
-
-
-def _features(frame: core.TrackedFrame) -> FrameFeatures:
-    ids = frame.map_points
-    return FrameFeatures(
-        keypoints=frame.frame.keypoints,
-        levels=frame.frame.levels,
-        depths=frame.frame.depth,
-        map_point_ids=ids,
-        inliers=(ids >= 0) & (frame.outlier == 0),
-    )
 
 
 def _abandon(workers: tuple[Worker[int], ...]) -> None:

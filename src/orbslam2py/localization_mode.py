@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Switching between mapping and localization mode."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterable
+
+from orbslam2py.threads import PauseTicket, Worker
+from orbslam2py.tracking import Tracking
+
+_log = logging.getLogger(__name__)
+
+
+class LocalizationSwitch:
+    """Holds the workers still while only poses are wanted.
+
+    Parameters
+    ----------
+    tracking : Tracking
+        Is told the mode.
+    workers : iterable of Worker
+        Stand still in localization mode; what waits for them is processed afterwards.
+    """
+
+    def __init__(self, tracking: Tracking, workers: Iterable[Worker[int]]) -> None:
+        self._tracking = tracking
+        self._workers = tuple(workers)
+        self._tickets: list[PauseTicket] = []
+        #: The mode that the next track call will run in; the last assignment counts.
+        self.wanted = False
+
+    def apply(self) -> None:
+        """Carry out the switch, between two frames."""
+        wanted = self.wanted
+        if wanted == self._tracking.localization_only:
+            return
+        if wanted:
+            self._tickets = [worker.pause() for worker in self._workers]
+            for ticket in self._tickets:
+                ticket.wait()
+        else:
+            for ticket in self._tickets:
+                ticket.release()
+            self._tickets = []
+        self._tracking.localization_only = wanted
+        _log.info("localization mode %s", "on" if wanted else "off")
