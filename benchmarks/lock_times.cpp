@@ -3,11 +3,12 @@
 // that the extension is measured as it is shipped: it takes the place of the functions under
 // std::shared_mutex, counts only calls from the extension, and writes what it saw at exit.
 //
-// ORBSLAM2PY_LOCK_TIMES names the output: one line per section, "w" or "r", microseconds waited and
-// held.
+// ORBSLAM2PY_LOCK_TIMES names the output: one line per section, "w" or "r", microseconds waited,
+// held, and of processor time used while it was held.
 #include <dlfcn.h>
 #include <link.h>
 #include <pthread.h>
+#include <time.h>
 
 #include <algorithm>
 #include <atomic>
@@ -23,8 +24,15 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using LockFunction = int (*)(pthread_rwlock_t*);
 
+/// Processor time of this thread [us].
+double thread_microseconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return 1e6 * static_cast<double>(now.tv_sec) + 1e-3 * static_cast<double>(now.tv_nsec);
+}
+
 struct Section {
-  float waited, held;  // microseconds
+  float waited, held, used;  // microseconds
   char kind;
 };
 
@@ -34,11 +42,12 @@ struct Log {
   std::unique_ptr<Section[]> sections{new Section[kCapacity]};
   std::atomic<std::size_t> size{0};
 
-  void add(char kind, Clock::duration waited, Clock::duration held) {
+  void add(char kind, Clock::duration waited, Clock::duration held, double used) {
     const std::size_t i = size.fetch_add(1);
     if (i >= kCapacity) return;
     using Microseconds = std::chrono::duration<float, std::micro>;
-    sections[i] = {Microseconds(waited).count(), Microseconds(held).count(), kind};
+    sections[i] = {Microseconds(waited).count(), Microseconds(held).count(),
+                   static_cast<float>(used), kind};
   }
 
   ~Log() {
@@ -47,8 +56,8 @@ struct Log {
     if (file == nullptr) return;
     for (std::size_t i = 0; i < std::min(size.load(), kCapacity); ++i) {
       const Section& s = sections[i];
-      std::fprintf(file, "%c %.1f %.1f\n", s.kind, static_cast<double>(s.waited),
-                   static_cast<double>(s.held));
+      std::fprintf(file, "%c %.1f %.1f %.1f\n", s.kind, static_cast<double>(s.waited),
+                   static_cast<double>(s.held), static_cast<double>(s.used));
     }
     std::fclose(file);
   }
@@ -89,6 +98,7 @@ struct Open {
   pthread_rwlock_t* lock = nullptr;
   char kind = 0;
   Clock::time_point asked, got;
+  double used_before = 0;
 };
 thread_local Open open_section;
 
@@ -96,7 +106,8 @@ int enter(pthread_rwlock_t* lock, char kind, LockFunction function, const void* 
   if (!is_from_extension(caller)) return function(lock);
   const auto asked = Clock::now();
   const int result = function(lock);
-  open_section = {lock, kind, asked, Clock::now()};
+  const double used = thread_microseconds();
+  open_section = {lock, kind, asked, Clock::now(), used};
   return result;
 }
 
@@ -119,9 +130,10 @@ int pthread_rwlock_unlock(pthread_rwlock_t* lock) noexcept {
   const Open section = open_section;
   if (section.lock != lock) return function(lock);
   const auto now = Clock::now();
+  const double used = thread_microseconds() - section.used_before;
   const int result = function(lock);
   open_section.lock = nullptr;
-  log().add(section.kind, section.got - section.asked, now - section.got);
+  log().add(section.kind, section.got - section.asked, now - section.got, used);
   return result;
 }
 }

@@ -41,7 +41,7 @@ class LockTimes:
     """Sections under the map's lock, microseconds."""
 
     written: np.ndarray
-    """(n, 2): waited, held."""
+    """(n, 3): waited, held, processor time used while held."""
     read: np.ndarray
 
     @staticmethod
@@ -56,5 +56,5 @@ class LockTimes:
                 del os.environ["ORBSLAM2PY_LOCK_TIMES"]
             rows = [line.split() for line in log.read_text().splitlines()]
         kinds = np.array([row[0] for row in rows])
-        times = np.array([row[1:] for row in rows], np.float64).reshape(-1, 2)
+        times = np.array([row[1:] for row in rows], np.float64).reshape(-1, 3)
         return LockTimes(times[kinds == "w"], times[kinds == "r"])

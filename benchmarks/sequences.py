@@ -19,7 +19,7 @@ from reference import SequenceFigure
 from rich.table import Table
 from steps import Row
 from tables import new_table, verdict
-from yardstick import Times, Yardstick, shared_folder
+from yardstick import Measurement, Times, Yardstick, shared_folder
 
 _MISSING = "left out: the sequences are not there (ORBSLAM2PY_SHARED names their folder)"
 
@@ -59,6 +59,19 @@ def sequence_tables(yardstick: Yardstick, n_runs: int) -> Iterator[object]:
             "ATE m\nreference",
         ],
     )
+    summed = new_table(
+        "The same by the original's formula: frames / (sum of tracking + sum of mapping)",
+        ["sequence", "mode"],
+        [
+            "frames/s here",
+            "slower\nhere by",
+            "there\nours",
+            "there\nreference",
+            "ours /\nreference",
+            "ATE m",
+            "ATE m\nreference",
+        ],
+    )
     realtime = new_table(
         "Real time: p99 of tracking",
         ["sequence"],
@@ -74,17 +87,18 @@ def sequence_tables(yardstick: Yardstick, n_runs: int) -> Iterator[object]:
         if folder is None:
             yield f"[yellow]{figure.name}: {_MISSING}"
             continue
-        _add_offline(offline, yardstick, figure, folder, n_runs)
+        reports, measured = _add_offline(offline, yardstick, figure, folder, n_runs)
+        _add_summed(summed, yardstick, figure, folder, reports, measured)
         _add_realtime(realtime, figure, folder, n_runs)
         _add_fusing(fusing, yardstick, figure, folder)
-    for table in (offline, realtime, fusing):
+    for table in (offline, summed, realtime, fusing):
         if table.row_count:
             yield table
 
 
 def _add_offline(
     table: Table, yardstick: Yardstick, figure: SequenceFigure, folder: Path, n_runs: int
-) -> None:
+) -> tuple[list[dict[str, Any]], Measurement]:
     reports: list[dict[str, Any]] = []
 
     def work() -> float:
@@ -110,6 +124,52 @@ def _add_offline(
         f"{_median(reports, 'ate_rmse_m'):.4f}",
         f"{figure.ate}",
     )
+    return reports, measured
+
+
+def _summed_milliseconds(report: dict[str, Any]) -> float:
+    """Tracking and mapping together, per frame; mapping is inside tracking if it ran inline."""
+    stages = report["milliseconds"]
+    parts = ["track"] if report["deterministic"] else ["track", "mapping"]
+    total = sum(stages[part]["mean"] * stages[part]["count"] for part in parts)
+    return float(total / stages["track"]["count"])
+
+
+def _add_summed(
+    table: Table,
+    yardstick: Yardstick,
+    figure: SequenceFigure,
+    folder: Path,
+    threaded: list[dict[str, Any]],
+    with_threads: Measurement,
+) -> None:
+    """Threads slow each other down on two processors; inline mapping has the same formula."""
+    inline: list[dict[str, Any]] = []
+
+    def work() -> float:
+        inline.append(runs.run(folder, figure.sensor, "--deterministic"))
+        return _summed_milliseconds(inline[-1])
+
+    inline_times = yardstick.around([work] * 3)
+    with_threads = replace(
+        with_threads, ours=Times.of([_summed_milliseconds(report) for report in threaded])
+    )
+    for mode, m, reports in (
+        ("threads", with_threads, threaded),
+        ("mapping inline", inline_times, inline),
+    ):
+        there = 1e3 / m.carried
+        table.add_row(
+            figure.name,
+            mode,
+            f"{1e3 / m.ours.median:.0f}",
+            f"{m.slower:.2f}",
+            f"{there:.0f}",
+            f"{figure.frames_per_second}",
+            f"{there / figure.frames_per_second:.2f}",
+            f"{_median(reports, 'ate_rmse_m'):.4f}",
+            f"{figure.ate}",
+        )
 
 
 def _add_realtime(table: Table, figure: SequenceFigure, folder: Path, n_runs: int) -> None:
@@ -224,7 +284,15 @@ def lock_tables(library: Path) -> Iterator[object]:
         f"Sections under the map's lock, by milliseconds held (aim: writing {local:g}, a whole map "
         f"{whole:g})",
         ["sequence", ""],
-        ["n", *(f"<{edge:g}" for edge in _EDGES_MS), "more", "p99", "max", "longest\nwait"],
+        [
+            "n",
+            *(f"<{edge:g}" for edge in _EDGES_MS),
+            "more",
+            "p99",
+            "max",
+            "max\nused",
+            "max\nwait",
+        ],
     )
     for figure in reference.SEQUENCES:
         folder = _folder(figure)
@@ -235,7 +303,7 @@ def lock_tables(library: Path) -> Iterator[object]:
         for kind, sections in (("writing", times.written), ("reading", times.read)):
             if not len(sections):
                 continue
-            waited, held = (sections / 1e3).T
+            waited, held, used = (sections / 1e3).T
             counts = np.bincount(np.searchsorted(_EDGES_MS, held, side="right"), minlength=11)
             table.add_row(
                 figure.name,
@@ -244,11 +312,12 @@ def lock_tables(library: Path) -> Iterator[object]:
                 *(str(count) for count in counts),
                 f"{np.percentile(held, 99):.2f}",
                 f"{held.max():.2f}",
+                f"{used.max():.2f}",
                 f"{waited.max():.2f}",
             )
     table.caption = (
-        "Wall-clock time: a section in which the thread loses the processor counts with the time "
-        "that it stood still."
+        "Held is wall-clock time: a thread that loses the processor goes on holding the lock. Used: "
+        "processor time\nwhile the lock was held."
     )
     table.caption_justify = "left"
     if table.row_count:
