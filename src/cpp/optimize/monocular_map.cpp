@@ -96,9 +96,9 @@ MonocularMapFailure normalise(Map& map, MonocularMap& made, std::size_t min_poin
     return MonocularMapFailure::kFewPoints;
   }
   const double factor = 1 / made.median_depth;
-  if (!(made.median_depth > 0) || !std::isfinite(factor) || !(factor > 0)) {
-    return MonocularMapFailure::kBadDepth;
-  }
+  // Also false for a median of zero, infinity or NaN.
+  const bool usable = factor > 0 && std::isfinite(factor);
+  if (!usable) return MonocularMapFailure::kBadDepth;
   scale_map(map, made.second, factor);
   return MonocularMapFailure::kNone;
 }
