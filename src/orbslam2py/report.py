@@ -11,8 +11,9 @@ from typing import Any
 
 from orbslam2py import __version__
 from orbslam2py.errors import OrbSlamError
-from orbslam2py.evaluation import Evaluation, evaluate_trajectory
+from orbslam2py.evaluation import Alignment, Evaluation, evaluate_trajectory
 from orbslam2py.runner import RunResult
+from orbslam2py.sensor import Sensor
 from orbslam2py.trajectory import Trajectory
 
 _log = logging.getLogger(__name__)
@@ -23,6 +24,9 @@ class RunEvaluation:
     """A run against ground truth."""
 
     figures: Evaluation
+    """Of all tracked frames."""
+    keyframes_ate_rmse: float
+    """Of the keyframes alone [m]."""
     truth: Trajectory
     """Ground truth over the time of the run, in the estimate's frame."""
 
@@ -40,14 +44,18 @@ def evaluate_run(result: RunResult) -> RunEvaluation | None:
         truth = result.sequence.ground_truth()
         if truth is None or not len(estimate):
             return None
-        figures = evaluate_trajectory(estimate, truth)
+        # The unit of length of a single camera is its own.
+        monocular = result.options.sensor is Sensor.MONOCULAR
+        alignment = Alignment.SIM3 if monocular else Alignment.SE3
+        figures = evaluate_trajectory(estimate, truth, alignment)
+        keyframes = evaluate_trajectory(result.keyframes, truth, alignment)
     except (OrbSlamError, OSError) as error:
         _log.warning("no comparison with ground truth: %s", error)
         return None
     begin, end = estimate.timestamps[0] - 0.02, estimate.timestamps[-1] + 0.02
     during = truth.select((truth.timestamps >= begin) & (truth.timestamps <= end))
     T_wc = figures.transform.inverse().apply_to_poses(during.T_wc)
-    return RunEvaluation(figures, Trajectory(during.timestamps, T_wc))
+    return RunEvaluation(figures, keyframes.ate.rmse, Trajectory(during.timestamps, T_wc))
 
 
 def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str, Any]:
@@ -84,6 +92,7 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
     }
     if evaluation is not None:
         report |= evaluation.figures.as_dict()
+        report["ate_keyframes_rmse_m"] = evaluation.keyframes_ate_rmse
     return report
 
 

@@ -45,6 +45,8 @@ class RunOptions:
     max_frames: int | None = None
     """Take at most so many frames."""
     seed: int = 0
+    localize_after: int | None = None
+    """Switch to localization mode after so many frames."""
 
     def indices(self, n_frames: int) -> list[int]:
         """Indices of the frames of a sequence that are used.
@@ -293,7 +295,9 @@ class SequenceRunner:
         result = self.result
         try:
             with contextlib.closing(self._feed.frames(stop)) as frames:
-                for frame in frames:
+                for position, frame in enumerate(frames):
+                    if position == self._options.localize_after:
+                        system.localization_mode = True
                     row = self._track(system, frame)
                     result.rows.append(row)
                     if progress is not None:

@@ -94,6 +94,14 @@ def run(
             metavar="FILE_OR_FOLDER",
         ),
     ] = None,
+    localize: Annotated[
+        int | None,
+        typer.Option(
+            help="Switch to localization mode after so many frames: the map stays as it is.",
+            min=1,
+            metavar="N",
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of all random draws.", min=0)] = 0,
     force: Annotated[
         bool, typer.Option("--force", help="Write into an output folder that is not empty.")
@@ -103,7 +111,7 @@ def run(
     """Track a recorded sequence, a video or a camera; write trajectory, map and report."""
     log_to(Console(stderr=True), quiet=quiet)  # opening warns already
     images = open_source(sequence, sensor, settings=settings, fps=fps, times=times, mask=mask)
-    options = RunOptions(sensor, deterministic, realtime, start, stride, max_frames, seed)
+    options = RunOptions(sensor, deterministic, realtime, start, stride, max_frames, seed, localize)
     code = run_and_write(
         images, options, vocabulary=vocabulary, output=output, force=force, quiet=quiet
     )
