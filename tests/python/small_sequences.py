@@ -6,6 +6,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 from orbslam2py.datasets.base import Images
+from orbslam2py.evaluation import evaluate_trajectory
 from orbslam2py.records import TrackingRecord
 from orbslam2py.sensor import Sensor
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
@@ -59,3 +60,8 @@ def black(sensor: Sensor) -> Images:
     right = None if shown.right is None else 0 * shown.right
     depth = None if shown.depth is None else 0 * shown.depth  # type: ignore[operator]
     return Images(0 * shown.image, right, depth)
+
+
+def ate(system: System) -> float:
+    truth = sequence(system.sensor).ground_truth()
+    return float(evaluate_trajectory(system.trajectory(), truth).as_dict()["ate_rmse_m"])
