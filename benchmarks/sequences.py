@@ -316,8 +316,8 @@ def lock_tables(library: Path) -> Iterator[object]:
                 f"{waited.max():.2f}",
             )
     table.caption = (
-        "Held is wall-clock time: a thread that loses the processor goes on holding the lock. Used: "
-        "processor time\nwhile the lock was held."
+        "Held is wall-clock time: a thread that loses the processor goes on holding the lock. "
+        "Used: processor time\nwhile the lock was held."
     )
     table.caption_justify = "left"
     if table.row_count:
