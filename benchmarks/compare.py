@@ -97,6 +97,11 @@ def machine(console: Console, yardstick: Yardstick) -> None:
             f"yardstick {name} ({n} features): {measured.yardstick.median:.2f} ms here "
             f"(least {measured.yardstick.least:.2f}), {there} there"
         )
+        if measured.yardstick.median > 1.2 * measured.yardstick.least:
+            console.print(
+                "[yellow]Other programs disturb: short steps suffer less than the yardstick, long "
+                "ones more. Trust the least times, or come back later."
+            )
     if not yardstick.exact:
         console.print(
             "[yellow]The extra data are missing (ORBSLAM2PY_SHARED): synthetic images stand in for "
