@@ -109,7 +109,7 @@ class MonocularInitializer:
     ) -> Reason:
         core.describe(first.frame, self._vocabulary)
         core.describe(second.frame, self._vocabulary)
-        placed = np.where(views.triangulated, matches, -1)
+        placed = np.where(views.triangulated, matches, -1).astype(np.int32)
         begun = core.create_monocular_map(
             self._map, first, second, views.T_21, placed, views.points
         )

@@ -115,6 +115,8 @@ class Tracking:
                 discarded = self._predict_pose(frame, outcome)
         if discarded is not None:
             frame.reference_keyframe = self.reference_keyframe
+            if self.state == TrackingState.LOST:
+                self._last_relocalization_frame_id = frame.id
             if not self._visual_odometry:
                 with timer("local_map"):
                     self._track_local_map(frame, discarded, outcome)
@@ -122,7 +124,6 @@ class Tracking:
             return self._lose(frame, outcome)
 
         if self.state == TrackingState.LOST:
-            self._last_relocalization_frame_id = frame.id
             self.n_relocalizations += 1
         self.state = outcome.state = TrackingState.OK
         self._update_velocity(frame)
