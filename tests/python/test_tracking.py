@@ -422,6 +422,16 @@ def test_a_small_map_is_given_up(scene: Scene, n_keyframes: int, reset: bool) ->
     assert lose(scene).reset_needed == reset
 
 
+@pytest.mark.parametrize(("inliers", "found"), [(49, False), (50, True)])
+def test_a_frame_found_again_has_to_prove_itself(scene: Scene, inliers: int, found: bool) -> None:
+    scene.run(40)
+    lose(scene)
+    scene.core.n_reference = 0
+    scene.core.inliers.extend([100, inliers])
+    assert (scene.track().state is TrackingState.OK) == found
+    assert scene.tracking.n_relocalizations == int(found)
+
+
 def test_lost_keeps_trying_the_reference_keyframe_and_recovers(scene: Scene) -> None:
     scene.run(40)
     lose(scene)
