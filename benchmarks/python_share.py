@@ -124,7 +124,8 @@ def measure(folder: Path, sensor: Sensor, *, tracking_only: bool) -> PythonShare
     clock = CoreClock()
     clock.install()
     once: list[tuple[float, float, int]] = []
-    twice: list[tuple[float, float, int]] = []
+    # Python's seconds in frames that are not keyframes, noted once and twice.
+    between_of: tuple[list[float], list[float]] = ([], [])
     with System(sequence.settings, sensor, deterministic=True) as system:
         track = system.track_stereo if sensor is Sensor.STEREO else system.track_rgbd
         for i, (image, timestamp) in enumerate(zip(images, sequence.timestamps, strict=True)):
@@ -134,13 +135,15 @@ def measure(folder: Path, sensor: Sensor, *, tracking_only: bool) -> PythonShare
             record = track(image.image, second, float(timestamp))
             elapsed = time.perf_counter() - begin
             clock.kept.clear()
-            if not (tracking_only and record.is_keyframe):
-                frames = twice if clock.note_twice else once
-                frames.append((elapsed, elapsed - clock.seconds, clock.calls))
+            between = elapsed - clock.seconds
+            if not record.is_keyframe:
+                between_of[clock.note_twice].append(between)
+            if not clock.note_twice and not (tracking_only and record.is_keyframe):
+                once.append((elapsed, between, clock.calls))
     # Mapping happens at keyframes only: medians would not see it.
     average = np.median if tracking_only else np.mean
     elapsed, between, calls = (float(value) for value in average(once, axis=0))
-    noting = max(0.0, float(np.median(twice, axis=0)[1] - np.median(once, axis=0)[1]))
+    noting = max(0.0, float(np.median(between_of[True]) - np.median(between_of[False])))
     return PythonShare(
         len(once), 1e3 * (elapsed - noting), 1e3 * (between - noting), 1e3 * noting, calls
     )
