@@ -83,7 +83,7 @@ sanitize: build/.system-packages
 
 # ---- the rest ------------------------------------------------------------------------------------
 bench: install
-	@cmake --preset release >/dev/null && cmake --build build/release -j $(JOBS)
+	@cmake --preset release >/dev/null && cmake --build build/release -j $(JOBS) --target benchmarks
 	@$(BIN)/python benchmarks/compare.py
 
 wheel: $(VENV)/.requirements

@@ -7,6 +7,7 @@ import logging
 import resource
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from orbslam2py import __version__
@@ -98,6 +99,12 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
 
 def peak_memory_mb() -> float:
     """Largest resident memory of this process so far, in megabytes."""
+    # A child inherits ru_maxrss of the program that started it; Linux' own figure is the process's.
+    status = Path("/proc/self/status")
+    if status.exists():
+        for line in status.read_text().splitlines():
+            if line.startswith("VmHWM:"):
+                return int(line.split()[1]) / 1e3
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak / (1e6 if sys.platform == "darwin" else 1e3)
 
