@@ -59,7 +59,7 @@ def run(
         Path | None, typer.Option(help="Vocabulary file; the one of the package if not given.")
     ] = None,
     output: Annotated[
-        Path | None, typer.Option(help="Folder for the results [runs/<sequence>-<time>].")
+        Path | None, typer.Option(help="Folder for the results [runs/SEQUENCE-TIME].")
     ] = None,
     deterministic: Annotated[
         bool, typer.Option("--deterministic", help="Map inline: the same bytes in every run.")
