@@ -129,7 +129,10 @@ class LiveCamera(UnposedSource):
             self._stopped = True
             self._changed.notify_all()
         if self._thread is not None:
-            self._thread.join()
+            self._thread.join(_PATIENCE)
+            if self._thread.is_alive():
+                _log.warning("camera %d does not answer; it is not waited for", self.index)
+                return
         if self._capture is not None:
             self._capture.release()
 
