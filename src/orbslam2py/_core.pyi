@@ -13,7 +13,7 @@ from orbslam2py.errors import SettingsError
 from orbslam2py.errors import StateError
 from orbslam2py.errors import VocabularyError
 import typing
-__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'DirectIndex', 'EdgeSnapshot', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'GlobalBundleOptions', 'GlobalBundleResult', 'ImageBounds', 'ImageError', 'KeyFrameIndex', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Map', 'MapFileError', 'MonocularMap', 'MonocularMapFailure', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'check_invariants', 'corridor_way', 'count_map_points', 'count_sightings', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'describe', 'direct_index_of', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'fundamental_matrix', 'fuse_points', 'fuse_with_neighbours', 'gather_points', 'global_bundle_adjustment', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_two_rooms', 'match_for_initialization', 'match_for_triangulation', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'median_scene_depth', 'optimize_pose', 'process_new_keyframe', 'project_into', 'refresh_associations', 'render', 'room_T_wc', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_observations', 'snapshot_points', 'solve_bundle', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'words_of']
+__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'DirectIndex', 'EdgeSnapshot', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'GlobalBundleOptions', 'GlobalBundleResult', 'ImageBounds', 'ImageError', 'KeyFrameIndex', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Map', 'MapFileError', 'MonocularMap', 'MonocularMapFailure', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'WorkerThread', 'World', 'add_temporary_points', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'check_invariants', 'corridor_way', 'count_map_points', 'count_sightings', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'describe', 'direct_index_of', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'fundamental_matrix', 'fuse_points', 'fuse_with_neighbours', 'gather_points', 'global_bundle_adjustment', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_two_rooms', 'match_for_initialization', 'match_for_triangulation', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'median_scene_depth', 'optimize_pose', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'refresh_associations', 'render', 'room_T_wc', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_observations', 'snapshot_points', 'solve_bundle', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'words_of']
 class Pose:
     """
     Rigid transform. `T_ab` maps coordinates of frame b into frame a.
@@ -1335,6 +1335,167 @@ class KeyFrameIndex:
         """
         Forgets a keyframe; call it after its death in the map.
         """
+class WorkerThread:
+    """
+    A helper thread that waits for work.
+    """
+    def __init__(self) -> None:
+        ...
+class TwoViewOutcome:
+    """
+    A reconstruction, or why there is none.
+
+    Members:
+
+      reconstructed
+
+      too_few_matches
+
+      degenerate_points
+
+      no_model
+
+      degenerate_plane
+
+      too_few_points
+
+      low_parallax
+
+      ambiguous_motion
+    """
+    __members__: typing.ClassVar[dict[str, TwoViewOutcome]]
+    ambiguous_motion: typing.ClassVar[TwoViewOutcome]
+    degenerate_plane: typing.ClassVar[TwoViewOutcome]
+    degenerate_points: typing.ClassVar[TwoViewOutcome]
+    low_parallax: typing.ClassVar[TwoViewOutcome]
+    no_model: typing.ClassVar[TwoViewOutcome]
+    reconstructed: typing.ClassVar[TwoViewOutcome]
+    too_few_matches: typing.ClassVar[TwoViewOutcome]
+    too_few_points: typing.ClassVar[TwoViewOutcome]
+    @typing.overload
+    def __eq__(self, other: TwoViewOutcome) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: TwoViewOutcome) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class TwoViewResult:
+    """
+    Motion and points of two views.
+    """
+    @property
+    def T_21(self) -> Pose:
+        """
+        First to second camera, |translation| = 1.
+        """
+    @property
+    def fundamental_score(self) -> float:
+        ...
+    @property
+    def homography_ratio(self) -> float:
+        """
+        Share of the homography in both scores; above 0.40 it is chosen.
+        """
+    @property
+    def homography_score(self) -> float:
+        ...
+    @property
+    def n_matches(self) -> int:
+        ...
+    @property
+    def outcome(self) -> TwoViewOutcome:
+        ...
+    @property
+    def parallax(self) -> float:
+        """
+        Degrees.
+        """
+    @property
+    def points(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        (n, 3) float64 per initial keypoint, in the first camera.
+        """
+    @property
+    def success(self) -> bool:
+        ...
+    @property
+    def triangulated(self) -> numpy.typing.NDArray[numpy.bool]:
+        """
+        (n,) bool: the point is well placed.
+        """
+class PnpPose:
+    """
+    A pose from points and pixels.
+    """
+    @property
+    def T_cw(self) -> Pose:
+        ...
+    @property
+    def inliers(self) -> numpy.typing.NDArray[numpy.bool]:
+        """
+        (n,) bool.
+        """
+    @property
+    def n_inliers(self) -> int:
+        ...
+    @property
+    def refined(self) -> bool:
+        """
+        Estimated from all inliers of a sample's pose.
+        """
+class PnpRansac:
+    """
+    RANSAC over EPnP in slices, so that candidates can take turns.
+    """
+    def __init__(self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], sigma2: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pinhole: Pinhole, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+        """
+        `points` (n, 3) world, `pixels` (n, 2) undistorted, `sigma2` (n,) [pixels^2].
+        """
+    def iterate(self, n: typing.SupportsInt | typing.SupportsIndex) -> PnpPose | None:
+        """
+        Runs at most n further iterations; a PnpPose, or None.
+        """
+    @property
+    def exhausted(self) -> bool:
+        """
+        No iterations are left.
+        """
+    @property
+    def iterations(self) -> int:
+        ...
+    @property
+    def max_iterations(self) -> int:
+        ...
+    @property
+    def min_inliers(self) -> int:
+        ...
 class LocalMapMatches:
     """
     Result of match_local_map().
@@ -2030,6 +2191,13 @@ def project_into(frame: TrackedFrame, points: PointBatch) -> tuple[numpy.typing.
     Returns (uvr, view_cosine, level, visible): (n, 3) float32 pixels u, v and the column in
     the right image; (n,) float32; (n,) int32 predicted level; (n,) bool. The others are only
     meaningful where visible. Raises StateError without a pose.
+    """
+def reconstruct_two_views(initial: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], current: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], matches: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], pinhole: Pinhole, seed: typing.SupportsInt | typing.SupportsIndex = 0, helper: WorkerThread = None) -> TwoViewResult:
+    """
+    Structure from two views: homography and fundamental matrix side by side, the
+    better one gives the motion. `initial` (n, 2), `current` (m, 2): undistorted pixels;
+    `matches` (n,): index in current or -1. `helper`: a WorkerThread for the second
+    model; the result is the same without.
     """
 def refresh_associations(map: Map, frame: TrackedFrame) -> None:
     """

@@ -118,9 +118,7 @@ class System:
             self.sensor,
             settings.max_frames,
             initializer=self._initializer(),
-            relocalizer=Relocalizer(self._map, self._index, seed)
-            if hasattr(core, "PnpRansac")
-            else None,
+            relocalizer=Relocalizer(self._map, self._index, seed),
         )
         self._localization = LocalizationSwitch(self._tracking, self._workers)
         self._recorder = core.TrajectoryRecorder()
