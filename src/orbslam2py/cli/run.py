@@ -17,7 +17,6 @@ from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.interrupts import StopOnInterrupt
 from orbslam2py.datasets import open_source
 from orbslam2py.datasets.base import LiveSource, Sequence
-from orbslam2py.errors import SettingsError
 from orbslam2py.outputs import OutputWriter, link_latest, prepare_output_folder
 from orbslam2py.report import evaluate_run, make_report
 from orbslam2py.runner import FrameRow, RunOptions, RunResult, SequenceRunner
@@ -131,11 +130,6 @@ def run_and_write(
     quiet: bool = False,
 ) -> ExitCode:
     """Run, write all files, show a table; returns the exit code."""
-    if options.sensor is Sensor.MONOCULAR:
-        raise SettingsError(
-            "tracking with a single camera is not available in this version; "
-            "use --sensor stereo or rgbd"
-        )
     console = Console(quiet=quiet)
     errors = Console(stderr=True)
     log_to(errors, quiet=quiet)
