@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "base/pose.hpp"
+#include "camera/camera.hpp"
+#include "geometry/ransac.hpp"
+
+namespace orbslam {
+
+/// Points of the map and the pixels that may show them, one correspondence per column.
+struct PnpProblem {
+  Eigen::Matrix3Xd points;  ///< world
+  Eigen::Matrix2Xd pixels;  ///< undistorted
+  Eigen::VectorXd sigma2;   ///< variance of each pixel [pixels^2]
+  Pinhole pinhole;
+};
+
+struct PnpOptions {
+  RansacOptions ransac{0.99, 10, 0.5, 300, 3};
+  double max_chi2 = 5.991;  ///< squared error over sigma2 that an inlier stays below
+};
+
+struct PnpPose {
+  Pose T_cw;
+  std::vector<std::uint8_t> inliers;  ///< per correspondence
+  std::size_t n_inliers = 0;
+  bool refined = false;  ///< estimated from all inliers of a sample's pose, not from the sample
+};
+
+/// RANSAC over EPnP, in slices: the tracker lets several candidate keyframes take turns. How the
+/// iterations are sliced does not change what is found.
+class PnpRansac {
+ public:
+  /// Throws std::invalid_argument when the arrays differ in length, or an option is out of range.
+  PnpRansac(PnpProblem problem, const PnpOptions& options, std::uint64_t seed);
+
+  /// Runs at most n further iterations. Returns the pose refined on the inliers of a new best
+  /// sample as soon as it has more than min_inliers() inliers; when the last iteration is done,
+  /// the best sample's pose if there is one; otherwise nothing.
+  std::optional<PnpPose> iterate(int n);
+
+  /// No iterations are left. So from the start with fewer correspondences than min_inliers().
+  bool exhausted() const { return iterations_ >= max_iterations_; }
+  int iterations() const { return iterations_; }
+  int max_iterations() const { return max_iterations_; }
+  std::size_t min_inliers() const { return min_inliers_; }
+
+ private:
+  PnpPose judge(const Pose& T_cw) const;
+  std::optional<PnpPose> pose_of_sample();
+  std::optional<PnpPose> refine_best() const;
+
+  PnpProblem problem_;
+  double max_chi2_ = 0;
+  std::size_t min_inliers_ = 0;
+  int max_iterations_ = 0;
+  int iterations_ = 0;
+  MinimalSampler sampler_;
+  PnpPose best_;
+};
+
+}  // namespace orbslam
