@@ -62,9 +62,9 @@ class System:
     deterministic : bool
         Run mapping inline after each keyframe: two runs give the same bytes.
     wait_for_mapping : bool
-        For recorded data: a track call waits until at most one keyframe waits for mapping, so that
-        the result does not depend on the speed at which images are delivered. For live cameras
-        leave it off.
+        For recorded data: a track call waits until at most one keyframe waits for mapping (with a
+        single camera: none, and mapping is idle), so that the result does not depend on the speed
+        at which images are delivered. For live cameras leave it off.
     seed : int
         Seed of all random draws.
 
@@ -297,7 +297,7 @@ class System:
             timer = StageTimer()
             if self._wait_for_mapping:
                 with timer("wait"):
-                    self._mapping.worker.wait_until_waiting(at_most=1)
+                    self._wait_for_mapper()
             with timer("track"):
                 frame = core.TrackedFrame(build(self._next_frame_id, timer))
                 # From here on the image counts: every id is one image.
@@ -306,6 +306,14 @@ class System:
                 outcome = self._tracking.track(frame, timer)
             self._statistics.add(timer.milliseconds)
             return self._record(frame, outcome, timer, details)
+
+    def _wait_for_mapper(self) -> None:
+        if self.sensor.has_depth:
+            self._mapping.worker.wait_until_waiting(at_most=1)
+        elif not self._mapping.worker.pausing:
+            # New points of a single camera come from mapping alone, and a busy mapper takes no
+            # keyframes: on fast motion the map would end before the mapper is done.
+            self._mapping.worker.wait_until_idle()
 
     def _check_timestamp(self, timestamp: float) -> None:
         if not math.isfinite(timestamp):
