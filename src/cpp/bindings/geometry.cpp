@@ -2,9 +2,13 @@
 #include <pybind11/eigen.h>
 #include <pybind11/stl.h>
 
-#include "base/worker_thread.hpp"
+#include <memory>
+#include <optional>
+#include <string>
+
 #include "bindings/arrays.hpp"
 #include "bindings/bindings.hpp"
+#include "geometry/epnp.hpp"
 #include "geometry/pnp_ransac.hpp"
 #include "geometry/triangulation.hpp"
 #include "geometry/two_view.hpp"
@@ -13,44 +17,40 @@ namespace orbslam::bindings {
 namespace {
 
 using namespace py::literals;
-using FloatArray = py::array_t<float, py::array::c_style | py::array::forcecast>;
-using DoubleArray = py::array_t<double, py::array::c_style | py::array::forcecast>;
-using IntArray = py::array_t<int, py::array::c_style | py::array::forcecast>;
+template <class Item>
+using Input = py::array_t<Item, py::array::c_style | py::array::forcecast>;
 
-py::array_t<bool> flags(const std::vector<std::uint8_t>& values) {
-  return copy_to_array<bool>(values.data(), {static_cast<py::ssize_t>(values.size())});
-}
-
-void require_columns(const py::array& array, py::ssize_t columns, const char* what) {
+std::size_t rows_of(const py::array& array, py::ssize_t columns, const char* name) {
   if (array.ndim() != 2 || array.shape(1) != columns) {
-    throw py::value_error(std::string(what) + " must have the shape (n, " +
+    throw py::value_error(std::string(name) + " must have the shape (n, " +
                           std::to_string(columns) + ")");
   }
+  return static_cast<std::size_t>(array.shape(0));
 }
 
-std::vector<Eigen::Vector2f> pixels_of(const FloatArray& array, const char* what) {
-  require_columns(array, 2, what);
-  std::vector<Eigen::Vector2f> pixels;
-  pixels.reserve(static_cast<std::size_t>(array.shape(0)));
-  for (py::ssize_t i = 0; i < array.shape(0); ++i)
-    pixels.emplace_back(array.at(i, 0), array.at(i, 1));
-  return pixels;
+std::vector<Eigen::Vector2f> positions_of(const Input<float>& array, const char* name) {
+  std::vector<Eigen::Vector2f> positions(rows_of(array, 2, name));
+  for (std::size_t i = 0; i < positions.size(); ++i) {
+    positions[i] = {array.data()[2 * i], array.data()[2 * i + 1]};
+  }
+  return positions;
 }
 
-TwoViewResult reconstruct(const FloatArray& initial, const FloatArray& current,
-                          const IntArray& matches, const Pinhole& pinhole, std::uint64_t seed,
-                          WorkerThread* helper) {
-  const auto first = pixels_of(initial, "initial"), second = pixels_of(current, "current");
-  if (matches.ndim() != 1) throw py::value_error("matches must be a 1-D array");
-  const std::vector<int> partners(matches.data(), matches.data() + matches.size());
-  const py::gil_scoped_release release;
-  return reconstruct_two_views({first, second, partners, pinhole}, TwoViewOptions(), seed, helper);
+std::vector<EightPairs> samples_of(const Input<std::int32_t>& array) {
+  std::vector<EightPairs> samples(rows_of(array, 8, "samples"));
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    std::copy_n(array.data() + 8 * i, 8, samples[i].begin());
+  }
+  return samples;
 }
 
-void bind_two_view(py::module_& module) {
-  py::class_<WorkerThread>(module, "WorkerThread", "A helper thread that waits for work.")
-      .def(py::init<>());
-  py::enum_<TwoViewOutcome>(module, "TwoViewOutcome", "A reconstruction, or why there is none.")
+Pinhole pinhole_of(const Eigen::Vector4d& intrinsics) {
+  return {intrinsics[0], intrinsics[1], intrinsics[2], intrinsics[3]};
+}
+
+void bind_two_view_types(py::module_& module) {
+  py::enum_<TwoViewOutcome>(module, "TwoViewOutcome",
+                            "Whether two views gave a reconstruction, or why not.")
       .value("reconstructed", TwoViewOutcome::reconstructed)
       .value("too_few_matches", TwoViewOutcome::too_few_matches)
       .value("degenerate_points", TwoViewOutcome::degenerate_points)
@@ -59,69 +59,175 @@ void bind_two_view(py::module_& module) {
       .value("too_few_points", TwoViewOutcome::too_few_points)
       .value("low_parallax", TwoViewOutcome::low_parallax)
       .value("ambiguous_motion", TwoViewOutcome::ambiguous_motion);
-  py::class_<TwoViewResult>(module, "TwoViewResult", "Motion and points of two views.")
-      .def_property_readonly("success", &TwoViewResult::success)
-      .def_readonly("outcome", &TwoViewResult::outcome)
-      .def_readonly("n_matches", &TwoViewResult::n_matches)
-      .def_readonly("homography_score", &TwoViewResult::homography_score)
-      .def_readonly("fundamental_score", &TwoViewResult::fundamental_score)
-      .def_readonly("homography_ratio", &TwoViewResult::homography_ratio,
-                    "Share of the homography in both scores; above 0.40 it is chosen.")
-      .def_readonly("T_21", &TwoViewResult::T_21, "First to second camera, |translation| = 1.")
-      .def_readonly("parallax", &TwoViewResult::parallax, "Degrees.")
+  py::enum_<TwoViewModel>(module, "TwoViewModel", "The model that gave the motion.")
+      .value("none", TwoViewModel::none)
+      .value("homography", TwoViewModel::homography)
+      .value("fundamental", TwoViewModel::fundamental);
+  py::class_<MotionScore>(module, "MotionScore", "What one motion hypothesis achieved.")
+      .def_readonly("n_good", &MotionScore::n_good, "Pairs in front of both cameras that fit.")
+      .def_readonly("parallax", &MotionScore::parallax, "Degrees; of the 51st best pair.");
+  py::class_<TwoViewOptions>(module, "TwoViewOptions", "Limits of reconstruct_two_views.")
+      .def(py::init([](double sigma, int n_samples, std::size_t min_matches, std::size_t min_points,
+                       double min_parallax) {
+             return TwoViewOptions{sigma, n_samples, min_matches, {min_points, min_parallax}};
+           }),
+           "sigma"_a = 1.0, "n_samples"_a = 200, "min_matches"_a = 100, "min_points"_a = 50,
+           "min_parallax"_a = 1.0)
+      .def_readwrite("sigma", &TwoViewOptions::sigma, "Deviation of a keypoint [pixels].")
+      .def_readwrite("n_samples", &TwoViewOptions::n_samples, "Minimal samples of 8 matches.")
+      .def_readwrite("min_matches", &TwoViewOptions::min_matches, "Fewer are refused.")
+      .def_property(
+          "min_points", [](const TwoViewOptions& o) { return o.limits.min_points; },
+          [](TwoViewOptions& o, std::size_t value) { o.limits.min_points = value; },
+          "Points a motion must place.")
+      .def_property(
+          "min_parallax", [](const TwoViewOptions& o) { return o.limits.min_parallax; },
+          [](TwoViewOptions& o, double value) { o.limits.min_parallax = value; }, "Degrees.");
+}
+
+void bind_two_view_result(py::module_& module) {
+  using Result = TwoViewResult;
+  py::class_<Result>(module, "TwoViewResult", "Result of reconstruct_two_views.")
+      .def_property_readonly("success", &Result::success, "The outcome is `reconstructed`.")
+      .def_readonly("outcome", &Result::outcome, "Success or the reason of failure.")
+      .def_readonly("model", &Result::model, "The model that was chosen.")
+      .def_readonly("n_matches", &Result::n_matches, "Matches given.")
+      .def_readonly("homography_score", &Result::homography_score, "0: no homography.")
+      .def_readonly("fundamental_score", &Result::fundamental_score, "0: no fundamental matrix.")
+      .def_readonly("homography_ratio", &Result::homography_ratio,
+                    "Of the homography's score in the sum; it is chosen above 0.40.")
+      .def_readonly("H_21", &Result::H_21, "(3, 3) float64, pixels of view 1 to view 2.")
+      .def_readonly("F_21", &Result::F_21, "(3, 3) float64, x_2^T F_21 x_1 = 0 for pixels.")
+      .def_readonly("n_homography_inliers", &Result::n_homography_inliers, "Matches that fit H.")
+      .def_readonly("n_fundamental_inliers", &Result::n_fundamental_inliers, "Matches that fit F.")
+      .def_readonly("hypotheses", &Result::hypotheses, "MotionScore of each motion tried.")
+      .def_readonly("best_hypothesis", &Result::best_hypothesis, "Index of the best one.")
+      .def_readonly("T_21", &Result::T_21,
+                    "Pose from camera 1 to camera 2, translation of length 1.")
+      .def_readonly("parallax", &Result::parallax, "Of the best hypothesis, degrees.")
       .def_property_readonly(
           "points",
-          [](const TwoViewResult& r) {
+          [](const Result& r) {
             return copy_to_array<double>(r.points.data(),
                                          {static_cast<py::ssize_t>(r.points.size()), 3});
           },
-          "(n, 3) float64 per initial keypoint, in the first camera.")
+          "Per initial keypoint, (n, 3) float64 in the frame of camera 1; zero where missing.")
       .def_property_readonly(
-          "triangulated", [](const TwoViewResult& r) { return flags(r.triangulated); },
-          "(n,) bool: the point is well placed.");
-  module.def(
-      "reconstruct_two_views", &reconstruct, "initial"_a, "current"_a, "matches"_a, "pinhole"_a,
-      "seed"_a = 0, "helper"_a = py::none(),
-      "Structure from two views: homography and fundamental matrix side by side, the\n"
-      "better one gives the motion. `initial` (n, 2), `current` (m, 2): undistorted pixels;\n"
-      "`matches` (n,): index in current or -1. `helper`: a WorkerThread for the second\n"
-      "model; the result is the same without.");
+          "triangulated", [](const Result& r) { return to_array(r.triangulated); },
+          "Per initial keypoint, (n,) uint8: the point is well placed.")
+      .def_property_readonly(
+          "homography_inlier", [](const Result& r) { return to_array(r.homography_inlier); },
+          "Per initial keypoint, (n,) uint8.")
+      .def_property_readonly(
+          "fundamental_inlier", [](const Result& r) { return to_array(r.fundamental_inlier); },
+          "Per initial keypoint, (n,) uint8.");
 }
 
-PnpProblem problem_of(const DoubleArray& points, const DoubleArray& pixels,
-                      const DoubleArray& sigma2, const Pinhole& pinhole) {
-  require_columns(points, 3, "points");
-  require_columns(pixels, 2, "pixels");
-  if (sigma2.ndim() != 1) throw py::value_error("sigma2 must be a 1-D array");
+void bind_two_view(py::module_& module) {
+  bind_two_view_types(module);
+  bind_two_view_result(module);
+  module.def(
+      "reconstruct_two_views",
+      [](const Input<float>& initial, const Input<float>& current,
+         const Input<std::int32_t>& matches, const Eigen::Vector4d& intrinsics, std::uint64_t seed,
+         const TwoViewOptions& options, const std::optional<Input<std::int32_t>>& samples,
+         bool two_threads) {
+        if (matches.ndim() != 1) throw py::value_error("matches must have the shape (n,)");
+        const auto points_1 = positions_of(initial, "initial");
+        const auto points_2 = positions_of(current, "current");
+        const std::vector<int> indices(matches.data(), matches.data() + matches.size());
+        std::optional<std::vector<EightPairs>> given;
+        if (samples) given = samples_of(*samples);
+        const TwoViewInput input{points_1, points_2, indices, pinhole_of(intrinsics)};
+        const py::gil_scoped_release release;
+        const auto helper = two_threads ? std::make_unique<WorkerThread>() : nullptr;
+        return given ? reconstruct_two_views(input, options, *given, helper.get())
+                     : reconstruct_two_views(input, options, seed, helper.get());
+      },
+      "initial"_a, "current"_a, "matches"_a, "intrinsics"_a, "seed"_a = 0,
+      "options"_a = TwoViewOptions(), "samples"_a = py::none(), "two_threads"_a = true,
+      "Motion and points from two views, up to scale.\n\n"
+      "`initial`, `current`: (n, 2), (m, 2) float32 undistorted pixels of all keypoints.\n"
+      "`matches`: (n,) int32 index in `current` or -1. `intrinsics`: fx, fy, cx, cy [pixels].\n"
+      "`samples`: (k, 8) int32 indices into the matches, ascending by initial keypoint, instead\n"
+      "of those drawn from `seed`. `two_threads` does not change the result. Raises ValueError\n"
+      "for bad shapes, indices or options.");
+}
+
+PnpProblem pnp_problem(const Input<double>& points, const Input<double>& pixels,
+                       const Input<double>& sigma2, const Eigen::Vector4d& intrinsics) {
+  const auto n = static_cast<Eigen::Index>(rows_of(points, 3, "points"));
+  const auto n_pixels = static_cast<Eigen::Index>(rows_of(pixels, 2, "pixels"));
+  if (sigma2.ndim() != 1) throw py::value_error("sigma2 must have the shape (n,)");
   PnpProblem problem;
-  problem.points = Eigen::Map<const Eigen::Matrix3Xd>(points.data(), 3, points.shape(0));
-  problem.pixels = Eigen::Map<const Eigen::Matrix2Xd>(pixels.data(), 2, pixels.shape(0));
+  // Rows of NumPy's are columns of Eigen's.
+  problem.points = Eigen::Map<const Eigen::Matrix3Xd>(points.data(), 3, n);
+  problem.pixels = Eigen::Map<const Eigen::Matrix2Xd>(pixels.data(), 2, n_pixels);
   problem.sigma2 = Eigen::Map<const Eigen::VectorXd>(sigma2.data(), sigma2.size());
-  problem.pinhole = pinhole;
+  problem.pinhole = pinhole_of(intrinsics);
   return problem;
 }
 
-void bind_pnp(py::module_& module) {
-  py::class_<PnpPose>(module, "PnpPose", "A pose from points and pixels.")
-      .def_readonly("T_cw", &PnpPose::T_cw)
+void bind_epnp(py::module_& module) {
+  py::class_<EpnpPose>(module, "EpnpPose", "Result of solve_epnp.")
+      .def_readonly("T_cw", &EpnpPose::T_cw, "World to camera.")
+      .def_readonly("mean_error", &EpnpPose::mean_error, "Mean reprojection error [pixels].");
+  module.def(
+      "solve_epnp",
+      [](const Input<double>& points, const Input<double>& pixels,
+         const Eigen::Vector4d& intrinsics) {
+        const auto n = static_cast<Eigen::Index>(rows_of(points, 3, "points"));
+        const auto n_pixels = static_cast<Eigen::Index>(rows_of(pixels, 2, "pixels"));
+        const Eigen::Map<const Eigen::Matrix3Xd> world(points.data(), 3, n);
+        const Eigen::Map<const Eigen::Matrix2Xd> image(pixels.data(), 2, n_pixels);
+        const py::gil_scoped_release release;
+        return solve_epnp(world, image, pinhole_of(intrinsics));
+      },
+      "points"_a, "pixels"_a, "intrinsics"_a,
+      "Pose from (n, 3) float64 world points and (n, 2) float64 undistorted pixels, n >= 4.\n\n"
+      "`intrinsics`: fx, fy, cx, cy [pixels]. Returns an EpnpPose, or None for collinear points.\n"
+      "All points count as inliers. Raises ValueError for bad shapes.");
+}
+
+void bind_pnp_ransac(py::module_& module) {
+  py::class_<PnpOptions>(module, "PnpOptions", "Options of PnpRansac.")
+      .def(py::init([](double probability, std::size_t min_inliers, double inlier_ratio,
+                       int max_iterations, int exponent, double max_chi2) {
+             return PnpOptions{{probability, min_inliers, inlier_ratio, max_iterations, exponent},
+                               max_chi2};
+           }),
+           "probability"_a = 0.99, "min_inliers"_a = 10, "inlier_ratio"_a = 0.5,
+           "max_iterations"_a = 300, "exponent"_a = 3, "max_chi2"_a = 5.991,
+           "`exponent`: sample size in the count of iterations. `max_chi2`: limit of the squared\n"
+           "error over the variance.");
+  py::class_<PnpPose>(module, "PnpPose", "A pose found by PnpRansac.")
+      .def_readonly("T_cw", &PnpPose::T_cw, "World to camera.")
       .def_property_readonly(
-          "inliers", [](const PnpPose& pose) { return flags(pose.inliers); }, "(n,) bool.")
-      .def_readonly("n_inliers", &PnpPose::n_inliers)
+          "inliers", [](const PnpPose& p) { return to_array(p.inliers); },
+          "Per correspondence, (n,) uint8.")
+      .def_readonly("n_inliers", &PnpPose::n_inliers, "Number of inliers.")
       .def_readonly("refined", &PnpPose::refined, "Estimated from all inliers of a sample's pose.");
   py::class_<PnpRansac>(module, "PnpRansac",
-                        "RANSAC over EPnP in slices, so that candidates can take turns.")
-      .def(py::init([](const DoubleArray& points, const DoubleArray& pixels,
-                       const DoubleArray& sigma2, const Pinhole& pinhole, std::uint64_t seed) {
-             return PnpRansac(problem_of(points, pixels, sigma2, pinhole), PnpOptions(), seed);
-           }),
-           "points"_a, "pixels"_a, "sigma2"_a, "pinhole"_a, "seed"_a = 0,
-           "`points` (n, 3) world, `pixels` (n, 2) undistorted, `sigma2` (n,) [pixels^2].")
+                        "RANSAC over EPnP in slices, so that several candidates can take turns.")
+      .def(
+          py::init([](const Input<double>& points, const Input<double>& pixels,
+                      const Input<double>& sigma2, const Eigen::Vector4d& intrinsics,
+                      std::uint64_t seed, const PnpOptions& options) {
+            return std::make_unique<PnpRansac>(pnp_problem(points, pixels, sigma2, intrinsics),
+                                               options, seed);
+          }),
+          "points"_a, "pixels"_a, "sigma2"_a, "intrinsics"_a, "seed"_a = 0,
+          "options"_a = PnpOptions(),
+          "`points`: (n, 3) float64 world. `pixels`: (n, 2) float64 undistorted. `sigma2`: (n,)\n"
+          "[pixels^2]. `intrinsics`: fx, fy, cx, cy [pixels]. Raises ValueError for bad shapes or\n"
+          "options.")
       .def("iterate", &PnpRansac::iterate, "n"_a, py::call_guard<py::gil_scoped_release>(),
-           "Runs at most n further iterations; a PnpPose, or None.")
+           "At most n further iterations. Returns a PnpPose as soon as one is good enough, the\n"
+           "best one when the iterations are used up, or None.")
       .def_property_readonly("exhausted", &PnpRansac::exhausted, "No iterations are left.")
-      .def_property_readonly("iterations", &PnpRansac::iterations)
-      .def_property_readonly("max_iterations", &PnpRansac::max_iterations)
-      .def_property_readonly("min_inliers", &PnpRansac::min_inliers);
+      .def_property_readonly("iterations", &PnpRansac::iterations, "Done so far.")
+      .def_property_readonly("max_iterations", &PnpRansac::max_iterations, "Of all calls.")
+      .def_property_readonly("min_inliers", &PnpRansac::min_inliers, "A pose needs as many.");
 }
 
 }  // namespace
@@ -135,7 +241,8 @@ void bind_geometry(py::module_& module) {
              "The (3, 3) matrix F_12 with x_1^T F_12 x_2 = 0 for pixels (u, v, 1) of cameras with\n"
              "calibration matrices K_1 and K_2.");
   bind_two_view(module);
-  bind_pnp(module);
+  bind_epnp(module);
+  bind_pnp_ransac(module);
 }
 
 }  // namespace orbslam::bindings
