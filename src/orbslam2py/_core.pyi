@@ -13,7 +13,7 @@ from orbslam2py.errors import SettingsError
 from orbslam2py.errors import StateError
 from orbslam2py.errors import VocabularyError
 import typing
-__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'DirectIndex', 'EdgeSnapshot', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'GlobalBundleOptions', 'GlobalBundleResult', 'ImageBounds', 'ImageError', 'KeyFrameIndex', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Map', 'MapFileError', 'MonocularMap', 'MonocularMapFailure', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'WorkerThread', 'World', 'add_temporary_points', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'check_invariants', 'corridor_way', 'count_map_points', 'count_sightings', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'describe', 'direct_index_of', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'fundamental_matrix', 'fuse_points', 'fuse_with_neighbours', 'gather_points', 'global_bundle_adjustment', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_two_rooms', 'match_for_initialization', 'match_for_triangulation', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'median_scene_depth', 'optimize_pose', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'refresh_associations', 'render', 'room_T_wc', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_observations', 'snapshot_points', 'solve_bundle', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'words_of']
+__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'GlobalBundleOptions', 'GlobalBundleResult', 'ImageBounds', 'ImageError', 'KeyFrameIndex', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Map', 'MapFileError', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'check_invariants', 'corridor_way', 'count_map_points', 'count_sightings', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'describe', 'direct_index_of', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'fundamental_matrix', 'fuse_points', 'fuse_with_neighbours', 'gather_points', 'global_bundle_adjustment', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_two_rooms', 'match_for_initialization', 'match_for_triangulation', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'median_scene_depth', 'optimize_pose', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'refresh_associations', 'render', 'room_T_wc', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_observations', 'snapshot_points', 'solve_bundle', 'solve_epnp', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'words_of']
 class Pose:
     """
     Rigid transform. `T_ab` maps coordinates of frame b into frame a.
@@ -1335,15 +1335,9 @@ class KeyFrameIndex:
         """
         Forgets a keyframe; call it after its death in the map.
         """
-class WorkerThread:
-    """
-    A helper thread that waits for work.
-    """
-    def __init__(self) -> None:
-        ...
 class TwoViewOutcome:
     """
-    A reconstruction, or why there is none.
+    Whether two views gave a reconstruction, or why not.
 
     Members:
 
@@ -1406,65 +1400,257 @@ class TwoViewOutcome:
     @property
     def value(self) -> int:
         ...
-class TwoViewResult:
+class TwoViewModel:
     """
-    Motion and points of two views.
+    The model that gave the motion.
+
+    Members:
+
+      none
+
+      homography
+
+      fundamental
+    """
+    __members__: typing.ClassVar[dict[str, TwoViewModel]]
+    fundamental: typing.ClassVar[TwoViewModel]
+    homography: typing.ClassVar[TwoViewModel]
+    none: typing.ClassVar[TwoViewModel]
+    @typing.overload
+    def __eq__(self, other: TwoViewModel) -> bool:
+        ...
+    @typing.overload
+    def __eq__(self, other: typing.Any) -> bool:
+        ...
+    def __getstate__(self) -> int:
+        ...
+    def __hash__(self) -> int:
+        ...
+    def __index__(self) -> int:
+        ...
+    def __init__(self, value: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __int__(self) -> int:
+        ...
+    @typing.overload
+    def __ne__(self, other: TwoViewModel) -> bool:
+        ...
+    @typing.overload
+    def __ne__(self, other: typing.Any) -> bool:
+        ...
+    def __repr__(self) -> str:
+        ...
+    def __setstate__(self, state: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    def __str__(self) -> str:
+        ...
+    @property
+    def name(self) -> str:
+        ...
+    @property
+    def value(self) -> int:
+        ...
+class MotionScore:
+    """
+    What one motion hypothesis achieved.
     """
     @property
-    def T_21(self) -> Pose:
+    def n_good(self) -> int:
         """
-        First to second camera, |translation| = 1.
+        Pairs in front of both cameras that fit.
         """
-    @property
-    def fundamental_score(self) -> float:
-        ...
-    @property
-    def homography_ratio(self) -> float:
-        """
-        Share of the homography in both scores; above 0.40 it is chosen.
-        """
-    @property
-    def homography_score(self) -> float:
-        ...
-    @property
-    def n_matches(self) -> int:
-        ...
-    @property
-    def outcome(self) -> TwoViewOutcome:
-        ...
     @property
     def parallax(self) -> float:
         """
+        Degrees; of the 51st best pair.
+        """
+class TwoViewOptions:
+    """
+    Limits of reconstruct_two_views.
+    """
+    def __init__(self, sigma: typing.SupportsFloat | typing.SupportsIndex = 1.0, n_samples: typing.SupportsInt | typing.SupportsIndex = 200, min_matches: typing.SupportsInt | typing.SupportsIndex = 100, min_points: typing.SupportsInt | typing.SupportsIndex = 50, min_parallax: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> None:
+        ...
+    @property
+    def min_matches(self) -> int:
+        """
+        Fewer are refused.
+        """
+    @min_matches.setter
+    def min_matches(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_parallax(self) -> float:
+        """
         Degrees.
+        """
+    @min_parallax.setter
+    def min_parallax(self, arg1: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_points(self) -> int:
+        """
+        Points a motion must place.
+        """
+    @min_points.setter
+    def min_points(self, arg1: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def n_samples(self) -> int:
+        """
+        Minimal samples of 8 matches.
+        """
+    @n_samples.setter
+    def n_samples(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def sigma(self) -> float:
+        """
+        Deviation of a keypoint [pixels].
+        """
+    @sigma.setter
+    def sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
+        ...
+class TwoViewResult:
+    """
+    Result of reconstruct_two_views.
+    """
+    @property
+    def F_21(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+        """
+        (3, 3) float64, x_2^T F_21 x_1 = 0 for pixels.
+        """
+    @property
+    def H_21(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
+        """
+        (3, 3) float64, pixels of view 1 to view 2.
+        """
+    @property
+    def T_21(self) -> Pose:
+        """
+        Pose from camera 1 to camera 2, translation of length 1.
+        """
+    @property
+    def best_hypothesis(self) -> int:
+        """
+        Index of the best one.
+        """
+    @property
+    def fundamental_inlier(self) -> numpy.typing.NDArray[numpy.uint8]:
+        """
+        Per initial keypoint, (n,) uint8.
+        """
+    @property
+    def fundamental_score(self) -> float:
+        """
+        0: no fundamental matrix.
+        """
+    @property
+    def homography_inlier(self) -> numpy.typing.NDArray[numpy.uint8]:
+        """
+        Per initial keypoint, (n,) uint8.
+        """
+    @property
+    def homography_ratio(self) -> float:
+        """
+        Of the homography's score in the sum; it is chosen above 0.40.
+        """
+    @property
+    def homography_score(self) -> float:
+        """
+        0: no homography.
+        """
+    @property
+    def hypotheses(self) -> list[MotionScore]:
+        """
+        MotionScore of each motion tried.
+        """
+    @property
+    def model(self) -> TwoViewModel:
+        """
+        The model that was chosen.
+        """
+    @property
+    def n_fundamental_inliers(self) -> int:
+        """
+        Matches that fit F.
+        """
+    @property
+    def n_homography_inliers(self) -> int:
+        """
+        Matches that fit H.
+        """
+    @property
+    def n_matches(self) -> int:
+        """
+        Matches given.
+        """
+    @property
+    def outcome(self) -> TwoViewOutcome:
+        """
+        Success or the reason of failure.
+        """
+    @property
+    def parallax(self) -> float:
+        """
+        Of the best hypothesis, degrees.
         """
     @property
     def points(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        (n, 3) float64 per initial keypoint, in the first camera.
+        Per initial keypoint, (n, 3) float64 in the frame of camera 1; zero where missing.
         """
     @property
     def success(self) -> bool:
-        ...
+        """
+        The outcome is `reconstructed`.
+        """
     @property
-    def triangulated(self) -> numpy.typing.NDArray[numpy.bool]:
+    def triangulated(self) -> numpy.typing.NDArray[numpy.uint8]:
         """
-        (n,) bool: the point is well placed.
+        Per initial keypoint, (n,) uint8: the point is well placed.
         """
-class PnpPose:
+class EpnpPose:
     """
-    A pose from points and pixels.
+    Result of solve_epnp.
     """
     @property
     def T_cw(self) -> Pose:
-        ...
-    @property
-    def inliers(self) -> numpy.typing.NDArray[numpy.bool]:
         """
-        (n,) bool.
+        World to camera.
+        """
+    @property
+    def mean_error(self) -> float:
+        """
+        Mean reprojection error [pixels].
+        """
+class PnpOptions:
+    """
+    Options of PnpRansac.
+    """
+    def __init__(self, probability: typing.SupportsFloat | typing.SupportsIndex = 0.99, min_inliers: typing.SupportsInt | typing.SupportsIndex = 10, inlier_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.5, max_iterations: typing.SupportsInt | typing.SupportsIndex = 300, exponent: typing.SupportsInt | typing.SupportsIndex = 3, max_chi2: typing.SupportsFloat | typing.SupportsIndex = 5.991) -> None:
+        """
+        `exponent`: sample size in the count of iterations. `max_chi2`: limit of the squared
+        error over the variance.
+        """
+class PnpPose:
+    """
+    A pose found by PnpRansac.
+    """
+    @property
+    def T_cw(self) -> Pose:
+        """
+        World to camera.
+        """
+    @property
+    def inliers(self) -> numpy.typing.NDArray[numpy.uint8]:
+        """
+        Per correspondence, (n,) uint8.
         """
     @property
     def n_inliers(self) -> int:
-        ...
+        """
+        Number of inliers.
+        """
     @property
     def refined(self) -> bool:
         """
@@ -1472,15 +1658,18 @@ class PnpPose:
         """
 class PnpRansac:
     """
-    RANSAC over EPnP in slices, so that candidates can take turns.
+    RANSAC over EPnP in slices, so that several candidates can take turns.
     """
-    def __init__(self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], sigma2: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pinhole: Pinhole, seed: typing.SupportsInt | typing.SupportsIndex = 0) -> None:
+    def __init__(self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], sigma2: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], intrinsics: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 1]"], seed: typing.SupportsInt | typing.SupportsIndex = 0, options: PnpOptions = ...) -> None:
         """
-        `points` (n, 3) world, `pixels` (n, 2) undistorted, `sigma2` (n,) [pixels^2].
+        `points`: (n, 3) float64 world. `pixels`: (n, 2) float64 undistorted. `sigma2`: (n,)
+        [pixels^2]. `intrinsics`: fx, fy, cx, cy [pixels]. Raises ValueError for bad shapes or
+        options.
         """
     def iterate(self, n: typing.SupportsInt | typing.SupportsIndex) -> PnpPose | None:
         """
-        Runs at most n further iterations; a PnpPose, or None.
+        At most n further iterations. Returns a PnpPose as soon as one is good enough, the
+        best one when the iterations are used up, or None.
         """
     @property
     def exhausted(self) -> bool:
@@ -1489,13 +1678,19 @@ class PnpRansac:
         """
     @property
     def iterations(self) -> int:
-        ...
+        """
+        Done so far.
+        """
     @property
     def max_iterations(self) -> int:
-        ...
+        """
+        Of all calls.
+        """
     @property
     def min_inliers(self) -> int:
-        ...
+        """
+        A pose needs as many.
+        """
 class LocalMapMatches:
     """
     Result of match_local_map().
@@ -2192,12 +2387,15 @@ def project_into(frame: TrackedFrame, points: PointBatch) -> tuple[numpy.typing.
     the right image; (n,) float32; (n,) int32 predicted level; (n,) bool. The others are only
     meaningful where visible. Raises StateError without a pose.
     """
-def reconstruct_two_views(initial: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], current: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], matches: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], pinhole: Pinhole, seed: typing.SupportsInt | typing.SupportsIndex = 0, helper: WorkerThread = None) -> TwoViewResult:
+def reconstruct_two_views(initial: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], current: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], matches: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], intrinsics: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 1]"], seed: typing.SupportsInt | typing.SupportsIndex = 0, options: TwoViewOptions = ..., samples: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, two_threads: bool = True) -> TwoViewResult:
     """
-    Structure from two views: homography and fundamental matrix side by side, the
-    better one gives the motion. `initial` (n, 2), `current` (m, 2): undistorted pixels;
-    `matches` (n,): index in current or -1. `helper`: a WorkerThread for the second
-    model; the result is the same without.
+    Motion and points from two views, up to scale.
+
+    `initial`, `current`: (n, 2), (m, 2) float32 undistorted pixels of all keypoints.
+    `matches`: (n,) int32 index in `current` or -1. `intrinsics`: fx, fy, cx, cy [pixels].
+    `samples`: (k, 8) int32 indices into the matches, ascending by initial keypoint, instead
+    of those drawn from `seed`. `two_threads` does not change the result. Raises ValueError
+    for bad shapes, indices or options.
     """
 def refresh_associations(map: Map, frame: TrackedFrame) -> None:
     """
@@ -2244,6 +2442,13 @@ def solve_bundle(T_cw: collections.abc.Sequence[Pose], fixed: collections.abc.Se
     `point_index`: (n,) int64. `pixels`: (n, 3) undistorted u, v and the right column, NaN
     without depth. `inverse_sigma2`: (n,) [pixels^-2]. `abort`: StopFlag or None. Raises
     ValueError for bad shapes or indices.
+    """
+def solve_epnp(points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], intrinsics: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 1]"]) -> EpnpPose | None:
+    """
+    Pose from (n, 3) float64 world points and (n, 2) float64 undistorted pixels, n >= 4.
+
+    `intrinsics`: fx, fy, cx, cy [pixels]. Returns an EpnpPose, or None for collinear points.
+    All points count as inliers. Raises ValueError for bad shapes.
     """
 def street_way(length: typing.SupportsFloat | typing.SupportsIndex) -> Way:
     """

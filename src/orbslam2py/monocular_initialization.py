@@ -11,6 +11,7 @@ import logging
 import numpy as np
 
 from orbslam2py import _core as core
+from orbslam2py.front_end import intrinsics
 from orbslam2py.local_mapping import LocalMapping
 from orbslam2py.records import Reason
 
@@ -63,7 +64,6 @@ class MonocularInitializer:
         self._vocabulary = vocabulary
         self._mapping = mapping
         self._seed = seed
-        self._helper = core.WorkerThread()
         self.reset()
 
     def reset(self) -> None:
@@ -92,9 +92,8 @@ class MonocularInitializer:
             first.frame.keypoints,
             frame.frame.keypoints,
             matches,
-            frame.frame.camera.pinhole,
+            intrinsics(frame.frame.camera),
             seed=self._seed,
-            helper=self._helper,
         )
         if not views.success:
             return _REASONS[views.outcome.name]
@@ -109,7 +108,7 @@ class MonocularInitializer:
     ) -> Reason:
         core.describe(first.frame, self._vocabulary)
         core.describe(second.frame, self._vocabulary)
-        placed = np.where(views.triangulated, matches, -1).astype(np.int32)
+        placed = np.where(views.triangulated != 0, matches, -1).astype(np.int32)
         begun = core.create_monocular_map(
             self._map, first, second, views.T_21, placed, views.points
         )

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from orbslam2py import _core as core
+from orbslam2py.front_end import intrinsics
 
 #: RANSAC iterations that each candidate gets per turn.
 _ITERATIONS_PER_TURN = 5
@@ -44,7 +45,7 @@ class _Candidate:
             matches.positions[self.indices],
             frame.keypoints[self.indices].astype(np.float64),
             frame.sigma2[self.indices].astype(np.float64),
-            frame.camera.pinhole,
+            intrinsics(frame.camera),
             seed=seed,
         )
 
@@ -117,7 +118,7 @@ class Relocalizer:
         """Optimise the pose, add matches by projection; the number of inliers."""
         limits = self._limits
         keep = np.zeros(len(frame.frame), bool)
-        keep[candidate.indices[pose.inliers]] = True
+        keep[candidate.indices[pose.inliers != 0]] = True
         frame.copy_associations(candidate.matches, keep)
         frame.T_cw = pose.T_cw
         n_inliers = self._optimize(frame)

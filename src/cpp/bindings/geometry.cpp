@@ -145,7 +145,8 @@ void bind_two_view(py::module_& module) {
                      : reconstruct_two_views(input, options, seed, helper.get());
       },
       "initial"_a, "current"_a, "matches"_a, "intrinsics"_a, "seed"_a = 0,
-      "options"_a = TwoViewOptions(), "samples"_a = py::none(), "two_threads"_a = true,
+      py::arg_v("options", TwoViewOptions(), "TwoViewOptions()"), "samples"_a = py::none(),
+      "two_threads"_a = true,
       "Motion and points from two views, up to scale.\n\n"
       "`initial`, `current`: (n, 2), (m, 2) float32 undistorted pixels of all keypoints.\n"
       "`matches`: (n,) int32 index in `current` or -1. `intrinsics`: fx, fy, cx, cy [pixels].\n"
@@ -217,7 +218,7 @@ void bind_pnp_ransac(py::module_& module) {
                                                options, seed);
           }),
           "points"_a, "pixels"_a, "sigma2"_a, "intrinsics"_a, "seed"_a = 0,
-          "options"_a = PnpOptions(),
+          py::arg_v("options", PnpOptions(), "PnpOptions()"),
           "`points`: (n, 3) float64 world. `pixels`: (n, 2) float64 undistorted. `sigma2`: (n,)\n"
           "[pixels^2]. `intrinsics`: fx, fy, cx, cy [pixels]. Raises ValueError for bad shapes or\n"
           "options.")
