@@ -231,12 +231,7 @@ class SyntheticSequence:
         IndexError
             If there is no such frame.
         """
-        image, depth = self._render(index, right=False)
-        if self.sensor is Sensor.STEREO:
-            return Images(image, right=self._render(index, right=True)[0])
-        if self.sensor is Sensor.RGBD:
-            return Images(image, depth=self._measured(depth, index))
-        return Images(image)
+        return self.view(self.T_wc(index), index)
 
     # ---- what only a made-up world knows ---------------------------------------------------------
     def T_wc(self, index: int) -> Array:
@@ -247,9 +242,35 @@ class SyntheticSequence:
         yaw = math.radians(self.options.yaw)
         return self._scene.T_wc(seconds, self._speed, self.options.lateral, yaw)
 
+    def view(self, T_wc: Array, number: int = 0, *, exposure: float | None = None) -> Images:
+        """Render the images seen from anywhere.
+
+        Parameters
+        ----------
+        T_wc
+            Pose of the (left) camera, camera to world, (4, 4).
+        number
+            Seeds the noise together with the sequence's seed: not negative.
+        exposure
+            Factor on the grey values; that of the options if None.
+
+        Returns
+        -------
+        Images
+            As from `load`.
+        """
+        image, depth = self._render(T_wc, 2 * number, exposure)
+        if self.sensor is Sensor.STEREO:
+            T_wr = T_wc.copy()
+            T_wr[:3, 3] += self.baseline * T_wc[:3, 0]
+            return Images(image, right=self._render(T_wr, 2 * number + 1, exposure)[0])
+        if self.sensor is Sensor.RGBD:
+            return Images(image, depth=self._measured(depth, number))
+        return Images(image)
+
     def exact_depth(self, index: int) -> NDArray[np.float32]:
         """Depth of the (left) image along z, (height, width) [m]; 0 where nothing is hit."""
-        return self._render(index, right=False)[1]
+        return self._render(self.T_wc(index), 2 * index, None)[1]
 
     def write(
         self,
@@ -288,10 +309,9 @@ class SyntheticSequence:
     def _built(self) -> core.World:
         return self._scene.make_world(self.options.seed)
 
-    def _render(self, index: int, *, right: bool) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        T_wc = self.T_wc(index)
-        if right:
-            T_wc[:3, 3] += self.baseline * T_wc[:3, 0]
+    def _render(
+        self, T_wc: Array, number: int, exposure: float | None
+    ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
         T_cw = np.eye(4)
         T_cw[:3, :3] = T_wc[:3, :3].T
         T_cw[:3, 3] = -T_wc[:3, :3].T @ T_wc[:3, 3]
@@ -302,16 +322,16 @@ class SyntheticSequence:
             *(camera.fx, camera.fy, camera.cx, camera.cy),
             *self._size,
             noise=self.options.noise,
-            exposure=self.options.exposure,
-            noise_seed=(self.options.seed << 32) | (2 * index + int(right)),
+            exposure=self.options.exposure if exposure is None else exposure,
+            noise_seed=(self.options.seed << 32) | number,
             threads=self._threads,
         )
         return grey, depth
 
-    def _measured(self, depth: NDArray[np.float32], index: int) -> NDArray[np.uint16]:
+    def _measured(self, depth: NDArray[np.float32], number: int) -> NDArray[np.uint16]:
         metres = depth.astype(np.float64)
         if self.options.depth_noise > 0:
-            random = np.random.default_rng([self.options.seed, index])
+            random = np.random.default_rng([self.options.seed, number])
             metres += self.options.depth_noise * metres**2 * random.standard_normal(depth.shape)
         raw = np.rint(metres * DEPTH_PER_METRE)
         return np.where((raw > 0) & (raw < 2**16), raw, 0).astype(np.uint16)

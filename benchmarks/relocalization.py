@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How well lost frames are found again, and that foreign ones are not.
+
+    python benchmarks/relocalization.py kidnap          to another place, black images between
+    python benchmarks/relocalization.py recall          viewpoints beside the path, other exposure
+    python benchmarks/relocalization.py foreign         worlds and photographs never mapped
+    python benchmarks/relocalization.py localization    out of the map and back, ten times
+
+Errors are taken through the nearest mapped keyframe, so that the drift of the map does not count;
+with a single camera lengths are those of the mapped path aligned by Sim(3).
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import time
+from collections import Counter
+from pathlib import Path
+
+import cv2
+import numpy as np
+from mapped_world import MappedWorld, PoseError, beside
+
+from orbslam2py import TrackingState
+from orbslam2py.datasets.base import Images
+from orbslam2py.report import peak_memory_mb
+from orbslam2py.sensor import Sensor
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence, SyntheticWorld
+
+
+def sequence_of(arguments: argparse.Namespace, sensor: str, **options: object) -> SyntheticSequence:
+    merged = {"world": arguments.world, "noise": 2.0} | options
+    return SyntheticSequence(SyntheticOptions(sensor=sensor, **merged), threads=2)
+
+
+def mapped(arguments: argparse.Namespace, sensor: str) -> MappedWorld:
+    sequence = sequence_of(arguments, sensor)
+    n_frames = min(arguments.frames or len(sequence), len(sequence))
+    world = MappedWorld(sequence, range(n_frames), arguments.seed)
+    print(
+        f"{sensor}, {arguments.world}: {world.n_tracked} of {n_frames} frames tracked, "
+        f"{world.system.n_keyframes} keyframes, scale {world.scale:.3f}",
+        flush=True,
+    )
+    return world
+
+
+def summary(errors: list[PoseError]) -> str:
+    if not errors:
+        return "no poses"
+    metres = np.array([e.metres for e in errors])
+    degrees = np.array([e.degrees for e in errors])
+    return (
+        f"{metres.mean() * 100:.2f} cm {degrees.mean():.2f} deg (mean), "
+        f"{np.median(metres) * 100:.2f} cm {np.median(degrees):.2f} deg (median), "
+        f"{metres.max() * 100:.2f} cm {degrees.max():.2f} deg (most); "
+        f"{sum(e.small for e in errors)} of {len(errors)} within 2 cm and 0.5 deg"
+    )
+
+
+# ---- kidnapped -----------------------------------------------------------------------------------
+def kidnap(arguments: argparse.Namespace, sensor: str) -> None:
+    """Black images, then the path from another place on, a little beside it."""
+    world = mapped(arguments, sensor)
+    beside_path = sequence_of(arguments, sensor, lateral=0.05, yaw=3.0)
+    rng = np.random.default_rng(arguments.seed)
+    waits: Counter[object] = Counter()
+    first_errors, all_errors = [], []
+    for _ in range(arguments.count):
+        assert world.lose(8).state is TrackingState.LOST
+        start = int(rng.integers(5, world.n_frames - 15))
+        found = None
+        for k in range(15):
+            T_wc = beside_path.T_wc(start + k)
+            record = world.show(beside_path.load(start + k), T_wc)
+            if record.state is TrackingState.OK:
+                error = world.error(record, T_wc)
+                if found is None:
+                    found = k
+                    first_errors.append(error)
+                all_errors.append(error)
+        waits[found] += 1
+    print(f"  frames until found: {dict(sorted(waits.items(), key=str))}")
+    print(f"  first pose  {summary(first_errors)}")
+    print(f"  all poses   {summary(all_errors)}", flush=True)
+
+
+# ---- recall --------------------------------------------------------------------------------------
+def recall(arguments: argparse.Namespace, sensor: str) -> None:
+    """Viewpoints within 0.5 m and 20 degrees of the path, exposure from 0.6 to 1.6."""
+    world = mapped(arguments, sensor)
+    world.system.localization_mode = True
+    rng = np.random.default_rng(arguments.seed)
+    found, errors, times = 0, [], []
+    for number in range(arguments.count):
+        assert world.lose().state is TrackingState.LOST
+        T_wc = world.sequence.T_wc(int(rng.integers(world.n_frames)))
+        T_wc = beside(T_wc, rng, 0.5, 20.0)
+        exposure = float(np.exp(rng.uniform(np.log(0.6), np.log(1.6))))
+        shown = world.sequence.view(T_wc, 1_000_000 + number, exposure=exposure)
+        record = world.show(shown)
+        times.append(record.milliseconds["predict"])
+        if record.state is TrackingState.OK:
+            found += 1
+            errors.append(world.error(record, T_wc))
+    print(
+        f"  found {found} of {arguments.count} ({found / arguments.count:.1%}); attempt "
+        f"{np.median(times):.1f} ms (median), {np.percentile(times, 99):.1f} ms (p99)"
+    )
+    print(f"  {summary(errors)}", flush=True)
+
+
+# ---- foreign -------------------------------------------------------------------------------------
+def foreign_views(arguments: argparse.Namespace, sensor: str):  # type: ignore[no-untyped-def]
+    """Images of other worlds, then the photographs (as both images of a pair, or at 2 m)."""
+    rng = np.random.default_rng(arguments.seed)
+    worlds = list(SyntheticWorld)
+    size = sequence_of(arguments, sensor).load(0).image.shape
+    for number in range(arguments.count // 20):
+        sequence = sequence_of(
+            arguments, sensor, world=worlds[number % len(worlds)], seed=1000 + number,
+            size=size[::-1],
+        )  # fmt: skip
+        for index in rng.integers(len(sequence), size=20):
+            yield "worlds", sequence.load(int(index))
+    shared = Path(os.environ.get("ORBSLAM2PY_SHARED", "../shared"))
+    for file in sorted((shared / "data" / "vocabulary_images").glob("*")):
+        image = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
+        if image is not None:
+            image = cv2.resize(image, size[::-1])
+            shown = Images(image)
+            if sensor == "stereo":
+                shown = Images(image, right=np.roll(image, -20, axis=1))
+            elif sensor == "rgbd":
+                shown = Images(image, depth=np.full(image.shape, 10_000, np.uint16))
+            yield "photographs", shown
+
+
+def foreign(arguments: argparse.Namespace, sensor: str) -> None:
+    """With mapping on: a lost frame may also be found by the reference keyframe."""
+    world = mapped(arguments, sensor)
+    assert world.lose().state is TrackingState.LOST
+    shown, found, times = Counter(), Counter(), []
+    for kind, images in foreign_views(arguments, sensor):
+        record = world.show(images)
+        shown[kind] += 1
+        times.append(record.milliseconds["predict"])
+        if record.state is TrackingState.OK:
+            found[kind] += 1
+            assert world.lose().state is TrackingState.LOST
+    print(
+        f"  shown {dict(shown)}, found {dict(found)}; attempt {np.median(times):.1f} ms (median), "
+        f"{np.percentile(times, 99):.1f} ms (p99)",
+        flush=True,
+    )
+
+
+# ---- localization mode ---------------------------------------------------------------------------
+def resident_mb() -> float:
+    """Resident memory now."""
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith("VmRSS:"):
+            return int(line.split()[1]) / 1e3
+    return float("nan")
+
+
+def localization(arguments: argparse.Namespace, sensor: str) -> None:
+    """Walk on past the end of the map and back, and again."""
+    world = mapped(arguments, sensor)
+    n, beyond = world.n_frames, arguments.beyond
+    world.system.localization_mode = True
+    before = world.system.map_hash()
+    begin = time.perf_counter()
+    for turn in range(10):
+        states: Counter[str] = Counter()
+        errors = []
+        out = range(n - 20, n + beyond)
+        for index in [*out, *reversed(out)]:
+            T_wc = world.sequence.T_wc(index)
+            record = world.show(world.sequence.load(index))
+            states[record.state.name] += 1
+            if record.state is TrackingState.OK:
+                errors.append(world.error(record, T_wc))
+        same = "unchanged" if world.system.map_hash() == before else "CHANGED"
+        last = errors[-1]
+        print(
+            f"  turn {turn + 1}: {dict(states)}, at the turn "
+            f"{max(e.metres for e in errors) * 100:.1f} cm, back {last.metres * 100:.2f} cm "
+            f"{last.degrees:.2f} deg, map {same}, {resident_mb():.1f} MB "
+            f"(peak {peak_memory_mb():.1f})",
+            flush=True,
+        )
+    print(f"  {time.perf_counter() - begin:.1f} s")
+
+
+def main() -> None:
+    parts = {f.__name__: f for f in (kidnap, recall, foreign, localization)}
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("part", choices=parts)
+    parser.add_argument("--sensor", choices=[str(s) for s in Sensor], action="append")
+    parser.add_argument("--world", choices=[str(w) for w in SyntheticWorld], default="corridor")
+    parser.add_argument("--frames", type=int, help="mapped frames [all, localization: 200]")
+    parser.add_argument("--count", type=int, help="tries, or foreign images")
+    parser.add_argument("--beyond", type=int, default=60, help="frames past the end of the map")
+    parser.add_argument("--seed", type=int, default=0)
+    arguments = parser.parse_args()
+    counts = {"kidnap": 20, "recall": 300, "foreign": 1000}
+    arguments.count = arguments.count or counts.get(arguments.part, 0)
+    if arguments.part == "localization":
+        arguments.frames = arguments.frames or 200
+    for sensor in arguments.sensor or [str(s) for s in Sensor]:
+        parts[arguments.part](arguments, sensor)
+
+
+if __name__ == "__main__":
+    main()
