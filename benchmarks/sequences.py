@@ -128,10 +128,9 @@ def _add_offline(
 
 
 def _summed_milliseconds(report: dict[str, Any]) -> float:
-    """Tracking and mapping together, per frame; mapping is inside tracking if it ran inline."""
+    """Tracking and mapping together, per frame."""
     stages = report["milliseconds"]
-    parts = ["track"] if report["deterministic"] else ["track", "mapping"]
-    total = sum(stages[part]["mean"] * stages[part]["count"] for part in parts)
+    total = sum(stages[part]["mean"] * stages[part]["count"] for part in ("track", "mapping"))
     return float(total / stages["track"]["count"])
 
 

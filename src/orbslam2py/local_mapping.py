@@ -28,7 +28,7 @@ class LocalMapping:
     index : orbslam2py._core.KeyFrameIndex
         Forgets the keyframes that are culled.
     threaded : bool
-        In a thread of its own, or inline at `insert_keyframe`.
+        In a thread of its own, or inline at `start`.
     on_done : callable
         ``on_done(keyframe_id)``: takes the finished keyframe (loop closing).
     """
@@ -46,6 +46,7 @@ class LocalMapping:
         self._index = index
         self._monocular = sensor is Sensor.MONOCULAR
         self._on_done = on_done
+        self._inserted: list[int] = []
         self._recent_points = core.RecentPoints()
         self._point_options = core.NewPointOptions()
         self._point_options.monocular = self._monocular
@@ -56,12 +57,22 @@ class LocalMapping:
         self.worker: Worker[int] = Worker("local mapping", self.process, threaded=threaded)
 
     def insert_keyframe(self, keyframe: int) -> None:
-        """Queue a keyframe; a running bundle adjustment is asked to end early."""
-        self.worker.submit(keyframe)
+        """Take note of a keyframe; its mapping begins with `start`."""
+        self._inserted.append(keyframe)
+
+    def start(self) -> None:
+        """Queue the inserted keyframes; a running bundle adjustment is asked to end early.
+
+        Not before the frame is recorded: its pose relative to its keyframe would be wrong once
+        mapping has moved that keyframe.
+        """
+        inserted, self._inserted = self._inserted, []
+        self.worker.submit(*inserted)
 
     def reset(self) -> None:
         """Drop waiting keyframes and the points under probation."""
         self.worker.reset()
+        self._inserted.clear()
         self._recent_points.clear()
 
     def process(self, keyframe: int) -> None:

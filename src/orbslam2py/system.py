@@ -305,7 +305,9 @@ class System:
                 self._last_timestamp = timestamp
                 outcome = self._tracking.track(frame, timer)
             self._statistics.add(timer.milliseconds)
-            return self._record(frame, outcome, timer, details)
+            record = self._record(frame, outcome, timer, details)
+            self._mapping.start()
+            return record
 
     def _wait_for_mapper(self) -> None:
         if self.sensor.has_depth:

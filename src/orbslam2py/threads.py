@@ -87,7 +87,7 @@ class Worker(Generic[Job]):
         ``step(job)``; an exception in it stops the worker and is raised as `WorkerError` by
         `raise_if_failed`, `submit` and `finish`.
     threaded : bool
-        False: `submit` runs the step at once in the caller's thread.
+        False: `submit` runs the steps in the caller's thread.
     """
 
     def __init__(self, name: str, step: Callable[[Job], None], *, threaded: bool) -> None:
@@ -158,27 +158,45 @@ class Worker(Generic[Job]):
             raise WorkerError(f"{self.name} did not acknowledge the reset within {timeout} s")
 
     # ---- jobs ------------------------------------------------------------------------------------
-    def submit(self, job: Job) -> None:
-        """Append a job; a running step is asked to end early."""
+    def submit(self, *jobs: Job) -> None:
+        """Append jobs, and ask a running step to end early; none begins before all are queued.
+
+        Inline, all of them are done on return.
+        """
         self.raise_if_failed()
         if self._finish_requested:
             raise StateError(f"{self.name} has been shut down")
-        if not self._threaded:
-            self.interrupt_flag.clear()
-            self._busy = True
-            try:
-                self._step(job)
-            except Exception as error:
-                self._error = error
-                self.raise_if_failed()
-            finally:
-                self._busy = False
+        if not jobs:
             return
         with self._condition:
-            self._queue.append(job)
+            self._queue.extend(jobs)
             self.waiting_flag.set()
             self.interrupt_flag.set()
             self._condition.notify_all()
+        if not self._threaded:
+            self._run_inline()
+
+    def _run_inline(self) -> None:
+        try:
+            while self._queue:
+                with self._condition:
+                    job = self._take()
+                self._step(job)
+        except Exception as error:
+            self._error = error
+            self.raise_if_failed()
+        finally:
+            self._queue.clear()  # after an error or Ctrl-C
+            self.waiting_flag.clear()
+            self._busy = False
+
+    def _take(self) -> Job:
+        job = self._queue.popleft()
+        self._busy = True
+        if not self._queue:
+            self.waiting_flag.clear()
+            self.interrupt_flag.clear()
+        return job
 
     def interrupt(self) -> None:
         """Ask the running step to end early."""
@@ -295,11 +313,7 @@ class Worker(Generic[Job]):
                 if self._finish_requested:
                     self._condition.notify_all()
                     return
-                job = self._queue.popleft()
-                self._busy = True
-                if not self._queue:
-                    self.waiting_flag.clear()
-                    self.interrupt_flag.clear()
+                job = self._take()
                 self._condition.notify_all()
             try:
                 self._step(job)

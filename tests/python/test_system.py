@@ -18,6 +18,7 @@ from orbslam2py.datasets.base import Images
 from orbslam2py.errors import SettingsError, StateError, VocabularyError
 from orbslam2py.records import Reason, TrackingState
 from orbslam2py.sensor import Sensor
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.system import System
 from orbslam2py.trajectory import write_tum
 from small_sequences import ate, images, new_system, play, track
@@ -78,6 +79,34 @@ def test_online_and_final_poses_agree_roughly(sensor: Sensor) -> None:
         assert np.linalg.norm(record.T_wc[:3, 3] - T_wc[:3, 3]) < 0.05
         assert record.T_cw is not None
         np.testing.assert_allclose(record.T_cw @ record.T_wc, np.eye(4), atol=1e-12)
+
+
+@pytest.mark.parametrize("deterministic", [True, False])
+def test_frames_of_keyframes_lie_on_their_keyframes(sensor: Sensor, deterministic: bool) -> None:
+    with new_system(sensor, deterministic=deterministic, wait_for_mapping=True) as system:
+        play(system, 50)
+        assert system.wait_until_idle(20)
+    frames, keyframes = system.trajectory(), system.keyframe_trajectory()
+    assert len(keyframes) >= 3
+    rows = np.searchsorted(frames.timestamps, keyframes.timestamps)
+    np.testing.assert_array_equal(frames.timestamps[rows], keyframes.timestamps)
+    # Mapping has moved the keyframes, and the frames with them.
+    np.testing.assert_allclose(frames.T_wc[rows], keyframes.T_wc, atol=1e-9)
+
+
+def test_waiting_for_an_idle_mapper_is_the_deterministic_mode_of_a_single_camera() -> None:
+    options = SyntheticOptions(world="corridor", sensor="mono", frames=40, size=(320, 240))
+    sequence = SyntheticSequence(options)
+    shown = [sequence.load(i).image for i in range(len(sequence))]
+    hashes = []
+    for mode in ({"deterministic": True}, {"wait_for_mapping": True}):
+        with System(sequence.settings, "mono", **mode) as system:  # type: ignore[arg-type]
+            for image, timestamp in zip(shown, sequence.timestamps, strict=True):
+                system.track_monocular(image, float(timestamp))
+            assert system.wait_until_idle(20)
+        assert system.n_keyframes >= 3
+        hashes.append((system.map_hash(), system.n_keyframes, system.n_map_points))
+    assert hashes[0] == hashes[1]
 
 
 # ---- the same bytes ------------------------------------------------------------------------------

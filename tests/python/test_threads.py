@@ -460,6 +460,39 @@ def test_inline_runs_at_once_in_the_callers_thread() -> None:
         worker.submit(1)
 
 
+@pytest.mark.parametrize("threaded", [True, False])
+def test_jobs_submitted_together_are_all_queued_before_the_first_begins(threaded: bool) -> None:
+    seen: list[tuple[int, int, bool, bool]] = []
+
+    def step(job: int) -> None:
+        waiting = worker.waiting_flag.is_set()
+        seen.append((job, worker.n_waiting, waiting, worker.lower_interrupt()))
+
+    worker: Worker[int] = Worker(NAME, step, threaded=threaded)
+    worker.start()
+    worker.submit(*range(3))
+    worker.submit()
+    assert worker.wait_until_idle(10)
+    worker.finish()
+    assert seen == [(0, 2, True, False), (1, 1, True, False), (2, 0, False, True)]
+
+
+def test_inline_failure_drops_the_jobs_behind() -> None:
+    begun: list[int] = []
+
+    def step(job: int) -> None:
+        begun.append(job)
+        raise KeyboardInterrupt
+
+    worker = Worker(NAME, step, threaded=False)
+    with pytest.raises(KeyboardInterrupt):
+        worker.submit(0, 1)
+    assert begun == [0]
+    assert worker.idle
+    assert worker.n_waiting == 0
+    assert not worker.waiting_flag.is_set()
+
+
 def test_inline_failure() -> None:
     worker = Worker(NAME, failing, threaded=False)
     worker.submit(0)
