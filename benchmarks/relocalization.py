@@ -36,7 +36,7 @@ def sequence_of(arguments: argparse.Namespace, sensor: str, **options: object) -
 
 def mapped(arguments: argparse.Namespace, sensor: str) -> MappedWorld:
     sequence = sequence_of(arguments, sensor)
-    n_frames = min(arguments.frames or len(sequence), len(sequence))
+    n_frames = min(arguments.frames or len(sequence), len(sequence) - 1)
     world = MappedWorld(sequence, range(n_frames), arguments.seed)
     print(
         f"{sensor}, {arguments.world}: {world.n_tracked} of {n_frames} frames tracked, "
@@ -179,7 +179,7 @@ def localization(arguments: argparse.Namespace, sensor: str) -> None:
         for index in [*out, *reversed(out)]:
             T_wc = world.sequence.T_wc(index)
             record = world.show(world.sequence.load(index))
-            states[record.state.name] += 1
+            states["odometry" if record.visual_odometry else record.state.name] += 1
             if record.state is TrackingState.OK:
                 errors.append(world.error(record, T_wc))
         same = "unchanged" if world.system.map_hash() == before else "CHANGED"

@@ -85,6 +85,8 @@ class TrackingRecord:
     is_keyframe: bool
     reference_keyframe: int
     """Keyframe that shares most points with the frame, -1 for none."""
+    visual_odometry: bool = False
+    """In localization mode: outside the map, the pose hangs on the depths of the frame before."""
     milliseconds: dict[str, float] = field(default_factory=dict)
     """Time per stage: wait, extract, stereo, predict, local_map, keyframe, track (all of it)."""
     features: FrameFeatures | None = None

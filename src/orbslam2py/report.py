@@ -6,6 +6,7 @@ from __future__ import annotations
 import logging
 import resource
 import sys
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 from orbslam2py import __version__
 from orbslam2py.errors import OrbSlamError
 from orbslam2py.evaluation import Alignment, Evaluation, evaluate_trajectory
+from orbslam2py.records import TrackingState
 from orbslam2py.runner import RunResult
 from orbslam2py.sensor import Sensor
 from orbslam2py.trajectory import Trajectory
@@ -84,6 +86,7 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "loops_closed": result.n_loops_closed,
         "relocalisations": result.n_relocalizations,
         "resets": result.n_resets,
+        "initialisation_reasons": initialization_reasons(result),
         "interrupted": result.interrupted,
         "seconds": result.seconds,
         "frames_per_second": _rate(n_done, result.seconds),
@@ -95,6 +98,17 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         report |= evaluation.figures.as_dict()
         report["ate_keyframes_rmse_m"] = evaluation.keyframes_ate_rmse
     return report
+
+
+def initialization_reasons(result: RunResult) -> dict[str, int]:
+    """Why there was no map yet: how many frames had each reason, the most frequent first."""
+    return dict(
+        Counter(
+            row.reason
+            for row in result.rows
+            if row.record is not None and row.record.state is TrackingState.NOT_INITIALIZED
+        ).most_common()
+    )
 
 
 def peak_memory_mb() -> float:

@@ -352,6 +352,7 @@ class System:
             n_inliers=outcome.n_inliers if ok else 0,
             is_keyframe=outcome.is_keyframe,
             reference_keyframe=self._tracking.reference_keyframe,
+            visual_odometry=outcome.visual_odometry,
             milliseconds=timer.milliseconds,
             features=frame_features(frame) if details else None,
         )

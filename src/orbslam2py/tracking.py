@@ -126,6 +126,7 @@ class Tracking:
         if self.state == TrackingState.LOST:
             self.n_relocalizations += 1
         self.state = outcome.state = TrackingState.OK
+        outcome.visual_odometry = self._visual_odometry
         self._update_velocity(frame)
         if self.localization_only:
             core.discard_temporary(frame)
@@ -191,6 +192,7 @@ class Tracking:
             Ids of the points that were matched and thrown out as outliers, ascending; None when
             no pose was found.
         """
+        self._visual_odometry = False
         if self.state == TrackingState.LOST and self._relocalize(frame, outcome):
             return _NOTHING
         last, T_lw = self._update_last_frame()
@@ -202,6 +204,8 @@ class Tracking:
         if discarded is None:
             frame.T_cw = T_lw
             discarded = self._track_reference_keyframe(frame, outcome)
+        if discarded is None and self.state == TrackingState.LOST:
+            outcome.reason = Reason.NOT_FOUND_IN_MAP
         return discarded
 
     def _predict_pose_in_fixed_map(
@@ -237,14 +241,19 @@ class Tracking:
         if not self._visual_odometry:  # enough of the map is in view again
             return discarded
         found = core.TrackedFrame(frame.frame)
-        reason = outcome.reason
+        kept = outcome.reason, outcome.n_matches, outcome.n_inliers
         if self._relocalize(found, outcome):
+            # The odometry's drift ends here and is no motion: the last frame moves along.
+            if discarded is not None and frame.T_cw is not None and found.T_cw is not None:
+                last.T_cw = T_lw @ frame.T_cw.inverse() @ found.T_cw
+            else:
+                self._last_tracked = False
             frame.copy_associations(found, np.ones(len(frame.frame), bool))
             frame.T_cw = found.T_cw
             self._visual_odometry = False
             self._last_relocalization_frame_id = frame.id
             return _NOTHING
-        outcome.reason = reason
+        outcome.reason, outcome.n_matches, outcome.n_inliers = kept
         return discarded
 
     def _relocalize(self, frame: core.TrackedFrame, outcome: TrackingOutcome) -> bool:

@@ -41,5 +41,6 @@ class TrackingOutcome:
     n_matches: int = 0
     n_inliers: int = 0
     is_keyframe: bool = False
+    visual_odometry: bool = False
     covariance: FloatArray | None = None
     reset_needed: bool = False

@@ -226,6 +226,8 @@ class _Display:
             f"{speed:5.1f} frames/s  {row.state}  {system.n_keyframes} keyframes  "
             f"{system.n_map_points} points"
         )
+        if row.reason:
+            status += escape(f"  ({row.reason})")
         self._bar.update(self._task, completed=self._done, status=status)
         self._shown_at = now
 
@@ -237,6 +239,10 @@ def _table(report: dict[str, Any]) -> Table:
     table.add_column(justify="right")
     for key, value in report.items():
         if key in {"sequence", "sensor", "milliseconds", "settings"} or value is None:
+            continue
+        if key == "initialisation_reasons":
+            for reason, count in value.items():
+                table.add_row(f"no map yet: {escape(reason)}", str(count))
             continue
         text = f"{value:.4f}" if isinstance(value, float) else str(value)
         table.add_row(key.replace("_", " "), escape(text))
