@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Accuracy of every stereo and RGB-D sequence beside the original's.
+"""Accuracy of every sequence beside the original's.
 
-Threaded runs differ from each other and are repeated; deterministic runs do not, so they start at
-different frames instead.
+Threaded runs with stereo or RGB-D differ from each other and are repeated; deterministic runs do
+not, so they start at different frames instead. With a single camera the seed decides which two
+views begin the map: every run has its own, and the median over them is judged.
 
     python benchmarks/accuracy.py --runs 5 --starts 5
 """
@@ -12,19 +13,20 @@ from __future__ import annotations
 import argparse
 import statistics
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import reference
 import runs
-from reference import SequenceFigure
+from reference import MonocularFigure, SequenceFigure
 from rich.console import Console
-from tables import new_table
+from rich.table import Table
+from tables import new_table, verdict
 from yardstick import shared_folder
 
 
-def _spread(values: list[float], digits: int = 4) -> str:
+def _spread(values: Sequence[float], digits: int = 4) -> str:
     middle = statistics.median(values)
     return f"{middle:.{digits}f} ({min(values):.{digits}f}..{max(values):.{digits}f})"
 
@@ -58,15 +60,38 @@ def accuracy_rows(
         )
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=5, help="threaded runs")
-    parser.add_argument("--starts", type=int, default=5, help="first frames of deterministic runs")
-    parser.add_argument("--width", type=int, default=150, help="columns of the output")
-    arguments = parser.parse_args()
-    shared = shared_folder()
-    if shared is None:
-        sys.exit("the sequences are not there: set ORBSLAM2PY_SHARED to their folder")
+def monocular_rows(figure: MonocularFigure, folder: Path, n_runs: int) -> Iterator[Any]:
+    """One row per mode."""
+    for mode, options in {"threads": [], "deterministic": ["--deterministic"]}.items():
+        reports = [
+            runs.run(folder, "mono", *options, "--seed", str(seed)) for seed in range(n_runs)
+        ]
+        keyframes_errors = [float(report["ate_keyframes_rmse_m"]) for report in reports]
+        frames_errors = [float(report["ate_rmse_m"]) for report in reports]
+        tracked = [int(report["tracked"]) for report in reports]
+        keyframes = [int(report["keyframes"]) for report in reports]
+        limit = reference.MONOCULAR_ERROR_RATIO
+        met = (
+            statistics.median(keyframes_errors) <= limit * figure.keyframes_ate
+            and statistics.median(frames_errors) <= limit * figure.frames_ate
+            and statistics.median(tracked) >= reference.MONOCULAR_TRACKED_RATIO * figure.tracked
+        )
+        yield (
+            figure.name,
+            f"{mode}, seeds 0..{n_runs - 1}",
+            _spread(keyframes_errors),
+            str(figure.keyframes_ate),
+            _spread(frames_errors),
+            str(figure.frames_ate),
+            _spread(tracked, 0),
+            f"{figure.tracked} of {figure.frames}",
+            f"{min(keyframes)}..{max(keyframes)}",
+            str(figure.keyframes),
+            verdict(met),
+        )
+
+
+def _depth_table(shared: Path, n_runs: int, n_starts: int) -> Table:
     table = new_table(
         "Accuracy: RMSE in metres of all frames after rigid alignment, median (least..most)",
         ["sequence", "mode"],
@@ -83,10 +108,49 @@ def main() -> None:
     for figure in [*reference.SEQUENCES, reference.STILL]:
         folder = shared / "sequences" / figure.folder
         # 8 frames only: starting later leaves too little.
-        n_starts = 1 if figure is reference.STILL else arguments.starts
-        for row in accuracy_rows(figure, folder, arguments.runs, n_starts):
+        own_starts = 1 if figure is reference.STILL else n_starts
+        for row in accuracy_rows(figure, folder, n_runs, own_starts):
             table.add_row(*row)
-    Console(width=arguments.width).print(table)
+    return table
+
+
+def _monocular_table(shared: Path, n_runs: int) -> Table:
+    table = new_table(
+        "A single camera: RMSE in metres after similarity alignment, median (least..most)",
+        ["sequence", "mode"],
+        [
+            "ATE of\nkeyframes",
+            "refer-\nence",
+            "ATE of\nall frames",
+            "refer-\nence",
+            "tracked",
+            "refer-\nence",
+            "key-\nframes",
+            "refer-\nence",
+            "met",
+        ],
+    )
+    for figure in reference.MONOCULAR:
+        for row in monocular_rows(figure, shared / "sequences" / figure.folder, n_runs):
+            table.add_row(*row)
+    return table
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--runs", type=int, default=5, help="threaded runs; seeds of one camera")
+    parser.add_argument("--starts", type=int, default=5, help="first frames of deterministic runs")
+    parser.add_argument("--only", choices=("mono", "depth"), help="one of the two tables")
+    parser.add_argument("--width", type=int, default=150, help="columns of the output")
+    arguments = parser.parse_args()
+    shared = shared_folder()
+    if shared is None:
+        sys.exit("the sequences are not there: set ORBSLAM2PY_SHARED to their folder")
+    console = Console(width=arguments.width)
+    if arguments.only != "mono":
+        console.print(_depth_table(shared, arguments.runs, arguments.starts))
+    if arguments.only != "depth":
+        console.print(_monocular_table(shared, arguments.runs))
 
 
 if __name__ == "__main__":

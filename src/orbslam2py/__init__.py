@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """ORB-SLAM2 for Python people.
 
-Feed images of a stereo pair or an RGB-D camera, get the camera's path and a map:
+Feed images of one camera, a stereo pair or an RGB-D camera, get the camera's path and a map:
 
 >>> import orbslam2py
 >>> with orbslam2py.System("tum1", "rgbd") as slam:  # doctest: +SKIP
@@ -9,7 +9,8 @@ Feed images of a stereo pair or an RGB-D camera, get the camera's path and a map
 ...         record = slam.track_rgbd(image, depth, timestamp)
 
 Poses are named by frames: ``T_cw`` maps world to camera, ``T_wc`` camera to world. Cameras look
-along +z, x points right, y down. Lengths are metres, times seconds, angles radians.
+along +z, x points right, y down. Lengths are metres, times seconds, angles radians. One
+camera alone cannot see metres: its unit of length is the median depth of the first view.
 """
 
 from typing import TYPE_CHECKING

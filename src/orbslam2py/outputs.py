@@ -24,6 +24,7 @@ from orbslam2py.errors import DatasetError
 from orbslam2py.plots import draw_trajectory
 from orbslam2py.report import RunEvaluation
 from orbslam2py.runner import FrameRow, RunResult
+from orbslam2py.sensor import Sensor
 from orbslam2py.trajectory import Trajectory, write_kitti, write_tum
 
 _log = logging.getLogger(__name__)
@@ -248,4 +249,5 @@ def _draw(
         keyframes=result.keyframes.positions,
         points=anchored_points(result),
         truth=truth,
+        unit="units" if result.options.sensor is Sensor.MONOCULAR else "m",
     )

@@ -33,6 +33,7 @@ def draw_trajectory(
     points: FloatArray,
     truth: tuple[FloatArray, FloatArray] | None = None,
     subtitle: str = "",
+    unit: str = "m",
 ) -> None:
     """Draw the path from above, and its height over time, into a PNG file.
 
@@ -43,7 +44,8 @@ def draw_trajectory(
     title, subtitle : str
         Two lines of text above the picture.
     positions : array of float64, (n, 3)
-        Camera positions in the camera frame of the first image (x right, y down, z forward) [m].
+        Camera positions in `unit`, in the camera frame of the first image (x right, y down, z
+        forward).
     seconds : array of float64, (n,)
         Time since the first image.
     keyframes : array of float64, (k, 3)
@@ -52,6 +54,8 @@ def draw_trajectory(
         Map points.
     truth : tuple of (seconds, positions), optional
         Ground truth, aligned to the estimate.
+    unit : str
+        Unit of length of the estimate, for the axes.
     """
     # The object interface keeps the process-wide state of pyplot untouched.
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
@@ -63,11 +67,13 @@ def draw_trajectory(
     figure.suptitle(f"{title}\n{subtitle}" if subtitle else title, fontsize=11)
 
     _draw_above(above, positions, keyframes, points, truth)
+    above.set_xlabel(f"x (right) [{unit}]")
+    above.set_ylabel(f"z (forward) [{unit}]")
     if truth is not None:
         height.plot(truth[0], -truth[1][:, 1], color=_TRUTH, linewidth=2.5)
     height.plot(seconds, -positions[:, 1], color=_ESTIMATE, linewidth=1.2)
     height.set_xlabel("time [s]")
-    height.set_ylabel("height [m]")
+    height.set_ylabel(f"height [{unit}]")
     low, high = height.get_ylim()
     if high - low < 0.1:  # a level path should look level
         middle = 0.5 * (low + high)
@@ -91,7 +97,7 @@ def _draw_above(
     path = positions if truth is None else np.vstack([positions, truth[1]])
     low, high = path[:, [0, 2]].min(axis=0), path[:, [0, 2]].max(axis=0)
     # The window follows the path and shows the points around it, but not those so far away that
-    # they would shrink the path to a dot. It has the shape of the axes: metres are equal on both.
+    # they would shrink the path to a dot. It has the shape of the axes: lengths are equal on both.
     extent = float((high - low).max())
     if len(points):
         near, far = np.quantile(points[:, [0, 2]], [0.03, 0.97], axis=0)
@@ -136,6 +142,4 @@ def _draw_above(
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     axes.set_aspect("equal", adjustable="box")
-    axes.set_xlabel("x (right) [m]")
-    axes.set_ylabel("z (forward) [m]")
     axes.legend(loc="best", fontsize=9, framealpha=0.9, markerscale=1.2)

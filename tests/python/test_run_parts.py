@@ -257,6 +257,28 @@ def test_picture(tmp_path: Path, n: int, with_truth: bool) -> None:
     assert names(tmp_path) == ["t.png"]
 
 
+def test_axes_tell_the_unit(tmp_path: Path) -> None:
+    pictures = []
+    for unit in ("m", "units"):
+        draw_trajectory(
+            tmp_path / unit,
+            title="t",
+            positions=np.eye(3),
+            seconds=np.arange(3.0),
+            keyframes=np.eye(3),
+            points=np.zeros((0, 3)),
+            unit=unit,
+        )
+        picture = cv2.imread(str(tmp_path / unit))
+        assert picture is not None
+        pictures.append(picture)
+    rows, columns = np.nonzero((pictures[0] != pictures[1]).any(axis=2))
+    height, width = pictures[0].shape[:2]
+    # The labels differ, left and below; and with their size, a little, the axes.
+    assert columns.min() < 0.05 * width
+    assert rows.max() > 0.5 * height
+
+
 # ---- the package ---------------------------------------------------------------------------------
 def test_everything_offered_is_there() -> None:
     for name in orbslam2py.__all__:

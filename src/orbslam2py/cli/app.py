@@ -17,7 +17,7 @@ from orbslam2py.errors import OrbSlamError
 
 app = typer.Typer(
     name="orbslam2py",
-    help="Visual SLAM for a stereo pair or an RGB-D camera: images in, path and map out.",
+    help="Visual SLAM for one camera, a stereo pair or RGB-D: images in, path and map out.",
     no_args_is_help=True,
     rich_markup_mode="markdown",
     pretty_exceptions_enable=False,
@@ -38,7 +38,7 @@ def _options(
         typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version."),
     ] = False,
 ) -> None:
-    """Visual SLAM for a stereo pair or an RGB-D camera: images in, path and map out."""
+    """Visual SLAM for one camera, a stereo pair or RGB-D: images in, path and map out."""
 
 
 app.command("run")(run.run)
