@@ -14,19 +14,22 @@ from __future__ import annotations
 
 import argparse
 import os
+import sys
 import time
 from collections import Counter
 from pathlib import Path
 
 import cv2
 import numpy as np
-from mapped_world import MappedWorld, PoseError, beside
 
 from orbslam2py import TrackingState
 from orbslam2py.datasets.base import Images
 from orbslam2py.report import peak_memory_mb
 from orbslam2py.sensor import Sensor
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence, SyntheticWorld
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "python"))
+from mapped_world import MappedWorld, PoseError, beside
 
 
 def sequence_of(arguments: argparse.Namespace, sensor: str, **options: object) -> SyntheticSequence:
@@ -124,7 +127,8 @@ def foreign_views(arguments: argparse.Namespace, sensor: str):  # type: ignore[n
         )  # fmt: skip
         for index in rng.integers(len(sequence), size=20):
             yield "worlds", sequence.load(int(index))
-    shared = Path(os.environ.get("ORBSLAM2PY_SHARED", "../shared"))
+    beside_checkout = Path(__file__).resolve().parents[2] / "shared"
+    shared = Path(os.environ.get("ORBSLAM2PY_SHARED", beside_checkout))
     for file in sorted((shared / "data" / "vocabulary_images").glob("*")):
         image = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
         if image is not None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterable
 
+from orbslam2py import _core as core
 from orbslam2py.threads import PauseTicket, Worker
 from orbslam2py.tracking import Tracking
 
@@ -17,13 +18,25 @@ class LocalizationSwitch:
 
     Parameters
     ----------
+    world : orbslam2py._core.Map
+        The map.
+    min_keyframes : int
+        How many keyframes begin a map; with fewer, mapping goes on until it has begun.
     tracking : Tracking
         Is told the mode.
     workers : iterable of Worker
         Stand still in localization mode; what waits for them is processed afterwards.
     """
 
-    def __init__(self, tracking: Tracking, workers: Iterable[Worker[int]]) -> None:
+    def __init__(
+        self,
+        world: core.Map,
+        min_keyframes: int,
+        tracking: Tracking,
+        workers: Iterable[Worker[int]],
+    ) -> None:
+        self._map = world
+        self._min_keyframes = min_keyframes
         self._tracking = tracking
         self._workers = tuple(workers)
         self._tickets: list[PauseTicket] = []
@@ -32,7 +45,7 @@ class LocalizationSwitch:
 
     def apply(self) -> None:
         """Carry out the switch, between two frames."""
-        wanted = self.wanted
+        wanted = self.wanted and self._map.n_keyframes >= self._min_keyframes
         if wanted == self._tracking.localization_only:
             return
         if wanted:

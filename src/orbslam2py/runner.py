@@ -297,6 +297,8 @@ class SequenceRunner:
             with contextlib.closing(self._feed.frames(stop)) as frames:
                 for position, frame in enumerate(frames):
                     if position == self._options.localize_after:
+                        # The map is to be complete, whatever the speed of mapping.
+                        self._wait_for_mapping(system, stop)
                         system.localization_mode = True
                     row = self._track(system, frame)
                     result.rows.append(row)
@@ -347,8 +349,9 @@ class SequenceRunner:
     # ---- the end ---------------------------------------------------------------------------------
     def _wait_for_mapping(self, system: System, stop: threading.Event) -> None:
         begin = time.perf_counter()
-        while not (system.wait_until_idle(_WAIT_SLICE) or stop.is_set()):
-            pass
+        idle = False
+        while not (idle or stop.is_set() or system.localization_mode):
+            idle = system.wait_until_idle(_WAIT_SLICE)
         self.result.slam_seconds += time.perf_counter() - begin
 
     def _shut_down(self, system: System) -> None:

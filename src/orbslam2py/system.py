@@ -120,7 +120,9 @@ class System:
             initializer=self._initializer(),
             relocalizer=Relocalizer(self._map, self._index, seed),
         )
-        self._localization = LocalizationSwitch(self._tracking, self._workers)
+        self._localization = LocalizationSwitch(
+            self._map, 1 if self.sensor.has_depth else 2, self._tracking, self._workers
+        )
         self._recorder = core.TrajectoryRecorder()
         self._finished_trajectories: list[Trajectory] = []
         self._statistics = StageStatistics()
@@ -365,7 +367,8 @@ class System:
         Assign to switch; carried out at the beginning of the next track call, and the last
         assignment before it counts. Leaving the map, the camera is followed by the depths of the
         frame before (stereo, RGB-D) until a mapped place comes into view again. Keyframes that wait
-        for mapping are processed when it goes on.
+        for mapping are processed when it goes on. Without a map, also after a reset, the mode comes
+        into force when one has begun.
         """
         return self._localization.wanted
 
@@ -397,7 +400,14 @@ class System:
         self.n_resets += 1
 
     def wait_until_idle(self, timeout: float | None = None) -> bool:
-        """Wait until every keyframe has been processed; False when `timeout` seconds passed."""
+        """Wait until every keyframe has been processed.
+
+        Returns
+        -------
+        bool
+            False when `timeout` seconds passed first, or keyframes wait for the end of localization
+            mode.
+        """
         done = self._mapping.worker.wait_until_idle(timeout)
         return self._loop_closing.worker.wait_until_idle(timeout) and done
 
