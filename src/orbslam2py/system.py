@@ -408,6 +408,8 @@ class System:
             False when `timeout` seconds passed first, or keyframes wait for the end of localization
             mode.
         """
+        if self._tracking.localization_only:
+            timeout = 0.0  # what has not been done by now waits for the end of the mode
         done = self._mapping.worker.wait_until_idle(timeout)
         return self._loop_closing.worker.wait_until_idle(timeout) and done
 

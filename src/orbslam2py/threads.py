@@ -274,21 +274,10 @@ class Worker(Generic[Job]):
         self.raise_if_failed()
 
     def wait_until_idle(self, timeout: float | None = None) -> bool:
-        """Wait until every job is done.
-
-        Returns
-        -------
-        bool
-            False when `timeout` seconds passed first, or the jobs left wait for the end of a pause.
-        """
-
-        def nothing_runs() -> bool:
-            standing = self._pauses > 0 and not self._busy
-            return self._is_idle() or standing or self._error is not None
-
-        self.wait_until(nothing_runs, timeout)
+        """Wait until every job is done; False when `timeout` seconds passed first."""
+        done = self.wait_until(lambda: self._is_idle() or self._error is not None, timeout)
         self.raise_if_failed()
-        return self.idle
+        return done
 
     def raise_if_failed(self) -> None:
         """Raise `WorkerError`, with the original as its cause, if a step has failed."""
