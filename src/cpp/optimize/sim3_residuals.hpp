@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+
+#include "optimize/sim3_optimization.hpp"
+
+namespace orbslam::sim3_residuals {
+
+using Jacobian = Eigen::Matrix<double, 2, 7>;
+
+/// A whitened residual, pixel minus projection, and its derivative in the left tangent of S_12.
+struct Residual {
+  Eigen::Vector2d error;
+  Jacobian jacobian;
+  double depth = 0;  ///< of the projected point; the sides of the camera's plane are told apart
+};
+
+/// In image 1, of S_12 point_2. Nothing for a point on the plane of the camera.
+std::optional<Residual> forward(const Similarity& S_12, const Pinhole& pinhole_1,
+                                const SimilarityMatch& match);
+/// In image 2, of S_12^-1 point_1.
+std::optional<Residual> inverse(const Similarity& S_12, const Pinhole& pinhole_2,
+                                const SimilarityMatch& match);
+
+}  // namespace orbslam::sim3_residuals
