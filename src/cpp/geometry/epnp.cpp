@@ -67,6 +67,10 @@ std::optional<ControlFrame> control_frame(const Points& points) {
   return frame;
 }
 
+// Sizes known to be small, but not unrolled: fully unrolled eigen solvers take the compiler minutes
+// and gigabytes under the sanitizers, and are no faster.
+using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 12, 12>;
+
 /// M^T M of the projection equations in the camera coordinates of the control points.
 Eigen::Matrix<double, 12, 12> normal_matrix(const ControlFrame& frame, const Pixels& pixels,
                                             const Pinhole& k) {
@@ -87,11 +91,10 @@ Eigen::Matrix<double, 12, 12> normal_matrix(const ControlFrame& frame, const Pix
 
 /// The control points of the four smallest singular values.
 KernelBasis kernel_basis(const ControlFrame& frame, const Pixels& pixels, const Pinhole& pinhole) {
-  const Eigen::Matrix<double, 12, 12> normal = normal_matrix(frame, pixels, pinhole);
+  const SmallMatrix normal = normal_matrix(frame, pixels, pinhole);
   KernelBasis basis;
   if (frame.planar) {
-    const Eigen::Matrix<double, 9, 9> three_points = normal.topLeftCorner<9, 9>();
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> solver(three_points);
+    const Eigen::SelfAdjointEigenSolver<SmallMatrix> solver(normal.topLeftCorner(9, 9));
     for (std::size_t k = 0; k < 4; ++k) {
       const Eigen::Matrix<double, 9, 1> v = solver.eigenvectors().col(static_cast<int>(k));
       basis[k].leftCols<3>() = Eigen::Map<const Eigen::Matrix3d>(v.data());
@@ -99,7 +102,7 @@ KernelBasis kernel_basis(const ControlFrame& frame, const Pixels& pixels, const 
     }
     return basis;
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 12, 12>> solver(normal);
+  const Eigen::SelfAdjointEigenSolver<SmallMatrix> solver(normal);
   for (std::size_t k = 0; k < 4; ++k) {
     const Eigen::Matrix<double, 12, 1> v = solver.eigenvectors().col(static_cast<int>(k));
     basis[k] = Eigen::Map<const ControlPoints>(v.data());
@@ -138,10 +141,9 @@ template <int Count>
 Eigen::Matrix<double, Count, 1> least_squares(const DistanceForms& forms,
                                               const std::array<int, Count>& columns,
                                               const Distances& rho) {
-  Eigen::Matrix<double, 6, Count> A;
+  SmallMatrix A(6, Count);
   for (int i = 0; i < Count; ++i) A.col(i) = forms.col(columns[static_cast<std::size_t>(i)]);
-  const Eigen::JacobiSVD<Eigen::Matrix<double, 6, Count>> svd(
-      A, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::JacobiSVD<SmallMatrix> svd(A, Eigen::ComputeThinU | Eigen::ComputeThinV);
   return svd.solve(rho);
 }
 

@@ -41,7 +41,9 @@ Eigen::Matrix3d fit_homography(const PointPairs& pairs, const EightPairs& sample
   // The normal matrix costs a third of the SVD of A; in float64 it keeps more digits than the
   // pixels have.
   const Eigen::Matrix<double, 9, 9> normal = A.transpose() * A;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> solver(normal);
+  // Not unrolled, which would take the compiler minutes under the sanitizers and be no faster.
+  using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 9, 9>;
+  const Eigen::SelfAdjointEigenSolver<SmallMatrix> solver(normal);
   const Eigen::Matrix<double, 9, 1> h = solver.eigenvectors().col(0);
   const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> H_normalized(h.data());
   return normalization_2.inverse() * H_normalized * normalization_1.matrix();
