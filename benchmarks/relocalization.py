@@ -5,6 +5,7 @@
     python benchmarks/relocalization.py recall          viewpoints beside the path, other exposure
     python benchmarks/relocalization.py foreign         worlds and photographs never mapped
     python benchmarks/relocalization.py localization    out of the map and back, ten times
+    python benchmarks/relocalization.py speed           single attempts, query of a large map
 
 Errors are taken through the nearest mapped keyframe, so that the drift of the map does not count;
 with a single camera lengths are those of the mapped path aligned by Sim(3).
@@ -17,19 +18,30 @@ import os
 import sys
 import time
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
 
-from orbslam2py import TrackingState
+from orbslam2py import System, TrackingState
+from orbslam2py import _core as core
 from orbslam2py.datasets.base import Images
+from orbslam2py.front_end import FrontEnd
+from orbslam2py.records import Reason
+from orbslam2py.relocalization import RelocalizationThresholds, Relocalizer
 from orbslam2py.report import peak_memory_mb
 from orbslam2py.sensor import Sensor
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence, SyntheticWorld
+from orbslam2py.timing import StageTimer
+from orbslam2py.vocabulary import load_vocabulary
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "python"))
 from mapped_world import MappedWorld, PoseError, beside
+
+#: Both views had enough matches, and a reconstruction was tried.
+ATTEMPTED = {Reason.LOW_PARALLAX, Reason.AMBIGUOUS_MOTION, Reason.DEGENERATE_VIEWS}
 
 
 def sequence_of(arguments: argparse.Namespace, sensor: str, **options: object) -> SyntheticSequence:
@@ -198,8 +210,108 @@ def localization(arguments: argparse.Namespace, sensor: str) -> None:
     print(f"  {time.perf_counter() - begin:.1f} s")
 
 
+# ---- speed ---------------------------------------------------------------------------------------
+def times_of(name: str, function: Callable[[], object], repeat: int, limit: float) -> None:
+    milliseconds = []
+    for _ in range(repeat):
+        begin = time.perf_counter()
+        function()
+        milliseconds.append(1e3 * (time.perf_counter() - begin))
+    report(name, milliseconds, limit)
+
+
+def report(name: str, milliseconds: list[float], limit: float) -> None:
+    median = float(np.median(milliseconds))
+    print(
+        f"{name}: {median:.2f} ms (median), {np.percentile(milliseconds, 99):.2f} ms (p99), "
+        f"{min(milliseconds):.2f} ms (least); limit {limit:g} ms "
+        f"{'met' if median < limit else 'NOT met'}",
+        flush=True,
+    )
+
+
+def speed(arguments: argparse.Namespace, sensor: str) -> None:
+    """Of a single camera, whatever the sensor asked for: the others do less."""
+    if sensor != "mono":
+        return
+    sequence = sequence_of(arguments, sensor)
+    system = System(sequence.settings, sensor, deterministic=True)
+    tries, sizes = [], []
+    for start in (0, 60, 250, 400):  # ways to walls that give many attempts
+        for index in range(start, start + 25):
+            record = system.track_monocular(
+                sequence.load(index).image, len(tries) + index + 1e3 * start, details=True
+            )
+            if record.state is TrackingState.NOT_INITIALIZED and record.reason in ATTEMPTED:
+                tries.append(record.milliseconds["keyframe"])
+                sizes.append(len(record.features.keypoints))
+        system.reset()
+    report(f"initialisation attempt, {np.median(sizes):.0f} keypoints", tries, 15)
+    _relocalization_speed(arguments, sensor)
+    _query_speed(sequence)
+
+
+def _relocalization_speed(arguments: argparse.Namespace, sensor: str) -> None:
+    """Twenty candidates around the place, none of which is ever good enough: the worst case."""
+    world = mapped(argparse.Namespace(**{**vars(arguments), "frames": 260}), sensor)
+    system, n_candidates = world.system, 20
+    frame = system._front_end.monocular(world.sequence.load(150).image, 9999, 0.0, StageTimer())
+    core.describe(frame, system.vocabulary)
+    ids = core.snapshot_keyframes(system._map).ids
+    T_wk = world.system.keyframe_trajectory().T_wc
+    middle = int(
+        np.argmin(
+            np.linalg.norm(world._true_T_wk[:, :3, 3] - world.sequence.T_wc(150)[:3, 3], axis=1)
+        )
+    )
+    first = min(max(middle - n_candidates // 2, 0), len(T_wk) - n_candidates)
+    chosen = [SimpleNamespace(keyframe=int(i)) for i in ids[first : first + n_candidates]]
+    query = core.find_relocalization_candidates
+    limits = {"never good enough": 10**6, "as it is": 50}
+    try:
+        core.find_relocalization_candidates = lambda *_: chosen
+        for name, enough in limits.items():
+            relocalizer = Relocalizer(
+                system._map, system._index, 0, RelocalizationThresholds(enough=enough)
+            )
+            candidates = relocalizer._candidates(core.TrackedFrame(frame))
+            times_of(
+                f"relocalization, 20 keyframes, {len(candidates)} with enough matches, {name}",
+                lambda r=relocalizer: r.relocalize(core.TrackedFrame(frame)),  # type: ignore[misc]
+                30,
+                30,
+            )
+    finally:
+        core.find_relocalization_candidates = query
+
+
+def _query_speed(sequence: SyntheticSequence) -> None:
+    """Every third of 750 images, twenty times over, makes an index of 5000 keyframes."""
+    world, index, vocabulary = core.Map(), core.KeyFrameIndex(), load_vocabulary()
+    front_end, recent = FrontEnd(sequence.settings, Sensor.MONOCULAR), core.RecentPoints()
+    frames = []
+    for number in range(0, 750, 3):
+        frame = front_end.monocular(sequence.load(number).image, number, number, StageTimer())
+        core.describe(frame, vocabulary)
+        frames.append(frame)
+    for _ in range(5000 // len(frames)):
+        for frame in frames:
+            tracked = core.TrackedFrame(frame)
+            tracked.T_cw = core.Pose()
+            keyframe = core.insert_keyframe(world, tracked, create_points=False)
+            core.process_new_keyframe(world, keyframe, recent)
+            core.index_keyframe(index, world, keyframe)
+    asked = iter(frames)
+    times_of(
+        f"candidates among {len(index)} keyframes ({len(frames)} views)",
+        lambda: core.find_relocalization_candidates(index, world, next(asked)),
+        len(frames),
+        5,
+    )
+
+
 def main() -> None:
-    parts = {f.__name__: f for f in (kidnap, recall, foreign, localization)}
+    parts = {f.__name__: f for f in (kidnap, recall, foreign, localization, speed)}
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
