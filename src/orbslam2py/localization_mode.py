@@ -53,8 +53,12 @@ class LocalizationSwitch:
             for ticket in self._tickets:
                 ticket.wait()
         else:
-            for ticket in self._tickets:
-                ticket.release()
-            self._tickets = []
+            self.release()
         self._tracking.localization_only = wanted
         _log.info("localization mode %s", "on" if wanted else "off")
+
+    def release(self) -> None:
+        """Let the workers go on; what waits for them is processed."""
+        for ticket in self._tickets:
+            ticket.release()
+        self._tickets = []

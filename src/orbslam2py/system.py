@@ -257,15 +257,11 @@ class System:
             As for `track_stereo`.
         """
         self._require(Sensor.MONOCULAR, "track_monocular")
-        initializing = self._tracking.state in (
-            TrackingState.NO_IMAGES_YET,
-            TrackingState.NOT_INITIALIZED,
-        )
         return self._track(
             timestamp,
             details,
             lambda i, timer: self._front_end.monocular(
-                image, i, timestamp, timer, mask, initializing=initializing
+                image, i, timestamp, timer, mask, initializing=self._tracking.initializing
             ),
         )
 
@@ -292,9 +288,9 @@ class System:
                 raise StateError("the system has been shut down; make a new one")
             for worker in self._workers:
                 worker.raise_if_failed()
-            self._check_timestamp(timestamp)
             if self._reset_requested.is_set():
                 self._reset_now()
+            self._check_timestamp(timestamp)
             self._localization.apply()
             timer = StageTimer()
             if self._wait_for_mapping:
@@ -396,6 +392,7 @@ class System:
         self._recorder.clear()
         self._tracking.reset()
         self._next_frame_id = 0
+        self._last_timestamp = -math.inf
         self._reset_requested.clear()
         self.n_resets += 1
 
@@ -433,6 +430,8 @@ class System:
         self._shut_down = True
         if not self._finalizer.alive:
             return
+        if drain:
+            self._localization.release()
         errors = []
         for worker in self._workers:
             try:

@@ -95,6 +95,11 @@ class Tracking:
         self._visual_odometry = False
         self._initializer.reset()
 
+    @property
+    def initializing(self) -> bool:
+        """Whether the next image may begin a map."""
+        return self.state in (TrackingState.NO_IMAGES_YET, TrackingState.NOT_INITIALIZED)
+
     # ---- one image -------------------------------------------------------------------------------
     def track(self, frame: core.TrackedFrame, timer: StageTimer) -> TrackingOutcome:
         """Find the frame's pose; make it a keyframe if the map needs one.
