@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "base/similarity.hpp"
+#include "map/map.hpp"
+
+namespace orbslam {
+
+/// Spec 06, 2.8: further matches between two keyframes of which S_12 is known roughly. `matches`
+/// holds per keypoint of `a` the matched point of `b`, or an invalid id; matches are added to it
+/// where the point of a keypoint, carried through the similarity and searched for in the other
+/// image, finds a keypoint whose own point finds it back. Distances are compared in the units of
+/// the map in which the point's scale range was measured. Returns the number of new matches, 0
+/// when a keyframe is dead. Takes the read lock while it copies.
+/// Throws std::invalid_argument unless `matches` has one entry per keypoint of `a`.
+int match_by_similarity(const Map& map, KeyFrameId a, KeyFrameId b, const Similarity& S_ab,
+                        std::vector<MapPointId>& matches, float radius_factor = 7.5F);
+
+/// Spec 06, 2.7: points on the far side of a loop projected into a keyframe at its corrected place
+/// `S_cw`. `matches` holds per keypoint the matched point or an invalid id; free keypoints are
+/// matched to points (each listed once) that are not in it. Returns the number of new matches, 0
+/// for a dead keyframe. Takes the read lock while it copies.
+/// Throws std::invalid_argument unless `matches` has one entry per keypoint.
+int match_loop_points(const Map& map, KeyFrameId keyframe, const Similarity& S_cw,
+                      const std::vector<MapPointId>& points, std::vector<MapPointId>& matches,
+                      float radius_factor = 10.0F);
+
+}  // namespace orbslam
