@@ -124,6 +124,8 @@ class System:
             self._map, 1 if self.sensor.has_depth else 2, self._tracking, self._workers
         )
         self._recorder = core.TrajectoryRecorder()
+        # Trajectories may be asked for in any thread, also while a frame is recorded.
+        self._trajectory_lock = threading.Lock()
         self._finished_trajectories: list[Trajectory] = []
         self._statistics = StageStatistics()
         self._guard = CallGuard("tracking")
@@ -336,7 +338,8 @@ class System:
             _log.info("lost soon after initialization; starting a new map")
             self._reset_requested.set()
         elif initialized:
-            self._recorder.record(self._map, frame, lost=not ok)
+            with self._trajectory_lock:
+                self._recorder.record(self._map, frame, lost=not ok)
         map_index = len(self._finished_trajectories)
         return TrackingRecord(
             frame_id=frame.id,
@@ -384,12 +387,13 @@ class System:
         _log.info("resetting: map %d ends", len(self._finished_trajectories))
         self._mapping.worker.reset(_PATIENCE)
         self._loop_closing.worker.reset(_PATIENCE)
-        self._finished_trajectories.append(self._current_trajectory())
         self._mapping.reset()
         self._loop_closing.reset()
-        self._index.clear()
-        self._map.clear()
-        self._recorder.clear()
+        with self._trajectory_lock:
+            self._finished_trajectories.append(frame_trajectory(self._recorder, self._map))
+            self._index.clear()
+            self._map.clear()
+            self._recorder.clear()
         self._tracking.reset()
         self._next_frame_id = 0
         self._last_timestamp = -math.inf
@@ -499,14 +503,13 @@ class System:
         Trajectory
             Time stamps, ``T_wc`` (n, 4, 4) relative to keyframe 0, and which frames were lost.
         """
-        return self._current_trajectory()
+        return self.trajectories()[-1]
 
     def trajectories(self) -> list[Trajectory]:
         """One trajectory per map: those ended by resets, then the present one."""
-        return [*self._finished_trajectories, self._current_trajectory()]
-
-    def _current_trajectory(self) -> Trajectory:
-        return frame_trajectory(self._recorder, self._map)
+        with self._trajectory_lock:
+            present = frame_trajectory(self._recorder, self._map)
+            return [*self._finished_trajectories, present]
 
     def keyframe_trajectory(self) -> Trajectory:
         """Poses of the keyframes, relative to keyframe 0."""

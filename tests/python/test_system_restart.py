@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import pytest
 
 from orbslam2py import Sensor
@@ -31,3 +33,27 @@ def test_keyframes_that_wait_in_localization_mode_are_processed_at_shutdown() ->
         system._mapping.worker.submit(7)
         assert system._mapping.worker.n_waiting == 1
     assert processed == [7]
+
+
+def test_trajectories_may_be_read_while_frames_are_recorded() -> None:
+    lengths: list[int] = []
+    with new_system(Sensor.RGBD) as system:
+        done = threading.Event()
+
+        def read() -> None:
+            while not done.is_set():
+                trajectory = system.trajectory()
+                lengths.append(len(trajectory))
+                assert len(trajectory.T_wc) == len(trajectory.timestamps)
+
+        readers = [threading.Thread(target=read) for _ in range(2)]
+        for reader in readers:
+            reader.start()
+        play(system, 15)
+        system.reset()
+        play(system, 15)
+        done.set()
+        for reader in readers:
+            reader.join()
+        assert [len(trajectory) for trajectory in system.trajectories()] == [15, 15]
+    assert lengths
