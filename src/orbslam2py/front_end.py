@@ -74,6 +74,8 @@ class FrontEnd:
         self._check(right, "right image")
         if left.shape != right.shape:
             raise ImageError(f"left and right image differ: shapes {left.shape} and {right.shape}")
+        if isinstance(mask, tuple) and len(mask) != 2:
+            raise ImageError(f"a tuple of masks must hold two (left, right), got {len(mask)}")
         left_mask, right_mask = mask if isinstance(mask, tuple) else (mask, mask)
         _check_mask(left_mask, left, "left mask")
         _check_mask(right_mask, right, "right mask")

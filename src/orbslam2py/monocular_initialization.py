@@ -94,6 +94,8 @@ class MonocularInitializer:
             matches,
             intrinsics(frame.frame.camera),
             seed=self._seed,
+            # Each model takes about a millisecond: a busy machine starts a thread no sooner.
+            two_threads=False,
         )
         if not views.success:
             return _REASONS[views.outcome.name]

@@ -7,20 +7,25 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import cv2
 import numpy as np
 import pytest
+from rich.progress import Progress, TextColumn
 
 import orbslam2py
+from orbslam2py.cli.run import _Display
 from orbslam2py.errors import DatasetError
 from orbslam2py.outputs import link_latest, prepare_output_folder, write_ply
 from orbslam2py.plots import draw_trajectory
 from orbslam2py.prefetch import Prefetcher
 from orbslam2py.records import Reason, TrackingRecord, TrackingState
 from orbslam2py.report import peak_memory_mb
-from orbslam2py.runner import RunOptions
+from orbslam2py.runner import FrameRow, RunOptions
 from orbslam2py.sensor import Sensor
+from orbslam2py.system import System
 from orbslam2py.timing import StageStatistics, StageTimer
 from watchdog import watchdog, worker_threads
 
@@ -144,6 +149,22 @@ def test_record_inverts_its_pose() -> None:
         *(0, 0.0, 0, TrackingState.LOST, Reason.NONE, None), reference_keyframe=0, **values
     )
     assert lost.T_wc is None
+
+
+def test_progress_tells_why_there_is_no_pose() -> None:
+    record = TrackingRecord(
+        *(0, 0.0, 0, TrackingState.NOT_INITIALIZED, Reason.LOW_PARALLAX),
+        *(None, None, 0, 0, False, -1),
+    )
+    status = []
+    for reason in (str(record.reason), ""):
+        bar = Progress(TextColumn("{task.fields[status]}"), get_time=lambda: 1.0)
+        row = FrameRow(0, "0.0", record, reason)
+        _Display(bar, 10).show(row, cast(System, SimpleNamespace(n_keyframes=0, n_map_points=0)))
+        status.append(bar.tasks[0].fields["status"])
+    assert "NOT_INITIALIZED" in status[0]
+    assert "(low parallax between the two views)" in status[0]
+    assert "(" not in status[1]
 
 
 def test_reasons_print_as_text() -> None:
