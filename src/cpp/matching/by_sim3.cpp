@@ -4,6 +4,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "map/point_batch.hpp"
 #include "matching/by_projection.hpp"
@@ -97,6 +98,27 @@ std::vector<std::int32_t> search_one_way(const Side& from, const Frame& to, cons
   return found;
 }
 
+/// Looks for points of the world at the pose that S_cw stands for; `take(point, keypoint)` is told
+/// of every match before the next point is searched for.
+template <class Free, class Take>
+void search_loop_points(const Frame& frame, const Similarity& S_cw, const PointBatch& points,
+                        float radius_factor, const Free& free, const Take& take) {
+  const Projector projector(frame, S_cw.pose());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    ImagePoint image;
+    if (!projector.project_into_keyframe(points.positions[i], image)) continue;
+    const Eigen::Vector3d ray = points.positions[i] - projector.center();
+    const double distance = ray.norm();
+    if (!in_scale_range(distance, points.min_distances[i], points.max_distances[i])) continue;
+    if (!(ray.dot(points.mean_directions[i]) >= kLeastViewCosine * distance)) continue;
+    const int level = frame.scales->predict_level(points.max_distances[i], distance);
+    const std::int32_t best =
+        best_keypoint(frame, {image.u, image.v, level, radius_factor, kDescriptorLow},
+                      points.descriptors[i], free);
+    if (best != kNoMatch) take(i, static_cast<std::uint32_t>(best));
+  }
+}
+
 }  // namespace
 
 int match_by_similarity(const Map& map, KeyFrameId a, KeyFrameId b, const Similarity& S_ab,
@@ -155,24 +177,57 @@ int match_loop_points(const Map& map, KeyFrameId keyframe, const Similarity& S_c
       if (point && matched.find(id) == PointIdIndex::kNone) batch.push_back(*point);
     }
   }
-  const Projector projector(*frame, S_cw.pose());
   int n_new = 0;
-  for (std::size_t i = 0; i < batch.size(); ++i) {
-    ImagePoint image;
-    if (!projector.project_into_keyframe(batch.positions[i], image)) continue;
-    const Eigen::Vector3d ray = batch.positions[i] - projector.center();
-    const double distance = ray.norm();
-    if (!in_scale_range(distance, batch.min_distances[i], batch.max_distances[i])) continue;
-    if (!(ray.dot(batch.mean_directions[i]) >= kLeastViewCosine * distance)) continue;
-    const int level = frame->scales->predict_level(batch.max_distances[i], distance);
-    const std::int32_t best = best_keypoint(
-        *frame, {image.u, image.v, level, radius_factor, kDescriptorLow}, batch.descriptors[i],
-        [&](std::uint32_t candidate) { return !matches[candidate].valid(); });
-    if (best == kNoMatch) continue;
-    matches[static_cast<std::size_t>(best)] = batch.ids[i];
-    ++n_new;
-  }
+  search_loop_points(
+      *frame, S_cw, batch, radius_factor,
+      [&](std::uint32_t candidate) { return !matches[candidate].valid(); },
+      [&](std::size_t point, std::uint32_t keypoint) {
+        matches[keypoint] = batch.ids[point];
+        ++n_new;
+      });
   return n_new;
+}
+
+int fuse_loop_points(Map& map, KeyFrameId keyframe, const Similarity& S_cw,
+                     const std::vector<MapPointId>& points, float radius_factor) {
+  std::shared_ptr<const Frame> frame;
+  PointBatch batch;
+  std::uint64_t epoch = 0;
+  {
+    const auto lock = map.read_lock();
+    const KeyFrame* found = map.find(keyframe);
+    if (!found) return 0;
+    epoch = map.epoch();
+    frame = found->frame;
+    for (const MapPointId id : points) {
+      const MapPoint* point = map.find(id);
+      if (point && !point->observation_of(keyframe)) batch.push_back(*point);
+    }
+  }
+  std::vector<std::pair<MapPointId, std::uint32_t>> fusions;
+  search_loop_points(
+      *frame, S_cw, batch, radius_factor, [](std::uint32_t) { return true; },
+      [&](std::size_t point, std::uint32_t keypoint) {
+        fusions.emplace_back(batch.ids[point], keypoint);
+      });
+  if (fusions.empty()) return 0;
+
+  const auto lock = map.write_lock();
+  const KeyFrame* target = map.epoch() == epoch ? map.find(keyframe) : nullptr;
+  if (!target) return 0;
+  int changes = 0;
+  for (const auto& [id, keypoint] : fusions) {
+    const MapPoint* point = map.find(id);
+    if (!point || point->observation_of(keyframe)) continue;
+    if (const MapPoint* present = map.find(target->map_points[keypoint])) {
+      map.replace_point(present->id, id);
+    } else {
+      map.add_observation(id, keyframe, keypoint);
+      map.update_point(id);
+    }
+    ++changes;
+  }
+  return changes;
 }
 
 }  // namespace orbslam

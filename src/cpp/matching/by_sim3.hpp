@@ -27,4 +27,12 @@ int match_loop_points(const Map& map, KeyFrameId keyframe, const Similarity& S_c
                       const std::vector<MapPointId>& points, std::vector<MapPointId>& matches,
                       float radius_factor = 10.0F);
 
+/// Spec 06, 2.11: the same search, for a keyframe that is corrected already, and what follows from
+/// it: a point on the far side of the loop is added to the keypoint that shows it, or takes the
+/// place of the point that is there, whichever of them was observed more often. Points that the
+/// keyframe observes are left alone. The search runs without a lock on copies, the changes are
+/// made in one write section. Returns the number of changes, 0 for a dead keyframe.
+int fuse_loop_points(Map& map, KeyFrameId keyframe, const Similarity& S_cw,
+                     const std::vector<MapPointId>& points, float radius_factor = 4.0F);
+
 }  // namespace orbslam

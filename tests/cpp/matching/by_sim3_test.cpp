@@ -182,5 +182,39 @@ TEST(MatchLoopPoints, DeadKeyframesAndBadSizes) {
                std::invalid_argument);
 }
 
+TEST(FuseLoopPoints, PointsOfTheLoopTakeThePlaceOfThoseThere) {
+  for (const double drift : {0.4, 1.0, 2.5}) {
+    LoopScene scene(drift);
+    const auto before = scene.map.find(scene.a)->map_points;
+    EXPECT_EQ(fuse_loop_points(scene.map, scene.a, scene.S_aw, scene.loop_points()),
+              scene.n_common());
+    const auto& slots = scene.map.find(scene.a)->map_points;
+    for (std::size_t i = 0; i < slots.size(); ++i) {
+      const bool common = scene.partner(i).valid();
+      EXPECT_EQ(slots[i], common ? scene.partner(i) : before[i]) << i;
+      EXPECT_EQ(scene.map.find(before[i]) == nullptr, common) << i;
+    }
+    EXPECT_EQ(fuse_loop_points(scene.map, scene.a, scene.S_aw, scene.loop_points()), 0);
+  }
+}
+
+TEST(FuseLoopPoints, FreeKeypointsGainAnObservation) {
+  LoopScene scene(1);
+  std::size_t i = 0;
+  while (!scene.partner(i).valid()) ++i;
+  scene.map.erase_point(scene.map.find(scene.a)->map_points[i]);
+  const int before = scene.map.find(scene.partner(i))->observation_count;
+  EXPECT_EQ(fuse_loop_points(scene.map, scene.a, scene.S_aw, {scene.partner(i)}), 1);
+  EXPECT_EQ(scene.map.find(scene.a)->map_points[i], scene.partner(i));
+  EXPECT_GT(scene.map.find(scene.partner(i))->observation_count, before);
+  scene.map.update_connections(scene.a);
+  scene.expect_consistent();
+}
+
+TEST(FuseLoopPoints, DeadKeyframesChangeNothing) {
+  LoopScene scene(1);
+  EXPECT_EQ(fuse_loop_points(scene.map, KeyFrameId(9), scene.S_aw, scene.loop_points()), 0);
+}
+
 }  // namespace
 }  // namespace orbslam
