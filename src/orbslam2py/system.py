@@ -63,8 +63,9 @@ class System:
         Run mapping inline after each keyframe: two runs give the same bytes.
     wait_for_mapping : bool
         For recorded data: a track call waits until at most one keyframe waits for mapping (with a
-        single camera: none, and mapping is idle), so that the result does not depend on the speed
-        at which images are delivered. For live cameras leave it off.
+        single camera: until mapping is idle), so that mapping keeps up however fast the images are
+        delivered. With a stereo or RGB-D sensor the result still depends a little on the timing of
+        the threads; `deterministic` does not. For live cameras leave it off.
     seed : int
         Seed of all random draws.
 
