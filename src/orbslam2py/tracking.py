@@ -91,6 +91,8 @@ class Tracking:
         self._last_keyframe_frame_id = 0
         # 0 acts as "relocalized at the first frame": a young map has to prove itself.
         self._last_relocalization_frame_id = 0
+        # Whether localization mode has been on in this map.
+        self._map_is_kept = False
         # In localization mode: the last frame hangs on its own depths more than on the map.
         self._visual_odometry = False
         self._initializer.reset()
@@ -115,6 +117,7 @@ class Tracking:
         outcome = TrackingOutcome(TrackingState.LOST)
         with timer("predict"):
             if self.localization_only:
+                self._map_is_kept = True
                 discarded = self._predict_pose_in_fixed_map(frame, outcome)
             else:
                 discarded = self._predict_pose(frame, outcome)
@@ -173,7 +176,7 @@ class Tracking:
         frame.clear_associations()
         frame.T_cw = None
         # In localization mode the map is the user's, however small.
-        outcome.reset_needed = self._map.n_keyframes <= _SMALL_MAP and not self.localization_only
+        outcome.reset_needed = self._map.n_keyframes <= _SMALL_MAP and not self._map_is_kept
         self._visual_odometry = False
         # The last pose stays where tracking was lost: the reference keyframe is tried from there.
         self._last_tracked = False

@@ -107,6 +107,9 @@ class FakeCore:
     def refresh_associations(self, world: FakeMap, frame: FakeFrame) -> None:
         self.calls.append("refresh")
 
+    def add_temporary_points(self, last: FakeFrame, points: str) -> int:
+        return 0
+
     def gather_points(self, world: FakeMap, ids: np.ndarray) -> str:
         return "points"
 
@@ -420,6 +423,16 @@ def test_a_small_map_is_given_up(scene: Scene, n_keyframes: int, reset: bool) ->
     scene.run(3)
     scene.map.n_keyframes = n_keyframes
     assert lose(scene).reset_needed == reset
+
+
+def test_a_small_map_that_was_used_for_localization_is_kept(scene: Scene) -> None:
+    scene.run(3)
+    scene.map.n_keyframes = 3
+    scene.tracking.localization_only = True
+    scene.core.motion.extend([0, 0])
+    assert not scene.track().reset_needed
+    scene.tracking.localization_only = False
+    assert not lose(scene).reset_needed, "the map is the user's, also after the mode"
 
 
 @pytest.mark.parametrize(("inliers", "found"), [(49, False), (50, True)])
