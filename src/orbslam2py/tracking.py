@@ -175,7 +175,7 @@ class Tracking:
         self._velocity = None
         frame.clear_associations()
         frame.T_cw = None
-        # In localization mode the map is the user's, however small.
+        # A map that was used for localization is the user's, however small.
         outcome.reset_needed = self._map.n_keyframes <= _SMALL_MAP and not self._map_is_kept
         self._visual_odometry = False
         # The last pose stays where tracking was lost: the reference keyframe is tried from there.
