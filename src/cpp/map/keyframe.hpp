@@ -18,6 +18,10 @@ struct KeyFrame {
   KeyFrameId id;
   std::shared_ptr<const Frame> frame;
   Pose T_cw;
+  /// By how much lengths around the keyframe have been multiplied since it was made: loops closed
+  /// with a single camera take out a drift of scale. Lengths kept outside the map (the poses of
+  /// frames relative to this keyframe) are to follow.
+  double scale = 1;
   std::vector<MapPointId> map_points;  ///< per keypoint: the observed point or an invalid id
 
   /// Number of shared points per neighbour, all neighbours, symmetric.

@@ -101,34 +101,51 @@ void Map::set_pose(KeyFrameId id, const Pose& T_cw) {
   ++geometry_version_;
 }
 
+void Map::rescale(KeyFrameId id, double factor) { keyframe(id).scale *= factor; }
+
 void Map::begin_lease(KeyFrameId id) { ++keyframe(id).leases; }
 
-void Map::end_lease(KeyFrameId id) {
+bool Map::end_lease(KeyFrameId id) {
   KeyFrame* leased = keyframes_.find(id);
-  if (!leased) return;
+  if (!leased) return false;
   if (leased->leases == 0) {
     throw StateError("keyframe " + std::to_string(id.value) +
                      " has no lease; begin_lease() and end_lease() must come in pairs");
   }
-  if (--leased->leases > 0 || !leased->to_be_erased) return;
+  if (--leased->leases > 0 || !leased->to_be_erased) return false;
   leased->to_be_erased = false;
-  if (leased->loop_edges.empty()) erase_keyframe(id);
+  return leased->loop_edges.empty() && erase_keyframe(id);
 }
 
-Pose Map::T_cw(KeyFrameId id) const {
-  // A living one's pose is returned as it is stored: a product with the identity changes bits.
-  if (const KeyFrame* living = find(id)) return living->T_cw;
-  Pose T_ck;  // from the keyframe reached so far to the one asked for
-  for (KeyFrameId at = id;;) {
-    if (const KeyFrame* living = find(at)) return T_ck * living->T_cw;
+ScaledPose Map::scaled_pose(KeyFrameId id) const {
+  std::vector<const ArchivedKeyFrame*> chain;  // from the keyframe asked for up to a living one
+  const KeyFrame* ancestor = find(id);
+  for (KeyFrameId at = id; !ancestor; ancestor = find(at)) {
     const auto archived = archive_.find(at);
     if (archived == archive_.end()) {
       throw StateError("keyframe " + std::to_string(id.value) +
                        " never existed in this map; its pose is unknown");
     }
-    T_ck = T_ck * archived->second.T_kp;
+    chain.push_back(&archived->second);
     at = archived->second.parent;
   }
+  ScaledPose found{ancestor->T_cw, ancestor->scale};
+  for (auto dead = chain.rbegin(); dead != chain.rend(); ++dead) {
+    const double stretched = found.scale / (*dead)->parent_scale;
+    const Pose& T_kp = (*dead)->T_kp;
+    found.T_cw = Pose(T_kp.rotation(), stretched * T_kp.translation()) * found.T_cw;
+    found.scale = (*dead)->scale * stretched;
+  }
+  return found;
+}
+
+KeyFrameId Map::living(KeyFrameId id) const {
+  while (!find(id)) {
+    const auto archived = archive_.find(id);
+    if (archived == archive_.end()) return KeyFrameId();
+    id = archived->second.parent;
+  }
+  return id;
 }
 
 void Map::clear() {

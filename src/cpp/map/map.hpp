@@ -17,6 +17,12 @@
 
 namespace orbslam {
 
+/// Where a keyframe is, and KeyFrame::scale.
+struct ScaledPose {
+  Pose T_cw;
+  double scale = 1;
+};
+
 /// Owner of keyframes and map points, the covisibility graph and the spanning tree.
 ///
 /// Locking: the methods below do not lock. Callers hold `read_lock()` for const methods and
@@ -75,6 +81,8 @@ class Map {
   /// whose observation process_new_keyframe() adds later. The slot must not hold an observation.
   void set_slot(KeyFrameId id, std::size_t index, MapPointId point);
   void set_pose(KeyFrameId id, const Pose& T_cw);
+  /// Notes that lengths around the keyframe have been multiplied by `factor` (see KeyFrame::scale).
+  void rescale(KeyFrameId id, double factor);
 
   /// Removes a keyframe: neighbours forget it, its points lose the observation (and may die), its
   /// children find new parents among the neighbours they share most points with, and its pose
@@ -87,7 +95,8 @@ class Map {
   void begin_lease(KeyFrameId id);
   /// The last one carries out a deferred death, unless a loop edge protects the keyframe by now;
   /// the request is cleared either way. Ignored when clear() removed the keyframe meanwhile.
-  void end_lease(KeyFrameId id);
+  /// Returns whether the keyframe died: who keeps an index of keyframes erases it there.
+  bool end_lease(KeyFrameId id);
   /// Adds the edge on both keyframes; both are protected for ever.
   void add_loop_edge(KeyFrameId a, KeyFrameId b);
   /// Throws StateError when that would make a cycle or give keyframe 0 a parent.
@@ -95,12 +104,22 @@ class Map {
 
   /// Pose of a keyframe, living or culled: a culled one is expressed through its archived pose
   /// relative to its parent at the time of its death. Throws StateError for an unknown id.
-  Pose T_cw(KeyFrameId id) const;
+  Pose T_cw(KeyFrameId id) const { return scaled_pose(id).T_cw; }
+  ScaledPose scaled_pose(KeyFrameId id) const;
+  /// The keyframe itself, or the nearest of its ancestors that lives; an invalid id for an unknown
+  /// one.
+  KeyFrameId living(KeyFrameId id) const;
 
   // ---- points ----------------------------------------------------------------------------------
   /// A new point without observations; the caller adds them, then calls update_point().
   MapPointId add_point(const Eigen::Vector3d& position, KeyFrameId reference, FrameId first_frame);
   void set_position(MapPointId id, const Eigen::Vector3d& position);
+  /// Position and what follows from it at once, worked out before by geometry_at().
+  void set_geometry(MapPointId id, const PointGeometry& geometry);
+  /// What would follow if the point were at `position` and the camera of its k-th observation at
+  /// centers[k].
+  PointGeometry geometry_at(const MapPoint& point, const Eigen::Vector3d& position,
+                            const std::vector<Eigen::Vector3d>& centers) const;
 
   // The methods that create or move something throw StateError for a dead or unknown id, because
   // the caller should have looked; those that remove, refresh or count ignore it.
@@ -155,7 +174,8 @@ class Map {
  private:
   struct ArchivedKeyFrame {
     KeyFrameId parent;
-    Pose T_kp;  ///< maps the parent's camera frame to the dead keyframe's
+    Pose T_kp;                           ///< maps the parent's camera frame to the dead keyframe's
+    double scale = 1, parent_scale = 1;  ///< KeyFrame::scale of both at that time
   };
 
   KeyFrame& keyframe(KeyFrameId id);

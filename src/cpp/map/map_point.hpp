@@ -15,6 +15,13 @@ struct Observation {
   bool has_depth = false;   ///< a stereo observation counts 2, a monocular one 1
 };
 
+/// Where a point is, and what follows from that and the poses of its observers.
+struct PointGeometry {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Vector3d mean_direction = Eigen::Vector3d::Zero();
+  double min_distance = 0, max_distance = 0;
+};
+
 /// A 3-D point of the map. Only the Map changes it, so that both sides of an observation, the
 /// count and the derived fields always agree.
 struct MapPoint {

@@ -72,27 +72,36 @@ void Map::refresh_descriptor(MapPoint& refreshed) {
                                                       distances.data() + n * n)];
 }
 
-void Map::refresh_geometry(MapPoint& refreshed) {
-  if (refreshed.observations.empty()) return;
+PointGeometry Map::geometry_at(const MapPoint& point, const Eigen::Vector3d& position,
+                               const std::vector<Eigen::Vector3d>& centers) const {
+  PointGeometry geometry{position, point.mean_direction, point.min_distance, point.max_distance};
+  if (point.observations.empty()) return geometry;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  double reference_distance = 0;
-  int reference_level = 0;
-  const Frame* reference_frame = nullptr;
-  for (const Observation& observation : refreshed.observations) {
-    const KeyFrame& observer = keyframe(observation.keyframe);
-    const Eigen::Vector3d ray = refreshed.position - observer.center();
+  for (std::size_t k = 0; k < point.observations.size(); ++k) {
+    const Observation& observation = point.observations[k];
+    const Eigen::Vector3d ray = position - centers[k];
     const double distance = ray.norm();
     if (distance > 0) sum += ray / distance;
-    if (observation.keyframe != refreshed.reference_keyframe) continue;
-    reference_distance = distance;
-    reference_frame = observer.frame.get();
-    reference_level = reference_frame->keypoints[observation.index].level;
+    if (observation.keyframe != point.reference_keyframe) continue;
+    const Frame& frame = *keyframe(observation.keyframe).frame;
+    geometry.max_distance =
+        distance * frame.scales->scale(frame.keypoints[observation.index].level);
+    geometry.min_distance = geometry.max_distance / frame.scales->scale(frame.scales->levels() - 1);
   }
-  refreshed.mean_direction = sum / static_cast<double>(refreshed.observations.size());
-  if (!reference_frame) return;  // the caller has not added the reference's observation yet
-  const ScalePyramid& scales = *reference_frame->scales;
-  refreshed.max_distance = reference_distance * scales.scale(reference_level);
-  refreshed.min_distance = refreshed.max_distance / scales.scale(scales.levels() - 1);
+  geometry.mean_direction = sum / static_cast<double>(point.observations.size());
+  return geometry;
+}
+
+void Map::refresh_geometry(MapPoint& refreshed) {
+  thread_local std::vector<Eigen::Vector3d> centers;
+  centers.clear();
+  for (const Observation& observation : refreshed.observations) {
+    centers.push_back(keyframe(observation.keyframe).center());
+  }
+  const PointGeometry geometry = geometry_at(refreshed, refreshed.position, centers);
+  refreshed.mean_direction = geometry.mean_direction;
+  refreshed.min_distance = geometry.min_distance;
+  refreshed.max_distance = geometry.max_distance;
 }
 
 void Map::update_descriptor(MapPointId id) {

@@ -52,6 +52,15 @@ void Map::set_position(MapPointId id, const Eigen::Vector3d& position) {
   ++geometry_version_;
 }
 
+void Map::set_geometry(MapPointId id, const PointGeometry& geometry) {
+  MapPoint& moved = point(id);
+  moved.position = geometry.position;
+  moved.mean_direction = geometry.mean_direction;
+  moved.min_distance = geometry.min_distance;
+  moved.max_distance = geometry.max_distance;
+  ++geometry_version_;
+}
+
 void Map::insert_observation(MapPoint& observed, KeyFrame& observer, std::size_t index) {
   const Observation observation{observer.id, static_cast<std::uint32_t>(index),
                                 observer.frame->has_depth(index)};

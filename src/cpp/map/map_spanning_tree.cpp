@@ -97,7 +97,8 @@ bool Map::erase_keyframe(KeyFrameId id) {
   KeyFrame& parent = keyframe(grandparent);
   adopt_children(*dying, grandparent);
   parent.children.erase(id);
-  archive_.emplace(id, ArchivedKeyFrame{grandparent, dying->T_cw * parent.T_cw.inverse()});
+  archive_.emplace(id, ArchivedKeyFrame{grandparent, dying->T_cw * parent.T_cw.inverse(),
+                                        dying->scale, parent.scale});
   if (dying->published) --n_published_;
   keyframes_.erase(id);
   ++structure_version_;

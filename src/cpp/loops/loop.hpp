@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "base/ids.hpp"
+#include "base/similarity.hpp"
+
+namespace orbslam {
+
+/// A place seen again: the present keyframe, the one that showed the place before, and the
+/// similarity between their cameras, with which the drift gathered meanwhile can be taken out.
+struct Loop {
+  KeyFrameId current, matched;
+  Similarity S_cm;                      ///< camera of `matched` to camera of `current`
+  Similarity S_cw;                      ///< world to `current` once corrected: S_cm * S_mw
+  std::vector<MapPointId> matches;      ///< per keypoint of `current`: far-side point or invalid
+  std::vector<MapPointId> loop_points;  ///< all points around `matched`, each once
+  int n_inliers = 0;                    ///< matches that the refined similarity was judged on
+  int n_matches = 0;                    ///< valid entries of `matches`
+};
+
+}  // namespace orbslam

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "map/map.hpp"
+
+namespace orbslam {
+
+/// A loop is believed only when the same part of the map is proposed by consecutive keyframes
+/// (Mur-Artal et al. 2015, section VII-A; spec 14, section 2). Remembers what the keyframe before
+/// proposed. One thread.
+class LoopConsistency {
+ public:
+  static constexpr int kNeeded = 3;  ///< consecutive confirmations
+
+  /// The candidates of the next keyframe, ascending ids; none breaks all chains. Returns those
+  /// whose part of the map (they and their covisible keyframes) has been proposed by kNeeded
+  /// keyframes before this one, in the given order. Takes the map's read lock.
+  std::vector<KeyFrameId> update(const Map& map, const std::vector<KeyFrameId>& candidates);
+
+  /// After a correction, a gap or a reset.
+  void clear() { groups_.clear(); }
+
+ private:
+  struct Group {
+    std::vector<KeyFrameId> members;  // ascending
+    int confirmations = 0;
+  };
+  std::vector<Group> groups_;
+};
+
+}  // namespace orbslam

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <unordered_map>
+#include <vector>
+
+#include "map/map.hpp"
+
+namespace orbslam {
+
+/// New poses and positions for many keyframes and points. What follows from them (viewing
+/// directions and scale ranges of the points) is worked out before the write section, so that
+/// this only copies.
+class MapRewrite {
+ public:
+  /// `rescaled`: lengths around the keyframe are multiplied by it.
+  void move_keyframe(KeyFrameId id, const Pose& T_cw, double rescaled = 1);
+  void move_point(MapPointId id, const Eigen::Vector3d& position);
+
+  /// Works out the points' geometry from the new poses, old ones where there is no new one. The
+  /// caller holds a lock.
+  void prepare(const Map& map);
+  /// Writes what still lives. Points whose observations have changed since prepare(), or that were
+  /// not prepared, are worked out now. The caller holds the write lock.
+  void apply(Map& map) const;
+
+  std::size_t n_keyframes() const { return keyframes_.size(); }
+  std::size_t n_points() const { return points_.size(); }
+  /// The new pose, or nullptr where there is none.
+  const Pose* T_cw(KeyFrameId id) const;
+
+ private:
+  struct MovedKeyFrame {
+    KeyFrameId id;
+    Pose T_cw;
+    double rescaled = 1;
+  };
+  struct MovedPoint {
+    MapPointId id;
+    PointGeometry geometry;
+    std::size_t n_observations = 0;  // when it was prepared; 0: it was not
+  };
+  std::vector<MovedKeyFrame> keyframes_;
+  std::vector<MovedPoint> points_;
+  std::unordered_map<KeyFrameId, std::size_t> slot_of_;  // for look-ups only
+};
+
+}  // namespace orbslam
