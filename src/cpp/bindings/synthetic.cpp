@@ -52,6 +52,10 @@ void bind_worlds(py::module_& module) {
   module.def("make_street", &synthetic::make_street, "length"_a, "width"_a, "seed"_a,
              py::call_guard<py::gil_scoped_release>(),
              "A street along z, the road 1.65 m below the origin, open above.");
+  module.def("make_street_lap", &synthetic::make_street_lap, "length"_a, "breadth"_a, "width"_a,
+             "seed"_a, py::call_guard<py::gil_scoped_release>(),
+             "Streets around a block of houses, their middle lines `length` (z) by `breadth` (x), "
+             "the road 1.65 m below the origin, open above.");
   module.def("make_two_rooms", &synthetic::make_two_rooms, "size"_a, "passage"_a, "seed"_a,
              "n_boxes"_a, py::call_guard<py::gil_scoped_release>(),
              "Two rooms that look alike, joined by a passage of the given length [m].");
@@ -85,6 +89,8 @@ void bind_paths(py::module_& module) {
   module.def("figure_eight_way", &synthetic::figure_eight_way, "length"_a, "breadth"_a, "width"_a,
              "The round through make_figure_eight; twice along the middle leg.");
   module.def("street_way", &synthetic::street_way, "length"_a, "Straight along z.");
+  module.def("street_lap_way", &synthetic::street_lap_way, "length"_a, "breadth"_a, "width"_a,
+             "Once around the block of make_street_lap with the same sizes.");
   module.def("two_rooms_way", &synthetic::two_rooms_way, "size"_a, "passage"_a,
              "From the first room of make_two_rooms into the second.");
 }

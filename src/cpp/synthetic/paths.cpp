@@ -26,6 +26,13 @@ Pose camera_to_world(const Eigen::Vector3d& position, double yaw, double pitch, 
   return {rotation, position};
 }
 
+/// Starts in the middle of the left leg, clockwise seen from above.
+Way rounded_rectangle(double length, double breadth, double radius) {
+  const double x = breadth / 2;
+  const double z = length / 2;
+  return Way({{-x, z}, {x, z}, {x, -z}, {-x, -z}}, radius, true);
+}
+
 }  // namespace
 
 Way::Way(const std::vector<Eigen::Vector2d>& corners, double radius, bool closed)
@@ -142,10 +149,7 @@ Pose room_T_wc(const Eigen::Vector3d& size, double seconds, double period) {
 }
 
 Way corridor_way(double length, double breadth, double width) {
-  const double x = (breadth - width) / 2;
-  const double z = (length - width) / 2;
-  // Starts in the middle of the left leg, clockwise seen from above.
-  return Way({{-x, z}, {x, z}, {x, -z}, {-x, -z}}, width / 2, true);
+  return rounded_rectangle(length - width, breadth - width, width / 2);
 }
 
 Way figure_eight_way(double length, double breadth, double width) {
@@ -156,6 +160,10 @@ Way figure_eight_way(double length, double breadth, double width) {
 }
 
 Way street_way(double length) { return Way({{0, 0}, {0, length}}, 1, false); }
+
+Way street_lap_way(double length, double breadth, double width) {
+  return rounded_rectangle(length, breadth, width);
+}
 
 Way two_rooms_way(const Eigen::Vector3d& size, double passage) {
   const double x = 0.2 * size.x();

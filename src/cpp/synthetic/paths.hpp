@@ -62,6 +62,8 @@ Way corridor_way(double length, double breadth, double width);
 /// Twice along the middle leg per round, first past the left, then past the right block.
 Way figure_eight_way(double length, double breadth, double width);
 Way street_way(double length);
+/// Once around the block, always to the right, in bends of radius `width`.
+Way street_lap_way(double length, double breadth, double width);
 /// From the first room through the door into the second.
 Way two_rooms_way(const Eigen::Vector3d& size, double passage);
 

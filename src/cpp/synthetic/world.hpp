@@ -60,6 +60,10 @@ World make_figure_eight(double length, double breadth, double width, double heig
 /// y = 1.65 (a camera at the origin drives 1.65 m above it); open above.
 World make_street(double length, double width, std::uint64_t seed);
 
+/// Streets around a block of houses: their middle lines are `length` (z) by `breadth` (x), centred
+/// on the origin; `width` [m] between the fronts on both sides, the road at y = 1.65; open above.
+World make_street_lap(double length, double breadth, double width, std::uint64_t seed);
+
 /// Two rooms of `size` that look alike, the second one turned by 180 degrees about y and centred
 /// on (0, 0, size.z + passage), joined by a passage 1.6 m wide that looks different.
 World make_two_rooms(const Eigen::Vector3d& size, double passage, std::uint64_t seed, int n_boxes);

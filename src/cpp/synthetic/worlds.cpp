@@ -17,6 +17,7 @@ constexpr double kCorridorTexel = 0.005;
 constexpr double kStreetTexel = 0.02;
 constexpr double kCarTexel = 0.01;
 constexpr double kCameraAboveRoad = 1.65;
+constexpr double kHouseDepth = 3;  // of what can be seen of a house's sides
 constexpr double kDoorWidth = 1.6;
 
 void require(bool fine, const std::string& message) {
@@ -68,6 +69,60 @@ std::vector<Rectangle> room(const Eigen::Vector3d& size, std::uint64_t seed, int
   }
   furnish(carpenter, size, seed, n_boxes);
   return carpenter.rectangles();
+}
+
+/// One side of a street: a point (x, z) on it, the direction of the street, and the direction from
+/// the road to the houses.
+struct Kerb {
+  Eigen::Vector2d start, along, away;
+
+  Eigen::Vector2d at(double distance, double depth) const {
+    return start + distance * along + depth * away;
+  }
+};
+
+/// The road between two corners (x, z), in pieces: cheap to cull.
+void pave(Carpenter& carpenter, double x0, double z0, double x1, double z1) {
+  constexpr double kPiece = 60;
+  for (double x = x0; x < x1; x += kPiece) {
+    for (double z = z0; z < z1; z += kPiece) {
+      carpenter.slab(x, z, std::min(x + kPiece, x1), std::min(z + kPiece, z1), kCameraAboveRoad);
+    }
+  }
+}
+
+/// House after house, set back from the kerb by up to 2.5 m.
+void build_houses(Carpenter& carpenter, const Kerb& kerb, double begin, double end,
+                  HashStream& random) {
+  double s = begin;
+  while (s < end) {
+    const double next = std::min(s + random.uniform(7, 18), end);
+    const double front = random.uniform(0, 2.5);
+    const double top = kCameraAboveRoad - random.uniform(5, 13);
+    const auto wall = [&](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+      carpenter.wall(a.x(), a.y(), b.x(), b.y(), top, kCameraAboveRoad);
+    };
+    wall(kerb.at(s, front), kerb.at(next, front));
+    wall(kerb.at(s, front), kerb.at(s, kHouseDepth));
+    wall(kerb.at(next, kHouseDepth), kerb.at(next, front));
+    s = next;
+  }
+}
+
+/// Cars along the kerb, with gaps of all sizes.
+void park_cars(Carpenter& carpenter, const Kerb& kerb, double begin, double end,
+               HashStream& random) {
+  const double yaw = std::atan2(kerb.along.x(), kerb.along.y());
+  carpenter.use_texel(kCarTexel);
+  for (double s = begin + random.uniform(3, 12); s < end; s += random.uniform(8, 25)) {
+    const Eigen::Vector2d centre = kerb.at(s, -1.1);
+    const double height = random.uniform(1.3, 2.2);
+    const double length = random.uniform(3.6, 5.2);
+    const double width = random.uniform(1.6, 1.9);
+    carpenter.box(centre.x(), centre.y(), width, length, kCameraAboveRoad - height,
+                  kCameraAboveRoad, yaw);
+  }
+  carpenter.use_texel(kStreetTexel);
 }
 
 }  // namespace
@@ -159,33 +214,46 @@ World make_street(double length, double width, std::uint64_t seed) {
   HashStream random(mix(seed, 0x57ee));
   constexpr double kBehind = 5;   // the street goes on behind the start
   constexpr double kBeyond = 60;  // and past the end
-  constexpr double kPiece = 60;   // floors in pieces: cheap to cull
-  const double bottom = kCameraAboveRoad;
   const double end = length + kBeyond;
-  const double half = width / 2 + 3;  // houses stand back by up to 3 m
-  for (double z = -kBehind; z < end; z += kPiece) {
-    carpenter.slab(-half, z, half, std::min(z + kPiece, end), bottom);
-  }
+  const double half = width / 2 + kHouseDepth;
+  pave(carpenter, -half, -kBehind, half, end);
   for (const double side : {-1.0, 1.0}) {
-    double z = -kBehind;
-    while (z < end) {
-      const double next = std::min(z + random.uniform(7, 18), end);
-      const double front = side * (width / 2 + random.uniform(0, 2.5));
-      const double top = bottom - random.uniform(5, 13);
-      carpenter.wall(front, z, front, next, top, bottom);
-      carpenter.wall(front, z, side * half, z, top, bottom);
-      carpenter.wall(side * half, next, front, next, top, bottom);
-      z = next;
-    }
-    for (z = random.uniform(3, 12); z < end; z += random.uniform(8, 25)) {
-      const double x = side * (width / 2 - 1.1);  // parked along the kerb
-      carpenter.use_texel(kCarTexel);
-      carpenter.box(x, z, random.uniform(1.6, 1.9), random.uniform(3.6, 5.2),
-                    bottom - random.uniform(1.3, 2.2), bottom, 0);
-      carpenter.use_texel(kStreetTexel);
+    const Kerb kerb{{side * width / 2, 0}, {0, 1}, {side, 0}};
+    build_houses(carpenter, kerb, -kBehind, end, random);
+    park_cars(carpenter, kerb, 0, end, random);
+  }
+  carpenter.wall(-half, end, half, end, kCameraAboveRoad - 12, kCameraAboveRoad);
+  return World(std::move(carpenter.rectangles()));
+}
+
+World make_street_lap(double length, double breadth, double width, std::uint64_t seed) {
+  require(width >= 6 && width <= 40, "street lap: width must be 6 to 40 m");
+  require(std::min(length, breadth) >= 3 * width && std::max(length, breadth) <= 2000,
+          "street lap: length and breadth must be 3 times the width to 2000 m");
+  Carpenter carpenter(seed, kStreetTexel);
+  HashStream random(mix(seed, 0x57ee));
+  const double half = width / 2 + kHouseDepth;
+  const double x = breadth / 2;
+  const double z = length / 2;
+  for (const double side : {-1.0, 1.0}) {
+    pave(carpenter, side * x - half, -z - half, side * x + half, z + half);
+    pave(carpenter, -x + half, side * z - half, x - half, side * z + half);
+  }
+  // Clockwise seen from above: the block is always on the right.
+  const Eigen::Vector2d corners[4] = {{-x, -z}, {-x, z}, {x, z}, {x, -z}};
+  for (int i = 0; i < 4; ++i) {
+    const Eigen::Vector2d leg = corners[(i + 1) % 4] - corners[i];
+    const Eigen::Vector2d along = leg.normalized();
+    const Eigen::Vector2d right(along.y(), -along.x());
+    const Kerb outer{corners[i] - width / 2 * right, along, -right};
+    const Kerb inner{corners[i] + width / 2 * right, along, right};
+    // Rows of the outer side meet behind the corner, those of the block at its corner.
+    build_houses(carpenter, outer, -half, leg.norm() + half, random);
+    build_houses(carpenter, inner, width / 2, leg.norm() - width / 2, random);
+    for (const Kerb& kerb : {outer, inner}) {
+      park_cars(carpenter, kerb, width, leg.norm() - width, random);  // not in the bends
     }
   }
-  carpenter.wall(-half, end, half, end, bottom - 12, bottom);
   return World(std::move(carpenter.rectangles()));
 }
 

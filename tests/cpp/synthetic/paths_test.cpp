@@ -54,7 +54,8 @@ TEST(RoomPath, ComesBackAfterAPeriodAndStaysInTheMiddle) {
 }
 
 TEST(Way, IsClosedAndSmoothAlsoAcrossLaps) {
-  for (const Way& way : {corridor_way(16, 12, 2.4), figure_eight_way(16, 20, 2.4)}) {
+  for (const Way& way :
+       {corridor_way(16, 12, 2.4), figure_eight_way(16, 20, 2.4), street_lap_way(20, 14, 1.2)}) {
     const PathOptions still{0, 0, 0, 1};
     EXPECT_LT(
         (way.T_wc(1.5, still).inverse() * way.T_wc(1.5 + 2 * way.length(), still)).log().norm(),
@@ -81,6 +82,22 @@ TEST(Way, StaysInTheMiddleOfTheCorridor) {
     const bool in_block = std::abs(p.x()) < 4.0 && std::abs(p.z()) < 6.0;
     EXPECT_TRUE(inside && !in_block) << s;
   }
+}
+
+TEST(Way, DrivesOnItsStreetAroundTheBlock) {
+  const double width = 14;
+  const Way way = street_lap_way(208, 104, width);
+  EXPECT_NEAR(way.length(), 600, 0.1);
+  double nearest_to_block = 1e9;
+  for (double s = 0; s < way.length(); s += 0.25) {
+    const Eigen::Vector3d p = way.T_wc(s, {0, 0, 0, 1}).translation().cwiseAbs();
+    EXPECT_TRUE(p.x() <= 52 + 1e-9 && p.z() <= 104 + 1e-9) << s;  // middle lines or inside of them
+    const double dx = std::max(p.x() - (52 - width / 2), 0.0);
+    const double dz = std::max(p.z() - (104 - width / 2), 0.0);
+    nearest_to_block = std::min(nearest_to_block, std::hypot(dx, dz));
+  }
+  // In the bends the way is nearest to the block's corners.
+  EXPECT_NEAR(nearest_to_block, width * (1 / std::sqrt(2.0) - (std::sqrt(2.0) - 1)), 0.01);
 }
 
 TEST(Way, FigureOfEightUsesTheMiddleLegTwiceInTheSameDirection) {

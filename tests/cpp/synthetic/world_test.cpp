@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <vector>
 
 #include "base/errors.hpp"
 #include "synthetic/paths.hpp"
@@ -193,6 +194,58 @@ TEST(Render, StreetIsOpenAbove) {
   EXPECT_GT(image.depth.at<float>(479, 320), 1);
 }
 
+TEST(Render, StreetsAroundABlockAreOpenAboveAndClosedAhead) {
+  const World streets = make_street_lap(120, 80, 14, 2);
+  const Way way = street_lap_way(120, 80, 14);
+  int open = 0;
+  for (int i = 0; i < 40; ++i) {
+    const Rendering image = render(streets, way.T_wc(way.length() * i / 40).inverse(), {});
+    open += static_cast<int>(image.depth.at<float>(0, 320) == 0);
+    // Just above the road, whatever the direction, there is a house: no gaps at the corners.
+    for (int x = 0; x < 640; ++x) ASSERT_GT(image.depth.at<float>(225, x), 1) << i << ' ' << x;
+  }
+  EXPECT_GT(open, 20);  // a house close ahead in a bend may fill the view
+}
+
+TEST(World, NothingStandsInTheWayAroundTheBlock) {
+  const Way way = street_lap_way(208, 104, 14);
+  std::vector<Eigen::Vector3d> places;
+  for (double d = 0; d < way.length(); d += 2) {
+    places.emplace_back(way.T_wc(d, {0, 0, 0, 1}).translation());
+  }
+  for (const std::uint64_t seed : {0, 1}) {
+    const World streets = make_street_lap(208, 104, 14, seed);
+    double nearest = 1e9;
+    for (const Rectangle& r : streets.rectangles()) {
+      if (r.v_axis.y() != 1) continue;  // roads and roofs
+      for (double a = 0; a < r.width; a += 0.5) {
+        const Eigen::Vector3d p = r.origin + a * r.u_axis;
+        for (const Eigen::Vector3d& c : places) {
+          nearest = std::min(nearest, std::hypot(p.x() - c.x(), p.z() - c.z()));
+        }
+      }
+    }
+    EXPECT_GT(nearest, 3.9) << seed;  // a car may be driven by up to 3 m beside the middle
+  }
+}
+
+TEST(World, StreetsAroundABlockDifferBySeedAndHaveCarsOnBothSides) {
+  const World one = make_street_lap(208, 104, 14, 1);
+  const World other = make_street_lap(208, 104, 14, 2);
+  EXPECT_NE(one.rectangles().size(), other.rectangles().size());
+  int inside = 0;
+  int outside = 0;
+  for (const Rectangle& r : one.rectangles()) {
+    const bool roof = r.v_axis.y() == 0 && r.origin.y() < 1.6;
+    if (!roof) continue;
+    const Eigen::Vector3d centre = r.origin + 0.5 * (r.width * r.u_axis + r.height * r.v_axis);
+    const bool within = std::abs(centre.x()) < 52 && std::abs(centre.z()) < 104;
+    ++(within ? inside : outside);
+  }
+  EXPECT_GT(inside, 15);
+  EXPECT_GT(outside, 15);
+}
+
 TEST(Render, TwoRoomsLookAlike) {
   const Eigen::Vector3d size(6, 3, 6);
   const World world = make_two_rooms(size, 2, 5, 6);
@@ -254,6 +307,8 @@ TEST(World, RefusesWhatCannotBe) {
   EXPECT_THROW(make_corridor(4, 10, 2, 2, 1), SettingsError);
   EXPECT_THROW(make_room({0, 3, 3}, 1, 1), SettingsError);
   EXPECT_THROW(make_street(5, 12, 1), SettingsError);
+  EXPECT_THROW(make_street_lap(208, 30, 14, 1), SettingsError);
+  EXPECT_THROW(make_street_lap(208, 104, 5, 1), SettingsError);
   RenderOptions options;
   options.noise = -1;
   EXPECT_THROW(render(room(), Pose(), options), SettingsError);
