@@ -16,7 +16,10 @@ class LoopConsistency {
 
   /// The candidates of the next keyframe, ascending ids; none breaks all chains. Returns those
   /// whose part of the map (they and their covisible keyframes) has been proposed by kNeeded
-  /// keyframes before this one, in the given order. Takes the map's read lock.
+  /// keyframes before this one, in the given order. Parts proposed by successive keyframes are
+  /// the same when they share a keyframe; the first candidate to meet a part of the keyframe
+  /// before carries its chain on. Dead candidates count for nothing. Takes the map's read lock
+  /// while it copies.
   std::vector<KeyFrameId> update(const Map& map, const std::vector<KeyFrameId>& candidates);
 
   /// After a correction, a gap or a reset.
@@ -25,7 +28,7 @@ class LoopConsistency {
  private:
   struct Group {
     std::vector<KeyFrameId> members;  // ascending
-    int confirmations = 0;
+    int confirmations = 0;            // by keyframes after the one that proposed it first
   };
   std::vector<Group> groups_;
 };

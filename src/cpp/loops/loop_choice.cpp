@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "loops/loop_choice.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <shared_mutex>
+#include <stdexcept>
+
+#include "loops/keyframe_graph.hpp"
+#include "map/scene_depth.hpp"
+
+namespace orbslam {
+namespace {
+
+// Stereo systems drift by less than 2 % of the way, those with a single camera by up to 10 %, most
+// of which is drift of scale, which the loop itself measures.
+constexpr double kDriftOfPath = 0.04;  // metres per metre
+constexpr double kDriftOfTurn = 0.02;  // scene depths per radian
+constexpr double kMeasuring = 0.1;     // scene depths, by which a loop's own measurement may err
+constexpr double kHiddenScale = 0.05;  // log of a scale that came and went
+constexpr double kRotation = 0.1;      // radians, drift over a short way and measurement
+constexpr double kRotationOfTurn = 0.03;
+constexpr double kRotationOfPath = 0.01;             // radians per scene depth
+constexpr double kMaxRotation = 1.0471975511965976;  // 60 degrees
+const double kLogScale = std::log(1.5);
+constexpr double kLogScaleOfPath = 0.01;  // per scene depth
+/// The difference of two measurements errs by the root of 2 times as much as one; rounded up.
+constexpr double kTwoMeasurements = 1.5;
+constexpr double kRounding = 1e-9;
+
+double angle_between(const Pose& a, const Pose& b) {
+  const Eigen::Quaterniond turn = a.rotation() * b.rotation().conjugate();
+  return 2 * std::atan2(turn.vec().norm(), std::abs(turn.w()));
+}
+
+struct Limits {
+  double translation = 0, rotation = 0, log_scale = 0;
+};
+
+/// What drift along a way explains when it has changed the scale by exp(log_scale) in the end.
+/// `measuring` multiplies the error of the measurement.
+Limits limits_of(const KeyFrameWay& way, double scene_depth, double log_scale, bool fix_scale,
+                 double measuring = 1) {
+  Limits limits;
+  const double depths = scene_depth > 0 ? way.length / scene_depth : 0;
+  limits.translation = kDriftOfPath * way.length + kDriftOfTurn * scene_depth * way.turned +
+                       measuring * kMeasuring * scene_depth;
+  if (!fix_scale) {
+    limits.translation += way.reach * (std::abs(log_scale) + kHiddenScale);
+    limits.log_scale = kLogScale + kLogScaleOfPath * depths;
+  }
+  limits.rotation = std::min(kMaxRotation, measuring * kRotation + kRotationOfTurn * way.turned +
+                                               kRotationOfPath * depths);
+  return limits;
+}
+
+/// The map around the keyframe that loops are judged for, copied.
+struct Surroundings {
+  Surroundings(const Map& map, KeyFrameId current) : Surroundings(map, current, map.read_lock()) {}
+
+  /// Turning by an angle costs as many metres as drift makes of it.
+  std::vector<KeyFrameWay> ways(KeyFrameId from, const std::vector<KeyFrameId>& to) const {
+    return graph.shortest_ways(from, to, scene_depth * kDriftOfTurn / kDriftOfPath);
+  }
+
+  KeyFrameGraph graph;
+  Pose T_cw;
+  double scene_depth = 0;  // 0 for a dead keyframe, which no way leads to
+
+ private:
+  using ReadLock = std::shared_lock<std::shared_mutex>;
+
+  Surroundings(const Map& map, KeyFrameId current, const ReadLock& /*held*/) : graph(map) {
+    const KeyFrame* keyframe = map.find(current);
+    if (!keyframe) return;
+    T_cw = keyframe->T_cw;
+    scene_depth = std::max(0.0, median_scene_depth(map, *keyframe).value_or(0));
+  }
+};
+
+LoopDrift assess(const Surroundings& around, const Loop& loop, const KeyFrameWay& way,
+                 bool fix_scale) {
+  LoopDrift drift;
+  drift.path = way.length;
+  drift.turned = way.turned;
+  drift.reach = way.reach;
+  drift.scene_depth = around.scene_depth;
+  const Pose corrected = loop.S_cw.pose();
+  drift.translation = (corrected.center() - around.T_cw.center()).norm();
+  drift.rotation = angle_between(corrected, around.T_cw);
+  drift.scale = loop.S_cm.scale();
+  if (!way.exists()) return drift;
+  const Limits limits = limits_of(way, around.scene_depth, std::log(drift.scale), fix_scale);
+  drift.max_translation = limits.translation;
+  drift.max_rotation = limits.rotation;
+  drift.max_log_scale = limits.log_scale;
+  return drift;
+}
+
+bool contradict(const Loop& a, const Loop& b, const Surroundings& around, bool fix_scale) {
+  const Pose place_a = a.S_cw.pose(), place_b = b.S_cw.pose();
+  const KeyFrameWay way = around.ways(a.matched, {b.matched}).front();
+  const double log_scale = std::log(a.S_cm.scale() / b.S_cm.scale());
+  const Limits limits = limits_of(way, around.scene_depth, log_scale, fix_scale, kTwoMeasurements);
+  return (place_a.center() - place_b.center()).norm() > limits.translation ||
+         angle_between(place_a, place_b) > limits.rotation;
+}
+
+bool stronger(const Loop& a, const Loop& b) {
+  return a.n_matches != b.n_matches ? a.n_matches > b.n_matches : a.matched < b.matched;
+}
+
+}  // namespace
+
+bool LoopDrift::plausible() const {
+  return std::isfinite(path) && translation <= max_translation && rotation <= max_rotation &&
+         std::abs(std::log(scale)) <= max_log_scale + kRounding;
+}
+
+LoopDrift assess_drift(const Map& map, const Loop& loop, bool fix_scale) {
+  const Surroundings around(map, loop.current);
+  return assess(around, loop, around.ways(loop.current, {loop.matched}).front(), fix_scale);
+}
+
+std::optional<Loop> choose_loop(const Map& map, const std::vector<Loop>& loops, bool fix_scale) {
+  if (loops.empty()) return std::nullopt;
+  std::vector<KeyFrameId> far_ends;
+  for (const Loop& loop : loops) {
+    if (loop.current != loops.front().current) {
+      throw std::invalid_argument("choose_loop: all loops must be of the same keyframe");
+    }
+    far_ends.push_back(loop.matched);
+  }
+  const Surroundings around(map, loops.front().current);
+  const std::vector<KeyFrameWay> ways = around.ways(loops.front().current, far_ends);
+  std::vector<const Loop*> plausible;
+  for (std::size_t i = 0; i < loops.size(); ++i) {
+    if (assess(around, loops[i], ways[i], fix_scale).plausible()) plausible.push_back(&loops[i]);
+  }
+  for (std::size_t i = 0; i < plausible.size(); ++i) {
+    for (std::size_t j = i + 1; j < plausible.size(); ++j) {
+      if (contradict(*plausible[i], *plausible[j], around, fix_scale)) return std::nullopt;
+    }
+  }
+  const auto best = std::min_element(plausible.begin(), plausible.end(),
+                                     [](const Loop* a, const Loop* b) { return stronger(*a, *b); });
+  if (best == plausible.end()) return std::nullopt;
+  return **best;
+}
+
+}  // namespace orbslam
