@@ -43,7 +43,6 @@ class DepthInitializer:
         frame.T_cw = core.Pose()
         core.describe(frame.frame, self._vocabulary)
         keyframe = core.insert_keyframe(self._map, frame, create_points=True, n_minimum=sys.maxsize)
-        frame.reference_keyframe = keyframe
         self._mapping.insert_keyframe(keyframe)
         _log.info("new map with %d points", self._map.n_points)
         return Reason.NONE

@@ -86,7 +86,7 @@ class Tracking:
         self.reference_keyframe = -1
         self._last: core.TrackedFrame | None = None
         self._last_tracked = False
-        self._last_T_cr: core.Pose | None = None
+        self._last_points = core.PointBatch()
         self._velocity: core.Pose | None = None
         self._last_keyframe_frame_id = 0
         # 0 acts as "relocalized at the first frame": a young map has to prove itself.
@@ -114,20 +114,12 @@ class Tracking:
         if self.state == TrackingState.NOT_INITIALIZED:
             return self._initialize(frame, timer)
 
-        outcome = TrackingOutcome(TrackingState.LOST)
-        with timer("predict"):
-            if self.localization_only:
-                self._map_is_kept = True
-                discarded = self._predict_pose_in_fixed_map(frame, outcome)
-            else:
-                discarded = self._predict_pose(frame, outcome)
-        if discarded is not None:
-            frame.reference_keyframe = self.reference_keyframe
-            if self.state == TrackingState.LOST:
-                self._last_relocalization_frame_id = frame.id
-            if not self._visual_odometry:
-                with timer("local_map"):
-                    self._track_local_map(frame, discarded, outcome)
+        map_moves = self._map.big_change_index
+        outcome = self._find_pose(frame, timer)
+        if outcome.reason is not Reason.NONE and self._map.big_change_index != map_moves:
+            # A loop was closed meanwhile: what was matched may be half of the old map.
+            frame.clear_associations()
+            outcome = self._find_pose(frame, timer)
         if outcome.reason is not Reason.NONE:
             return self._lose(frame, outcome)
 
@@ -147,6 +139,22 @@ class Tracking:
         # frame must not start from them.
         frame.discard_outliers()
         self._remember(frame, tracked=True)
+        return outcome
+
+    def _find_pose(self, frame: core.TrackedFrame, timer: StageTimer) -> TrackingOutcome:
+        outcome = TrackingOutcome(TrackingState.LOST)
+        with timer("predict"):
+            if self.localization_only:
+                self._map_is_kept = True
+                discarded = self._predict_pose_in_fixed_map(frame, outcome)
+            else:
+                discarded = self._predict_pose(frame, outcome)
+        if discarded is not None:
+            if self.state == TrackingState.LOST:
+                self._last_relocalization_frame_id = frame.id
+            if not self._visual_odometry:
+                with timer("local_map"):
+                    self._track_local_map(frame, discarded, outcome)
         return outcome
 
     def _initialize(self, frame: core.TrackedFrame, timer: StageTimer) -> TrackingOutcome:
@@ -186,7 +194,6 @@ class Tracking:
         assert frame.T_cw is not None
         self._last = frame
         self._last_tracked = tracked
-        self._last_T_cr = frame.T_cw @ self._map.keyframe_pose(frame.reference_keyframe).inverse()
 
     # ---- first estimate of the pose --------------------------------------------------------------
     def _predict_pose(
@@ -207,10 +214,10 @@ class Tracking:
         just_relocalized = frame.id < self._last_relocalization_frame_id + 2
         discarded = None
         if self._velocity is not None and not just_relocalized:
-            frame.T_cw = self._velocity @ T_lw
+            self._predict(frame, last, self._velocity @ T_lw)
             discarded = self._track_with_motion_model(frame, last, outcome)
         if discarded is None:
-            frame.T_cw = T_lw
+            self._predict(frame, last, T_lw)
             discarded = self._track_reference_keyframe(frame, outcome)
         if discarded is None and self.state == TrackingState.LOST:
             outcome.reason = Reason.NOT_FOUND_IN_MAP
@@ -230,9 +237,9 @@ class Tracking:
         if self._visual_odometry:
             return self._follow_visual_odometry(frame, last, T_lw, outcome)
         if self._velocity is not None:
-            frame.T_cw = self._velocity @ T_lw
+            self._predict(frame, last, self._velocity @ T_lw)
             return self._track_with_motion_model(frame, last, outcome)
-        frame.T_cw = T_lw
+        self._predict(frame, last, T_lw)
         return self._track_reference_keyframe(frame, outcome)
 
     def _follow_visual_odometry(
@@ -244,7 +251,7 @@ class Tracking:
     ) -> npt.NDArray[np.int64] | None:
         discarded = None
         if self._velocity is not None:
-            frame.T_cw = self._velocity @ T_lw
+            self._predict(frame, last, self._velocity @ T_lw)
             discarded = self._track_with_motion_model(frame, last, outcome)
         if not self._visual_odometry:  # enough of the map is in view again
             return discarded
@@ -257,7 +264,7 @@ class Tracking:
             else:
                 self._last_tracked = False
             frame.copy_associations(found, np.ones(len(frame.frame), bool))
-            frame.T_cw = found.T_cw
+            self._predict(frame, found, found.T_cw)
             self._visual_odometry = False
             self._last_relocalization_frame_id = frame.id
             return _NOTHING
@@ -270,20 +277,37 @@ class Tracking:
         core.describe(frame.frame, self._vocabulary)
         outcome.n_inliers = outcome.n_matches = self._relocalizer.relocalize(frame)
         outcome.reason = Reason.NONE if outcome.n_inliers else Reason.NOT_FOUND_IN_MAP
-        return outcome.n_inliers > 0
+        if outcome.n_inliers == 0:
+            return False
+        core.anchor_frame(self._map, frame, self.reference_keyframe)
+        return True
+
+    @staticmethod
+    def _predict(
+        frame: core.TrackedFrame, source: core.TrackedFrame, T_cw: core.Pose | None
+    ) -> None:
+        """Set a pose that follows from another frame's, and with it from the same map."""
+        frame.T_cw = T_cw
+        frame.share_anchor(source)
 
     def _update_last_frame(self) -> tuple[core.TrackedFrame, core.Pose]:
-        """Express the last frame by its reference keyframe, which mapping may have moved."""
-        assert self._last is not None and self._last_T_cr is not None
-        T_lw = self._last_T_cr @ self._map.keyframe_pose(self._last.reference_keyframe)
-        self._last.T_cw = T_lw
-        return self._last, T_lw
+        """Bring the last frame up to date with the map, which mapping and loop closing move."""
+        last = self._last
+        assert last is not None
+        self._last_points, stretched = core.follow_map(self._map, last)
+        if self._velocity is not None and stretched != 1.0:
+            # A single camera's loop took out a drift of scale, in which the speed was measured.
+            self._velocity = core.Pose(
+                self._velocity.quaternion_xyzw, stretched * self._velocity.translation
+            )
+        self.reference_keyframe = self._map.living(self.reference_keyframe)
+        assert last.T_cw is not None
+        return last, last.T_cw
 
     def _track_with_motion_model(
         self, frame: core.TrackedFrame, last: core.TrackedFrame, outcome: TrackingOutcome
     ) -> npt.NDArray[np.int64] | None:
-        core.refresh_associations(self._map, last)
-        points = core.gather_points(self._map, last.map_points)
+        points = self._last_points
         if self.localization_only and self._sensor.has_depth:
             core.add_temporary_points(last, points)
         stereo = self._sensor is Sensor.STEREO
@@ -342,7 +366,6 @@ class Tracking:
         local_map = core.select_local_map(self._map, frame)
         if local_map.reference_keyframe >= 0:
             self.reference_keyframe = local_map.reference_keyframe
-            frame.reference_keyframe = local_map.reference_keyframe
         radius_factor = 3.0 if self._sensor is Sensor.RGBD else 1.0
         if frame.id < self._last_relocalization_frame_id + 2:
             radius_factor = 5.0
@@ -364,7 +387,12 @@ class Tracking:
 
     def _update_velocity(self, frame: core.TrackedFrame) -> None:
         last = self._last
-        consecutive = last is not None and self._last_tracked and frame.id == last.id + 1
+        consecutive = (
+            last is not None
+            and self._last_tracked
+            and frame.id == last.id + 1
+            and frame.big_change == last.big_change
+        )
         if consecutive and last is not None and last.T_cw is not None and frame.T_cw is not None:
             self._velocity = frame.T_cw @ last.T_cw.inverse()
         else:
@@ -411,6 +439,6 @@ class Tracking:
     def _create_keyframe(self, frame: core.TrackedFrame) -> None:
         core.describe(frame.frame, self._vocabulary)
         keyframe = core.insert_keyframe(self._map, frame, create_points=self._sensor.has_depth)
-        frame.reference_keyframe = self.reference_keyframe = keyframe
+        self.reference_keyframe = keyframe
         self._last_keyframe_frame_id = frame.id
         self._mapping.insert_keyframe(keyframe)

@@ -38,6 +38,12 @@ class FakeFrame:
         self.close_counts = (200, 0)
         self.n_cleared = 0
         self.n_discards = 0
+        self.anchor_x = 0.0
+        self.big_change = 0
+
+    def share_anchor(self, other: FakeFrame) -> None:
+        self.anchor_x, self.big_change = other.anchor_x, other.big_change
+        self.reference_keyframe = other.reference_keyframe
 
     def clear_associations(self) -> None:
         self.n_cleared += 1
@@ -58,10 +64,12 @@ class FakeMap:
         self.n_keyframes = 10
         self.n_points = 1000
         self.keyframe_x = 0.0
+        self.stretched = 1.0
+        self.big_change_index = 0
+        self.culled: dict[int, int] = {}
 
-    def keyframe_pose(self, keyframe: int) -> _core.Pose:
-        assert keyframe >= 0
-        return pose(self.keyframe_x)
+    def living(self, keyframe: int) -> int:
+        return self.culled.get(keyframe, keyframe)
 
 
 class FakeWorker:
@@ -104,14 +112,22 @@ class FakeCore:
     start_poses: list[float] = field(default_factory=list)
     n_inserted: int = 0
 
-    def refresh_associations(self, world: FakeMap, frame: FakeFrame) -> None:
-        self.calls.append("refresh")
+    def PointBatch(self) -> str:
+        return "no points"
+
+    def follow_map(self, world: FakeMap, frame: FakeFrame) -> tuple[str, float]:
+        assert frame.T_cw is not None
+        frame.T_cw = frame.T_cw @ pose(world.keyframe_x - frame.anchor_x)
+        frame.anchor_x = world.keyframe_x
+        frame.big_change = world.big_change_index
+        return "points", world.stretched
+
+    def anchor_frame(self, world: FakeMap, frame: FakeFrame, keyframe: int) -> None:
+        frame.anchor_x = world.keyframe_x
+        frame.reference_keyframe = keyframe
 
     def add_temporary_points(self, last: FakeFrame, points: str) -> int:
         return 0
-
-    def gather_points(self, world: FakeMap, ids: np.ndarray) -> str:
-        return "points"
 
     def match_last_frame(
         self, frame: FakeFrame, last: FakeFrame, points: str, window: float, has_depth: bool
@@ -145,6 +161,9 @@ class FakeCore:
 
     def select_local_map(self, world: FakeMap, frame: FakeFrame) -> SimpleNamespace:
         self.calls.append("local map")
+        if self.local_reference >= 0:
+            frame.reference_keyframe = self.local_reference
+            frame.big_change = world.big_change_index
         return SimpleNamespace(reference_keyframe=self.local_reference, points="local points")
 
     def match_local_map(
@@ -167,6 +186,7 @@ class FakeCore:
         assert frame.frame.described
         assert create_points
         self.n_inserted += 1
+        frame.reference_keyframe = 100 + self.n_inserted
         return 100 + self.n_inserted
 
 
@@ -274,7 +294,7 @@ def test_motion_model_from_the_third_frame(scene: Scene) -> None:
     scene.run(2)
     scene.core.calls.clear()
     scene.run(1)
-    expected = ["refresh", "motion", "optimize", "local map", "optimize", "sightings"]
+    expected = ["motion", "optimize", "local map", "optimize", "sightings"]
     assert scene.core.calls == expected
     np.testing.assert_array_equal(scene.core.discarded[-1], OUTLIERS)
 
@@ -298,6 +318,66 @@ def test_last_frame_follows_its_reference_keyframe(scene: Scene) -> None:
     scene.map.keyframe_x += 5.0  # mapping has moved everything
     scene.run(1)
     assert scene.core.start_poses[-1] == pytest.approx(5.0)
+
+
+def test_speed_follows_a_change_of_scale(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene.run(2)
+    original = scene.core.optimize_pose
+
+    def moves(frame: FakeFrame) -> SimpleNamespace:
+        frame.T_cw = pose(0.5 * frame.id)
+        return original(frame)
+
+    monkeypatch.setattr(scene.core, "optimize_pose", moves)
+    scene.run(1)
+    scene.map.stretched = 1.5  # the drift of scale that a loop took out
+    scene.run(1)
+    assert scene.core.start_poses[-1] == pytest.approx(1.0 + 1.5 * 1.0)
+
+
+def test_no_speed_between_two_states_of_the_map(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene.run(3)
+    original = scene.core.match_last_frame
+
+    def moves(*arguments: Any) -> int:
+        scene.map.big_change_index = 1  # a loop is closed after the frame has begun
+        return original(*arguments)
+
+    monkeypatch.setattr(scene.core, "match_last_frame", moves)
+    scene.run(1)
+    scene.core.calls.clear()
+    scene.run(1)
+    assert "motion" not in scene.core.calls
+
+
+def test_tries_again_when_the_map_moved_while_a_frame_was_tracked(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene.run(3)
+    scene.core.calls.clear()
+    scene.core.inliers.extend([100, 1])  # the local map does not fit
+    original = scene.core.select_local_map
+
+    def moves(world: FakeMap, frame: FakeFrame) -> SimpleNamespace:
+        world.big_change_index = 1
+        return original(world, frame)
+
+    monkeypatch.setattr(scene.core, "select_local_map", moves)
+    assert scene.track().state is TrackingState.OK
+    assert scene.core.calls.count("local map") == 2
+    scene.core.inliers.extend([100, 1])
+    assert scene.track().state is TrackingState.LOST, "only once"
+
+
+def test_a_culled_reference_keyframe_gives_way_to_its_parent(scene: Scene) -> None:
+    scene.run(2)
+    scene.map.culled[4] = 2
+    scene.core.local_reference = -1
+    scene.core.motion.extend([0, 0])
+    scene.run(1)
+    assert scene.core.reference_keyframes[-1] == 2
 
 
 def test_search_window(scene: Scene, sensor: Sensor) -> None:
@@ -625,6 +705,7 @@ def test_depth_initializer(
 
     def insert(_map: FakeMap, frame: FakeFrame, **options: Any) -> int:
         assert frame.frame.described
+        frame.reference_keyframe = 0
         inserted.append(options)
         return 0
 

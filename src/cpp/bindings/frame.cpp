@@ -205,7 +205,15 @@ void bind_tracked_frame(py::module_& module) {
           "timestamp", [](const TrackedFrame& t) { return t.frame->timestamp; },
           "Seconds, as given by the caller.")
       .def_readwrite("T_cw", &TrackedFrame::T_cw, "World to camera; None while unknown.")
-      .def_readwrite("reference_keyframe", &TrackedFrame::reference_keyframe, "-1: none.")
+      .def_property_readonly("reference_keyframe", &TrackedFrame::reference_keyframe,
+                             "The keyframe that the pose is relative to; -1: none.")
+      .def(
+          "share_anchor",
+          [](TrackedFrame& t, const TrackedFrame& other) { t.anchor = other.anchor; },
+          py::arg("other"), "The pose was predicted from that of another frame.")
+      .def_property_readonly(
+          "big_change", [](const TrackedFrame& t) { return t.anchor.big_change; },
+          "Map.big_change_index of the map that the pose belongs to.")
       .def_property_readonly(
           "map_points", [](const TrackedFrame& t) { return to_array(t.map_points); },
           "(n,) int64, ids of the associated map points, -1: none.")

@@ -6,6 +6,7 @@
 
 #include "bindings/arrays.hpp"
 #include "bindings/bindings.hpp"
+#include "map/anchor.hpp"
 #include "map/content_hash.hpp"
 #include "map/culling.hpp"
 #include "map/invariants.hpp"
@@ -108,6 +109,8 @@ void bind_queries(MapClass& map) {
            "The living point that replaced this one (or the point itself); -1 when it died.")
       .def("keyframe_pose", reader(&Map::T_cw), "id"_a, Release(),
            "T_cw of a keyframe, living or culled. Raises StateError for an unknown id.")
+      .def("living", reader(&Map::living), "id"_a, Release(),
+           "The keyframe itself, or the nearest of its ancestors that lives; -1 if unknown.")
       .def(
           "has_keyframe",
           [](const Map& self, KeyFrameId id) {
@@ -189,8 +192,9 @@ void bind_changes(MapClass& map) {
            "Remove a keyframe. False, and only marked, while leases or loop edges protect it.")
       .def("begin_lease", writer(&Map::begin_lease), "id"_a, Release(),
            "Protect a keyframe from erase_keyframe(); counted.")
-      .def("end_lease", writer(&Map::end_lease), "id"_a, Release(),
-           "End a protection; the last one carries out a deferred death.")
+      .def(
+          "end_lease", writer(&Map::end_lease), "id"_a, Release(),
+          "End a protection; the last one carries out a deferred death, and then True is returned.")
       .def("add_loop_edge", writer(&Map::add_loop_edge), "a"_a, "b"_a, Release(),
            "Connect two keyframes by a loop edge; both are protected for ever.")
       .def("set_parent", writer(&Map::set_parent), "child"_a, "parent"_a, Release(),
@@ -274,6 +278,22 @@ void bind_local_map(py::module_& module) {
                     "Shares most points with the frame; -1 without votes.");
   module.def("refresh_associations", &refresh_associations, "map"_a, "frame"_a, Release(),
              "Exchange replaced points of a frame, refresh positions, drop dead ones.");
+  module.def("anchor_frame", &anchor_frame, "map"_a, "frame"_a, "keyframe"_a, Release(),
+             "Make a frame's pose relative to a keyframe (living or culled) as it is now.");
+  module.def(
+      "follow_map",
+      [](const Map& map, TrackedFrame& frame) {
+        FollowedMap followed;
+        {
+          const py::gil_scoped_release release;
+          followed = follow_map(map, frame);
+        }
+        return py::make_tuple(std::move(followed.points), followed.stretched);
+      },
+      "map"_a, "frame"_a,
+      "Bring an earlier frame up to date: its pose follows its keyframe, replaced points their\n"
+      "successors, dead ones are dropped. Returns (PointBatch of the frame's points, by how much\n"
+      "lengths around the frame have been multiplied since).");
   module.def("select_local_map", &select_local_map, "map"_a, "frame"_a, Release(),
              "Keyframes voted for by the frame's points, extended, and all their points.");
   module.def(

@@ -52,11 +52,20 @@ struct CloseCounts {
   int untracked = 0;
 };
 
+/// The keyframe that a frame's pose is relative to, as it was in the map in which the pose was
+/// estimated. When the map moves, the frame follows (map/anchor.hpp).
+struct Anchor {
+  KeyFrameId keyframe;  ///< invalid: none
+  Pose T_kw;
+  double scale = 1;              ///< KeyFrame::scale
+  std::uint64_t big_change = 0;  ///< Map::big_change_index()
+};
+
 /// A frame in the tracker's hands: pose and associations, which change while it is tracked.
 struct TrackedFrame {
   std::shared_ptr<const Frame> frame;
   std::optional<Pose> T_cw;
-  KeyFrameId reference_keyframe;
+  Anchor anchor;
 
   // Per keypoint: the associated map point (invalid id: none), a copy of its position in the
   // world at association time, and whether the last pose optimisation called it an outlier.
@@ -69,6 +78,8 @@ struct TrackedFrame {
         map_points(frame->size()),
         positions(frame->size(), Eigen::Vector3d::Zero()),
         outlier(frame->size(), 0) {}
+
+  KeyFrameId reference_keyframe() const { return anchor.keyframe; }
 
   void associate(std::size_t i, MapPointId point, const Eigen::Vector3d& position) {
     map_points[i] = point;

@@ -6,6 +6,7 @@
 
 #include "base/errors.hpp"
 #include "frame/nearest_keypoints.hpp"
+#include "map/anchor.hpp"
 
 namespace orbslam {
 namespace {
@@ -53,8 +54,10 @@ KeyFrameId insert_keyframe(Map& map, TrackedFrame& frame, bool create_points,
     throw StateError("a frame without a pose cannot become a keyframe; track it first");
   }
   const auto lock = map.write_lock();
+  // A loop closed since the frame was tracked has moved everything but the frame.
+  if (frame.anchor.big_change != map.big_change_index()) move_with_anchor(map, frame);
   const KeyFrameId id = map.add_keyframe(frame.frame, *frame.T_cw);
-  frame.reference_keyframe = id;
+  frame.anchor = anchor_at(map, id);
   for (std::size_t i = 0; i < frame.map_points.size(); ++i) {
     if (!frame.map_points[i].valid()) continue;
     const MapPoint* point = map.find(map.resolve(frame.map_points[i]));

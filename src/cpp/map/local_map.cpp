@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "map/anchor.hpp"
+
 namespace orbslam {
 namespace {
 
@@ -11,7 +13,9 @@ constexpr std::size_t kMaxKeyFrames = 80;
 /// How many of a keyframe's neighbours may be tried.
 constexpr std::size_t kTriedNeighbours = 10;
 
-void refresh_locked(const Map& map, TrackedFrame& frame) {
+}  // namespace
+
+void refresh_associations_locked(const Map& map, TrackedFrame& frame) {
   for (std::size_t i = 0; i < frame.map_points.size(); ++i) {
     const MapPointId id = frame.map_points[i];
     if (!id.valid() || is_temporary(id)) continue;
@@ -32,6 +36,8 @@ void refresh_locked(const Map& map, TrackedFrame& frame) {
     frame.positions[i] = point->position;
   }
 }
+
+namespace {
 
 /// A set of ids as one bit each: small enough to stay in the cache for any local map, emptied in
 /// time proportional to its content.
@@ -124,13 +130,15 @@ void collect_points(const Map& map, const std::vector<KeyFrameId>& keyframes, Po
 
 void refresh_associations(const Map& map, TrackedFrame& frame) {
   const auto lock = map.read_lock();
-  refresh_locked(map, frame);
+  refresh_associations_locked(map, frame);
 }
 
 LocalMap select_local_map(const Map& map, TrackedFrame& frame) {
   LocalMap local;
   const auto lock = map.read_lock();
-  refresh_locked(map, frame);
+  // Predicted in a map that has moved since: from here on the frame is in the present one.
+  if (frame.anchor.big_change != map.big_change_index()) move_with_anchor(map, frame);
+  refresh_associations_locked(map, frame);
   int most = 0;
   for (const auto& [keyframe, votes] : count_votes(map, frame)) {
     local.keyframes.push_back(keyframe);
@@ -140,6 +148,7 @@ LocalMap select_local_map(const Map& map, TrackedFrame& frame) {
   }
   extend(map, local.keyframes);
   collect_points(map, local.keyframes, local.points);
+  if (local.reference_keyframe.valid()) frame.anchor = anchor_at(map, local.reference_keyframe);
   return local;
 }
 

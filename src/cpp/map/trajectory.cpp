@@ -29,11 +29,12 @@ void TrajectoryRecorder::record(const Map& map, const TrackedFrame& frame, bool 
     const auto lock = map.read_lock();
     check_epoch(map);
     if (size() == 0) epoch_ = map.epoch();
-    if (frame.T_cw && frame.reference_keyframe.valid()) {
-      reference = frame.reference_keyframe;
-      const Pose pose = *frame.T_cw * map.T_cw(reference).inverse();
+    const Anchor& anchor = frame.anchor;
+    if (frame.T_cw && anchor.keyframe.valid()) {
+      reference = anchor.keyframe;
+      const Pose pose = *frame.T_cw * anchor.T_kw.inverse();
       const Eigen::Quaterniond& q = pose.rotation();
-      const Eigen::Vector3d& t = pose.translation();
+      const Eigen::Vector3d t = pose.translation() / anchor.scale;
       T_cr = {q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z()};
     } else if (size() > 0) {
       reference = references_.back();
@@ -56,6 +57,7 @@ Trajectory TrajectoryRecorder::rebuild(const Map& map) const {
   Pose T_0w;
   if (map.find(KeyFrameId(0))) T_0w = map.T_cw(KeyFrameId(0));
   KeyFrameId reference;
+  ScaledPose T_rw;
   Pose T_0r;  // frames follow each other under one reference: walk its chain of parents once
   for (std::size_t i = 0; i < size(); ++i) {
     if (!references_[i].valid()) {
@@ -64,10 +66,12 @@ Trajectory TrajectoryRecorder::rebuild(const Map& map) const {
     }
     if (references_[i] != reference) {
       reference = references_[i];
-      T_0r = T_0w * map.T_cw(reference).inverse();
+      T_rw = map.scaled_pose(reference);
+      T_0r = T_0w * T_rw.T_cw.inverse();
     }
     const RelativePose& r = T_cr_[i];
-    const Pose T_cr(Eigen::Quaterniond(r.qw, r.qx, r.qy, r.qz), Eigen::Vector3d(r.x, r.y, r.z));
+    const Pose T_cr(Eigen::Quaterniond(r.qw, r.qx, r.qy, r.qz),
+                    T_rw.scale * Eigen::Vector3d(r.x, r.y, r.z));
     trajectory.T_wc.push_back(row_major(T_0r * T_cr.inverse()));
   }
   return trajectory;

@@ -36,7 +36,8 @@ class TrajectoryRecorder {
   std::size_t n_bytes() const;
 
  private:
-  struct RelativePose {  // T_cr as plain numbers: Eigen's quaternion would pad to 64 bytes
+  struct RelativePose {  // T_cr at the keyframe's first scale, as plain numbers: Eigen's quaternion
+                         // would pad to 64 bytes
     double qw = 1, qx = 0, qy = 0, qz = 0, x = 0, y = 0, z = 0;
   };
   void check_epoch(const Map& map) const;

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "base/errors.hpp"
+#include "map/anchor.hpp"
 #include "map/scene_depth.hpp"
 #include "optimize/global_bundle_adjustment.hpp"
 
@@ -107,7 +108,7 @@ void take_over(const Map& map, KeyFrameId id, TrackedFrame& frame) {
   const KeyFrame& keyframe = *map.find(id);
   frame.clear_associations();
   frame.T_cw = keyframe.T_cw;
-  frame.reference_keyframe = id;
+  frame.anchor = anchor_at(map, id);
   for (std::size_t i = 0; i < keyframe.map_points.size(); ++i) {
     const MapPoint* point = map.find(keyframe.map_points[i]);
     if (point != nullptr) frame.associate(i, point->id, point->position);

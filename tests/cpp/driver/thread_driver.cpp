@@ -17,6 +17,7 @@
 
 #include "features/orb_extractor.hpp"
 #include "frame/build_frame.hpp"
+#include "map/anchor.hpp"
 #include "map/culling.hpp"
 #include "map/invariants.hpp"
 #include "map/keyframe_insertion.hpp"
@@ -142,10 +143,9 @@ class Tracker {
       return std::numeric_limits<int>::max();
     }
 
-    last_->T_cw = last_T_cr_ * keyframe_pose(last_->reference_keyframe);
-    refresh_associations(map_, *last_);
+    const PointBatch points = follow_map(map_, *last_).points;
     frame.T_cw = velocity_ * *last_->T_cw;
-    const PointBatch points = gather_points(map_, last_->map_points);
+    frame.anchor = last_->anchor;
     int n_matches = match_last_frame(frame, *last_, points, 15, true);
     if (n_matches < 20) {
       frame.T_cw = last_->T_cw;
@@ -156,7 +156,6 @@ class Tracker {
 
     const LocalMap local = select_local_map(map_, frame);
     if (local.reference_keyframe.valid()) reference_ = local.reference_keyframe;
-    frame.reference_keyframe = reference_;
     const LocalMapMatches matches = match_local_map(frame, local.points, discarded, 3);
     const PoseEstimate estimate = optimize_pose(frame);
     count_sightings(map_, frame, matches.visible);
@@ -171,25 +170,17 @@ class Tracker {
   }
 
  private:
-  Pose keyframe_pose(KeyFrameId id) const {
-    const auto lock = map_.read_lock();
-    return map_.T_cw(id);
-  }
   void insert(TrackedFrame& frame, std::size_t n_minimum) {
     reference_ = insert_keyframe(map_, frame, true, n_minimum);
-    frame.reference_keyframe = reference_;
     mapper_.submit(reference_);
   }
-  void remember(TrackedFrame frame) {
-    last_T_cr_ = *frame.T_cw * keyframe_pose(frame.reference_keyframe).inverse();
-    last_ = std::move(frame);
-  }
+  void remember(TrackedFrame frame) { last_ = std::move(frame); }
 
   Map& map_;
   Mapper& mapper_;
   std::shared_ptr<const Vocabulary> vocabulary_;
   std::optional<TrackedFrame> last_;
-  Pose last_T_cr_, velocity_;
+  Pose velocity_;
   KeyFrameId reference_;
 };
 

@@ -27,7 +27,7 @@ std::shared_ptr<Frame> frame_with_depths(const std::vector<float>& depths) {
 TEST(TrackedFrame, StartsWithoutPoseAndAssociations) {
   const TrackedFrame tracked(frame_with_depths({1, 2, 3}));
   EXPECT_FALSE(tracked.T_cw.has_value());
-  EXPECT_FALSE(tracked.reference_keyframe.valid());
+  EXPECT_FALSE(tracked.reference_keyframe().valid());
   EXPECT_EQ(tracked.map_points.size(), 3U);
   EXPECT_EQ(tracked.n_associated(), 0U);
 }
@@ -35,7 +35,7 @@ TEST(TrackedFrame, StartsWithoutPoseAndAssociations) {
 TEST(TrackedFrame, ClearingRemovesEveryTraceOfTheAssociations) {
   TrackedFrame tracked(frame_with_depths({1, 2, 3}));
   tracked.T_cw = Pose();
-  tracked.reference_keyframe = KeyFrameId(4);
+  tracked.anchor.keyframe = KeyFrameId(4);
   tracked.associate(1, MapPointId(9), {1, 2, 3});
   tracked.associate(2, MapPointId(8), {3, 2, 1});
   tracked.outlier[2] = 1;
@@ -48,7 +48,7 @@ TEST(TrackedFrame, ClearingRemovesEveryTraceOfTheAssociations) {
     EXPECT_EQ(tracked.outlier[i], 0);
   }
   EXPECT_TRUE(tracked.T_cw.has_value());
-  EXPECT_EQ(tracked.reference_keyframe, KeyFrameId(4));
+  EXPECT_EQ(tracked.reference_keyframe(), KeyFrameId(4));
 }
 
 TEST(TrackedFrame, DissociatingForgetsTheOutlierFlag) {

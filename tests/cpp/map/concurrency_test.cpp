@@ -50,7 +50,6 @@ TEST(Concurrency, ReadersSeeConsistentMapsWhileAWriterWorks) {
       for (std::size_t i = 0; i < seen.size(); ++i) frame.associate(i, seen[i], {0, 0, 0});
       const LocalMap local = select_local_map(map, frame);
       if (!local.reference_keyframe.valid()) continue;
-      frame.reference_keyframe = local.reference_keyframe;
       recorder.record(map, frame, false);
       EXPECT_EQ(gather_points(map, {MapPointId()}).size(), 0U);
       ++n_views;

@@ -50,7 +50,7 @@ TEST(InsertKeyframe, TakesTheNearestAndPutsThemWhereTheyAreMeasured) {
   Map map;
   TrackedFrame frame = frame_with_depths(20, 300);
   const KeyFrameId id = insert_keyframe(map, frame, true);
-  EXPECT_EQ(frame.reference_keyframe, id);
+  EXPECT_EQ(frame.reference_keyframe(), id);
   EXPECT_FALSE(map.find(id)->published);
   float farthest = 0, nearest_left = 100;
   for (std::size_t i = 0; i < frame.frame->size(); ++i) {

@@ -157,7 +157,7 @@ TEST(CreateMonocularMap, FramesTakeOverTheResult) {
        {std::pair{views.initial.get(), made.first}, std::pair{views.current.get(), made.second}}) {
     const KeyFrame& keyframe = *map.find(id);
     EXPECT_EQ(frame->T_cw->matrix(), keyframe.T_cw.matrix());
-    EXPECT_EQ(frame->reference_keyframe, id);
+    EXPECT_EQ(frame->reference_keyframe(), id);
     EXPECT_EQ(frame->map_points, keyframe.map_points);
     for (std::size_t i = 0; i < frame->map_points.size(); ++i) {
       const MapPoint* point = map.find(frame->map_points[i]);
