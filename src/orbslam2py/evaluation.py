@@ -179,7 +179,7 @@ def evaluate_trajectory(
     """
     estimate = estimate.select(~estimate.lost)
     truth = truth.select(~truth.lost)
-    i, j = _match(estimate, truth, max_difference)
+    i, j = match_poses(estimate, truth, max_difference)
     transform = Similarity.identity()
     if alignment is not Alignment.NONE:
         transform = align(
@@ -309,9 +309,21 @@ def segment_errors(estimate: Array, truth: Array) -> Array:
     return np.concatenate(errors)
 
 
-def _match(
-    estimate: Trajectory, truth: Trajectory, max_difference: float
+def match_poses(
+    estimate: Trajectory, truth: Trajectory, max_difference: float = MAX_DIFFERENCE
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Find which poses belong together by their time stamps.
+
+    Returns
+    -------
+    i, j
+        Indices into the estimate and into the truth, (k,) each, k > 0.
+
+    Raises
+    ------
+    DatasetError
+        If no time stamps match.
+    """
     i, j = associate(estimate.timestamps, truth.timestamps, max_difference)
     if not len(i):
         raise DatasetError(
