@@ -27,6 +27,8 @@ class SyntheticWorld(str, Enum):
     """Two corridors with a common leg; two loops and a bit."""
     STREET = "street"
     """A drive of 600 m along a straight street."""
+    STREET_LAP = "street-lap"
+    """A drive around a block of houses; one lap (600 m) and a bit."""
     TWO_ROOMS = "two-rooms"
     """From a room through a door and a passage into a room that looks the same."""
 
@@ -46,8 +48,6 @@ class Scene:
         None stands for looking around in the room.
     speed
         Usual speed [m/s].
-    laps
-        How often the whole way is gone.
     outdoors
         Open above; seen from a car.
     """
@@ -55,12 +55,11 @@ class Scene:
     make_world: Callable[[int], core.World]
     way: core.Way | None
     speed: float = 0.7
-    laps: float = 1.0
     outdoors: bool = False
 
-    def seconds(self, speed: float) -> float:
-        """Time that the whole way takes."""
-        return _LOOKING_AROUND if self.way is None else self.laps * self.way.length() / speed
+    def seconds(self, speed: float, laps: float) -> float:
+        """Time that going the whole way so often takes."""
+        return _LOOKING_AROUND if self.way is None else laps * self.way.length() / speed
 
     def T_wc(self, seconds: float, speed: float, lateral: float, yaw: float) -> NDArray[np.float64]:
         """Camera to world (4, 4) at a time.
@@ -95,6 +94,7 @@ _EIGHT = (10.0, 12.0, 2.0)
 _HEIGHT = 2.6
 _REPEAT = 4.0
 _STREET = (600.0, 12.0)  # length, width
+_STREETS = (208.0, 104.0, 14.0)  # length, breadth, width
 _PASSAGE = 3.0
 
 
@@ -105,7 +105,16 @@ ROOM_BESIDE = {
     SyntheticWorld.REPEATING_CORRIDOR: 0.8,
     SyntheticWorld.FIGURE_EIGHT: 0.8,
     SyntheticWorld.STREET: 3.5,
+    SyntheticWorld.STREET_LAP: 3.0,
     SyntheticWorld.TWO_ROOMS: 0.6,
+}
+
+#: How often the way is usually gone, for those that come back to their start.
+LAPS = {
+    SyntheticWorld.CORRIDOR: 1.2,
+    SyntheticWorld.REPEATING_CORRIDOR: 1.2,
+    SyntheticWorld.FIGURE_EIGHT: 1.1,
+    SyntheticWorld.STREET_LAP: 1.2,
 }
 
 
@@ -118,19 +127,24 @@ def make_scene(world: SyntheticWorld) -> Scene:
         return Scene(
             lambda seed: core.make_corridor(*_CORRIDOR, _HEIGHT, seed, repeat),
             core.corridor_way(*_CORRIDOR),
-            laps=1.2,
         )
     if world is SyntheticWorld.FIGURE_EIGHT:
         return Scene(
             lambda seed: core.make_figure_eight(*_EIGHT, _HEIGHT, seed),
             core.figure_eight_way(*_EIGHT),
-            laps=1.1,
         )
     if world is SyntheticWorld.TWO_ROOMS:
         return Scene(
             lambda seed: core.make_two_rooms(_ROOM, _PASSAGE, seed, 8),
             core.two_rooms_way(_ROOM, _PASSAGE),
             speed=0.4,
+        )
+    if world is SyntheticWorld.STREET_LAP:
+        return Scene(
+            lambda seed: core.make_street_lap(*_STREETS, seed),
+            core.street_lap_way(*_STREETS),
+            speed=10.0,
+            outdoors=True,
         )
     return Scene(
         lambda seed: core.make_street(*_STREET, seed),

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from orbslam2py import _core as core
 from orbslam2py._synthetic_files import write_sequence
-from orbslam2py._synthetic_scenes import ROOM_BESIDE, SyntheticWorld, make_scene
+from orbslam2py._synthetic_scenes import LAPS, ROOM_BESIDE, SyntheticWorld, make_scene
 from orbslam2py.datasets.base import Images, Layout
 from orbslam2py.errors import SettingsError
 from orbslam2py.sensor import Sensor
@@ -48,13 +48,16 @@ class SyntheticOptions:
         What delivers the images.
     frames
         Number of images; by default the whole way.
+    laps
+        How often to go around, instead of `frames`; only where the way comes back to its start
+        (1.2 in corridors and around the block, 1.1 in the figure of eight).
     fps
-        Frames per second (20 indoors, 10 in the street).
+        Frames per second (20 indoors, 10 in streets).
     speed
-        Metres per second along the way (0.7 in corridors, 0.4 between the rooms, 10 in the
-        street); not for the room, where one turn takes 30 s.
+        Metres per second along the way (0.7 in corridors, 0.4 between the rooms, 10 in streets);
+        not for the room, where one turn takes 30 s.
     size
-        Width and height in pixels (640 x 480, in the street 1241 x 376).
+        Width and height in pixels (640 x 480, in streets 1241 x 376).
     seed
         Another seed, another wallpaper and furniture.
     noise
@@ -65,7 +68,7 @@ class SyntheticOptions:
         Standard deviation of the depth [m] at 1 m; it grows with the square of the depth (RGB-D).
     lateral
         Metres to the right of the way: the same places from other viewpoints. Limited by the
-        walls (0.6 m between the rooms, 3.5 m in the street).
+        walls (0.6 m between the rooms, 3.5 m in the street, 3 m around the block).
     yaw
         Degrees to the right of the direction of travel.
 
@@ -78,6 +81,7 @@ class SyntheticOptions:
     world: SyntheticWorld | str = SyntheticWorld.ROOM
     sensor: Sensor | str = Sensor.STEREO
     frames: int | None = None
+    laps: float | None = None
     fps: float | None = None
     speed: float | None = None
     size: tuple[int, int] | None = None
@@ -92,6 +96,7 @@ class SyntheticOptions:
         object.__setattr__(self, "world", _member(SyntheticWorld, "world", self.world))
         object.__setattr__(self, "sensor", _member(Sensor, "sensor", self.sensor))
         _check_range("frames", self.frames, 1, 1_000_000)
+        _check_range("laps", self.laps, 0.01, 1000)
         _check_range("fps", self.fps, 0.1, 1000)
         _check_range("speed", self.speed, 0.001, 100)
         for pixels in self.size or ():
@@ -105,6 +110,11 @@ class SyntheticOptions:
         _check_range("yaw", self.yaw, -180, 180)
         if self.speed is not None and self.world is SyntheticWorld.ROOM:
             raise SettingsError("speed does not apply to the room: one turn takes 30 s")
+        if self.laps is not None and self.world not in LAPS:
+            names = ", ".join(map(str, LAPS))
+            raise SettingsError(f"laps apply to ways that come back to their start: {names}")
+        if self.laps is not None and self.frames is not None:
+            raise SettingsError("frames and laps exclude each other: both say how long the way is")
 
 
 def _member(kind: type[Enum], name: str, value: object) -> Enum:
@@ -148,7 +158,8 @@ class SyntheticSequence:
         return self.options.size or ((1241, 376) if self._scene.outdoors else (640, 480))
 
     def _frames_of_whole_way(self) -> int:
-        return math.floor(self._scene.seconds(self._speed) * self._fps) + 1
+        laps = self.options.laps or LAPS.get(self._world, 1.0)
+        return math.floor(self._scene.seconds(self._speed, laps) * self._fps) + 1
 
     def __len__(self) -> int:
         return self._n_frames
@@ -234,6 +245,12 @@ class SyntheticSequence:
         return self.view(self.T_wc(index), index)
 
     # ---- what only a made-up world knows ---------------------------------------------------------
+    @property
+    def lap_length(self) -> float | None:
+        """Metres around, without the swaying; None where the way does not come back."""
+        way = self._scene.way
+        return way.length() if way is not None and self._world in LAPS else None
+
     def T_wc(self, index: int) -> Array:
         """Exact pose of the (left) camera, camera to world, (4, 4)."""
         if not 0 <= index < len(self):

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from orbslam2py import Sensor, open_sequence
-from orbslam2py._synthetic_scenes import ROOM_BESIDE
+from orbslam2py._synthetic_scenes import LAPS, ROOM_BESIDE
 from orbslam2py.cli.synthesize import parse_size, synthesize
 from orbslam2py.datasets.base import Layout
 from orbslam2py.errors import DatasetError, SettingsError
@@ -23,6 +23,7 @@ from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence, SyntheticW
 
 SMALL = (160, 120)
 WORLDS = list(SyntheticWorld)
+STREETS = (SyntheticWorld.STREET, SyntheticWorld.STREET_LAP)
 LAYOUTS = [
     (Layout.TUM, Sensor.MONOCULAR),
     (Layout.TUM, Sensor.RGBD),
@@ -124,21 +125,42 @@ def test_motion_is_plausible(world):
     np.testing.assert_allclose(np.linalg.det(T_wc[:, :3, :3]), 1, atol=1e-12)
     step = np.linalg.norm(np.diff(T_wc[:, :3, 3], axis=0), axis=1)
     fps = sequence.camera.fps
-    assert step.max() * fps < (10.5 if world is SyntheticWorld.STREET else 0.9)
+    assert step.max() * fps < (10.5 if world in STREETS else 0.9)
     relative = np.swapaxes(T_wc[:-1, :3, :3], 1, 2) @ T_wc[1:, :3, :3]
     angles = np.degrees(np.arccos(np.clip((np.trace(relative, axis1=1, axis2=2) - 1) / 2, -1, 1)))
     assert angles.max() * fps < 50
     assert np.abs(np.diff(angles)).max() < 0.5
 
 
-def test_the_corridor_is_walked_for_more_than_a_lap():
-    sequence = SyntheticSequence(SyntheticOptions(world="corridor"))
-    positions = sequence.ground_truth().positions
-    near_start = np.linalg.norm(positions - positions[0], axis=1) < 0.3
-    assert near_start[0]
-    assert not near_start[len(positions) // 2]
-    assert near_start[int(0.8 * len(positions)) : int(0.87 * len(positions))].any()
-    assert np.linalg.norm(positions[-1] - positions[0]) > 1
+@pytest.mark.parametrize("world", LAPS)
+def test_ways_around_come_back_to_their_start_and_go_on_looking_the_same_way(world):
+    sequence = SyntheticSequence(SyntheticOptions(world=world))
+    T_wc, length = sequence.ground_truth().T_wc, sequence.lap_length
+    step = sequence.options.speed or (10.0 if world in STREETS else 0.7)
+    lap = round(length / step * sequence.camera.fps)
+    again = len(sequence) - lap
+    assert again * step / sequence.camera.fps > 4  # metres for which the places are the same
+    gap = np.linalg.inv(T_wc[:again]) @ T_wc[lap:]
+    assert np.linalg.norm(gap[:, :3, 3], axis=1).max() < (0.6 if world in STREETS else 0.25)
+    turned = np.arccos(np.clip((np.trace(gap[:, :3, :3], axis1=1, axis2=2) - 1) / 2, -1, 1))
+    assert np.degrees(turned).max() < 4
+    far = np.linalg.norm(T_wc[: lap // 2, :3, 3] - T_wc[0, :3, 3], axis=1).max()
+    assert far > 0.1 * length
+
+
+def test_laps_say_how_often_to_go_around():
+    once, thrice = (small(world="corridor", frames=None, laps=laps) for laps in (1, 3))
+    assert len(thrice) - 1 == pytest.approx(3 * (len(once) - 1), abs=3)
+    assert once.lap_length == pytest.approx(26.2, abs=0.2)
+    with pytest.raises(SettingsError, match="frames and laps"):
+        small(world="corridor", laps=2.0)
+    with pytest.raises(SettingsError, match="laps apply"):
+        small(world="street", frames=None, laps=2.0)
+    assert small(world="street").lap_length is None
+
+
+def test_the_drive_around_the_block_is_600_metres_long():
+    assert small(world="street-lap").lap_length == pytest.approx(600, abs=0.1)
 
 
 def test_the_street_is_600_metres_long():
@@ -162,7 +184,7 @@ def test_no_viewpoint_leaves_the_world(world):
         for i in np.linspace(0, len(sequence) - 1, 25).astype(int):
             depth = sequence.exact_depth(int(i))
             assert depth[depth > 0].min() > 0.05
-            if world is not SyntheticWorld.STREET:
+            if world not in STREETS:
                 assert depth.min() > 0
 
 
@@ -262,7 +284,9 @@ def test_nothing_is_left_behind_when_writing_fails(tmp_path):
         {"exposure": 0.0},
         {"depth_noise": -1.0},
         {"world": "street", "lateral": 4.0},
+        {"world": "street-lap", "lateral": -3.1},
         {"world": "corridor", "lateral": -1.0},
+        {"world": "corridor", "laps": 0.0},
         {"yaw": 999.0},
         {"world": "room", "speed": 1.0},
     ],

@@ -41,18 +41,25 @@ def synthesize(
     frames: Annotated[
         int | None, typer.Option(help="Number of images.  [default: the whole way]")
     ] = None,
+    laps: Annotated[
+        float | None,
+        typer.Option(
+            help="Instead of --frames: how often to go around, where the way comes back to its "
+            "start.  [default: 1.2; figure-eight: 1.1]"
+        ),
+    ] = None,
     fps: Annotated[
-        float | None, typer.Option(help="Frames per second.  [default: 20; street: 10]")
+        float | None, typer.Option(help="Frames per second.  [default: 20; streets: 10]")
     ] = None,
     speed: Annotated[
         float | None,
         typer.Option(
-            help="Metres per second, not for room.  [default: 0.7; two-rooms: 0.4; street: 10]"
+            help="Metres per second, not for room.  [default: 0.7; two-rooms: 0.4; streets: 10]"
         ),
     ] = None,
     size: Annotated[
         str | None,
-        typer.Option(metavar="WxH", help="Pixels.  [default: 640x480; street: 1241x376]"),
+        typer.Option(metavar="WxH", help="Pixels.  [default: 640x480; streets: 1241x376]"),
     ] = None,
     seed: Annotated[int, typer.Option(help="Another seed, another world.")] = 0,
     noise: Annotated[float, typer.Option(help="Noise of the images [grey levels].")] = 0.0,
@@ -72,6 +79,7 @@ def synthesize(
         world=world,
         sensor=sensor,
         frames=frames,
+        laps=laps,
         fps=fps,
         speed=speed,
         size=None if size is None else parse_size(size),
