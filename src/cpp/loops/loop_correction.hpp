@@ -31,13 +31,14 @@ struct LoopCorrection {
   std::vector<Fusion> fusions;
   std::vector<KeyFrameId> group;  ///< `current` and its neighbours, whose connections change
 
-  /// The essential graph: vertex k stands for keyframes[k]. Before optimize_essential_graph() its
-  /// vertices are at the start of the optimisation, after it at the result.
+  /// The essential graph: vertex k stands for keyframes[k] (ascending). Before
+  /// optimize_essential_graph() its vertices are at the start of the optimisation, after it at the
+  /// result. Empty when an end of the loop is dead.
   std::vector<KeyFrameId> keyframes;
   PoseGraph graph;
-  std::vector<Similarity> start;  ///< S0 of each vertex
+  std::vector<Similarity> uncorrected;  ///< of each vertex: where it is in the map
 
-  /// Points to be moved, and the vertex that carries each along.
+  /// All points, ascending, and the vertex that carries each along.
   std::vector<std::pair<MapPointId, std::uint32_t>> carried;
 };
 

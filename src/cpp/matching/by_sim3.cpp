@@ -4,9 +4,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
-#include <utility>
 
-#include "map/point_batch.hpp"
 #include "matching/by_projection.hpp"
 #include "matching/id_index.hpp"
 #include "matching/projector.hpp"
@@ -188,46 +186,15 @@ int match_loop_points(const Map& map, KeyFrameId keyframe, const Similarity& S_c
   return n_new;
 }
 
-int fuse_loop_points(Map& map, KeyFrameId keyframe, const Similarity& S_cw,
-                     const std::vector<MapPointId>& points, float radius_factor) {
-  std::shared_ptr<const Frame> frame;
-  PointBatch batch;
-  std::uint64_t epoch = 0;
-  {
-    const auto lock = map.read_lock();
-    const KeyFrame* found = map.find(keyframe);
-    if (!found) return 0;
-    epoch = map.epoch();
-    frame = found->frame;
-    for (const MapPointId id : points) {
-      const MapPoint* point = map.find(id);
-      if (point && !point->observation_of(keyframe)) batch.push_back(*point);
-    }
-  }
-  std::vector<std::pair<MapPointId, std::uint32_t>> fusions;
+std::vector<PointSighting> find_loop_fusions(const Frame& frame, const Similarity& S_cw,
+                                             const PointBatch& points, float radius_factor) {
+  std::vector<PointSighting> found;
   search_loop_points(
-      *frame, S_cw, batch, radius_factor, [](std::uint32_t) { return true; },
+      frame, S_cw, points, radius_factor, [](std::uint32_t) { return true; },
       [&](std::size_t point, std::uint32_t keypoint) {
-        fusions.emplace_back(batch.ids[point], keypoint);
+        found.push_back({points.ids[point], keypoint});
       });
-  if (fusions.empty()) return 0;
-
-  const auto lock = map.write_lock();
-  const KeyFrame* target = map.epoch() == epoch ? map.find(keyframe) : nullptr;
-  if (!target) return 0;
-  int changes = 0;
-  for (const auto& [id, keypoint] : fusions) {
-    const MapPoint* point = map.find(id);
-    if (!point || point->observation_of(keyframe)) continue;
-    if (const MapPoint* present = map.find(target->map_points[keypoint])) {
-      map.replace_point(present->id, id);
-    } else {
-      map.add_observation(id, keyframe, keypoint);
-      map.update_point(id);
-    }
-    ++changes;
-  }
-  return changes;
+  return found;
 }
 
 }  // namespace orbslam

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "base/similarity.hpp"
 #include "map/map.hpp"
+#include "map/point_batch.hpp"
 
 namespace orbslam {
 
@@ -27,12 +29,16 @@ int match_loop_points(const Map& map, KeyFrameId keyframe, const Similarity& S_c
                       const std::vector<MapPointId>& points, std::vector<MapPointId>& matches,
                       float radius_factor = 10.0F);
 
-/// Spec 06, 2.11: the same search, for a keyframe that is corrected already, and what follows from
-/// it: a point on the far side of the loop is added to the keypoint that shows it, or takes the
-/// place of the point that is there, whichever of them was observed more often. Points that the
-/// keyframe observes are left alone. The search runs without a lock on copies, the changes are
-/// made in one write section. Returns the number of changes, 0 for a dead keyframe.
-int fuse_loop_points(Map& map, KeyFrameId keyframe, const Similarity& S_cw,
-                     const std::vector<MapPointId>& points, float radius_factor = 4.0F);
+/// A point of the map and the keypoint of a keyframe that shows it.
+struct PointSighting {
+  MapPointId point;
+  std::uint32_t keypoint = 0;
+};
+
+/// Spec 06, 2.11: the same search for a keyframe that is to be corrected. Keypoints may be occupied
+/// and may be found by several points, since what is found shows which points are the same; in the
+/// order of `points`. Takes no lock.
+std::vector<PointSighting> find_loop_fusions(const Frame& frame, const Similarity& S_cw,
+                                             const PointBatch& points, float radius_factor = 4.0F);
 
 }  // namespace orbslam

@@ -182,38 +182,62 @@ TEST(MatchLoopPoints, DeadKeyframesAndBadSizes) {
                std::invalid_argument);
 }
 
-TEST(FuseLoopPoints, PointsOfTheLoopTakeThePlaceOfThoseThere) {
+TEST(FindLoopFusions, FindsThePointsWhateverTheKeypointsHold) {
   for (const double drift : {0.4, 1.0, 2.5}) {
     LoopScene scene(drift);
-    const auto before = scene.map.find(scene.a)->map_points;
-    EXPECT_EQ(fuse_loop_points(scene.map, scene.a, scene.S_aw, scene.loop_points()),
-              scene.n_common());
-    const auto& slots = scene.map.find(scene.a)->map_points;
-    for (std::size_t i = 0; i < slots.size(); ++i) {
-      const bool common = scene.partner(i).valid();
-      EXPECT_EQ(slots[i], common ? scene.partner(i) : before[i]) << i;
-      EXPECT_EQ(scene.map.find(before[i]) == nullptr, common) << i;
+    // Half of the keypoints that show a point of the loop are free.
+    const std::vector<MapPointId> slots = scene.map.find(scene.a)->map_points;
+    for (std::size_t i = 0; i < slots.size(); i += 2) scene.map.erase_point(slots[i]);
+    const auto before = scene.map.structure_version();
+    const auto found = find_loop_fusions(*scene.projected[0].frame, scene.S_aw,
+                                         gather_points(scene.map, scene.loop_points()));
+    EXPECT_EQ(static_cast<int>(found.size()), scene.n_common());
+    for (const PointSighting& sighting : found) {
+      EXPECT_EQ(sighting.point, scene.partner(sighting.keypoint));
     }
-    EXPECT_EQ(fuse_loop_points(scene.map, scene.a, scene.S_aw, scene.loop_points()), 0);
+    EXPECT_EQ(scene.map.structure_version(), before);
   }
 }
 
-TEST(FuseLoopPoints, FreeKeypointsGainAnObservation) {
-  LoopScene scene(1);
-  std::size_t i = 0;
-  while (!scene.partner(i).valid()) ++i;
-  scene.map.erase_point(scene.map.find(scene.a)->map_points[i]);
-  const int before = scene.map.find(scene.partner(i))->observation_count;
-  EXPECT_EQ(fuse_loop_points(scene.map, scene.a, scene.S_aw, {scene.partner(i)}), 1);
-  EXPECT_EQ(scene.map.find(scene.a)->map_points[i], scene.partner(i));
-  EXPECT_GT(scene.map.find(scene.partner(i))->observation_count, before);
-  scene.map.update_connections(scene.a);
-  scene.expect_consistent();
+TEST(FindLoopFusions, RadiusIsFourTimesTheScale) {
+  for (const float aside : {3.9F, 4.1F}) {
+    LoopScene scene(1);
+    Frame& frame = *scene.projected[0].frame;
+    for (Keypoint& keypoint : frame.keypoints) keypoint.x += aside;
+    frame.grid = KeypointGrid(frame.keypoints, frame.camera->bounds());
+    PointBatch points = gather_points(scene.map, scene.loop_points());
+    for (std::size_t i = 0; i < points.size(); ++i) {  // seen at level 0 from where `a` stands
+      points.max_distances[i] = (points.positions[i] - scene.S_aw.pose().center()).norm();
+      points.min_distances[i] = 0;
+    }
+    const auto found = find_loop_fusions(frame, scene.S_aw, points);
+    if (aside > 4) {
+      EXPECT_TRUE(found.empty());
+    } else {
+      EXPECT_GT(static_cast<int>(found.size()), scene.n_common() * 9 / 10);
+    }
+  }
 }
 
-TEST(FuseLoopPoints, DeadKeyframesChangeNothing) {
+TEST(FindLoopFusions, SeveralPointsMayFindTheSameKeypoint) {
   LoopScene scene(1);
-  EXPECT_EQ(fuse_loop_points(scene.map, KeyFrameId(9), scene.S_aw, scene.loop_points()), 0);
+  PointBatch points = gather_points(scene.map, scene.loop_points());
+  const auto once = find_loop_fusions(*scene.projected[0].frame, scene.S_aw, points);
+  const PointBatch again = points;
+  for (std::size_t i = 0; i < again.size(); ++i) {
+    points.ids.push_back(again.ids[i]);
+    points.positions.push_back(again.positions[i]);
+    points.mean_directions.push_back(again.mean_directions[i]);
+    points.min_distances.push_back(again.min_distances[i]);
+    points.max_distances.push_back(again.max_distances[i]);
+    points.descriptors.push_back(again.descriptors[i]);
+  }
+  const auto twice = find_loop_fusions(*scene.projected[0].frame, scene.S_aw, points);
+  ASSERT_EQ(twice.size(), 2 * once.size());
+  for (std::size_t i = 0; i < once.size(); ++i) {
+    EXPECT_EQ(twice[i].point, once[i].point);
+    EXPECT_EQ(twice[i + once.size()].keypoint, once[i].keypoint);
+  }
 }
 
 }  // namespace

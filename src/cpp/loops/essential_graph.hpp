@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "loops/fusion_draft.hpp"
+#include "loops/loop_correction.hpp"
+
+namespace orbslam {
+
+/// The keyframes that a loop corrects directly.
+struct CorrectedGroup {
+  std::vector<KeyFrameId> keyframes;  ///< `current` first
+  std::vector<Similarity> corrected;  ///< S_iw of each
+  std::vector<SharedPoints> shared;   ///< of each, with the fusions
+  /// Keyframes outside of the group, that had not been neighbours, and share points with one of
+  /// the group now: (of the group, other).
+  std::vector<std::pair<KeyFrameId, KeyFrameId>> links;
+};
+
+/// Vertices, measurements and fixed vertex of a correction (spec 16, section 6): the loop and its
+/// strong new links, as the group says that they are; the spanning tree, earlier loops and strong
+/// covisibility, as the map says. One edge per pair. Leaves the graph empty when an end of the loop
+/// is dead or unpublished. Takes the read lock.
+void build_essential_graph(const Map& map, const CorrectedGroup& group, LoopCorrection& correction);
+
+/// Where an id is among ascending ones, or -1.
+std::ptrdiff_t vertex_of(const std::vector<KeyFrameId>& keyframes, KeyFrameId id);
+/// The keyframe itself or the last one before it; the first one when there is none. The ids must
+/// not be empty.
+std::size_t vertex_before(const std::vector<KeyFrameId>& keyframes, KeyFrameId id);
+
+}  // namespace orbslam

@@ -1,0 +1,357 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "loops/loop_correction.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <thread>
+
+#include "loops/ring_scene.hpp"
+#include "map/content_hash.hpp"
+#include "map/keyframe_insertion.hpp"
+
+namespace orbslam {
+namespace {
+
+using namespace testing;
+
+RingOptions single_camera() {
+  RingOptions options;
+  options.monocular = true;
+  options.log_scale_drift = 0.005;
+  return options;
+}
+
+LoopCorrection planned(RingScene& scene) {
+  LoopCorrection correction = plan_loop_correction(scene.map, scene.loop, !scene.options.monocular);
+  const PoseGraphSummary summary = optimize_essential_graph(correction, nullptr);
+  EXPECT_FALSE(summary.aborted);
+  return correction;
+}
+
+LoopCorrectionResult correct(RingScene& scene) {
+  const LoopCorrectionResult result = apply_loop_correction(scene.map, planned(scene));
+  EXPECT_EQ(scene.violations(), "");
+  return result;
+}
+
+TEST(LoopCorrection, TakesTheDriftOut) {
+  for (const bool monocular : {false, true}) {
+    RingScene scene(monocular ? single_camera() : RingOptions());
+    ASSERT_EQ(scene.violations(), "");
+    const auto before = scene.pose_errors();
+    const Pose was = scene.map.T_cw(scene.current());
+    ASSERT_GT(scene.n_doubles(), 100);
+    const LoopCorrectionResult result = correct(scene);
+    ASSERT_TRUE(result.applied);
+    const auto after = scene.pose_errors();
+    EXPECT_LT(after.first, 0.1 * before.first) << monocular;
+    EXPECT_LT(after.second, 0.1 * before.second) << monocular;
+    EXPECT_LT(scene.largest_reprojection_error(), 1.0) << monocular;
+
+    const Pose is = scene.map.T_cw(scene.current());
+    EXPECT_NEAR(result.translation, (is.center() - was.center()).norm(), 1e-12);
+    EXPECT_NEAR(result.rotation, was.rotation().angularDistance(is.rotation()), 1e-12);
+    EXPECT_LT((is.center() - scene.expected(65).center()).norm(), 0.02);
+    EXPECT_EQ(scene.map.big_change_index(), 1U);
+    EXPECT_THAT(scene.map.find(scene.current())->loop_edges,
+                ::testing::ElementsAre(scene.matched()));
+    EXPECT_THAT(scene.map.find(scene.matched())->loop_edges,
+                ::testing::ElementsAre(scene.current()));
+  }
+}
+
+TEST(LoopCorrection, MakesOnePointOfTwo) {
+  for (const bool monocular : {false, true}) {
+    RingScene scene(monocular ? single_camera() : RingOptions());
+    const std::size_t before = scene.map.n_points();
+    const int doubles = scene.n_doubles();
+    const LoopCorrectionResult result = correct(scene);
+    EXPECT_LT(scene.n_doubles(), doubles / 10);
+    EXPECT_GT(result.n_fused, doubles);
+    EXPECT_LE(before - scene.map.n_points(), static_cast<std::size_t>(result.n_fused));
+    EXPECT_GT(scene.map.weight(scene.current(), scene.matched()), 100);
+    // Whatever was matched is the point of the first visit now.
+    const auto& slots = scene.map.find(scene.current())->map_points;
+    for (std::size_t i = 0; i < slots.size(); ++i) {
+      if (!scene.loop.matches[i].valid()) continue;
+      EXPECT_EQ(slots[i], scene.loop.matches[i]);
+    }
+    // Nothing was mixed up: a point shows the same thing in all its keyframes.
+    scene.map.for_each_point([&](const MapPoint& point) {
+      const auto& descriptor = scene.map.find(point.observations[0].keyframe)
+                                   ->frame->descriptors[point.observations[0].index];
+      for (const Observation& seen : point.observations) {
+        EXPECT_EQ(scene.map.find(seen.keyframe)->frame->descriptors[seen.index].words,
+                  descriptor.words);
+      }
+      EXPECT_EQ(point.descriptor.words, descriptor.words);
+    });
+  }
+}
+
+TEST(LoopCorrection, PointsFollowTheirKeyframes) {
+  // The geometry that was worked out beforehand is what the map works out itself.
+  RingScene scene(single_camera());
+  correct(scene);
+  for (const MapPointId id : scene.map.point_ids()) {
+    const MapPoint written = *scene.map.find(id);
+    scene.map.update_point(id);
+    const MapPoint& fresh = *scene.map.find(id);
+    EXPECT_EQ(written.mean_direction, fresh.mean_direction);
+    EXPECT_EQ(written.min_distance, fresh.min_distance);
+    EXPECT_EQ(written.max_distance, fresh.max_distance);
+    EXPECT_EQ(written.descriptor.words, fresh.descriptor.words);
+  }
+}
+
+TEST(LoopCorrection, WithMeasuredDepthNothingChangesItsScale) {
+  RingScene scene;
+  LoopCorrection correction = planned(scene);
+  for (const Similarity& S_iw : correction.graph.S_iw) EXPECT_EQ(S_iw.scale(), 1.0);
+  EXPECT_EQ(apply_loop_correction(scene.map, correction).scale, 1.0);
+  scene.map.for_each_keyframe([](const KeyFrame& keyframe) { EXPECT_EQ(keyframe.scale, 1.0); });
+}
+
+TEST(LoopCorrection, SaysByHowMuchLengthsWereMultiplied) {
+  RingScene scene(single_camera());
+  const auto depths = [&](std::size_t k) {  // of the keyframe's own points that stay what they are
+    std::vector<std::pair<MapPointId, double>> found;
+    const KeyFrame& keyframe = *scene.map.find(RingScene::id(k));
+    for (const MapPointId id : keyframe.map_points) {
+      const MapPoint* point = scene.map.find(id);
+      if (point && point->reference_keyframe == keyframe.id) {
+        found.emplace_back(id, (keyframe.T_cw * point->position).z());
+      }
+    }
+    return found;
+  };
+  const auto before = depths(30);
+  const LoopCorrectionResult result = correct(scene);
+  const auto after = depths(30);
+  ASSERT_EQ(after.size(), before.size());
+  ASSERT_GT(after.size(), 10U);
+  for (std::size_t i = 0; i < after.size(); ++i) {
+    EXPECT_NEAR(after[i].second / before[i].second, scene.map.find(RingScene::id(30))->scale, 1e-9);
+  }
+  // Metres per unit of the map before: after 5 keyframes and at the end.
+  const double expected = scene.drifted[65].scale() / scene.drifted[5].scale();
+  EXPECT_GT(expected, 1.3);
+  EXPECT_NEAR(result.scale, expected, 0.01);
+  EXPECT_EQ(scene.map.find(scene.current())->scale, result.scale);
+  EXPECT_EQ(scene.map.find(scene.matched())->scale, 1.0);
+}
+
+TEST(LoopCorrection, TheFarSideStaysWhereItIs) {
+  RingScene scene(single_camera());
+  std::vector<std::pair<MapPointId, Eigen::Vector3d>> before;
+  for (const MapPointId id : scene.loop.loop_points) {
+    const MapPoint& point = *scene.map.find(id);
+    if (point.reference_keyframe == scene.matched()) before.emplace_back(id, point.position);
+  }
+  ASSERT_GT(before.size(), 10U);
+  const Pose matched = scene.map.T_cw(scene.matched());
+  correct(scene);
+  EXPECT_TRUE(scene.map.T_cw(scene.matched()).matrix().isApprox(matched.matrix(), 1e-14));
+  for (const auto& [id, position] : before) {
+    EXPECT_TRUE(scene.map.find(id)->position.isApprox(position, 1e-12));
+  }
+}
+
+/// A keyframe as the tracker inserts it, a bit farther along, with points of its own depths.
+KeyFrameId insert(RingScene& scene, int k) {
+  std::vector<std::size_t> seen;
+  TrackedFrame frame(scene.make_frame(k, seen));
+  const auto c = static_cast<std::size_t>(scene.current().value);
+  const Pose ahead(Eigen::Quaterniond(1, 0, -0.05, 0), Eigen::Vector3d(-0.2, 0, 0.01));
+  frame.T_cw = ahead * scene.map.T_cw(RingScene::id(c));
+  return insert_keyframe(scene.map, frame, true);
+}
+
+TEST(LoopCorrection, KeyframesThatNobodyPlannedForFollow) {
+  RingScene scene;
+  const KeyFrameId waiting = insert(scene, 66);
+  const LoopCorrection correction = planned(scene);
+  EXPECT_EQ(correction.keyframes.back(), scene.current());
+  const KeyFrameId late = insert(scene, 67);
+  struct Seen {
+    MapPointId point;
+    Eigen::Vector3d p_c;
+  };
+  std::vector<std::pair<KeyFrameId, Seen>> before;
+  const Pose T_rel = scene.map.T_cw(waiting) * scene.map.T_cw(scene.current()).inverse();
+  for (const KeyFrameId id : {waiting, late}) {
+    for (const MapPointId point : scene.map.find(id)->map_points) {
+      if (!scene.map.find(point)) continue;
+      before.push_back({id, {point, scene.map.T_cw(id) * scene.map.find(point)->position}});
+    }
+  }
+  ASSERT_GT(before.size(), 100U);
+  ASSERT_TRUE(apply_loop_correction(scene.map, correction).applied);
+  EXPECT_EQ(scene.violations(), "");
+  for (const KeyFrameId id : {waiting, late}) {
+    const Pose now = scene.map.T_cw(id) * scene.map.T_cw(scene.current()).inverse();
+    EXPECT_TRUE(now.matrix().isApprox(T_rel.matrix(), 1e-9));
+  }
+  for (const auto& [id, seen] : before) {
+    const Eigen::Vector3d p_c = scene.map.T_cw(id) * scene.map.find(seen.point)->position;
+    EXPECT_TRUE(p_c.isApprox(seen.p_c, 1e-9));
+  }
+}
+
+TEST(LoopCorrection, FollowersChangeScaleToo) {
+  RingScene scene(single_camera());
+  std::vector<std::size_t> seen;
+  const Pose T_rel(Eigen::Quaterniond(1, 0, -0.05, 0), Eigen::Vector3d(-0.2, 0, 0.01));
+  const auto frame = scene.make_frame(66, seen);
+  const KeyFrameId waiting = scene.map.add_keyframe(frame, T_rel * scene.map.T_cw(scene.current()));
+  correct(scene);
+  const KeyFrame &follower = *scene.map.find(waiting), &leader = *scene.map.find(scene.current());
+  EXPECT_NEAR(follower.scale, leader.scale, 1e-12);
+  const Pose now = follower.T_cw * leader.T_cw.inverse();
+  EXPECT_TRUE(now.translation().isApprox(leader.scale * T_rel.translation(), 1e-9));
+  EXPECT_NEAR(now.rotation().angularDistance(T_rel.rotation()), 0, 1e-9);
+}
+
+TEST(LoopCorrection, PointsMayDieMeanwhile) {
+  RingScene scene;
+  const LoopCorrection correction = planned(scene);
+  int n = 0;
+  for (const LoopCorrection::Fusion& fusion : correction.fusions) {
+    if (++n % 7 == 0) scene.map.erase_point(fusion.point);
+    if (n % 5 == 0 && fusion.replaced.valid()) scene.map.erase_point(fusion.replaced);
+  }
+  // And a keyframe of the group.
+  const KeyFrameId neighbour = correction.group[1];
+  EXPECT_TRUE(scene.map.erase_keyframe(neighbour));
+  const LoopCorrectionResult result = apply_loop_correction(scene.map, correction);
+  EXPECT_TRUE(result.applied);
+  EXPECT_GT(result.n_fused, 0);
+  EXPECT_LT(result.n_fused, static_cast<int>(correction.fusions.size()));
+  EXPECT_EQ(scene.violations(), "");
+  EXPECT_LT(scene.largest_reprojection_error(), 1.0);
+}
+
+TEST(LoopCorrection, ReplacedPointsAreFollowed) {
+  RingScene scene;
+  const LoopCorrection correction = planned(scene);
+  const LoopCorrection::Fusion& fusion = correction.fusions.front();
+  ASSERT_TRUE(fusion.replaced.valid());
+  const MapPointId other =
+      scene.map.add_point(scene.map.find(fusion.point)->position, scene.matched(), 0);
+  scene.physical.push_back(scene.physical[static_cast<std::size_t>(fusion.point.value)]);
+  scene.map.replace_point(fusion.point, other);
+  ASSERT_EQ(scene.map.resolve(fusion.point), other);
+  EXPECT_EQ(apply_loop_correction(scene.map, correction).n_fused,
+            static_cast<int>(correction.fusions.size()));
+  EXPECT_EQ(scene.map.resolve(fusion.replaced), other);
+  EXPECT_EQ(scene.violations(), "");
+}
+
+TEST(LoopCorrection, IsNotAppliedToAnotherMap) {
+  RingScene scene;
+  const LoopCorrection correction = planned(scene);
+  scene.map.clear();
+  EXPECT_FALSE(apply_loop_correction(scene.map, correction).applied);
+  RingScene twin;
+  twin.map.clear();
+  twin.map.add_keyframe(make_raster_frame(0, 10), Pose());
+  const LoopCorrection late = plan_loop_correction(twin.map, twin.loop, true);
+  EXPECT_TRUE(late.keyframes.empty());
+  EXPECT_FALSE(apply_loop_correction(twin.map, late).applied);
+}
+
+TEST(LoopCorrection, IsNotAppliedWithoutBothEnds) {
+  for (const bool at_current : {false, true}) {
+    RingScene scene;
+    LoopCorrection correction = planned(scene);
+    ASSERT_TRUE(scene.map.erase_keyframe(at_current ? scene.current() : scene.matched()));
+    const std::uint64_t before = content_hash(scene.map);
+    EXPECT_FALSE(apply_loop_correction(scene.map, correction).applied);
+    EXPECT_EQ(content_hash(scene.map), before);
+    EXPECT_EQ(scene.map.big_change_index(), 0U);
+
+    LoopCorrection late = plan_loop_correction(scene.map, scene.loop, true);
+    EXPECT_TRUE(late.keyframes.empty());
+    EXPECT_EQ(optimize_essential_graph(late, nullptr).iterations, 0);
+    EXPECT_FALSE(apply_loop_correction(scene.map, late).applied);
+  }
+}
+
+TEST(LoopCorrection, PlanningChangesNothing) {
+  RingScene scene;
+  const std::uint64_t before = content_hash(scene.map);
+  const auto structure = scene.map.structure_version(), geometry = scene.map.geometry_version();
+  planned(scene);
+  EXPECT_EQ(content_hash(scene.map), before);
+  EXPECT_EQ(scene.map.structure_version(), structure);
+  EXPECT_EQ(scene.map.geometry_version(), geometry);
+}
+
+TEST(LoopCorrection, RefusesMatchesThatDoNotFit) {
+  RingScene scene;
+  scene.loop.matches.pop_back();
+  EXPECT_THROW(plan_loop_correction(scene.map, scene.loop, true), std::invalid_argument);
+}
+
+TEST(LoopCorrection, EndsWhenAsked) {
+  RingScene scene;
+  LoopCorrection correction = plan_loop_correction(scene.map, scene.loop, true);
+  const std::vector<Similarity> start = correction.graph.S_iw;
+  const std::atomic<bool> stop{true};
+  EXPECT_TRUE(optimize_essential_graph(correction, &stop).aborted);
+  for (std::size_t k = 0; k < start.size(); ++k) {
+    EXPECT_EQ(correction.graph.S_iw[k].matrix(), start[k].matrix());
+  }
+}
+
+TEST(LoopCorrection, IsTheSameInEveryRun) {
+  for (const bool monocular : {false, true}) {
+    std::vector<std::uint64_t> hashes;
+    for (int run = 0; run < 2; ++run) {
+      RingScene scene(monocular ? single_camera() : RingOptions());
+      correct(scene);
+      hashes.push_back(content_hash(scene.map));
+    }
+    EXPECT_EQ(hashes[0], hashes[1]);
+  }
+}
+
+TEST(LoopCorrection, NobodySeesAMixture) {
+  RingScene scene(single_camera());
+  const LoopCorrection correction = planned(scene);
+  std::vector<Eigen::Matrix4d> before;
+  for (std::size_t k = 0; k < scene.truth.size(); ++k) {
+    before.push_back(scene.map.T_cw(RingScene::id(k)).matrix());
+  }
+  std::atomic<bool> started{false}, done{false};
+  int n_mixed = 0, n_old = 0;
+  std::thread reader([&] {
+    do {
+      const bool last = done;
+      {
+        const auto lock = scene.map.read_lock();
+        const bool old = scene.map.big_change_index() == 0;
+        for (std::size_t k = 0; k < before.size(); ++k) {
+          if (RingScene::id(k) == scene.matched()) continue;
+          n_mixed += (scene.map.T_cw(RingScene::id(k)).matrix() == before[k]) == old ? 0 : 1;
+        }
+        const KeyFrame& current = *scene.map.find(scene.current());
+        n_mixed += current.loop_edges.empty() == old ? 0 : 1;
+        n_mixed += (current.scale == 1) == old ? 0 : 1;
+        n_old += old ? 1 : 0;
+      }
+      started = true;
+      if (last) break;
+    } while (true);
+  });
+  while (!started) std::this_thread::yield();
+  EXPECT_TRUE(apply_loop_correction(scene.map, correction).applied);
+  done = true;
+  reader.join();
+  EXPECT_EQ(n_mixed, 0);
+  EXPECT_GT(n_old, 0);
+}
+
+}  // namespace
+}  // namespace orbslam
