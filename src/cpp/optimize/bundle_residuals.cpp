@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "optimize/rotation_jacobian.hpp"
+
 namespace orbslam {
 namespace {
 
@@ -45,6 +47,10 @@ void write_camera_row(const BundleMeasurement& m, const CameraRow& g, double* ou
 void write_point_row(const BundleMeasurement& m, const CameraRow& g, double* out) {
   const Eigen::Matrix3d& R = m.view->R_cw();
   for (int i = 0; i < 3; ++i) out[i] = -(g.a * R(0, i) + g.b * R(1, i) + g.c * R(2, i));
+  if (m.chart == nullptr) return;
+  const Eigen::Matrix3d& C = *m.chart;
+  const double x = out[0], y = out[1], z = out[2];
+  for (int i = 0; i < 3; ++i) out[i] = x * C(0, i) + y * C(1, i) + z * C(2, i);
 }
 
 template <bool kFree>
@@ -74,16 +80,7 @@ BundleView::BundleView(const Pose& T_cw, const Pinhole& pinhole, double bf)
 void BundleView::move(const double* parameters) {
   const Eigen::Map<const Eigen::Vector3d> w(parameters);
   shift_ = Eigen::Map<const Eigen::Vector3d>(parameters + 3);
-  const double angle_squared = w.squaredNorm();
-  const double angle = std::sqrt(angle_squared);
-  // Series below 1e-4 rad, where the closed forms lose digits.
-  const bool small = angle < 1e-4;
-  const double b = small ? 0.5 - angle_squared / 24 : (1 - std::cos(angle)) / angle_squared;
-  const double c =
-      small ? 1.0 / 6 - angle_squared / 120 : (angle - std::sin(angle)) / (angle_squared * angle);
-  const Eigen::Matrix3d W = skew(w);
-  left_jacobian_ = Eigen::Matrix3d::Identity() + b * W + c * W * W;
-
+  left_jacobian_ = rotation_left_jacobian(w);
   Vector6d xi = Vector6d::Zero();
   xi.head<3>() = w;
   const Eigen::Quaterniond turn = Pose::exp(xi).rotation();

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Pose graphs of one round trip that drifts in position, rotation and scale: every keyframe is tied
+// to its three to six predecessors, and the last thirty to the start by a loop. One thread.
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "optimize/pose_graph.hpp"
+
+namespace {
+
+using namespace orbslam;
+
+double uniform(std::mt19937_64& random, double low, double high) {
+  return low + (high - low) * static_cast<double>(random() >> 11) * 0x1.0p-53;
+}
+
+/// The essential graph right after a loop was found: keyframes near the last one are corrected, all
+/// other edges still measure the drifted poses.
+PoseGraph round_trip(std::uint32_t n) {
+  constexpr std::uint32_t kLoop = 30, kCorrected = 15;
+  std::mt19937_64 random(n);
+  std::vector<Similarity> S_iw(n), S_true(n);  // with drift and without
+  const double turn = 2 * M_PI / n, stride = 0.3;
+  Vector7d step, drifted;
+  step << 0, -turn, 0, 0, 0, -stride, 0;
+  for (std::uint32_t i = 1; i < n; ++i) {
+    drifted = step;
+    for (int k = 0; k < 3; ++k) drifted(k) += 0.2 / n + uniform(random, -5e-4, 5e-4);
+    for (int k = 3; k < 6; ++k) drifted(k) += uniform(random, -5e-3, 5e-3);
+    drifted(6) = 0.5 / n;
+    S_true[i] = Similarity::exp(step) * S_true[i - 1];
+    S_iw[i] = Similarity::exp(drifted) * S_iw[i - 1];
+    S_iw[i] = Similarity(S_iw[i].pose());
+  }
+
+  PoseGraph graph;
+  const auto measure = [&](std::uint32_t i, std::uint32_t j, const std::vector<Similarity>& S) {
+    graph.edges.push_back({i, j, S[j] * S[i].inverse()});
+  };
+  for (std::uint32_t i = 1; i < n; ++i) {
+    const std::uint32_t neighbours = 3 + static_cast<std::uint32_t>(random() % 4);
+    for (std::uint32_t k = 1; k <= std::min(i, neighbours); ++k) measure(i, i - k, S_iw);
+  }
+  graph.S_iw = S_iw;
+  graph.fixed.assign(n, 0);
+  graph.fixed[0] = 1;
+  for (std::uint32_t i = n - kCorrected; i < n; ++i) {
+    graph.S_iw[i] = S_iw[i] * S_iw[n - 1].inverse() * S_true[n - 1];
+  }
+  for (std::uint32_t k = 0; k < kLoop; ++k) {
+    measure(n - 1 - k / 2, k - k / 2, graph.S_iw);
+  }
+  return graph;
+}
+
+void BM_OptimizePoseGraph(benchmark::State& state) {
+  const PoseGraph start = round_trip(static_cast<std::uint32_t>(state.range(0)));
+  PoseGraphOptions options;
+  options.fix_scale = state.range(1) != 0;
+  PoseGraph graph;
+  PoseGraphSummary summary;
+  std::vector<double> milliseconds;
+  for (auto _ : state) {
+    graph = start;
+    const auto begin = std::chrono::steady_clock::now();
+    summary = optimize_pose_graph(graph, options, nullptr);
+    const std::chrono::duration<double, std::milli> taken =
+        std::chrono::steady_clock::now() - begin;
+    milliseconds.push_back(taken.count());
+  }
+  std::sort(milliseconds.begin(), milliseconds.end());
+  state.counters["median_ms"] = milliseconds[milliseconds.size() / 2];
+  state.counters["min_ms"] = milliseconds.front();
+  state.counters["iterations"] = summary.iterations;
+  state.counters["cost_before"] = summary.initial_cost;
+  state.counters["cost_after"] = summary.final_cost;
+}
+BENCHMARK(BM_OptimizePoseGraph)
+    ->ArgNames({"keyframes", "fix_scale"})
+    ->ArgsProduct({{250, 500, 1000, 2000, 4000}, {0, 1}})
+    ->Unit(benchmark::kMillisecond);
+
+}  // namespace

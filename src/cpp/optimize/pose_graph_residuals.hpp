@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <ceres/sized_cost_function.h>
+
+#include "base/similarity.hpp"
+
+namespace orbslam {
+
+/// A vertex of a pose graph in a chart around its start: seven parameters (w, v, c) stand for
+/// S_iw = (exp(c) s, exp(w) R, exp(c) exp(w) t + v) with (s, R, t) the start. The camera turns and
+/// rescales about its own centre, then moves. To first order that is the left perturbation
+/// (rotation, translation, logarithm of the scale), and being a plain vector space it saves Ceres a
+/// product by a manifold's Jacobian per edge. Without the last parameter the scale is kept.
+class PoseGraphView {
+ public:
+  explicit PoseGraphView(const Similarity& S_iw) : start_(S_iw), S_iw_(S_iw) {}
+
+  /// Moves to the given six or seven parameters, unless they are not finite or the logarithm of
+  /// the scale gets out of hand: then the view is not valid and stays where it was.
+  void move(const double* parameters, int n_parameters);
+  bool valid() const { return valid_; }
+
+  const Similarity& S_iw() const { return S_iw_; }
+  const Eigen::Vector3d& shift() const { return shift_; }  ///< v
+  /// Left Jacobian of SO(3) at w: exp(w + d) = exp(left_jacobian * d) exp(w) to first order.
+  const Eigen::Matrix3d& left_jacobian() const { return left_jacobian_; }
+
+ private:
+  Similarity start_, S_iw_;
+  Eigen::Matrix3d left_jacobian_ = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d shift_ = Eigen::Vector3d::Zero();
+  bool valid_ = true;
+};
+
+/// log(S_ji S_iw S_jw^-1): zero where the vertices agree with the measured S_ji.
+Vector7d pose_graph_residual(const Similarity& S_ji, const Similarity& S_iw,
+                             const Similarity& S_jw);
+
+/// The residual of an edge; its blocks are the parameters of view i and of view j, kParameters of
+/// each: 7, or 6 with scales kept. The views must have moved to them before.
+template <int kParameters>
+class PoseGraphResidual final : public ceres::SizedCostFunction<7, kParameters, kParameters> {
+ public:
+  PoseGraphResidual(const Similarity& S_ji, const PoseGraphView* view_i,
+                    const PoseGraphView* view_j)
+      : S_ji_(S_ji), view_i_(view_i), view_j_(view_j) {}
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+ private:
+  Similarity S_ji_;
+  const PoseGraphView* view_i_;
+  const PoseGraphView* view_j_;
+};
+
+}  // namespace orbslam
