@@ -16,6 +16,7 @@ void bind_places(pybind11::module_& module);
 void bind_geometry(pybind11::module_& module);
 void bind_matching(pybind11::module_& module);
 void bind_optimize(pybind11::module_& module);
+void bind_loops(pybind11::module_& module);
 void bind_synthetic(pybind11::module_& module);
 
 }  // namespace orbslam::bindings

@@ -15,5 +15,6 @@ PYBIND11_MODULE(_core, module) {
   bind_geometry(module);
   bind_matching(module);
   bind_optimize(module);
+  bind_loops(module);
   bind_synthetic(module);
 }
