@@ -191,6 +191,8 @@ void bind_bundle(py::module_& module) {
       .def_readonly("aborted", &BundleSummary::aborted, "The flag was raised.")
       .def_readonly("stage_one_done", &BundleSummary::stage_one_done,
                     "The first stage ran to its end.")
+      .def_readonly("timed_out", &BundleSummary::timed_out,
+                    "A time limit ended it; what was reached is used.")
       .def_property_readonly(
           "outlier", [](const BundleSummary& s) { return to_array(s.outlier); },
           "Per observation (n,) uint8, judged at the final estimate.");
@@ -231,15 +233,59 @@ void bind_local_bundle(py::module_& module) {
       "gives an empty result, a reset meanwhile drops it.");
 }
 
+void bind_global_bundle_steps(py::module_& module) {
+  py::class_<GatheredBundle>(module, "GatheredBundle",
+                             "A copy of the keyframes and points of a map to be refined together.")
+      .def_property_readonly(
+          "n_keyframes", [](const GatheredBundle& b) { return b.keyframes.size(); },
+          "Keyframes, the fixed one included.")
+      .def_property_readonly(
+          "n_points", [](const GatheredBundle& b) { return b.points.size(); }, "Points.")
+      .def_property_readonly(
+          "n_observations", [](const GatheredBundle& b) { return b.problem.observations.size(); },
+          "Observations.")
+      .def_readonly("solved", &GatheredBundle::solved, "It holds a result that may be committed.");
+  py::class_<GlobalBundleCommit>(module, "GlobalBundleCommit", "What commit_global_bundle did.")
+      .def_readonly("committed", &GlobalBundleCommit::committed, "Whether the map was changed.")
+      .def_readonly("n_followed_keyframes", &GlobalBundleCommit::n_followed_keyframes,
+                    "Keyframes that were not in the bundle and moved with their parents.")
+      .def_readonly("n_followed_points", &GlobalBundleCommit::n_followed_points,
+                    "Points that were not in the bundle and moved with their reference keyframe.");
+  module.def("gather_global_bundle", &gather_global_bundle, "map"_a,
+             py::call_guard<py::gil_scoped_release>(),
+             "Copy all keyframes that points tie to each other, and these points.\n\n"
+             "First of three steps, between which the map may change. Takes the read lock.");
+  module.def(
+      "solve_global_bundle",
+      [](GatheredBundle& bundle, const GlobalBundleOptions& options,
+         const std::shared_ptr<StopFlag>& abort,
+         int n_threads) { return solve_global_bundle(bundle, options, flag_of(abort), n_threads); },
+      "bundle"_a, py::arg_v("options", GlobalBundleOptions(), "GlobalBundleOptions()"),
+      "abort"_a = py::none(), "n_threads"_a = 1, py::call_guard<py::gil_scoped_release>(),
+      "Refine a gathered bundle; returns a BundleSummary. Takes no lock.\n\n"
+      "`abort`: a StopFlag polled once per iteration, or None; what an aborted run has reached\n"
+      "is not committed. Results that are worse or not finite are not either.");
+  module.def("commit_global_bundle", &commit_global_bundle, "map"_a, "bundle"_a,
+             py::call_guard<py::gil_scoped_release>(),
+             "Move the map to the result in one write section, which counts as a big change.\n\n"
+             "Keyframes and points made since the gathering move along with their parents and\n"
+             "reference keyframes; what has died is left out. Nothing is changed when the bundle\n"
+             "is not solved, or when the map was cleared or had another big change since. Keep\n"
+             "local mapping still meanwhile.");
+}
+
 void bind_global_bundle(py::module_& module) {
   py::class_<GlobalBundleOptions>(module, "GlobalBundleOptions",
                                   "How global_bundle_adjustment works.")
-      .def(py::init([](int iterations, bool robust) {
-             return GlobalBundleOptions{iterations, robust};
+      .def(py::init([](int iterations, bool robust, double max_seconds) {
+             return GlobalBundleOptions{iterations, robust, max_seconds};
            }),
-           "iterations"_a = 10, "robust"_a = true)
+           "iterations"_a = 10, "robust"_a = true, "max_seconds"_a = 0.0)
       .def_readwrite("iterations", &GlobalBundleOptions::iterations, "Accepted steps at most.")
-      .def_readwrite("robust", &GlobalBundleOptions::robust, "Huber kernel on all observations.");
+      .def_readwrite("robust", &GlobalBundleOptions::robust, "Huber kernel on all observations.")
+      .def_readwrite("max_seconds", &GlobalBundleOptions::max_seconds,
+                     "No step is begun that would probably end later; what was reached is used.\n"
+                     "0: no limit, and results do not depend on the speed of the machine.");
   py::class_<GlobalBundleResult>(module, "GlobalBundleResult", "What global_bundle_adjustment did.")
       .def_readonly("n_keyframes", &GlobalBundleResult::n_keyframes,
                     "Keyframes, fixed ones included.")
@@ -256,9 +302,10 @@ void bind_global_bundle(py::module_& module) {
       "map"_a, py::arg_v("options", GlobalBundleOptions(), "GlobalBundleOptions()"),
       "abort"_a = py::none(), "n_threads"_a = 1, py::call_guard<py::gil_scoped_release>(),
       "Refine all keyframes (but 0), unpublished ones included, and all points.\n\n"
-      "`abort`: a StopFlag polled once per iteration, or None. After an abort, or when the map\n"
-      "was cleared meanwhile, the map stays as it was. No observation is erased. Takes the map's\n"
-      "locks for short sections only; a commit counts as a big change.");
+      "gather_global_bundle, solve_global_bundle and commit_global_bundle in one call. After an\n"
+      "abort, or when the map was cleared meanwhile, the map stays as it was. No observation is\n"
+      "erased. Takes the map's locks for short sections only.");
+  bind_global_bundle_steps(module);
 }
 
 void bind_monocular_map(py::module_& module) {

@@ -10,6 +10,7 @@
 
 #include "base/errors.hpp"
 #include "optimize/bundle_iterations.hpp"
+#include "optimize/bundle_point.hpp"
 #include "optimize/bundle_residuals.hpp"
 #include "optimize/gates.hpp"
 
@@ -102,6 +103,7 @@ class BundleSolver final : public ceres::EvaluationCallback {
   BundleSolver(BundleProblem& problem, const BundleOptions& options, const Judgement& start)
       : bundle_(problem), options_(options), problem_(problem_options(this)) {
     make_views();
+    if (options.inverse_depth) make_charts();
     make_measurements(start);
     add_residuals();
   }
@@ -122,10 +124,10 @@ class BundleSolver final : public ceres::EvaluationCallback {
   /// Minimises and writes the poses and points reached into the bundle. Returns whether the flag
   /// was raised.
   bool minimise(int iterations, Damping damping, const std::atomic<bool>* abort,
-                BundleSummary& summary) {
+                const TimeLimit* limit, BundleSummary& summary) {
     if (problem_.NumResidualBlocks() == 0) return is_raised(abort);
     const bool equal = damping == Damping::kEqual;
-    BundleIterations rules(iterations, equal ? 0.0 : kConverged, abort);
+    BundleIterations rules(iterations, equal ? 0.0 : kConverged, abort, limit);
     ceres::Solver::Options solver = solver_options(iterations);
     if (equal) {
       solver.min_lm_diagonal = solver.max_lm_diagonal = 1;
@@ -135,11 +137,13 @@ class BundleSolver final : public ceres::EvaluationCallback {
     ceres::Solver::Summary report;
     ceres::Solve(solver, &problem_, &report);
     summary.iterations += rules.successful();
+    summary.timed_out = rules.timed_out();
     if (rules.successful() == 0) return rules.aborted();
     for (const std::size_t camera : free_cameras_) {
       views_[camera].move(parameters(camera));
       bundle_.cameras[camera].T_cw = views_[camera].T_cw();
     }
+    read_charts();
     return rules.aborted();
   }
 
@@ -166,6 +170,41 @@ class BundleSolver final : public ceres::EvaluationCallback {
     parameters_.assign(views_.size() * BundleView::kParameters, 0.0);
   }
 
+  /// Every point is seen from where the first of its cameras is at the start.
+  void make_charts() {
+    std::vector<const BundleView*> first(bundle_.points.size(), nullptr);
+    for (const Observation& o : bundle_.observations) {
+      if (first[o.point] == nullptr) first[o.point] = &views_[o.camera];
+    }
+    charts_.reserve(first.size());
+    for (std::size_t i = 0; i < first.size(); ++i) {
+      const Eigen::Vector3d& point = bundle_.points[i];
+      charts_.emplace_back(first[i] != nullptr ? first[i]->T_cw().center() : point, point);
+    }
+    chart_parameters_.assign(charts_.size() * BundlePoint::kParameters, 0.0);
+  }
+
+  void move_charts() {
+    for (std::size_t i = 0; i < charts_.size(); ++i) {
+      charts_[i].move(chart_parameters_.data() + i * BundlePoint::kParameters);
+    }
+  }
+
+  /// Points that have moved to the bundle.
+  void read_charts() {
+    move_charts();
+    for (std::size_t i = 0; i < charts_.size(); ++i) {
+      const double* p = chart_parameters_.data() + i * BundlePoint::kParameters;
+      if (p[0] != 0 || p[1] != 0 || p[2] != 0) bundle_.points[i] = charts_[i].position();
+    }
+  }
+
+  /// The parameter block of a point.
+  double* point_block(std::size_t point) {
+    return charts_.empty() ? bundle_.points[point].data()
+                           : chart_parameters_.data() + point * BundlePoint::kParameters;
+  }
+
   void make_measurements(const Judgement& start) {
     measurements_.resize(bundle_.observations.size());
     for (std::size_t i = 0; i < measurements_.size(); ++i) {
@@ -173,6 +212,10 @@ class BundleSolver final : public ceres::EvaluationCallback {
       BundleMeasurement& m = measurements_[i];
       m.view = &views_[o.camera];
       m.point = bundle_.points[o.point].data();
+      if (!charts_.empty()) {
+        m.point = charts_[o.point].position().data();
+        m.chart = &charts_[o.point].jacobian();
+      }
       m.has_depth = o.has_depth;
       m.huber = options_.robust ? kernel_width(o) : 0.0;
       m.u = o.u;
@@ -193,7 +236,7 @@ class BundleSolver final : public ceres::EvaluationCallback {
     for (std::size_t i = 0; i < measurements_.size(); ++i) {
       const Observation& o = bundle_.observations[i];
       if (!bundle_.points[o.point].allFinite()) continue;
-      double* point = bundle_.points[o.point].data();
+      double* point = point_block(o.point);
       const BundleMeasurement* m = &measurements_[i];
       if (problem_.NumResidualBlocks() == 0) {
         problem_.AddResidualBlock(&missing_cost_block_, nullptr, point);
@@ -212,6 +255,7 @@ class BundleSolver final : public ceres::EvaluationCallback {
   }
 
   void evaluate() {
+    move_charts();
     for (const std::size_t camera : free_cameras_) views_[camera].move(parameters(camera));
     missing_cost_ = 0;
     for (BundleMeasurement& m : measurements_) missing_cost_ += m.evaluate();
@@ -269,6 +313,8 @@ class BundleSolver final : public ceres::EvaluationCallback {
   std::vector<BundleView> views_;
   std::vector<double> parameters_;
   std::vector<std::size_t> free_cameras_;
+  std::vector<BundlePoint> charts_;  // empty: points are their coordinates
+  std::vector<double> chart_parameters_;
   std::vector<BundleMeasurement> measurements_;
   double missing_cost_ = 0;
   MissingCost missing_cost_block_{&missing_cost_};
@@ -284,6 +330,8 @@ class BundleSolver final : public ceres::EvaluationCallback {
 BundleSummary solve_bundle(BundleProblem& problem, const BundleOptions& options,
                            const std::atomic<bool>* abort) {
   check_indices(problem);
+  const TimeLimit time_limit(options.max_seconds);
+  const TimeLimit* limit = options.max_seconds > 0 ? &time_limit : nullptr;
   BundleSummary summary;
   const Judgement start = judge(problem);
   Judgement now = start;
@@ -293,12 +341,12 @@ BundleSummary solve_bundle(BundleProblem& problem, const BundleOptions& options,
     BundleSolver solver(problem, options, start);
     const auto damping = options.final_iterations > 0 ? BundleSolver::Damping::kEqual
                                                       : BundleSolver::Damping::kScaled;
-    summary.aborted = solver.minimise(options.robust_iterations, damping, abort, summary);
-    summary.stage_one_done = !summary.aborted;
-    if (!summary.aborted && options.final_iterations > 0) {
+    summary.aborted = solver.minimise(options.robust_iterations, damping, abort, limit, summary);
+    summary.stage_one_done = !summary.aborted && !summary.timed_out;
+    if (summary.stage_one_done && options.final_iterations > 0) {
       solver.keep_inliers(judge(problem));
-      summary.aborted =
-          solver.minimise(options.final_iterations, BundleSolver::Damping::kScaled, abort, summary);
+      summary.aborted = solver.minimise(options.final_iterations, BundleSolver::Damping::kScaled,
+                                        abort, limit, summary);
     }
     now = judge(problem);
   }

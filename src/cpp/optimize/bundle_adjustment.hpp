@@ -36,6 +36,11 @@ struct BundleOptions {
   int final_iterations = 10;
   bool robust = true;
   int n_threads = 1;  ///< 1 gives the same bytes in every run
+  /// Steps along directions and inverse depths of points (see BundlePoint) instead of coordinates.
+  /// Large maps, whose points of small parallax otherwise forbid long steps, need half the steps.
+  bool inverse_depth = false;
+  /// No iteration is begun that would probably end later; 0: no limit. What was reached is used.
+  double max_seconds = 0;
 };
 
 struct BundleSummary {
@@ -45,6 +50,7 @@ struct BundleSummary {
   int iterations = 0;    ///< accepted steps; each lowered the cost of its stage
   bool aborted = false;  ///< the flag was raised; parameters hold what was reached
   bool stage_one_done = false;
+  bool timed_out = false;             ///< max_seconds ended it
   std::vector<std::uint8_t> outlier;  ///< per observation, judged at the final estimate
 };
 

@@ -18,9 +18,12 @@ struct GatheredBundle {
   std::vector<MapPointId> points;        ///< per point
   std::vector<std::uint32_t> keypoints;  ///< per observation: slot of its keyframe
   std::uint64_t epoch = 0;               ///< of the map when it was gathered
+  std::uint64_t big_changes = 0;         ///< Map::big_change_index() then
+  bool solved = false;  ///< the parameters are a result that is better than what was gathered
   std::unordered_map<KeyFrameId, std::uint32_t> camera_of;  ///< for look-ups only
 
-  explicit GatheredBundle(const Map& map) : epoch(map.epoch()) {}
+  explicit GatheredBundle(const Map& map)
+      : epoch(map.epoch()), big_changes(map.big_change_index()) {}
 
   void add_camera(const KeyFrame& keyframe, bool fixed);
   /// The point with its observations by the cameras added so far.

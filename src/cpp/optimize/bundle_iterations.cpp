@@ -15,7 +15,10 @@ ceres::CallbackReturnType BundleIterations::operator()(const ceres::IterationSum
                     : summary.step_is_successful ? accept(summary.cost)
                                                  : ++rejected_ >= kRejectedTrials;
   aborted_ = is_raised(abort_);
-  return done || aborted_ ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
+  timed_out_ =
+      !done && !aborted_ && limit_ != nullptr && limit_->left() < summary.iteration_time_in_seconds;
+  return done || aborted_ || timed_out_ ? ceres::SOLVER_TERMINATE_SUCCESSFULLY
+                                        : ceres::SOLVER_CONTINUE;
 }
 
 bool BundleIterations::start(double cost) {

@@ -45,6 +45,8 @@ class BundleView {
 struct BundleMeasurement {
   const BundleView* view = nullptr;
   const double* point = nullptr;  ///< world
+  /// Of the point by its parameters; nullptr: they are its coordinates.
+  const Eigen::Matrix3d* chart = nullptr;
   double u = 0, v = 0, right_u = 0;
   double scale = 1;  ///< one over the standard deviation; 0 takes the observation out
   double huber = 0;  ///< width of the kernel; 0: none

@@ -1,34 +1,29 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "optimize/global_bundle_adjustment.hpp"
 
-#include <vector>
+#include <algorithm>
+#include <cmath>
 
 namespace orbslam {
 namespace {
 
-/// Without observations nothing is estimated, so nothing must be written: somebody else may move
-/// such a keyframe meanwhile.
-void fix_unobserved(BundleProblem& problem) {
-  std::vector<bool> observed(problem.cameras.size(), false);
-  for (const BundleProblem::Observation& o : problem.observations) observed[o.camera] = true;
-  for (std::size_t i = 0; i < observed.size(); ++i) {
-    if (!observed[i]) problem.cameras[i].fixed = true;
-  }
+/// Maps of few keyframes have begun just now: their points are where two views have put them, and
+/// their coordinates do as well.
+constexpr std::size_t kManyKeyframes = 30;
+
+bool is_finite(const BundleProblem& problem) {
+  const auto& cameras = problem.cameras;
+  const auto& points = problem.points;
+  return std::all_of(cameras.begin(), cameras.end(),
+                     [](const auto& camera) {
+                       return camera.T_cw.rotation().coeffs().allFinite() &&
+                              camera.T_cw.translation().allFinite();
+                     }) &&
+         std::all_of(points.begin(), points.end(),
+                     [](const Eigen::Vector3d& point) { return point.allFinite(); });
 }
 
 }  // namespace
-
-GatheredBundle gather_global_bundle(const Map& map) {
-  const auto lock = map.read_lock();
-  GatheredBundle bundle(map);
-  map.for_each_keyframe(
-      [&](const KeyFrame& keyframe) { bundle.add_camera(keyframe, keyframe.id.value == 0); });
-  map.for_each_point([&](const MapPoint& point) {
-    if (!point.observations.empty()) bundle.add_point(point, map);
-  });
-  fix_unobserved(bundle.problem);
-  return bundle;
-}
 
 BundleSummary solve_global_bundle(GatheredBundle& bundle, const GlobalBundleOptions& options,
                                   const std::atomic<bool>* abort, int n_threads) {
@@ -37,7 +32,13 @@ BundleSummary solve_global_bundle(GatheredBundle& bundle, const GlobalBundleOpti
   solver.final_iterations = 0;
   solver.robust = options.robust;
   solver.n_threads = n_threads;
-  return solve_bundle(bundle.problem, solver, abort);
+  solver.inverse_depth = bundle.keyframes.size() > kManyKeyframes;
+  solver.max_seconds = options.max_seconds;
+  const BundleSummary summary = solve_bundle(bundle.problem, solver, abort);
+  // A comparison with NaN is false.
+  bundle.solved = !summary.aborted && summary.iterations > 0 &&
+                  summary.final_cost <= summary.initial_cost && is_finite(bundle.problem);
+  return summary;
 }
 
 GlobalBundleResult global_bundle_adjustment(Map& map, const GlobalBundleOptions& options,
@@ -48,13 +49,7 @@ GlobalBundleResult global_bundle_adjustment(Map& map, const GlobalBundleOptions&
   result.n_points = static_cast<int>(bundle.points.size());
   result.n_observations = static_cast<int>(bundle.problem.observations.size());
   result.summary = solve_global_bundle(bundle, options, abort, n_threads);
-  if (result.summary.aborted || result.summary.iterations == 0) return result;
-
-  const auto lock = map.write_lock();
-  if (map.epoch() != bundle.epoch) return result;
-  write_back(bundle, map);
-  map.count_big_change();
-  result.committed = true;
+  result.committed = commit_global_bundle(map, bundle).committed;
   return result;
 }
 

@@ -12,6 +12,9 @@ namespace orbslam {
 struct GlobalBundleOptions {
   int iterations = 10;  ///< accepted steps at most
   bool robust = true;   ///< Huber kernel on all observations
+  /// No iteration is begun that would probably end later; 0: no limit, and the result does not
+  /// depend on the speed of the machine. What was reached is used.
+  double max_seconds = 0;
 };
 
 struct GlobalBundleResult {
@@ -21,20 +24,41 @@ struct GlobalBundleResult {
   BundleSummary summary;
 };
 
-/// Spec 16, section 4: refines all keyframes, unpublished ones included, and all points; keyframe 0
-/// is fixed and no observation is erased. Gathers under the read lock, solves without a lock, and
-/// commits in one write section, which counts as a big change; what has died meanwhile is left
-/// out. After an abort, or when the map was cleared meanwhile, the map stays as it was.
+/// Spec 16, section 4: refines all keyframes, unpublished ones included, and all points; the first
+/// keyframe is fixed and no observation is erased. One after the other the three steps below.
+/// After an abort, or when the map was cleared meanwhile, the map stays as it was.
 GlobalBundleResult global_bundle_adjustment(Map& map, const GlobalBundleOptions& options,
                                             const std::atomic<bool>* abort, int n_threads = 1);
 
-// Its parts, for those that put something between.
+// Its steps, for those that let the map change between them (spec 14, section 5).
 
-/// All keyframes and points of the map. Keyframes without observations are fixed. Takes the read
+/// All keyframes that are tied to each other by points, and these points. Others (a keyframe that
+/// was just inserted and has not been processed) are left out: nothing says where they are relative
+/// to the rest. If the map falls apart, the part with most keyframes is taken. The first keyframe
+/// of the bundle is fixed: it is keyframe 0 unless that one has lost its points. Takes the read
 /// lock.
 GatheredBundle gather_global_bundle(const Map& map);
-/// Solves a gathered bundle in place. The parameters are of no use when the summary says aborted.
+
+/// Solves a gathered bundle in place, without a lock. It counts as solved, and may be committed,
+/// unless there was no step that lowered the cost, the result is not finite or `abort` was raised.
 BundleSummary solve_global_bundle(GatheredBundle& bundle, const GlobalBundleOptions& options,
                                   const std::atomic<bool>* abort, int n_threads);
+
+struct GlobalBundleCommit {
+  bool committed = false;  ///< the map was changed
+  /// Moved along with others, because they were not in the bundle (made meanwhile, mostly).
+  int n_followed_keyframes = 0, n_followed_points = 0;
+};
+
+/// Moves the map to the result, in one write section that was prepared outside of it and counts as
+/// a big change. What has died since the gathering is left out. Keyframes that are not part of the
+/// bundle keep their pose relative to their parent in the spanning tree (those without a parent: to
+/// the keyframe before them), points their place before their reference keyframe. What was moved
+/// meanwhile by others, e.g. by local bundle adjustment, is overwritten: keep local mapping still
+/// and let it refine the newest keyframes afterwards.
+///
+/// Nothing is changed when the bundle is not solved, when the map was cleared since, and when
+/// another big change has happened since (a loop closed meanwhile would be torn open again).
+GlobalBundleCommit commit_global_bundle(Map& map, const GatheredBundle& bundle);
 
 }  // namespace orbslam

@@ -164,14 +164,29 @@ TEST(GlobalBundleAdjustment, ResetDuringTheWorkDropsTheResult) {
   }
 }
 
-TEST(GlobalBundleAdjustment, KeyframesWithoutObservationsStay) {
+TEST(GlobalBundleAdjustment, KeyframesThatNoPointTiesToTheOthersFollow) {
   Row row(4);
-  const Pose away = Pose::exp(Vector6d::Constant(0.3));
-  const KeyFrameId blind = row.map.add_keyframe(make_raster_frame(9, 10), away);
+  const KeyFrameId blind =
+      row.map.add_keyframe(make_raster_frame(9, 10), Pose::exp(Vector6d::Constant(0.3)));
+  const KeyFrameId own = row.map.add_keyframe(make_raster_frame(10, 10, 3), Pose());
+  const MapPointId point = row.map.add_point({0, 0, 3}, own, 10);
+  row.map.add_observation(point, own, 0);
+  const KeyFrame& before = *row.map.find(KeyFrameId(3));
+  const Pose T_blind = row.map.find(blind)->T_cw * before.T_cw.inverse();
+  const Pose T_own = row.map.find(own)->T_cw * row.map.find(blind)->T_cw.inverse();
+  const Eigen::Vector3d p_own = row.map.find(own)->T_cw * row.map.find(point)->position;
+
   const GatheredBundle bundle = gather_global_bundle(row.map);
-  EXPECT_EQ(bundle.n_fixed(), 2);
+  EXPECT_EQ(bundle.n_fixed(), 1);
+  EXPECT_EQ(bundle.keyframes.size(), 4U);
+  EXPECT_EQ(bundle.camera_of.count(blind) + bundle.camera_of.count(own), 0U);
+  EXPECT_EQ(bundle.points.back().value + 1, point.value);
   ASSERT_TRUE(global_bundle_adjustment(row.map, {}, nullptr).committed);
-  EXPECT_EQ(row.map.find(blind)->T_cw.matrix(), away.matrix());
+  const auto& map = row.map;
+  EXPECT_TRUE((T_blind * before.T_cw).matrix().isApprox(map.find(blind)->T_cw.matrix(), 1e-12));
+  EXPECT_TRUE(
+      (T_own * map.find(blind)->T_cw).matrix().isApprox(map.find(own)->T_cw.matrix(), 1e-12));
+  EXPECT_TRUE((map.find(own)->T_cw * map.find(point)->position).isApprox(p_own, 1e-12));
 }
 
 TEST(GlobalBundleAdjustment, EmptyMapIsLeftAlone) {
