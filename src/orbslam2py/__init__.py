@@ -28,6 +28,16 @@ from orbslam2py.errors import (
 
 if TYPE_CHECKING:
     from orbslam2py.datasets import open_sequence
+    from orbslam2py.events import (
+        Callbacks,
+        KeyframeAdded,
+        LoopClosed,
+        MapChangeCause,
+        MapChanged,
+        Relocalized,
+        TrackingLost,
+    )
+    from orbslam2py.full_adjustment import FullAdjustmentRecord
     from orbslam2py.map_views import MapSnapshot
     from orbslam2py.records import FrameFeatures, Reason, TrackingRecord, TrackingState
     from orbslam2py.sensor import Sensor
@@ -39,18 +49,26 @@ if TYPE_CHECKING:
     __version__: str
 
 __all__ = [
+    "Callbacks",
     "DatasetError",
     "FrameFeatures",
+    "FullAdjustmentRecord",
     "ImageError",
+    "KeyframeAdded",
+    "LoopClosed",
+    "MapChangeCause",
+    "MapChanged",
     "MapFileError",
     "MapSnapshot",
     "OrbSlamError",
     "Reason",
+    "Relocalized",
     "Sensor",
     "Settings",
     "SettingsError",
     "StateError",
     "System",
+    "TrackingLost",
     "TrackingRecord",
     "TrackingState",
     "Trajectory",
@@ -63,12 +81,20 @@ __all__ = [
 
 
 _MODULES = {
+    "Callbacks": "events",
     "FrameFeatures": "records",
+    "FullAdjustmentRecord": "full_adjustment",
+    "KeyframeAdded": "events",
+    "LoopClosed": "events",
+    "MapChangeCause": "events",
+    "MapChanged": "events",
     "MapSnapshot": "map_views",
     "Reason": "records",
+    "Relocalized": "events",
     "Sensor": "sensor",
     "Settings": "settings",
     "System": "system",
+    "TrackingLost": "events",
     "TrackingRecord": "records",
     "TrackingState": "records",
     "Trajectory": "trajectory",

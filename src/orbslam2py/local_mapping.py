@@ -29,8 +29,6 @@ class LocalMapping:
         Forgets the keyframes that are culled.
     threaded : bool
         In a thread of its own, or inline at `start`.
-    on_done : callable
-        ``on_done(keyframe_id)``: takes the finished keyframe (loop closing).
     """
 
     def __init__(
@@ -40,12 +38,12 @@ class LocalMapping:
         index: core.KeyFrameIndex,
         *,
         threaded: bool,
-        on_done: Callable[[int], None],
     ) -> None:
         self._map = world
         self._index = index
         self._monocular = sensor is Sensor.MONOCULAR
-        self._on_done = on_done
+        #: ``on_done(keyframe_id)``: takes the finished keyframe (loop closing).
+        self.on_done: Callable[[int], None] = lambda keyframe: None
         self._inserted: list[int] = []
         self._recent_points = core.RecentPoints()
         self._point_options = core.NewPointOptions()
@@ -96,7 +94,7 @@ class LocalMapping:
             if self.worker.lower_interrupt():
                 self._refine(keyframe, timer)
         self.statistics.add(timer.milliseconds)
-        self._on_done(keyframe)
+        self.on_done(keyframe)
 
     def _refine(self, keyframe: int, timer: StageTimer) -> None:
         if self._map.n_keyframes > 2:

@@ -27,27 +27,31 @@ class MapSnapshot:
     """(p,) ascending."""
     point_positions: npt.NDArray[np.float64]
     """(p, 3) world [m]."""
+    loop_edges: npt.NDArray[np.int64]
+    """(l, 2) ids of the keyframes that a closed loop connects."""
 
 
 def take_snapshot(world: core.Map) -> MapSnapshot:
-    """Copy keyframe poses and points."""
-    keyframes, points = core.snapshot_keyframes(world), core.snapshot_points(world)
+    """Copy keyframe poses, points and loop edges in one consistent view."""
+    snapshot = core.snapshot_map(world)
+    keyframes, points = snapshot.keyframes, snapshot.points
     return MapSnapshot(
         keyframe_ids=keyframes.ids,
         keyframe_timestamps=keyframes.timestamps,
         keyframe_T_wc=keyframes.T_wc,
         point_ids=points.ids,
         point_positions=points.positions,
+        loop_edges=snapshot.loop_edges,
     )
 
 
 def keyframe_trajectory(world: core.Map) -> Trajectory:
     """Poses of the keyframes, relative to keyframe 0."""
-    snapshot = take_snapshot(world)
-    T_wc = snapshot.keyframe_T_wc
+    keyframes = core.snapshot_keyframes(world)
+    T_wc = keyframes.T_wc
     if len(T_wc):
         T_wc = np.linalg.inv(T_wc[0]) @ T_wc
-    return Trajectory(timestamps=snapshot.keyframe_timestamps, T_wc=T_wc)
+    return Trajectory(timestamps=keyframes.timestamps, T_wc=T_wc)
 
 
 def frame_trajectory(recorder: core.TrajectoryRecorder, world: core.Map) -> Trajectory:

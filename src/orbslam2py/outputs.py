@@ -227,6 +227,13 @@ def _frame_fields(row: FrameRow) -> list[object]:
     ]
 
 
+def _loop_positions(result: RunResult) -> npt.NDArray[np.float64]:
+    """Both ends of every loop of the last map, (l, 2, 3), in the frame of keyframe 0."""
+    snapshot = result.snapshot
+    rows = np.searchsorted(snapshot.keyframe_ids, snapshot.loop_edges)
+    return np.asarray(result.keyframes.positions[rows])
+
+
 def _draw(
     path: Path, result: RunResult, evaluation: RunEvaluation | None, report: dict[str, Any]
 ) -> None:
@@ -249,5 +256,6 @@ def _draw(
         keyframes=result.keyframes.positions,
         points=anchored_points(result),
         truth=truth,
+        loops=_loop_positions(result),
         unit="units" if result.options.sensor is Sensor.MONOCULAR else "m",
     )

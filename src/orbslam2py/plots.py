@@ -19,6 +19,7 @@ FloatArray = npt.NDArray[np.float64]
 _ESTIMATE = "#1f5fa8"
 _TRUTH = "#9a9a9a"
 _POINTS = "#c9b99a"
+_LOOP = "#c8442c"
 #: Width by height of the view from above.
 _SHAPE = 1.85
 
@@ -32,6 +33,7 @@ def draw_trajectory(
     keyframes: FloatArray,
     points: FloatArray,
     truth: tuple[FloatArray, FloatArray] | None = None,
+    loops: FloatArray | None = None,
     subtitle: str = "",
     unit: str = "m",
 ) -> None:
@@ -54,6 +56,8 @@ def draw_trajectory(
         Map points.
     truth : tuple of (seconds, positions), optional
         Ground truth, aligned to the estimate.
+    loops : array of float64, (l, 2, 3), optional
+        Positions of the two keyframes of every loop.
     unit : str
         Unit of length of the estimate, for the axes.
     """
@@ -67,6 +71,9 @@ def draw_trajectory(
     figure.suptitle(f"{title}\n{subtitle}" if subtitle else title, fontsize=11)
 
     _draw_above(above, positions, keyframes, points, truth)
+    if loops is not None and len(loops):
+        _draw_loops(above, loops)
+    above.legend(loc="best", fontsize=9, framealpha=0.9, markerscale=1.2)
     above.set_xlabel(f"x (right) [{unit}]")
     above.set_ylabel(f"z (forward) [{unit}]")
     if truth is not None:
@@ -142,4 +149,19 @@ def _draw_above(
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     axes.set_aspect("equal", adjustable="box")
-    axes.legend(loc="best", fontsize=9, framealpha=0.9, markerscale=1.2)
+
+
+def _draw_loops(axes: Axes, loops: FloatArray) -> None:
+    # Ends of a closed loop are close together: rings around them show where they are.
+    for number, ends in enumerate(loops):
+        axes.plot(
+            ends[:, 0],
+            ends[:, 2],
+            color=_LOOP,
+            linewidth=2.0,
+            marker="o",
+            markersize=9,
+            markerfacecolor="none",
+            zorder=5,
+            label="loops closed" if number == 0 else None,
+        )

@@ -14,6 +14,8 @@ from typing import Any
 from orbslam2py import __version__
 from orbslam2py.errors import OrbSlamError
 from orbslam2py.evaluation import Alignment, Evaluation, evaluate_trajectory
+from orbslam2py.events import LoopClosed
+from orbslam2py.full_adjustment import FullAdjustmentRecord
 from orbslam2py.records import TrackingState
 from orbslam2py.runner import RunResult
 from orbslam2py.sensor import Sensor
@@ -83,7 +85,7 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "dropped_frames": result.n_dropped,
         "keyframes": len(result.keyframes),
         "map_points": len(result.snapshot.point_ids),
-        "loops_closed": result.n_loops_closed,
+        "loops_closed": len(result.loops),
         "relocalisations": result.n_relocalizations,
         "resets": result.n_resets,
         "initialisation_reasons": initialization_reasons(result),
@@ -93,11 +95,48 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "slam_frames_per_second": _rate(n_done, result.slam_seconds),
         "peak_memory_mb": peak_memory_mb(),
         "milliseconds": result.stages,
+        "loops": [loop_entry(loop) for loop in result.loops],
+        "full_adjustments": [adjustment_entry(a) for a in result.full_adjustments],
     }
     if evaluation is not None:
         report |= evaluation.figures.as_dict()
         report["ate_keyframes_rmse_m"] = evaluation.keyframes_ate_rmse
     return report
+
+
+def loop_entry(loop: LoopClosed) -> dict[str, Any]:
+    """What report.json says about a loop."""
+    return {
+        "map": loop.map_index,
+        "keyframes": [loop.matched_keyframe, loop.current_keyframe],
+        "timestamps": [loop.matched_timestamp, loop.current_timestamp],
+        "inliers": loop.n_inliers,
+        "matches": loop.n_matches,
+        "fused_points": loop.n_fused,
+        "scale": loop.scale,
+        "correction_m": loop.translation,
+        "correction_deg": loop.rotation_deg,
+        "milliseconds": _rounded(loop.milliseconds),
+    }
+
+
+def adjustment_entry(record: FullAdjustmentRecord) -> dict[str, Any]:
+    """What report.json says about a full bundle adjustment."""
+    return {
+        "map": record.map_index,
+        "keyframes": record.n_keyframes,
+        "points": record.n_points,
+        "observations": record.n_observations,
+        "iterations": record.iterations,
+        "initial_cost": record.initial_cost,
+        "final_cost": record.final_cost,
+        "used": record.used,
+        "milliseconds": _rounded(record.milliseconds),
+    }
+
+
+def _rounded(milliseconds: dict[str, float]) -> dict[str, float]:
+    return {step: round(value, 4) for step, value in milliseconds.items()}
 
 
 def initialization_reasons(result: RunResult) -> dict[str, int]:

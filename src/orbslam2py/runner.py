@@ -18,7 +18,9 @@ import numpy.typing as npt
 from orbslam2py import _core as core
 from orbslam2py.datasets.base import Images, LiveSource, Sequence, Source
 from orbslam2py.errors import DatasetError, ImageError, OrbSlamError
+from orbslam2py.events import LoopClosed
 from orbslam2py.feeds import FedFrame, LiveFeed, RecordedFeed, is_sequence
+from orbslam2py.full_adjustment import FullAdjustmentRecord, check_time_limit
 from orbslam2py.map_views import MapSnapshot
 from orbslam2py.records import TrackingRecord, TrackingState
 from orbslam2py.sensor import Sensor
@@ -47,6 +49,21 @@ class RunOptions:
     seed: int = 0
     localize_after: int | None = None
     """Switch to localization mode after so many frames."""
+    loop_closing: bool = True
+    """Recognise places seen before and take out the drift."""
+    full_adjustment: bool = True
+    """After a loop, refine the whole map."""
+    full_adjustment_time_limit: float | None = None
+    """Seconds after which that ends with what it has reached.
+
+    Raises
+    ------
+    SettingsError
+        If the time limit is not more than 0, or the run is to be deterministic.
+    """
+
+    def __post_init__(self) -> None:
+        check_time_limit(self.full_adjustment_time_limit, deterministic=self.deterministic)
 
     def indices(self, n_frames: int) -> list[int]:
         """Indices of the frames of a sequence that are used.
@@ -125,7 +142,8 @@ def empty_trajectory() -> Trajectory:
 def empty_snapshot() -> MapSnapshot:
     """A map without anything."""
     ids = np.zeros(0, np.int64)
-    return MapSnapshot(ids, np.zeros(0), np.zeros((0, 4, 4)), ids, np.zeros((0, 3)))
+    edges = np.zeros((0, 2), np.int64)
+    return MapSnapshot(ids, np.zeros(0), np.zeros((0, 4, 4)), ids, np.zeros((0, 3)), edges)
 
 
 @dataclass
@@ -151,7 +169,10 @@ class RunResult:
     """Time in track calls and waiting for mapping."""
     n_resets: int = 0
     n_relocalizations: int = 0
-    n_loops_closed: int = 0
+    loops: list[LoopClosed] = field(default_factory=list)
+    """Loops closed, over all maps."""
+    full_adjustments: list[FullAdjustmentRecord] = field(default_factory=list)
+    """Full bundle adjustments, also those that were given up."""
     n_lost_by_camera: int = 0
     """Images of a camera that came while an earlier one was being tracked."""
     is_live: bool = False
@@ -272,6 +293,9 @@ class SequenceRunner:
             self._vocabulary,
             deterministic=options.deterministic,
             wait_for_mapping=not (options.realtime or self._feed.is_live),
+            loop_closing=options.loop_closing,
+            full_adjustment=options.full_adjustment,
+            full_adjustment_time_limit=options.full_adjustment_time_limit,
             seed=options.seed,
         )
         stop = stop or threading.Event()
@@ -389,7 +413,8 @@ class SequenceRunner:
         result.stages = system.stage_statistics()
         result.n_resets = system.n_resets
         result.n_relocalizations = system.n_relocalizations
-        result.n_loops_closed = system.n_loops_closed
+        result.loops = system.loops
+        result.full_adjustments = system.full_adjustments
 
 
 def _renumber(trajectory: Trajectory, positions: list[int]) -> Trajectory:

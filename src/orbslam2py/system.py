@@ -15,13 +15,23 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
+from orbslam2py.back_end import BackEnd
 from orbslam2py.builtin_settings import resolve_settings
 from orbslam2py.errors import ImageError, StateError, WorkerError
+from orbslam2py.events import (
+    Callbacks,
+    LoopClosed,
+    Relocalized,
+    TrackingLost,
+)
 from orbslam2py.front_end import FrontEnd, Mask, PairMask
+from orbslam2py.full_adjustment import (
+    FullAdjustmentOptions,
+    FullAdjustmentRecord,
+    check_time_limit,
+)
 from orbslam2py.initialization import DepthInitializer
-from orbslam2py.local_mapping import LocalMapping
 from orbslam2py.localization_mode import LocalizationSwitch
-from orbslam2py.loop_closing import LoopClosing
 from orbslam2py.map_views import (
     MapSnapshot,
     frame_features,
@@ -34,7 +44,7 @@ from orbslam2py.records import TrackingRecord, TrackingState
 from orbslam2py.relocalization import Relocalizer
 from orbslam2py.sensor import Sensor
 from orbslam2py.settings import Settings
-from orbslam2py.threads import CallGuard, Worker
+from orbslam2py.threads import CallGuard
 from orbslam2py.timing import StageStatistics, StageTimer
 from orbslam2py.tracking import Tracking
 from orbslam2py.tracking_types import TrackingOutcome
@@ -60,12 +70,21 @@ class System:
     vocabulary : Vocabulary or path, optional
         Visual words; the one shipped with the package if None.
     deterministic : bool
-        Run mapping inline after each keyframe: two runs give the same bytes.
+        Run mapping and loop closing inline after each keyframe: two runs give the same bytes.
     wait_for_mapping : bool
         For recorded data: a track call waits until at most one keyframe waits for mapping (with a
         single camera: until mapping is idle), so that mapping keeps up however fast the images are
         delivered. With a stereo or RGB-D sensor the result still depends a little on the timing of
         the threads; `deterministic` does not. For live cameras leave it off.
+    loop_closing : bool
+        Recognise places seen before and take out the drift.
+    full_adjustment : bool
+        After every loop, refine the whole map in a thread of its own.
+    full_adjustment_time_limit : float, optional
+        Seconds after which a full adjustment ends with what it has reached. Not in deterministic
+        mode, whose results must not depend on the clock.
+    callbacks : Callbacks, optional
+        Functions that are told of loops, keyframes, losses and changes of the map.
     seed : int
         Seed of all random draws.
 
@@ -89,8 +108,13 @@ class System:
         *,
         deterministic: bool = False,
         wait_for_mapping: bool = False,
+        loop_closing: bool = True,
+        full_adjustment: bool = True,
+        full_adjustment_time_limit: float | None = None,
+        callbacks: Callbacks | None = None,
         seed: int = 0,
     ) -> None:
+        check_time_limit(full_adjustment_time_limit, deterministic=deterministic)
         self.sensor = Sensor(sensor)
         self.settings = settings = resolve_settings(settings, self.sensor)
         if not isinstance(vocabulary, core.Vocabulary):
@@ -100,18 +124,18 @@ class System:
         self.seed = seed
         self._wait_for_mapping = wait_for_mapping and not deterministic
 
-        self._map = core.Map()
         self._front_end = FrontEnd(settings, self.sensor)
-        threaded = not deterministic
-        self._index = core.KeyFrameIndex()
-        self._loop_closing = LoopClosing(self._map, self._index, threaded=threaded)
-        self._mapping = LocalMapping(
-            self._map,
+        self._back_end = back_end = BackEnd(
             self.sensor,
-            self._index,
-            threaded=threaded,
-            on_done=self._loop_closing.insert_keyframe,
+            loop_closing=loop_closing,
+            adjustment=FullAdjustmentOptions(
+                enabled=full_adjustment, time_limit=full_adjustment_time_limit
+            ),
+            callbacks=callbacks or Callbacks(),
+            seed=seed,
+            threaded=not deterministic,
         )
+        self._map, self._mapping = back_end.map, back_end.mapping
         self._tracking = Tracking(
             self._map,
             vocabulary,
@@ -119,10 +143,10 @@ class System:
             self.sensor,
             settings.max_frames,
             initializer=self._initializer(),
-            relocalizer=Relocalizer(self._map, self._index, seed),
+            relocalizer=Relocalizer(self._map, back_end.index, seed),
         )
         self._localization = LocalizationSwitch(
-            self._map, 1 if self.sensor.has_depth else 2, self._tracking, self._workers
+            self._map, 1 if self.sensor.has_depth else 2, self._tracking, back_end.map_workers
         )
         self._recorder = core.TrajectoryRecorder()
         # Trajectories may be asked for in any thread, also while a frame is recorded.
@@ -137,9 +161,9 @@ class System:
         self.n_resets = 0
 
         # Everything refers to everything it needs before the first thread runs.
-        for worker in self._workers:
+        for worker in back_end.workers:
             worker.start()
-        self._finalizer = weakref.finalize(self, _abandon, self._workers)
+        self._finalizer = weakref.finalize(self, _abandon, back_end)
 
     # ---- tracking --------------------------------------------------------------------------------
     def track_stereo(
@@ -289,7 +313,7 @@ class System:
         with self._guard():
             if self._shut_down:
                 raise StateError("the system has been shut down; make a new one")
-            for worker in self._workers:
+            for worker in self._back_end.workers:
                 worker.raise_if_failed()
             if self._reset_requested.is_set():
                 self._reset_now()
@@ -299,6 +323,7 @@ class System:
             if self._wait_for_mapping:
                 with timer("wait"):
                     self._wait_for_mapper()
+            before = self._tracking.state
             with timer("track"):
                 frame = core.TrackedFrame(build(self._next_frame_id, timer))
                 # From here on the image counts: every id is one image.
@@ -307,13 +332,23 @@ class System:
                 outcome = self._tracking.track(frame, timer)
             self._statistics.add(timer.milliseconds)
             record = self._record(frame, outcome, timer, details)
+            self._announce(before, record)
             self._mapping.start()
             return record
+
+    def _announce(self, before: TrackingState, record: TrackingRecord) -> None:
+        events = self._back_end.events
+        where = record.map_index, record.frame_id, record.timestamp
+        if before is TrackingState.OK and record.state is TrackingState.LOST:
+            events.post(events.callbacks.on_lost, TrackingLost(*where, str(record.reason)))
+        elif before is TrackingState.LOST and record.T_wc is not None:
+            events.post(events.callbacks.on_relocalized, Relocalized(*where, record.T_wc))
 
     def _wait_for_mapper(self) -> None:
         if self.sensor.has_depth:
             self._mapping.worker.wait_until_waiting(at_most=1)
-        elif not self._mapping.worker.pausing:
+        elif not self._mapping.worker.held:
+            self._mapping.worker.wait_until_waiting(at_most=0)
             # New points of a single camera come from mapping alone, and a busy mapper takes no
             # keyframes: on fast motion the map would end before the mapper is done.
             self._mapping.worker.wait_until_idle()
@@ -386,23 +421,50 @@ class System:
 
     def _reset_now(self) -> None:
         _log.info("resetting: map %d ends", len(self._finished_trajectories))
-        self._mapping.worker.reset(_PATIENCE)
-        self._loop_closing.worker.reset(_PATIENCE)
-        self._mapping.reset()
-        self._loop_closing.reset()
-        with self._trajectory_lock:
-            self._finished_trajectories.append(frame_trajectory(self._recorder, self._map))
-            self._index.clear()
-            self._map.clear()
-            self._recorder.clear()
+        self._back_end.reset(_PATIENCE, keep=self._keep_trajectory)
         self._tracking.reset()
         self._next_frame_id = 0
         self._last_timestamp = -math.inf
         self._reset_requested.clear()
         self.n_resets += 1
 
+    def _keep_trajectory(self) -> None:
+        with self._trajectory_lock:
+            self._finished_trajectories.append(frame_trajectory(self._recorder, self._map))
+            self._recorder.clear()
+
+    def optimize(self) -> FullAdjustmentRecord:
+        """Refine all keyframes and points together, now (full bundle adjustment).
+
+        Tracking may go on meanwhile. A Ctrl-C gives up and leaves the map as it was.
+
+        Returns
+        -------
+        FullAdjustmentRecord
+            Size, cost before and after, and whether the result was used.
+
+        Raises
+        ------
+        StateError
+            In localization mode, where the map is not to change.
+        WorkerError
+            If a worker has failed.
+        """
+        if self._localization.wanted or self._tracking.localization_only:
+            raise StateError("optimize changes the map; switch localization mode off first")
+        adjustment = self._back_end.adjustment
+        if adjustment.worker.ended:
+            return adjustment.run()
+        adjustment.start()
+        try:
+            adjustment.worker.wait_until_idle()
+        except KeyboardInterrupt:
+            adjustment.cancel()
+            raise
+        return adjustment.records[-1]
+
     def wait_until_idle(self, timeout: float | None = None) -> bool:
-        """Wait until every keyframe has been processed.
+        """Wait until every keyframe has been processed, and full adjustments have ended.
 
         Returns
         -------
@@ -412,10 +474,15 @@ class System:
         """
         if self._tracking.localization_only:
             timeout = 0.0  # what has not been done by now waits for the end of the mode
-        done = self._mapping.worker.wait_until_idle(timeout)
-        return self._loop_closing.worker.wait_until_idle(timeout) and done
+        return self._back_end.wait_until_idle(timeout)
 
-    def shutdown(self, *, drain: bool = True, timeout: float | None = None) -> None:
+    def shutdown(
+        self,
+        *,
+        drain: bool = True,
+        wait_for_adjustment: bool = False,
+        timeout: float | None = None,
+    ) -> None:
         """Stop the workers and join their threads; idempotent, to be repeated after a time-out.
 
         Results remain available. Also called at the end of a ``with`` block.
@@ -424,6 +491,9 @@ class System:
         ----------
         drain : bool
             Let waiting keyframes be processed first.
+        wait_for_adjustment : bool
+            Let a running full adjustment end as well; otherwise it is given up, and the map stays
+            as it was before it.
         timeout : float, optional
             Seconds to wait for each worker.
 
@@ -437,14 +507,11 @@ class System:
             return
         if drain:
             self._localization.release()
-        errors = []
-        for worker in self._workers:
-            try:
-                worker.finish(drain=drain, timeout=timeout)
-            except Exception as error:
-                errors.append(error)
+        errors = self._back_end.finish(
+            drain=drain, wait_for_adjustment=wait_for_adjustment, timeout=timeout
+        )
         # Only now: should a Ctrl-C come before, the threads are still ended with the interpreter.
-        if all(worker.ended for worker in self._workers):
+        if all(worker.ended for worker in self._back_end.workers):
             self._finalizer.detach()
         if errors:
             raise errors[0]
@@ -466,10 +533,6 @@ class System:
             if not isinstance(error, WorkerError):  # else it is the same one
                 _log.exception("shutdown after an error failed as well")
 
-    @property
-    def _workers(self) -> tuple[Worker[int], Worker[int]]:
-        return self._mapping.worker, self._loop_closing.worker
-
     # ---- results ---------------------------------------------------------------------------------
     @property
     def state(self) -> TrackingState:
@@ -488,8 +551,18 @@ class System:
 
     @property
     def n_loops_closed(self) -> int:
-        """Loops closed so far."""
-        return self._loop_closing.n_loops
+        """Loops closed so far, over all maps."""
+        return len(self._back_end.loop_closing.loops)
+
+    @property
+    def loops(self) -> list[LoopClosed]:
+        """The loops closed so far, over all maps."""
+        return list(self._back_end.loop_closing.loops)
+
+    @property
+    def full_adjustments(self) -> list[FullAdjustmentRecord]:
+        """The full bundle adjustments so far, also those that were given up."""
+        return list(self._back_end.adjustment.records)
 
     @property
     def n_relocalizations(self) -> int:
@@ -529,14 +602,11 @@ class System:
         return list(core.check_invariants(self._map, require_words=True))
 
     def stage_statistics(self) -> dict[str, dict[str, float]]:
-        """Median, mean and p99 milliseconds per stage of tracking and mapping."""
-        return {**self._statistics.summary(), **self._mapping.statistics.summary()}
+        """Median, mean and p99 milliseconds per stage of tracking, mapping and loop closing."""
+        return {**self._statistics.summary(), **self._back_end.statistics()}
 
 
-def _abandon(workers: tuple[Worker[int], ...]) -> None:
+def _abandon(back_end: BackEnd) -> None:
     """End the threads of a system that was dropped without shutdown."""
-    for worker in workers:
-        try:
-            worker.finish(timeout=_PATIENCE)
-        except Exception:
-            _log.exception("%s failed while the system was dropped", worker.name)
+    for error in back_end.finish(drain=False, wait_for_adjustment=False, timeout=_PATIENCE):
+        _log.error("while a system was dropped", exc_info=error)

@@ -97,12 +97,16 @@ class Worker(Generic[Job]):
         self._condition = threading.Condition()
         self._queue: deque[Job] = deque()
         self._busy = False
+        self._off_duty = False
         self._pauses = 0
+        self._holds = 0  # those of the pauses that may last
         self._finish_requested = False
         self._error: BaseException | None = None
         self._thread: threading.Thread | None = None
         #: Raised when the running step should end early; lowered when a step begins.
         self.interrupt_flag = StopFlag()
+        #: Raised when nobody wants the running step's result any more (reset, finish).
+        self.cancel_flag = StopFlag()
         #: Raised while jobs wait behind the running one.
         self.waiting_flag = StopFlag()
 
@@ -120,7 +124,8 @@ class Worker(Generic[Job]):
         ----------
         drain : bool
             Process the waiting jobs first; otherwise they are dropped and the running step is
-            asked to end early. A paused worker does not wait for its resumption: it drops them.
+            asked to end early. A worker whose pause may last does not wait for its end: it drops
+            them.
         timeout : float, optional
             Seconds to wait for the jobs, and again for the thread.
 
@@ -131,13 +136,14 @@ class Worker(Generic[Job]):
         """
         if drain and self._thread is not None:
             self.wait_until(
-                lambda: self._error is not None or self._is_idle() or self._pauses > 0, timeout
+                lambda: self._error is not None or self._is_idle() or self.held, timeout
             )
         with self._condition:
             self._finish_requested = True
             self._queue.clear()
             self.waiting_flag.clear()
             self.interrupt_flag.set()
+            self.cancel_flag.set()
             self._condition.notify_all()
         if self._thread is not None and self._thread is not threading.current_thread():
             deadline = None if timeout is None else time.monotonic() + timeout
@@ -149,12 +155,18 @@ class Worker(Generic[Job]):
         self.raise_if_failed()
 
     def reset(self, timeout: float | None = None) -> None:
-        """Drop all waiting jobs and wait until the running step has ended, paused or not."""
+        """Drop all waiting jobs and wait until the running step has ended, paused or not.
+
+        A step that is off duty will end without touching the map; nobody waits for it.
+        """
         with self._condition:
             self._queue.clear()
             self.waiting_flag.clear()
-            self.interrupt_flag.set()
-        if not self.wait_until(lambda: not self._busy, timeout):
+            if self._busy:
+                self.interrupt_flag.set()
+                self.cancel_flag.set()
+            self._condition.notify_all()
+        if not self.wait_until(self._leaves_map_alone, timeout):
             raise WorkerError(f"{self.name} did not acknowledge the reset within {timeout} s")
 
     # ---- jobs ------------------------------------------------------------------------------------
@@ -193,6 +205,8 @@ class Worker(Generic[Job]):
     def _take(self) -> Job:
         job = self._queue.popleft()
         self._busy = True
+        if not self._finish_requested:
+            self.cancel_flag.clear()
         if not self._queue:
             self.waiting_flag.clear()
             self.interrupt_flag.clear()
@@ -212,30 +226,65 @@ class Worker(Generic[Job]):
             the worker is to finish; otherwise the interrupt is lowered.
         """
         with self._condition:
-            if self._queue or self._pauses or self._finish_requested:
+            unwanted = self._finish_requested or self.cancel_flag.is_set()
+            if self._queue or self._pauses or unwanted:
                 return False
             self.interrupt_flag.clear()
             return True
 
+    @contextlib.contextmanager
+    def off_duty(self) -> Iterator[None]:
+        """Entered by a step for a long part that leaves the map alone.
+
+        A pause or a reset does not wait for that part; its end waits for the end of the pause.
+        Afterwards the step must look at `cancel_flag`, and end if it is raised.
+        """
+        with self._condition:
+            self._off_duty = True
+            self._condition.notify_all()
+        try:
+            yield
+        finally:
+            with self._condition:
+                while self._threaded and self._pauses and not self.cancel_flag.is_set():
+                    self._condition.wait(_WAIT_SLICE)
+                self._off_duty = False
+
     # ---- pauses ----------------------------------------------------------------------------------
-    def pause(self) -> PauseTicket:
-        """Ask the worker to stand still after the running step; see `PauseTicket`."""
+    def pause(self, *, brief: bool = False) -> PauseTicket:
+        """Ask the worker to stand still after the running step; see `PauseTicket`.
+
+        An inline worker stands still whenever somebody else's code runs.
+
+        Parameters
+        ----------
+        brief : bool
+            The ticket will be released soon whatever happens, so that others may wait for it.
+        """
+        lasting = 0 if brief else 1
         with self._condition:
             self._pauses += 1
+            self._holds += lasting
             self.interrupt_flag.set()
             self._condition.notify_all()
 
         def release() -> None:
             with self._condition:
                 self._pauses -= 1
+                self._holds -= lasting
                 self._condition.notify_all()
 
-        return PauseTicket(release, lambda t: self.wait_until(lambda: not self._busy, t))
+        return PauseTicket(release, lambda t: self.wait_until(self._leaves_map_alone, t))
 
     @property
     def pausing(self) -> bool:
         """Whether a pause is in force or asked for."""
         return self._pauses > 0
+
+    @property
+    def held(self) -> bool:
+        """Whether a pause that may last is in force or asked for."""
+        return self._holds > 0
 
     # ---- state -----------------------------------------------------------------------------------
     @property
@@ -267,10 +316,16 @@ class Worker(Generic[Job]):
             return self._is_idle()
 
     def wait_until_waiting(self, at_most: int) -> None:
-        """Wait while more than `at_most` jobs wait (returns at once when paused or failed)."""
-        self.wait_until(
-            lambda: len(self._queue) <= at_most or self._pauses > 0 or self._error is not None
-        )
+        """Wait while more than `at_most` jobs wait, or a brief pause lasts.
+
+        Returns at once when a pause is in force that may last.
+        """
+
+        def done() -> bool:
+            free = self._pauses == 0 and len(self._queue) <= at_most
+            return free or self.held or self._error is not None
+
+        self.wait_until(done)
         self.raise_if_failed()
 
     def wait_until_idle(self, timeout: float | None = None) -> bool:
@@ -304,6 +359,9 @@ class Worker(Generic[Job]):
     # ---- the thread ------------------------------------------------------------------------------
     def _is_idle(self) -> bool:
         return not self._queue and not self._busy
+
+    def _leaves_map_alone(self) -> bool:
+        return not self._threaded or not self._busy or self._off_duty
 
     def _run(self) -> None:
         while True:

@@ -250,7 +250,7 @@ def test_waiting_keyframes_are_processed_afterwards(
         track(system, n + 10)
         assert system.wait_until_idle(20)
         assert system._mapping.worker.n_waiting == 0
-        assert system._loop_closing.last_keyframe >= n_waiting
+        assert system._back_end.loop_closing.last_keyframe >= n_waiting
         assert system.check_map() == []
 
 

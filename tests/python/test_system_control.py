@@ -243,7 +243,7 @@ def test_failed_loop_closing_reaches_the_caller(
     monkeypatch: pytest.MonkeyPatch, deterministic: bool
 ) -> None:
     system = new_system(Sensor.RGBD, deterministic=deterministic)
-    monkeypatch.setattr(system._loop_closing.worker, "_step", breaks)
+    monkeypatch.setattr(system._back_end.loop_closing.worker, "_step", breaks)
     with pytest.raises(WorkerError, match="loop closing stopped: out of order") as caught:
         play(system, 80)
         system.wait_until_idle(20)

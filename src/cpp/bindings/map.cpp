@@ -109,6 +109,13 @@ void bind_queries(MapClass& map) {
            "The living point that replaced this one (or the point itself); -1 when it died.")
       .def("keyframe_pose", reader(&Map::T_cw), "id"_a, Release(),
            "T_cw of a keyframe, living or culled. Raises StateError for an unknown id.")
+      .def(
+          "keyframe_timestamp",
+          [](const Map& self, KeyFrameId id) {
+            const auto lock = self.read_lock();
+            return living(self, id).frame->timestamp;
+          },
+          "id"_a, Release(), "Seconds, of a living keyframe.")
       .def("living", reader(&Map::living), "id"_a, Release(),
            "The keyframe itself, or the nearest of its ancestors that lives; -1 if unknown.")
       .def(

@@ -74,6 +74,23 @@ void bind_snapshots(py::module_& module) {
       .def_property_readonly(
           "keypoints", [](const ObservationSnapshot& self) { return to_array(self.keypoints); },
           "(m,) int32, index of the keypoint in its keyframe.");
+  py::class_<MapSnapshot>(module, "MapSnapshot", "Keyframes, loop edges and points at one moment.")
+      .def_readonly("keyframes", &MapSnapshot::keyframes)
+      .def_readonly("points", &MapSnapshot::points)
+      .def_property_readonly(
+          "loop_edges",
+          [](const MapSnapshot& self) {
+            const auto n = static_cast<py::ssize_t>(self.loop_a.size());
+            py::array_t<std::int64_t> edges({n, py::ssize_t{2}});
+            for (py::ssize_t i = 0; i < n; ++i) {
+              edges.mutable_at(i, 0) = self.loop_a[static_cast<std::size_t>(i)].value;
+              edges.mutable_at(i, 1) = self.loop_b[static_cast<std::size_t>(i)].value;
+            }
+            return edges;
+          },
+          "(n, 2) int64, ids of the keyframes that a closed loop connects, the lower one first.");
+  module.def("snapshot_map", &snapshot_map, "map"_a, Release(),
+             "Copy keyframes, loop edges and points in one consistent view.");
   module.def("snapshot_keyframes", &snapshot_keyframes, "map"_a, Release(),
              "Copy ids, poses, time stamps and parents of the keyframes.");
   module.def("snapshot_edges", &snapshot_edges, "map"_a,

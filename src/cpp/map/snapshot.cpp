@@ -2,6 +2,31 @@
 #include "map/snapshot.hpp"
 
 namespace orbslam {
+namespace {
+
+void copy_keyframes(const Map& map, KeyFrameSnapshot& snapshot) {
+  map.for_each_keyframe([&](const KeyFrame& keyframe) {
+    if (!keyframe.published) return;
+    snapshot.ids.push_back(keyframe.id);
+    snapshot.T_wc.push_back(row_major(keyframe.T_cw.inverse()));
+    snapshot.timestamps.push_back(keyframe.frame->timestamp);
+    snapshot.parents.push_back(keyframe.parent);
+  });
+}
+
+void copy_points(const Map& map, PointSnapshot& snapshot) {
+  snapshot.ids.reserve(map.n_points());
+  snapshot.positions.reserve(map.n_points());
+  snapshot.observation_counts.reserve(map.n_points());
+  map.for_each_point([&](const MapPoint& point) {
+    const Eigen::Vector3d& p = point.position;
+    snapshot.ids.push_back(point.id);
+    snapshot.positions.push_back({p.x(), p.y(), p.z()});
+    snapshot.observation_counts.push_back(point.observation_count);
+  });
+}
+
+}  // namespace
 
 Matrix4 row_major(const Pose& pose) {
   Matrix4 matrix;
@@ -12,13 +37,7 @@ Matrix4 row_major(const Pose& pose) {
 KeyFrameSnapshot snapshot_keyframes(const Map& map) {
   KeyFrameSnapshot snapshot;
   const auto lock = map.read_lock();
-  map.for_each_keyframe([&](const KeyFrame& keyframe) {
-    if (!keyframe.published) return;
-    snapshot.ids.push_back(keyframe.id);
-    snapshot.T_wc.push_back(row_major(keyframe.T_cw.inverse()));
-    snapshot.timestamps.push_back(keyframe.frame->timestamp);
-    snapshot.parents.push_back(keyframe.parent);
-  });
+  copy_keyframes(map, snapshot);
   return snapshot;
 }
 
@@ -40,14 +59,21 @@ EdgeSnapshot snapshot_edges(const Map& map, int min_weight) {
 PointSnapshot snapshot_points(const Map& map) {
   PointSnapshot snapshot;
   const auto lock = map.read_lock();
-  snapshot.ids.reserve(map.n_points());
-  snapshot.positions.reserve(map.n_points());
-  snapshot.observation_counts.reserve(map.n_points());
-  map.for_each_point([&](const MapPoint& point) {
-    const Eigen::Vector3d& p = point.position;
-    snapshot.ids.push_back(point.id);
-    snapshot.positions.push_back({p.x(), p.y(), p.z()});
-    snapshot.observation_counts.push_back(point.observation_count);
+  copy_points(map, snapshot);
+  return snapshot;
+}
+
+MapSnapshot snapshot_map(const Map& map) {
+  MapSnapshot snapshot;
+  const auto lock = map.read_lock();
+  copy_keyframes(map, snapshot.keyframes);
+  copy_points(map, snapshot.points);
+  map.for_each_keyframe([&](const KeyFrame& keyframe) {
+    for (const KeyFrameId other : keyframe.loop_edges) {
+      if (other < keyframe.id) continue;
+      snapshot.loop_a.push_back(keyframe.id);
+      snapshot.loop_b.push_back(other);
+    }
   });
   return snapshot;
 }

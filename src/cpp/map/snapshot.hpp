@@ -42,11 +42,19 @@ struct ObservationSnapshot {
   std::vector<std::int32_t> keypoints;  ///< index of the keypoint in its keyframe
 };
 
+/// Keyframes, loop edges a[i] < b[i] by ascending (a, b), and points, all of one moment.
+struct MapSnapshot {
+  KeyFrameSnapshot keyframes;
+  std::vector<KeyFrameId> loop_a, loop_b;
+  PointSnapshot points;
+};
+
 // Copies for viewers, exporters and users; each is one consistent view and takes the read lock.
 KeyFrameSnapshot snapshot_keyframes(const Map& map);
 /// Edges between published keyframes with weight >= min_weight.
 EdgeSnapshot snapshot_edges(const Map& map, int min_weight = Map::kCovisibilityThreshold);
 PointSnapshot snapshot_points(const Map& map);
 ObservationSnapshot snapshot_observations(const Map& map);
+MapSnapshot snapshot_map(const Map& map);
 
 }  // namespace orbslam

@@ -101,6 +101,25 @@ def run(
             metavar="N",
         ),
     ] = None,
+    loop_closing: Annotated[
+        bool,
+        typer.Option(
+            "--loop-closing/--no-loop-closing",
+            help="Recognise places seen before and take out the drift.",
+        ),
+    ] = True,
+    full_adjustment: Annotated[
+        bool,
+        typer.Option(
+            "--full-adjustment/--no-full-adjustment", help="After a loop, refine the whole map."
+        ),
+    ] = True,
+    full_adjustment_time_limit: Annotated[
+        float | None,
+        typer.Option(
+            help="Seconds after which that ends with what it has reached.", metavar="SECONDS"
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of all random draws.", min=0)] = 0,
     force: Annotated[
         bool, typer.Option("--force", help="Write into an output folder that is not empty.")
@@ -110,7 +129,12 @@ def run(
     """Track a recorded sequence, a video or a camera; write trajectory, map and report."""
     log_to(Console(stderr=True), quiet=quiet)  # opening warns already
     images = open_source(sequence, sensor, settings=settings, fps=fps, times=times, mask=mask)
-    options = RunOptions(sensor, deterministic, realtime, start, stride, max_frames, seed, localize)
+    options = RunOptions(
+        *(sensor, deterministic, realtime, start, stride, max_frames, seed, localize),
+        loop_closing=loop_closing,
+        full_adjustment=full_adjustment,
+        full_adjustment_time_limit=full_adjustment_time_limit,
+    )
     code = run_and_write(
         images, options, vocabulary=vocabulary, output=output, force=force, quiet=quiet
     )
@@ -232,6 +256,15 @@ class _Display:
         self._shown_at = now
 
 
+def _describe_loop(loop: dict[str, Any]) -> str:
+    matched, current = loop["keyframes"]
+    text = f"keyframe {current} at {matched}: {loop['correction_m']:.3f} m"
+    text += f", {loop['correction_deg']:.2f} deg"
+    if loop["scale"] != 1.0:
+        text += f", scale {loop['scale']:.4f}"
+    return text
+
+
 def _table(report: dict[str, Any]) -> Table:
     title = escape(f"{report['sequence']} ({report['sensor']})")
     table = Table(title=title, show_header=False)
@@ -243,6 +276,15 @@ def _table(report: dict[str, Any]) -> Table:
         if key == "initialisation_reasons":
             for reason, count in value.items():
                 table.add_row(f"no map yet: {escape(reason)}", str(count))
+            continue
+        if key == "loops":
+            for loop in value:
+                table.add_row("loop", _describe_loop(loop))
+            continue
+        if key == "full_adjustments":
+            used = sum(entry["used"] for entry in value)
+            if value:
+                table.add_row(key.replace("_", " "), f"{used} of {len(value)} used")
             continue
         text = f"{value:.4f}" if isinstance(value, float) else str(value)
         table.add_row(key.replace("_", " "), escape(text))
