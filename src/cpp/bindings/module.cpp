@@ -16,5 +16,6 @@ PYBIND11_MODULE(_core, module) {
   bind_matching(module);
   bind_optimize(module);
   bind_loops(module);
+  bind_loop_correction(module);
   bind_synthetic(module);
 }

@@ -6,9 +6,9 @@
 #include <memory>
 #include <string>
 
-#include "base/stop_flag.hpp"
 #include "bindings/arrays.hpp"
 #include "bindings/bindings.hpp"
+#include "bindings/stop_flag.hpp"
 #include "optimize/bundle_adjustment.hpp"
 #include "optimize/global_bundle_adjustment.hpp"
 #include "optimize/local_bundle_adjustment.hpp"
@@ -21,10 +21,6 @@ namespace {
 using namespace py::literals;
 template <class Item>
 using Input = py::array_t<Item, py::array::c_style | py::array::forcecast>;
-
-const std::atomic<bool>* flag_of(const std::shared_ptr<StopFlag>& flag) {
-  return flag ? &flag->value() : nullptr;
-}
 
 /// Rows of an (n, columns) array; columns 0: of an (n,) array. Raises ValueError naming it.
 template <class Item>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "base/stop_flag.hpp"
+#include "bindings/stop_flag.hpp"
 
 #include <memory>
 

@@ -18,9 +18,10 @@ struct RingOptions {
   bool monocular = false;
   int per_lap = 60;            ///< keyframes of a lap
   int extra = 6;               ///< keyframes that follow after it
-  int points_per_step = 40;    ///< physical points
-  double turn_drift = 3e-4;    ///< between keyframes [rad]
-  double move_drift = 1.5e-3;  ///< [m]
+  int points_per_step = 80;    ///< physical points
+  double radius = 2;           ///< of the camera's path [m]; walls are 4 to 7 m farther out
+  double half_view = 120;      ///< keypoints lie in columns up to this far from the middle [pixels]
+  double turn_drift = 4e-4;    ///< between keyframes, about the vertical [rad]
   double log_scale_drift = 0;  ///< for a single camera
   std::uint64_t seed = 1;
 };
@@ -41,7 +42,7 @@ class RingScene {
     make_walls();
     const int n = options.per_lap + options.extra;
     Vector7d drift;
-    drift << 0, options.turn_drift, 0, 0, options.move_drift, 0, options.log_scale_drift;
+    drift << 0, options.turn_drift, 0, 0, 0, 0, options.log_scale_drift;
     const Similarity step = Similarity::exp(drift);
     for (int k = 0; k < n; ++k) {
       truth.push_back(pose_at(k));
@@ -65,10 +66,11 @@ class RingScene {
     std::vector<FeatureSpec> features;
     const Pose T_cw = pose_at(k);
     const auto camera = synthetic_camera(options.monocular ? 0 : 40);
-    for (std::size_t i = 0; i < walls_.positions.size(); ++i) {
+    for (const std::size_t i : near(k)) {
       const Eigen::Vector3d p = T_cw * walls_.positions[i];
       if (!(p.z() > 0.5)) continue;
       const Eigen::Vector2d uv = camera->pinhole().project(p);
+      if (std::abs(uv.x() - 320) > options.half_view) continue;
       if (!camera->bounds().contains_half_open(uv.x(), uv.y())) continue;
       FeatureSpec feature;
       feature.u = static_cast<float>(uv.x());
@@ -136,24 +138,40 @@ class RingScene {
 
  private:
   static constexpr double kTwoPi = 6.283185307179586;
-  static constexpr double kRadius = 2;  // of the camera's path [m]
 
   Pose pose_at(int k) const {
     const double angle = kTwoPi * k / options.per_lap;
     // y points down, z outwards.
     const Eigen::Matrix3d R_wc =
         Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitY()).toRotationMatrix();
-    return Pose(R_wc, kRadius * R_wc.col(2)).inverse();
+    return Pose(R_wc, options.radius * R_wc.col(2)).inverse();
   }
 
   void make_walls() {
     std::mt19937_64 random(options.seed);
-    for (int i = 0; i < options.per_lap * options.points_per_step; ++i) {
-      const double angle = uniform(random, 0, kTwoPi), distance = uniform(random, 6, 9);
+    const int n = options.per_lap * options.points_per_step;
+    for (int i = 0; i < n; ++i) {  // by ascending angles
+      const double angle = kTwoPi * (i + uniform(random)) / n;
+      const double distance = options.radius + uniform(random, 4, 7);
       walls_.positions.emplace_back(distance * std::sin(angle), uniform(random, -2, 2),
                                     distance * std::cos(angle));
       walls_.descriptors.push_back(random_descriptor(random));
     }
+  }
+
+  /// Numbers of the points that can be in view of keyframe k, ascending.
+  std::vector<std::size_t> near(int k) const {
+    const auto n = static_cast<std::int64_t>(walls_.positions.size());
+    const double half_window = std::atan(0.8 * 7 / (options.radius + 7));
+    const auto half = static_cast<std::int64_t>(half_window / kTwoPi * static_cast<double>(n)) + 1;
+    const std::int64_t middle = static_cast<std::int64_t>(k) * options.points_per_step;
+    std::vector<std::size_t> numbers;
+    for (std::int64_t i = middle - half; i <= middle + half; ++i) {
+      numbers.push_back(static_cast<std::size_t>(((i % n) + n) % n));
+    }
+    std::sort(numbers.begin(), numbers.end());
+    numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
+    return numbers;
   }
 
   void add_keyframe(int k) {
