@@ -5,12 +5,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orbslam2py.evaluation import align, match_poses
+from orbslam2py.events import LoopClosed
 from orbslam2py.trajectory import Trajectory
 
 Array = NDArray[np.float64]
@@ -19,14 +19,6 @@ Array = NDArray[np.float64]
 TOLERANCE_METRES = 0.3
 TOLERANCE_OF_DISTANCE = 0.02
 TOLERANCE_DEGREES = 10.0
-
-
-class ClosedLoop(Protocol):
-    """What is read of a loop of `RunResult.loops`."""
-
-    current_timestamp: float
-    matched_timestamp: float
-    S_cm: Array
 
 
 @dataclass(frozen=True)
@@ -61,7 +53,7 @@ class Revisit:
         return max(self.begin - timestamp, timestamp - self.end, 0.0)
 
 
-def judge_loop(loop: ClosedLoop, truth: Trajectory, metres_per_unit: float = 1.0) -> Judgement:
+def judge_loop(loop: LoopClosed, truth: Trajectory, metres_per_unit: float = 1.0) -> Judgement:
     """Compare a loop's relative pose with the true one.
 
     Parameters
@@ -76,7 +68,7 @@ def judge_loop(loop: ClosedLoop, truth: Trajectory, metres_per_unit: float = 1.0
     """
     T_wc = _pose_at(truth, loop.current_timestamp)
     T_wm = _pose_at(truth, loop.matched_timestamp)
-    S_cm = np.asarray(loop.S_cm, np.float64)
+    S_cm = loop.S_cm
     scale = np.cbrt(np.linalg.det(S_cm[:3, :3]))
     # Of the similarity: position and axes of the present camera in the matched one.
     R_mc = S_cm[:3, :3].T / scale
@@ -84,7 +76,7 @@ def judge_loop(loop: ClosedLoop, truth: Trajectory, metres_per_unit: float = 1.0
     T_mc = np.linalg.inv(T_wm) @ T_wc
     cosine = (np.trace(R_mc.T @ T_mc[:3, :3]) - 1) / 2
     return Judgement(
-        timestamp=float(loop.current_timestamp),
+        timestamp=loop.current_timestamp,
         distance=float(np.linalg.norm(T_mc[:3, 3])),
         metres=float(np.linalg.norm(claimed - T_mc[:3, 3])),
         degrees=float(np.degrees(np.arccos(np.clip(cosine, -1, 1)))),

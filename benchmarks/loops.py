@@ -115,7 +115,7 @@ def _judge_loops(outcome: Outcome, case: Case, result: RunResult, truth: Traject
     for loop in result.loops:
         unit = 1.0
         if case.sensor is Sensor.MONOCULAR:
-            estimate = result.trajectories[loop.map]
+            estimate = result.trajectories[loop.map_index]
             estimate = estimate.select(~estimate.lost)
             unit = metres_per_unit_at(loop.matched_timestamp, estimate, truth, 2 * case.near)
         judgement = judge_loop(loop, truth, unit)
