@@ -5,7 +5,6 @@
 
 #include <array>
 #include <cmath>
-#include <functional>
 #include <random>
 
 #include "optimize/gates.hpp"
@@ -51,56 +50,6 @@ struct Scene {
     return measurement.evaluate();
   }
 };
-
-using Rows = Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::RowMajor>;
-
-/// The generic test: analytic against central differences of the residuals in every parameter.
-void expect_derivatives(const ceres::CostFunction& cost, Scene& scene) {
-  const bool free = cost.parameter_block_sizes().size() == 2;
-  std::vector<double*> blocks;
-  if (free) blocks.push_back(scene.camera.data());
-  blocks.push_back(scene.point.data());
-
-  std::vector<Rows> analytic;
-  std::vector<double*> pointers;
-  for (const int size : cost.parameter_block_sizes()) analytic.emplace_back(2, size);
-  for (Rows& rows : analytic) pointers.push_back(rows.data());
-  Eigen::Vector2d residuals;
-  scene.update();
-  ASSERT_TRUE(cost.Evaluate(blocks.data(), residuals.data(), pointers.data()));
-
-  for (std::size_t b = 0; b < blocks.size(); ++b) {
-    for (int i = 0; i < analytic[b].cols(); ++i) {
-      const double start = blocks[b][i], step = 1e-6;
-      Eigen::Vector2d above, below;
-      blocks[b][i] = start + step;
-      scene.update();
-      cost.Evaluate(blocks.data(), above.data(), nullptr);
-      blocks[b][i] = start - step;
-      scene.update();
-      cost.Evaluate(blocks.data(), below.data(), nullptr);
-      blocks[b][i] = start;
-      const Eigen::Vector2d numeric = (above - below) / (2 * step);
-      const double tolerance = 1e-6 * (1 + analytic[b].norm());
-      EXPECT_NEAR(analytic[b](0, i), numeric(0), tolerance) << "block " << b << " entry " << i;
-      EXPECT_NEAR(analytic[b](1, i), numeric(1), tolerance) << "block " << b << " entry " << i;
-    }
-  }
-}
-
-TEST(BundleResiduals, DerivativesMatchCentralDifferences) {
-  std::mt19937_64 random(1);
-  for (int trial = 0; trial < 200; ++trial) {
-    for (const bool has_depth : {false, true}) {
-      Scene scene(random, has_depth, 0);
-      expect_derivatives(ImageResiduals<true>(&scene.measurement), scene);
-      expect_derivatives(ImageResiduals<false>(&scene.measurement), scene);
-      if (!has_depth) continue;
-      expect_derivatives(RightResidual<true>(&scene.measurement), scene);
-      expect_derivatives(RightResidual<false>(&scene.measurement), scene);
-    }
-  }
-}
 
 TEST(BundleResiduals, BlocksNobodyAsksForAreLeftAlone) {
   std::mt19937_64 random(2);

@@ -10,7 +10,6 @@
 #include <random>
 
 #include "golden.hpp"
-#include "optimize/pose_kernels.hpp"
 
 namespace orbslam {
 namespace {
@@ -156,39 +155,6 @@ TEST(PoseOptimization, AgreesWithCeresOnRandomProblems) {
     const PoseEstimate ours = solve(problem), oracle = solve_with_ceres(problem);
     EXPECT_LT(distance(ours.T_cw, oracle.T_cw), 1e-6) << "seed " << seed;
     EXPECT_EQ(ours.outlier, oracle.outlier) << "seed " << seed;
-  }
-}
-
-TEST(PoseOptimization, NormalEquationsMatchCentralDifferences) {
-  const PoseProblem problem = random_problem(7, 1, 0, true);
-  std::mt19937_64 random(3);
-  for (int trial = 0; trial < 200; ++trial) {
-    for (const bool stereo : {false, true}) {
-      pose_kernels::Group group;
-      const double z = std::exp(uniform(random, std::log(0.5), std::log(50.0)));
-      const double u = uniform(random, 0, 640), v = uniform(random, 0, 480);
-      const Pose& T = problem.T_cw_initial;
-      group.push_back(T.inverse() * problem.pinhole.unproject(u, v, z), u + uniform(random, -5, 5),
-                      v + uniform(random, -5, 5), u - problem.bf / z + uniform(random, -5, 5), 0.7,
-                      0);
-      group.pad();
-      const pose_kernels::Projection projection{problem.pinhole, problem.bf};
-      const auto cost = [&](const Pose& pose, pose_kernels::NormalEquations* equations) {
-        return stereo ? accumulate_stereo(group, projection, pose, 0, equations)
-                      : accumulate_mono(group, projection, pose, 0, equations);
-      };
-      pose_kernels::NormalEquations equations;
-      cost(T, &equations);
-      const double step = 1e-6;
-      for (int i = 0; i < 6; ++i) {
-        Vector6d xi = Vector6d::Zero();
-        xi(i) = step;
-        // The gradient of the sum of squares is -2 b.
-        const double numeric =
-            (cost(Pose::exp(xi) * T, nullptr) - cost(Pose::exp(-xi) * T, nullptr)) / (2 * step);
-        EXPECT_NEAR(-2 * equations.b(i), numeric, 1e-5 * (1 + equations.H.norm()));
-      }
-    }
   }
 }
 
