@@ -36,5 +36,12 @@ def watchdog(seconds: float) -> Iterator[None]:
 
 def worker_threads() -> list[str]:
     """Names of the living threads that this package starts."""
-    names = {"local mapping", "loop closing", "image loader", "worker under test"}
+    names = {
+        "local mapping",
+        "loop closing",
+        "full bundle adjustment",
+        "callbacks",
+        "image loader",
+        "worker under test",
+    }
     return [thread.name for thread in threading.enumerate() if thread.name in names]
