@@ -2,21 +2,26 @@
 #include "optimize/bundle_point.hpp"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 
 namespace orbslam {
 namespace {
 
+/// Below this, a hundred times as far as at the start, a point is as good as infinitely far and
+/// moves only across: nothing says how far it is, so that steps would go on for ever.
+constexpr double kInfinity = -2.5;
+
 /// Inverse depth relative to that at the start, and its derivative: 1 + r, bent for points that
-/// would pass infinity, where it tends to 0.
+/// would pass infinity.
 struct InverseDepth {
   double value, derivative;
 };
 
 InverseDepth inverse_depth(double r) {
   if (r > -0.5) return {1 + r, 1};
-  const double value = 0.5 * std::exp(1 + 2 * r);
-  return {value, 2 * value};
+  const double value = 0.5 * std::exp(1 + 2 * std::max(r, kInfinity));
+  return {value, r > kInfinity ? 2 * value : 0};
 }
 
 }  // namespace

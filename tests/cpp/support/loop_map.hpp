@@ -20,9 +20,9 @@ struct LoopMapOptions {
   /// Observations with a measured depth: all of points nearer than this [m]. 0: a single camera.
   double depth_limit = 8;
   double pixel_noise = 0.7;  ///< standard deviation at level 0 [pixels]
-  double outliers = 0;       ///< part of the observations that are off by up to 40 pixels
-  double turn_drift = 2e-4;  ///< of the poses per keyframe before the loop was closed [rad]
-  double move_drift = 2e-3;  ///< [m]
+  double outliers = 0;       ///< part of the observations that are off by up to 10 sigma
+  double turn_drift = 5e-4;  ///< of the poses per keyframe before the loop was closed [rad]
+  double move_drift = 4e-3;  ///< [m]
   double pose_noise = 2e-4;  ///< of each pose beside that: [m], half of it in [rad]
   std::uint64_t seed = 1;
 };
@@ -42,6 +42,7 @@ class LoopMap {
     n_lap_ = n_ - static_cast<std::size_t>(options.overlap * options.n_keyframes);
     for (std::size_t k = 0; k < n_; ++k) truth.push_back(on_ring(k));
     features_.resize(n_);
+    wrong_.resize(n_);
     seen_.resize(n_);
     for (std::size_t k = 0; k < n_lap_; ++k) make_points(k);
     disturb();
@@ -141,7 +142,7 @@ class LoopMap {
     const double sigma =
         options_.pixel_noise * static_cast<double>(synthetic_scales()->scale(feature.level));
     const bool wrong = uniform(random_) < options_.outliers;
-    const double off = wrong ? 40 : 0;
+    const double off = wrong ? 10 * sigma : 0;
     const Eigen::Vector2d uv = camera_->pinhole().project(p_c);
     feature.u = static_cast<float>(uv.x() + sigma * normal() + uniform(random_, -off, off));
     feature.v = static_cast<float>(uv.y() + sigma * normal() + uniform(random_, -off, off));
@@ -151,6 +152,7 @@ class LoopMap {
     }
     feature.descriptor = random_descriptor(random_);
     features_[k].push_back(feature);
+    wrong_[k].push_back(wrong);
     observations_[point].emplace_back(k, seen_[k].size());
     seen_[k].push_back(point);
   }
@@ -188,7 +190,7 @@ class LoopMap {
       Eigen::Matrix3d H = 1e-2 * Eigen::Matrix3d::Identity();
       Eigen::Vector3d g = 1e-2 * (start - x);
       for (const auto& [keyframe, slot] : observations_[point]) {
-        if (keyframe > creator_[point] + 30) continue;
+        if (keyframe > creator_[point] + 30 || wrong_[keyframe][slot]) continue;
         const FeatureSpec& feature = features_[keyframe][slot];
         const Eigen::Vector3d p = start_[keyframe] * x;
         const Eigen::Matrix3d R = start_[keyframe].rotation_matrix();
@@ -243,6 +245,7 @@ class LoopMap {
       synthetic_camera(options_.depth_limit > 0 ? 200 : 0);  // a baseline of 0.5 m
   std::size_t n_ = 0, n_lap_ = 0;  // keyframes; those of the first time around
   std::vector<std::vector<FeatureSpec>> features_;
+  std::vector<std::vector<bool>> wrong_;        // per feature
   std::vector<std::vector<std::size_t>> seen_;  // per keyframe: the points of its features
   std::vector<std::size_t> creator_;            // per point
   std::vector<std::vector<std::pair<std::size_t, std::size_t>>> observations_;  // keyframe, slot

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Full bundle adjustment after a loop, by number of keyframes (some 65 points each, 6 observations
+// a point). One thread. Seconds are of processor time unless the name says wall, because other
+// programs disturb; `write_ms` is how long the commit holds the map's write lock.
+#include <benchmark/benchmark.h>
+#include <dlfcn.h>
+#include <pthread.h>
+#include <time.h>
+
+#include <chrono>
+#include <memory>
+#include <thread>
+
+#include "optimize/global_bundle_adjustment.hpp"
+#include "support/loop_map.hpp"
+
+namespace {
+
+using namespace orbslam;
+using testing::LoopMap;
+using testing::LoopMapOptions;
+
+double seconds_of(clockid_t clock) {
+  timespec now{};
+  clock_gettime(clock, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+/// Write sections of this thread: the longest, in seconds of its processor time and of the wall.
+struct WriteSections {
+  double began = 0, wall_began = 0, longest = 0, wall_longest = 0;
+  bool open = false;
+};
+thread_local WriteSections write_sections;
+
+using LockFunction = int (*)(pthread_rwlock_t*);
+LockFunction next(const char* name) {
+  return reinterpret_cast<LockFunction>(dlsym(RTLD_NEXT, name));
+}
+
+class Stopwatch {
+ public:
+  double seconds() const { return seconds_of(CLOCK_PROCESS_CPUTIME_ID) - began_; }
+  double wall_seconds() const { return seconds_of(CLOCK_MONOTONIC) - wall_began_; }
+
+ private:
+  double began_ = seconds_of(CLOCK_PROCESS_CPUTIME_ID);
+  double wall_began_ = seconds_of(CLOCK_MONOTONIC);
+};
+
+LoopMapOptions loop_options(const benchmark::State& state, bool monocular) {
+  LoopMapOptions options;
+  options.n_keyframes = static_cast<int>(state.range(0));
+  if (monocular) options.depth_limit = 0;
+  options.outliers = 0.01;
+  return options;
+}
+
+GlobalBundleOptions bundle_options(bool robust) {
+  GlobalBundleOptions options;
+  options.robust = robust;
+  return options;
+}
+
+void BM_GlobalBundle(benchmark::State& state, bool monocular, bool robust) {
+  for (auto _ : state) {
+    LoopMap loop(loop_options(state, monocular));
+    state.counters["error_before_m"] = loop.pose_error();
+    const Stopwatch gathering;
+    GatheredBundle bundle = gather_global_bundle(loop.map);
+    state.counters["gather_ms"] = 1e3 * gathering.seconds();
+    const Stopwatch solving;
+    const BundleSummary summary = solve_global_bundle(bundle, bundle_options(robust), nullptr, 1);
+    state.counters["solve_s"] = solving.seconds();
+    state.counters["solve_wall_s"] = solving.wall_seconds();
+    write_sections = {};
+    const Stopwatch committing;
+    if (!commit_global_bundle(loop.map, bundle).committed) state.SkipWithError("not committed");
+    state.counters["commit_ms"] = 1e3 * committing.seconds();
+    state.counters["write_ms"] = 1e3 * write_sections.longest;
+    state.counters["write_wall_ms"] = 1e3 * write_sections.wall_longest;
+    state.SetIterationTime(gathering.wall_seconds());
+    state.counters["points"] = static_cast<double>(bundle.points.size());
+    state.counters["observations"] = static_cast<double>(bundle.problem.observations.size());
+    state.counters["steps"] = summary.iterations;
+    state.counters["cost_ratio"] = summary.final_cost / summary.initial_cost;
+    state.counters["error_m"] = loop.pose_error();
+  }
+}
+
+#define SIZES Arg(250)->Arg(500)->Arg(1000)->Arg(2000)->Arg(4000)
+#define ONCE UseManualTime()->Iterations(1)->Unit(benchmark::kMillisecond)
+BENCHMARK_CAPTURE(BM_GlobalBundle, stereo, false, true)->SIZES->ONCE;
+BENCHMARK_CAPTURE(BM_GlobalBundle, mono, true, true)->SIZES->ONCE;
+BENCHMARK_CAPTURE(BM_GlobalBundle, stereo_without_kernel, false, false)->Arg(1000)->ONCE;
+
+/// From raising the flag until the solver returns, raised at some moments of a run.
+void BM_AbortLatency(benchmark::State& state) {
+  const LoopMap loop(loop_options(state, false));
+  const GatheredBundle gathered = gather_global_bundle(loop.map);
+  double longest = 0;
+  for (auto _ : state) {
+    for (int tenths = 2; tenths <= 30; tenths += 4) {
+      GatheredBundle bundle = gathered;
+      std::atomic<bool> abort{false};
+      double raised = 0;
+      std::thread other([&] {
+        std::this_thread::sleep_for(std::chrono::milliseconds(100 * tenths));
+        raised = seconds_of(CLOCK_MONOTONIC);
+        abort = true;
+      });
+      const bool aborted = solve_global_bundle(bundle, bundle_options(true), &abort, 1).aborted;
+      const double returned = seconds_of(CLOCK_MONOTONIC);
+      other.join();
+      if (aborted) longest = std::max(longest, returned - raised);
+    }
+    state.SetIterationTime(longest);
+  }
+  state.counters["longest_wall_s"] = longest;
+}
+BENCHMARK(BM_AbortLatency)->Arg(1000)->ONCE;
+
+}  // namespace
+
+// In front of the functions under std::shared_mutex.
+extern "C" {
+
+int pthread_rwlock_wrlock(pthread_rwlock_t* lock) noexcept {
+  static const LockFunction function = next("pthread_rwlock_wrlock");
+  const int result = function(lock);
+  write_sections.open = true;
+  write_sections.began = seconds_of(CLOCK_THREAD_CPUTIME_ID);
+  write_sections.wall_began = seconds_of(CLOCK_MONOTONIC);
+  return result;
+}
+
+int pthread_rwlock_unlock(pthread_rwlock_t* lock) noexcept {
+  static const LockFunction function = next("pthread_rwlock_unlock");
+  WriteSections& s = write_sections;
+  if (s.open) {
+    s.open = false;
+    s.longest = std::max(s.longest, seconds_of(CLOCK_THREAD_CPUTIME_ID) - s.began);
+    s.wall_longest = std::max(s.wall_longest, seconds_of(CLOCK_MONOTONIC) - s.wall_began);
+  }
+  return function(lock);
+}
+}
