@@ -26,9 +26,9 @@ class Case:
     features: int = 600
     noise: float = 12.0
     depth_noise: float = 0.0
-    size: tuple[int, int] = (400, 300)
+    size: tuple[int, int] = (360, 270)
     fps: float = 10.0
-    speed: float | None = None
+    speed: float | None = 1.0
 
     @property
     def name(self) -> str:
@@ -90,17 +90,19 @@ _EIGHT = SyntheticWorld.FIGURE_EIGHT
 _CORRIDOR = SyntheticWorld.CORRIDOR
 _REPEATING = SyntheticWorld.REPEATING_CORRIDOR
 _BLOCK = SyntheticWorld.STREET_LAP
+_STREET = SyntheticWorld.STREET
+_ROOMS = SyntheticWorld.TWO_ROOMS
 
 CASES = (
     Case(_CORRIDOR, Sensor.STEREO, 1, 1.5),
-    Case(_CORRIDOR, Sensor.RGBD, 1, 1.5, depth_noise=0.05),
-    Case(_CORRIDOR, Sensor.MONOCULAR, 1, 1.5, features=1000, noise=8, fps=15.0),
+    Case(_CORRIDOR, Sensor.RGBD, 1, 1.5, depth_noise=0.03),
+    Case(_CORRIDOR, Sensor.MONOCULAR, 1, 1.5, 1000, 8, size=(400, 300), fps=15, speed=0.7),
     Case(_EIGHT, Sensor.STEREO, 2, 1.2),
-    Case(_EIGHT, Sensor.RGBD, 2, 1.2, depth_noise=0.05),
-    Case(_BLOCK, Sensor.STEREO, 1, 1.2, features=1000, size=(496, 150), fps=8.0),
+    Case(_EIGHT, Sensor.RGBD, 2, 1.2, depth_noise=0.03),
+    Case(_BLOCK, Sensor.STEREO, 1, 1.2, 1000, size=(496, 150), speed=10),
     Case(_REPEATING, Sensor.STEREO, 1, 1.5),
-    Case(_REPEATING, Sensor.RGBD, 1, 1.5, depth_noise=0.05),
-    Case(SyntheticWorld.STREET, Sensor.STEREO, 0, features=1000, size=(496, 150), fps=8.0),
-    Case(SyntheticWorld.TWO_ROOMS, Sensor.STEREO, 0),
-    Case(SyntheticWorld.TWO_ROOMS, Sensor.RGBD, 0, depth_noise=0.05),
+    Case(_REPEATING, Sensor.RGBD, 1, 1.5, depth_noise=0.03),
+    Case(_STREET, Sensor.STEREO, 0, None, 1000, size=(496, 150), speed=10),
+    Case(_ROOMS, Sensor.STEREO, 0, speed=0.6),
+    Case(_ROOMS, Sensor.RGBD, 0, depth_noise=0.03, speed=0.6),
 )
