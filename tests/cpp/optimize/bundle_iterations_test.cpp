@@ -25,6 +25,37 @@ TEST(BundleIterations, EndsInTheIterationInWhichTheFlagIsRaised) {
   EXPECT_EQ(rules.successful(), 2);  // the step just taken counts: its estimate is kept
 }
 
+TEST(BundleIterations, EndsWhenAnotherIterationWouldGoBeyondTheLimit) {
+  const TimeLimit limit(3600);
+  BundleIterations rules(10, 0, nullptr, &limit);
+  ceres::IterationSummary iteration;
+  iteration.cost = 100;
+  EXPECT_EQ(rules(iteration), ceres::SOLVER_CONTINUE);
+  iteration.iteration = 1;
+  iteration.cost = 50;
+  iteration.step_is_successful = true;
+  iteration.iteration_time_in_seconds = 60;
+  EXPECT_EQ(rules(iteration), ceres::SOLVER_CONTINUE);
+  EXPECT_FALSE(rules.timed_out());
+  iteration.iteration = 2;
+  iteration.cost = 25;
+  iteration.iteration_time_in_seconds = 7200;
+  EXPECT_EQ(rules(iteration), ceres::SOLVER_TERMINATE_SUCCESSFULLY);
+  EXPECT_TRUE(rules.timed_out());
+  EXPECT_FALSE(rules.aborted());
+  EXPECT_EQ(rules.successful(), 2);  // the steps taken count
+}
+
+TEST(BundleIterations, TheLastIterationIsNotEndedByTheLimit) {
+  const TimeLimit limit(0);
+  BundleIterations rules(1, 0, nullptr, &limit);
+  ceres::IterationSummary iteration;
+  iteration.iteration = 1;
+  iteration.step_is_successful = true;
+  EXPECT_EQ(rules(iteration), ceres::SOLVER_TERMINATE_SUCCESSFULLY);
+  EXPECT_FALSE(rules.timed_out());
+}
+
 TEST(BundleIterations, EndsAfterThreeSmallDecreasesInARow) {
   BundleIterations rules(10, 0, nullptr);
   ceres::IterationSummary iteration;
