@@ -13,7 +13,7 @@ from orbslam2py.errors import SettingsError
 from orbslam2py.errors import StateError
 from orbslam2py.errors import VocabularyError
 import typing
-__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'GlobalBundleOptions', 'GlobalBundleResult', 'ImageBounds', 'ImageError', 'KeyFrameIndex', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Map', 'MapFileError', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'check_invariants', 'corridor_way', 'count_map_points', 'count_sightings', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'describe', 'direct_index_of', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'fundamental_matrix', 'fuse_points', 'fuse_with_neighbours', 'gather_points', 'global_bundle_adjustment', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_two_rooms', 'match_for_initialization', 'match_for_triangulation', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'median_scene_depth', 'optimize_pose', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'refresh_associations', 'render', 'room_T_wc', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_observations', 'snapshot_points', 'solve_bundle', 'solve_epnp', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'words_of']
+__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'GatheredBundle', 'GlobalBundleCommit', 'GlobalBundleOptions', 'GlobalBundleResult', 'ImageBounds', 'ImageError', 'KeyFrameIndex', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapFileError', 'MapSnapshot', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'anchor_frame', 'apply_loop_correction', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'check_invariants', 'choose_loop', 'commit_global_bundle', 'corridor_way', 'count_map_points', 'count_sightings', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'describe', 'direct_index_of', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'fundamental_matrix', 'fuse_points', 'fuse_with_neighbours', 'gather_global_bundle', 'gather_points', 'global_bundle_adjustment', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'match_for_initialization', 'match_for_triangulation', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'plan_loop_correction', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'refresh_associations', 'render', 'room_T_wc', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'snapshot_points', 'solve_bundle', 'solve_epnp', 'solve_global_bundle', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'verify_loop_candidate', 'words_of']
 class Pose:
     """
     Rigid transform. `T_ab` maps coordinates of frame b into frame a.
@@ -539,6 +539,10 @@ class TrackedFrame:
         """
         (with, without) an inlier map point, over the close keypoints.
         """
+    def share_anchor(self, other: TrackedFrame) -> None:
+        """
+        The pose was predicted from that of another frame.
+        """
     @property
     def T_cw(self) -> Pose | None:
         """
@@ -547,6 +551,11 @@ class TrackedFrame:
     @T_cw.setter
     def T_cw(self, arg0: Pose | None) -> None:
         ...
+    @property
+    def big_change(self) -> int:
+        """
+        Map.big_change_index of the map that the pose belongs to.
+        """
     @property
     def frame(self) -> Frame:
         ...
@@ -573,11 +582,8 @@ class TrackedFrame:
     @property
     def reference_keyframe(self) -> int:
         """
-        -1: none.
+        The keyframe that the pose is relative to; -1: none.
         """
-    @reference_keyframe.setter
-    def reference_keyframe(self, arg0: int) -> None:
-        ...
     @property
     def timestamp(self) -> float:
         """
@@ -649,9 +655,9 @@ class Map:
         """
         Tell that the map moved as a whole.
         """
-    def end_lease(self, id: int) -> None:
+    def end_lease(self, id: int) -> bool:
         """
-        End a protection; the last one carries out a deferred death.
+        End a protection; the last one carries out a deferred death, and then True is returned.
         """
     def erase_keyframe(self, id: int) -> bool:
         """
@@ -684,6 +690,14 @@ class Map:
     def keyframe_pose(self, id: int) -> Pose:
         """
         T_cw of a keyframe, living or culled. Raises StateError for an unknown id.
+        """
+    def keyframe_timestamp(self, id: int) -> float:
+        """
+        Seconds, of a living keyframe.
+        """
+    def living(self, id: int) -> int:
+        """
+        The keyframe itself, or the nearest of its ancestors that lives; -1 if unknown.
         """
     def neighbours(self, id: int) -> numpy.typing.NDArray[numpy.int64]:
         """
@@ -943,6 +957,21 @@ class ObservationSnapshot:
         """
         (n + 1,) int64.
         """
+class MapSnapshot:
+    """
+    Keyframes, loop edges and points at one moment.
+    """
+    @property
+    def keyframes(self) -> KeyFrameSnapshot:
+        ...
+    @property
+    def loop_edges(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (n, 2) int64, ids of the keyframes that a closed loop connects, the lower one first.
+        """
+    @property
+    def points(self) -> PointSnapshot:
+        ...
 class RecordedTrajectory:
     """
     Camera poses of all recorded frames.
@@ -1831,6 +1860,11 @@ class BundleSummary:
         """
         The first stage ran to its end.
         """
+    @property
+    def timed_out(self) -> bool:
+        """
+        A time limit ended it; what was reached is used.
+        """
 class LocalBundleResult:
     """
     What local_bundle_adjustment did.
@@ -1874,7 +1908,7 @@ class GlobalBundleOptions:
     """
     How global_bundle_adjustment works.
     """
-    def __init__(self, iterations: typing.SupportsInt | typing.SupportsIndex = 10, robust: bool = True) -> None:
+    def __init__(self, iterations: typing.SupportsInt | typing.SupportsIndex = 10, robust: bool = True, max_seconds: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         ...
     @property
     def iterations(self) -> int:
@@ -1883,6 +1917,15 @@ class GlobalBundleOptions:
         """
     @iterations.setter
     def iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def max_seconds(self) -> float:
+        """
+        No step is begun that would probably end later; what was reached is used.
+        0: no limit, and results do not depend on the speed of the machine.
+        """
+    @max_seconds.setter
+    def max_seconds(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def robust(self) -> bool:
@@ -1920,6 +1963,49 @@ class GlobalBundleResult:
     def summary(self) -> BundleSummary:
         """
         Of the solver.
+        """
+class GatheredBundle:
+    """
+    A copy of the keyframes and points of a map to be refined together.
+    """
+    @property
+    def n_keyframes(self) -> int:
+        """
+        Keyframes, the fixed one included.
+        """
+    @property
+    def n_observations(self) -> int:
+        """
+        Observations.
+        """
+    @property
+    def n_points(self) -> int:
+        """
+        Points.
+        """
+    @property
+    def solved(self) -> bool:
+        """
+        It holds a result that may be committed.
+        """
+class GlobalBundleCommit:
+    """
+    What commit_global_bundle did.
+    """
+    @property
+    def committed(self) -> bool:
+        """
+        Whether the map was changed.
+        """
+    @property
+    def n_followed_keyframes(self) -> int:
+        """
+        Keyframes that were not in the bundle and moved with their parents.
+        """
+    @property
+    def n_followed_points(self) -> int:
+        """
+        Points that were not in the bundle and moved with their reference keyframe.
         """
 class MonocularMapFailure:
     """
@@ -2013,6 +2099,255 @@ class MonocularMap:
     def summary(self) -> BundleSummary:
         """
         Of the bundle adjustment.
+        """
+class LoopConsistency:
+    """
+    Believes a loop only when consecutive keyframes propose the same part of the map.
+
+    Remembers what the keyframe before proposed (Mur-Artal et al. 2015, section VII-A). For
+    one thread.
+    """
+    NEEDED: typing.ClassVar[int] = 3
+    def __init__(self) -> None:
+        ...
+    def clear(self) -> None:
+        """
+        Forget everything: after a correction or a gap.
+        """
+    def update(self, map: Map, candidates: collections.abc.Sequence[int]) -> list[int]:
+        """
+        Take the candidates of the next keyframe, ids in ascending order; none breaks all
+        chains. Returns the list of those proposed by NEEDED keyframes before as well.
+        """
+class Loop:
+    """
+    A place seen again. Poses are similarities: p_a = S_ab p_b with the scale in
+    the rotation's part. Arrays are copies.
+    """
+    @property
+    def S_cm(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        (4, 4) float64: camera of `matched` to camera of `current`.
+        """
+    @property
+    def S_cw(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        (4, 4) float64: world to camera of `current` once the loop is corrected.
+        """
+    @property
+    def current(self) -> int:
+        """
+        The present keyframe.
+        """
+    @property
+    def loop_points(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (m,) int64: all points around `matched`.
+        """
+    @property
+    def matched(self) -> int:
+        """
+        The keyframe that showed the place before.
+        """
+    @property
+    def matches(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (n,) int64: per keypoint of `current` the point of the far side, or -1.
+        """
+    @property
+    def n_inliers(self) -> int:
+        """
+        Matches that the refined similarity was judged on.
+        """
+    @property
+    def n_matches(self) -> int:
+        """
+        Entries of `matches` that are points.
+        """
+    @property
+    def scale(self) -> float:
+        """
+        Of S_cm: lengths around `current` over lengths around `matched`.
+        """
+class LoopVerificationOptions:
+    """
+    Options of verify_loop_candidate().
+    """
+    def __init__(self, fix_scale: bool = False, seed: typing.SupportsInt | typing.SupportsIndex = 0, min_word_matches: typing.SupportsInt | typing.SupportsIndex = 20, min_inliers: typing.SupportsInt | typing.SupportsIndex = 20, min_matches: typing.SupportsInt | typing.SupportsIndex = 40) -> None:
+        ...
+    @property
+    def fix_scale(self) -> bool:
+        """
+        Where depth is measured the scale cannot drift.
+        """
+    @fix_scale.setter
+    def fix_scale(self, arg0: bool) -> None:
+        ...
+    @property
+    def min_inliers(self) -> int:
+        """
+        Of the refinement; RANSAC must find more.
+        """
+    @min_inliers.setter
+    def min_inliers(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_matches(self) -> int:
+        """
+        With the points around the candidate projected.
+        """
+    @min_matches.setter
+    def min_matches(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def min_word_matches(self) -> int:
+        ...
+    @min_word_matches.setter
+    def min_word_matches(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def seed(self) -> int:
+        """
+        Of the system; the draws depend on it and on both ids.
+        """
+    @seed.setter
+    def seed(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+class LoopDrift:
+    """
+    How far drift may have carried the map between the keyframes of a loop,
+    and how far the loop says that it has. Lengths in units of the map.
+    """
+    def plausible(self) -> bool:
+        """
+        Whether drift can explain the loop.
+        """
+    @property
+    def max_log_scale(self) -> float:
+        """
+        Limit of |log(scale)|.
+        """
+    @property
+    def max_rotation(self) -> float:
+        """
+        Limit of `rotation`.
+        """
+    @property
+    def max_translation(self) -> float:
+        """
+        Limit of `translation`.
+        """
+    @property
+    def path(self) -> float:
+        """
+        Metres of the shortest way along the keyframe graph; inf without a way.
+        """
+    @property
+    def reach(self) -> float:
+        """
+        Metres from `current` to the keyframe on it farthest away.
+        """
+    @property
+    def rotation(self) -> float:
+        """
+        Radians that `current` would turn.
+        """
+    @property
+    def scale(self) -> float:
+        """
+        Scale of S_cm.
+        """
+    @property
+    def scene_depth(self) -> float:
+        """
+        Median depth of `current`'s points [m].
+        """
+    @property
+    def translation(self) -> float:
+        """
+        Metres that `current` would move.
+        """
+    @property
+    def turned(self) -> float:
+        """
+        Radians turned along it.
+        """
+class PoseGraphSummary:
+    """
+    What optimize_essential_graph did.
+    """
+    @property
+    def aborted(self) -> bool:
+        """
+        The flag was raised: the correction must not be applied.
+        """
+    @property
+    def final_cost(self) -> float:
+        """
+        The same at the end.
+        """
+    @property
+    def initial_cost(self) -> float:
+        """
+        Sum of squared residuals at the start.
+        """
+    @property
+    def iterations(self) -> int:
+        """
+        Accepted steps.
+        """
+class LoopCorrectionResult:
+    """
+    What apply_loop_correction did.
+    """
+    @property
+    def applied(self) -> bool:
+        """
+        False: the map was cleared meanwhile, or an end of the loop died.
+        """
+    @property
+    def n_fused(self) -> int:
+        """
+        Points replaced by points of the far side, or observations added to these.
+        """
+    @property
+    def rotation(self) -> float:
+        """
+        By what angle it turned [rad].
+        """
+    @property
+    def scale(self) -> float:
+        """
+        By what lengths around it were multiplied.
+        """
+    @property
+    def translation(self) -> float:
+        """
+        How far `current` moved [m].
+        """
+class LoopCorrection:
+    """
+    What closing a loop does to the map, worked out on copies.
+    """
+    @property
+    def n_edges(self) -> int:
+        """
+        Measurements between them.
+        """
+    @property
+    def n_fusions(self) -> int:
+        """
+        Points to be replaced by points of the far side, or to be seen by more keyframes.
+        """
+    @property
+    def n_keyframes(self) -> int:
+        """
+        Keyframes in the essential graph. 0: an end of the loop was dead.
+        """
+    @property
+    def n_points(self) -> int:
+        """
+        Points that move along.
         """
 class Rectangle:
     """
@@ -2138,6 +2473,20 @@ def add_temporary_points(last: TrackedFrame, points: PointBatch, n_minimum: typi
     with `last`; temporary points left there are dropped first. Their ids start at
     FIRST_TEMPORARY_POINT. Returns the number made. Raises StateError without a pose.
     """
+def anchor_frame(map: Map, frame: TrackedFrame, keyframe: int) -> None:
+    """
+    Make a frame's pose relative to a keyframe (living or culled) as it is now.
+    """
+def apply_loop_correction(map: Map, correction: LoopCorrection) -> LoopCorrectionResult:
+    """
+    Carry out a correction in one write section, so that everybody else sees the map before it
+    or after it. Counts as a big change. Keyframes that are not in the graph (the tracker may
+    just have inserted one) follow the keyframe before them. Returns a LoopCorrectionResult.
+    """
+def assess_drift(map: Map, loop: Loop, fix_scale: bool) -> LoopDrift:
+    """
+    Compare a loop's correction with what drift can explain. Returns a LoopDrift.
+    """
 def build_monocular_frame(context: FrameContext, id: typing.SupportsInt | typing.SupportsIndex, timestamp: typing.SupportsFloat | typing.SupportsIndex, extraction: Extraction) -> Frame:
     """
     Frame of a single camera: undistorted keypoints, no depth.
@@ -2153,6 +2502,22 @@ def build_stereo_frame(context: FrameContext, id: typing.SupportsInt | typing.Su
 def check_invariants(map: Map, require_words: bool) -> list[str]:
     """
     One sentence per violated invariant; empty for a consistent map.
+    """
+def choose_loop(map: Map, loops: collections.abc.Sequence[Loop], fix_scale: bool) -> Loop | None:
+    """
+    The plausible loop with most matches among loops of one keyframe.
+
+    None when there is none, or when plausible ones put the keyframe at different
+    places. Raises ValueError when the loops are of different keyframes.
+    """
+def commit_global_bundle(map: Map, bundle: GatheredBundle) -> GlobalBundleCommit:
+    """
+    Move the map to the result in one write section, which counts as a big change.
+
+    Keyframes and points made since the gathering move along with their parents and
+    reference keyframes; what has died is left out. Nothing is changed when the bundle
+    is not solved, or when the map was cleared or had another big change since. Keep
+    local mapping still meanwhile.
     """
 def corridor_way(length: typing.SupportsFloat | typing.SupportsIndex, breadth: typing.SupportsFloat | typing.SupportsIndex, width: typing.SupportsFloat | typing.SupportsIndex) -> Way:
     """
@@ -2226,6 +2591,12 @@ def find_relocalization_candidates(index: KeyFrameIndex, map: Map, frame: Frame)
     """
     Keyframes that look like a described frame, by ascending id.
     """
+def follow_map(map: Map, frame: TrackedFrame) -> tuple[PointBatch, float]:
+    """
+    Bring an earlier frame up to date: its pose follows its keyframe, replaced points their
+    successors, dead ones are dropped. Returns (PointBatch of the frame's points, by how much
+    lengths around the frame have been multiplied since).
+    """
 def fundamental_matrix(T_1w: Pose, T_2w: Pose, K_1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"], K_2: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
     """
     The (3, 3) matrix F_12 with x_1^T F_12 x_2 = 0 for pixels (u, v, 1) of cameras with
@@ -2242,6 +2613,12 @@ def fuse_with_neighbours(map: Map, current: int, n_neighbours: typing.SupportsIn
     Fuse a keyframe's points with those of its first and second neighbours, both ways;
     refresh its points and connections. Returns the number of changes.
     """
+def gather_global_bundle(map: Map) -> GatheredBundle:
+    """
+    Copy all keyframes that points tie to each other, and these points.
+
+    First of three steps, between which the map may change. Takes the read lock.
+    """
 def gather_points(map: Map, ids: typing.Annotated[numpy.typing.ArrayLike, numpy.int64]) -> PointBatch:
     """
     The living points among `ids` ((n,) int64), in that order.
@@ -2250,9 +2627,9 @@ def global_bundle_adjustment(map: Map, options: GlobalBundleOptions = ..., abort
     """
     Refine all keyframes (but 0), unpublished ones included, and all points.
 
-    `abort`: a StopFlag polled once per iteration, or None. After an abort, or when the map
-    was cleared meanwhile, the map stays as it was. No observation is erased. Takes the map's
-    locks for short sections only; a commit counts as a big change.
+    gather_global_bundle, solve_global_bundle and commit_global_bundle in one call. After an
+    abort, or when the map was cleared meanwhile, the map stays as it was. No observation is
+    erased. Takes the map's locks for short sections only.
     """
 def hamming_distances(a: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8], b: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8]) -> numpy.typing.NDArray[numpy.int32]:
     """
@@ -2297,6 +2674,10 @@ def make_room(size: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3,
 def make_street(length: typing.SupportsFloat | typing.SupportsIndex, width: typing.SupportsFloat | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> World:
     """
     A street along z, the road 1.65 m below the origin, open above.
+    """
+def make_street_lap(length: typing.SupportsFloat | typing.SupportsIndex, breadth: typing.SupportsFloat | typing.SupportsIndex, width: typing.SupportsFloat | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex) -> World:
+    """
+    Streets around a block of houses, their middle lines `length` (z) by `breadth` (x), the road 1.65 m below the origin, open above.
     """
 def make_two_rooms(size: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], passage: typing.SupportsFloat | typing.SupportsIndex, seed: typing.SupportsInt | typing.SupportsIndex, n_boxes: typing.SupportsInt | typing.SupportsIndex) -> World:
     """
@@ -2358,6 +2739,13 @@ def median_scene_depth(map: Map, id: int) -> float | None:
     """
     Lower median of the depths of a living keyframe's points; None without points.
     """
+def optimize_essential_graph(correction: LoopCorrection, abort: StopFlag | None = None, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> PoseGraphSummary:
+    """
+    Spread the loop's error over all keyframes (spec 16, section 6), in place, without locks.
+
+    `abort`: a StopFlag polled once per iteration, or None. 1 thread gives the same bytes in
+    every run. Returns a PoseGraphSummary.
+    """
 @typing.overload
 def optimize_pose(frame: TrackedFrame) -> PoseEstimate:
     """
@@ -2374,6 +2762,16 @@ def optimize_pose(T_cw: Pose, intrinsics: typing.Annotated[numpy.typing.ArrayLik
     `intrinsics`: fx, fy, cx, cy [pixels]. `bf`: baseline times fx [pixel metre]. `points`:
     (n, 3) float64, world. `pixels`: (n, 3) float64, undistorted u, v and the right column,
     NaN without depth. `inverse_sigma2`: (n,) [pixels^-2]. Raises ValueError for bad shapes.
+    """
+def plan_loop_correction(map: Map, loop: Loop, fix_scale: bool) -> LoopCorrection:
+    """
+    Work out how a loop corrects the map (spec 14, section 4).
+
+    Carries the loop's similarity to the neighbours of its current keyframe, finds which points
+    are in the map twice, and builds the essential graph. `fix_scale`: where depth is measured.
+    Takes the map's read lock in short sections; the map is not changed. Local mapping must
+    rest until apply_loop_correction() is through. Raises ValueError when the loop's matches
+    are not one per keypoint. Returns a LoopCorrection.
     """
 def process_new_keyframe(map: Map, id: int, recent: RecentPoints) -> None:
     """
@@ -2425,6 +2823,10 @@ def snapshot_keyframes(map: Map) -> KeyFrameSnapshot:
     """
     Copy ids, poses, time stamps and parents of the keyframes.
     """
+def snapshot_map(map: Map) -> MapSnapshot:
+    """
+    Copy keyframes, loop edges and points in one consistent view.
+    """
 def snapshot_observations(map: Map) -> ObservationSnapshot:
     """
     Copy who observes what, as compressed rows.
@@ -2449,6 +2851,17 @@ def solve_epnp(points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], 
 
     `intrinsics`: fx, fy, cx, cy [pixels]. Returns an EpnpPose, or None for collinear points.
     All points count as inliers. Raises ValueError for bad shapes.
+    """
+def solve_global_bundle(bundle: GatheredBundle, options: GlobalBundleOptions = ..., abort: StopFlag | None = None, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> BundleSummary:
+    """
+    Refine a gathered bundle; returns a BundleSummary. Takes no lock.
+
+    `abort`: a StopFlag polled once per iteration, or None; what an aborted run has reached
+    is not committed. Results that are worse or not finite are not either.
+    """
+def street_lap_way(length: typing.SupportsFloat | typing.SupportsIndex, breadth: typing.SupportsFloat | typing.SupportsIndex, width: typing.SupportsFloat | typing.SupportsIndex) -> Way:
+    """
+    Once around the block of make_street_lap with the same sizes.
     """
 def street_way(length: typing.SupportsFloat | typing.SupportsIndex) -> Way:
     """
@@ -2475,6 +2888,14 @@ def triangulate(ray_1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "
 def two_rooms_way(size: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], passage: typing.SupportsFloat | typing.SupportsIndex) -> Way:
     """
     From the first room of make_two_rooms into the second.
+    """
+def verify_loop_candidate(map: Map, current: int, candidate: int, options: LoopVerificationOptions) -> Loop | None:
+    """
+    Verify by geometry that two keyframes show the same place.
+
+    Matches by words, a similarity by RANSAC, guided matching, refinement, projection of
+    the points around the candidate (spec 14, section 3). Returns a Loop, or None when a
+    step finds too little or a keyframe is dead. The map is not changed.
     """
 def words_of(frame: Frame) -> WordVector:
     """
