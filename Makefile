@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= $(shell nproc)
 
-.PHONY: demo test bench lint types stubs format sanitize tidy wheel install clean \
+.PHONY: demo test bench lint types stubs format sanitize stress tidy wheel install clean \
   test-cpp test-python help
 
 help:
@@ -13,6 +13,7 @@ help:
 	@echo "make test      all tests: C++, Python, lint, types"
 	@echo "make bench     measure, and compare with the reference's figures where they are known"
 	@echo "make sanitize  C++ tests under the address, undefined-behaviour and thread sanitizers"
+	@echo "make stress    ten minutes of all threads at random under the thread sanitizer"
 	@echo "make wheel     build dist/*.whl"
 	@echo "make format    apply clang-format and ruff"
 
@@ -79,7 +80,13 @@ sanitize: build/.system-packages
 	@cmake --preset asan >/dev/null && cmake --build build/asan -j $(JOBS)
 	@ctest --test-dir build/asan --output-on-failure -j $(JOBS)
 	@cmake --preset tsan >/dev/null && cmake --build build/tsan -j $(JOBS) --target thread_driver
-	@build/tsan/tests/cpp/thread_driver
+	@build/tsan/tests/cpp/thread_driver --seconds 60
+
+# The whole system in threads, disturbed at random, under the thread sanitizer.
+STRESS_SECONDS ?= 600
+stress: build/.system-packages
+	@cmake --preset tsan >/dev/null && cmake --build build/tsan -j $(JOBS) --target thread_driver
+	@build/tsan/tests/cpp/thread_driver --seconds $(STRESS_SECONDS)
 
 # ---- the rest ------------------------------------------------------------------------------------
 bench: install

@@ -1,261 +1,196 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
-// Tracks and maps at once in two threads, with the core's verbs in the order of tracking.py and
-// local_mapping.py, while a third thread reads the map as a viewer would. Under the thread
-// sanitizer any race in the core ends it with an error. Exit code 1 when tracking or an invariant
-// of the map fails.
+// The whole system in C++ threads: tracking, mapping, loop closing, full bundle adjustment, with
+// the core's verbs in the order of the Python modules, while others switch modes, reset, pause,
+// refine, look at the map, shut down and start again, at random. Under the thread sanitizer any
+// race in the core ends it with an error. Exit code 1 when an invariant of the map breaks, a
+// control operation hangs, or nothing happened.
 
-#include <atomic>
-#include <condition_variable>
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
-#include <deque>
-#include <limits>
-#include <mutex>
+#include <cstring>
 #include <random>
 #include <thread>
 
-#include "features/orb_extractor.hpp"
-#include "frame/build_frame.hpp"
-#include "map/anchor.hpp"
-#include "map/culling.hpp"
-#include "map/invariants.hpp"
-#include "map/keyframe_insertion.hpp"
-#include "map/local_map.hpp"
-#include "map/sightings.hpp"
-#include "matching/by_projection.hpp"
-#include "matching/by_words.hpp"
-#include "matching/for_triangulation.hpp"
-#include "matching/fuse.hpp"
-#include "optimize/local_bundle_adjustment.hpp"
-#include "optimize/pose_optimization.hpp"
-#include "places/vocabulary.hpp"
-#include "synthetic/paths.hpp"
-#include "synthetic/world.hpp"
+#include "driver/system.hpp"
 
 namespace {
 
 using namespace orbslam;
+using namespace orbslam::driver;
+using Clock = std::chrono::steady_clock;
 
-/// Two levels of random centres: enough to group features for matching by words.
-std::shared_ptr<const Vocabulary> random_vocabulary() {
-  std::mt19937_64 random(1);
-  const auto descriptor = [&random] {
-    Descriptor d;
-    for (auto& word : d.words) word = random();
-    return d;
-  };
-  std::vector<VocabularyNode> nodes;
-  for (int i = 0; i < 10; ++i) nodes.push_back({0, false, descriptor(), 0});
-  for (std::uint32_t parent = 1; parent <= 10; ++parent) {
-    for (int i = 0; i < 10; ++i) nodes.push_back({parent, true, descriptor(), 1.0});
+constexpr int kFramesPerLap = 90;
+
+struct Options {
+  double seconds = 20;
+  double patience = 2;  // seconds that a control operation may take
+  std::uint64_t seed = 1;
+};
+
+Options parse(int argc, char** argv) {
+  Options options;
+  for (int i = 1; i < argc; i += 2) {
+    const char* value = i + 1 < argc ? argv[i + 1] : nullptr;
+    char* end = nullptr;
+    const double number = value ? std::strtod(value, &end) : -1;
+    const bool good = value && end != value && *end == '\0' && number >= 0;
+    if (good && std::strcmp(argv[i], "--seconds") == 0) {
+      options.seconds = number;
+    } else if (good && std::strcmp(argv[i], "--patience") == 0) {
+      options.patience = number;
+    } else if (good && std::strcmp(argv[i], "--seed") == 0) {
+      options.seed = static_cast<std::uint64_t>(number);
+    } else {
+      std::fprintf(stderr, "usage: thread_driver [--seconds N] [--patience SECONDS] [--seed S]\n");
+      std::exit(2);
+    }
   }
-  return Vocabulary::from_nodes(10, 2, Scoring::kL1, Weighting::kTfIdf, nodes);
+  return options;
 }
 
-/// The mapper of local_mapping.py with a queue of keyframes.
-class Mapper {
+/// Own draws: those of the standard library differ between platforms.
+class Random {
  public:
-  explicit Mapper(Map& map) : map_(map), thread_([this] { run(); }) {}
-  ~Mapper() {
-    {
-      const std::lock_guard lock(mutex_);
-      finished_ = true;
-      interrupt_ = true;
-    }
-    wake_.notify_all();
-    thread_.join();
+  explicit Random(std::uint64_t seed) : engine_(seed) {}
+  int below(int n) {
+    return static_cast<int>((engine_() >> 32) * static_cast<std::uint64_t>(n) >> 32);
   }
+  bool chance(int percent) { return below(100) < percent; }
 
-  void submit(KeyFrameId keyframe) {
-    {
-      const std::lock_guard lock(mutex_);
-      queue_.push_back(keyframe);
-      waiting_ = true;
-      interrupt_ = true;
-    }
-    wake_.notify_all();
-  }
-  std::size_t n_waiting() const {
-    const std::lock_guard lock(mutex_);
-    return queue_.size();
-  }
-  bool idle() const {
-    const std::lock_guard lock(mutex_);
-    return queue_.empty() && !busy_;
+ private:
+  std::mt19937_64 engine_;
+};
+
+/// One system from start to shutdown, and the threads that disturb it.
+class Session {
+ public:
+  Session(ImageRing& images, Counts& counts, Watchdog& watchdog, std::uint64_t seed)
+      : counts_(counts), system_(images, counts, watchdog, seed), seed_(seed) {}
+
+  void run(Clock::duration duration, bool drain) {
+    std::thread threads[] = {
+        std::thread([this] {
+          while (!done_) system_.track_next();
+        }),
+        std::thread([this] { control(); }),
+        std::thread([this] { refine(); }),
+        std::thread([this] { look(); }),
+    };
+    std::this_thread::sleep_for(duration);
+    system_.shutdown(drain);  // while the others go on
+    done_ = true;
+    for (std::thread& thread : threads) thread.join();
   }
 
  private:
-  void run() {
-    for (;;) {
-      KeyFrameId keyframe;
-      {
-        std::unique_lock lock(mutex_);
-        busy_ = false;
-        wake_.wait(lock, [this] { return finished_ || !queue_.empty(); });
-        if (finished_) return;
-        keyframe = queue_.front();
-        queue_.pop_front();
-        busy_ = true;
-        waiting_ = !queue_.empty();
-        interrupt_ = false;
+  /// Sleeps until some more frames have been tracked; false at the end.
+  bool wait_for_frames(int n) {
+    const int until = counts_.frames + n;
+    while (counts_.frames < until && !done_) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return !done_;
+  }
+
+  void control() {
+    Random random(seed_);
+    int loops = counts_.loops_closed;
+    while (wait_for_frames(1 + random.below(kFramesPerLap / 3))) {
+      if (system_.localization_wanted()) {
+        // The mode ends soon; now and then a reset comes first.
+        if (random.chance(10)) system_.request_reset();
+        system_.request_localization(false);
+        continue;
       }
-      process(keyframe);
+      const int action = random.below(100);
+      if (action < 15) {
+        system_.request_localization(true);
+      } else if (action < 55) {
+        const std::chrono::milliseconds duration(random.below(20));
+        system_.pause(random.below(3), random.chance(50), duration);
+      } else if (action < 58) {
+        system_.request_jump();
+      } else if (action < 61 || (counts_.loops_closed != loops && action < 90)) {
+        // Soon after a loop: the same map sees no second one at this place.
+        loops = counts_.loops_closed;
+        system_.request_reset();
+      }
     }
   }
 
-  void process(KeyFrameId keyframe) {
-    process_new_keyframe(map_, keyframe, recent_);
-    cull_recent_points(map_, keyframe, 3, recent_);
-    const auto created = create_new_points(map_, keyframe, NewPointOptions{}, &waiting_);
-    recent_.insert(recent_.end(), created.begin(), created.end());
-    if (!waiting_) fuse_with_neighbours(map_, keyframe, 10);
-    if (!waiting_) {
-      local_bundle_adjustment(map_, keyframe, &interrupt_);
-      cull_keyframes(map_, keyframe, true);
+  void refine() {
+    Random random(seed_ + 1);
+    while (wait_for_frames(random.below(2 * kFramesPerLap))) system_.optimize();
+  }
+
+  void look() {
+    Random random(seed_ + 2);
+    while (!done_) {
+      system_.look();
+      std::this_thread::sleep_for(std::chrono::milliseconds(20 + random.below(100)));
     }
   }
 
-  Map& map_;
-  std::vector<MapPointId> recent_;
-  mutable std::mutex mutex_;
-  std::condition_variable wake_;
-  std::deque<KeyFrameId> queue_;
-  bool finished_ = false, busy_ = false;
-  std::atomic<bool> waiting_{false}, interrupt_{false};
-  std::thread thread_;
+  Counts& counts_;
+  System system_;
+  const std::uint64_t seed_;
+  std::atomic<bool> done_{false};
 };
 
-/// The tracker of tracking.py for an RGB-D camera.
-class Tracker {
- public:
-  Tracker(Map& map, Mapper& mapper, std::shared_ptr<const Vocabulary> vocabulary)
-      : map_(map), mapper_(mapper), vocabulary_(std::move(vocabulary)) {}
+void print(const Counts& c, const Watchdog& watchdog, double minutes) {
+  std::printf("%d frames (%.0f a minute), %d keyframes, %d lost, %d relocalized, %d localized\n",
+              c.frames.load(), c.frames / minutes, c.keyframes.load(), c.lost.load(),
+              c.relocalized.load(), c.localized.load());
+  std::printf("%d loops closed (%.1f a minute), %d corrections dropped, %d candidates verified\n",
+              c.loops_closed.load(), c.loops_closed / minutes, c.corrections_dropped.load(),
+              c.verified.load());
+  std::printf("full adjustments: %d begun, %d committed, %d given up\n", c.adjustments_begun.load(),
+              c.adjustments_committed.load(), c.adjustments_dropped.load());
+  std::printf("%d resets, %d mode switches, %d pauses, %d looks, %d shutdowns\n", c.resets.load(),
+              c.mode_switches.load(), c.pauses.load(), c.snapshots.load(), c.shutdowns.load());
+  std::printf("slowest:");
+  for (const auto& [name, ms] : watchdog.slowest()) std::printf(" %s %.0f ms;", name.c_str(), ms);
+  std::printf("\n");
+}
 
-  /// Returns the number of inliers; below 30 tracking is lost.
-  int track(std::shared_ptr<Frame> image) {
-    describe(*image, *vocabulary_);
-    TrackedFrame frame(std::move(image));
-    if (!last_) {
-      frame.T_cw = Pose();
-      insert(frame, std::numeric_limits<std::size_t>::max());
-      remember(std::move(frame));
-      return std::numeric_limits<int>::max();
-    }
-
-    const PointBatch points = follow_map(map_, *last_).points;
-    frame.T_cw = velocity_ * *last_->T_cw;
-    frame.anchor = last_->anchor;
-    int n_matches = match_last_frame(frame, *last_, points, 15, true);
-    if (n_matches < 20) {
-      frame.T_cw = last_->T_cw;
-      n_matches = match_keyframe_by_words(map_, reference_, frame, 0.7F);
-    }
-    optimize_pose(frame);
-    const auto discarded = frame.discard_outliers();
-
-    const LocalMap local = select_local_map(map_, frame);
-    if (local.reference_keyframe.valid()) reference_ = local.reference_keyframe;
-    const LocalMapMatches matches = match_local_map(frame, local.points, discarded, 3);
-    const PoseEstimate estimate = optimize_pose(frame);
-    count_sightings(map_, frame, matches.visible);
-    velocity_ = *frame.T_cw * last_->T_cw->inverse();
-
-    const int n_reference = count_tracked_points(map_, reference_, 3);
-    const bool weak = estimate.n_inliers < 0.75 * n_reference;
-    if ((weak || frame.frame->id % 10 == 0) && mapper_.n_waiting() < 3) insert(frame, 100);
-    frame.discard_outliers();
-    remember(std::move(frame));
-    return estimate.n_inliers;
+/// What must have happened for the run to mean anything.
+bool eventful(const Counts& c) {
+  const std::pair<const char*, int> needed[] = {
+      {"loop closed", c.loops_closed},
+      {"full adjustment committed", c.adjustments_committed},
+      {"reset", c.resets},
+      {"mode switch", c.mode_switches},
+      {"pause", c.pauses},
+      {"look at the map", c.snapshots},
+      {"frame in localization mode", c.localized}};
+  bool all = true;
+  for (const auto& [what, count] : needed) {
+    if (count > 0) continue;
+    std::printf("no %s\n", what);
+    all = false;
   }
-
- private:
-  void insert(TrackedFrame& frame, std::size_t n_minimum) {
-    reference_ = insert_keyframe(map_, frame, true, n_minimum);
-    mapper_.submit(reference_);
-  }
-  void remember(TrackedFrame frame) { last_ = std::move(frame); }
-
-  Map& map_;
-  Mapper& mapper_;
-  std::shared_ptr<const Vocabulary> vocabulary_;
-  std::optional<TrackedFrame> last_;
-  Pose velocity_;
-  KeyFrameId reference_;
-};
-
-/// What a viewer does: looks at everything, all the time.
-void read_until(const Map& map, const std::atomic<bool>& done) {
-  while (!done) {
-    {
-      const auto lock = map.read_lock();
-      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-      map.for_each_keyframe([&sum](const KeyFrame& keyframe) { sum += keyframe.center(); });
-      map.for_each_point([&sum](const MapPoint& point) { sum += point.position; });
-      if (!sum.allFinite()) std::abort();
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  }
+  return all;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  const int n_frames = argc > 1 ? std::atoi(argv[1]) : 60;
-  const Eigen::Vector3d room(8, 3, 6);
-  const synthetic::World world = synthetic::make_room(room, 1, 6);
-  synthetic::RenderOptions view;
-  view.fx = view.fy = 260;
-  view.cx = 160;
-  view.cy = 120;
-  view.size = {320, 240};
-  view.noise = 2;
-
-  OrbOptions orb;
-  orb.n_features = 700;
-  OrbExtractor extractor(orb);
-  CameraOptions camera;
-  camera.pinhole = {view.fx, view.fy, view.cx, view.cy};
-  camera.bf = 0.08 * view.fx;
-  camera.depth_ratio = 40;
-  camera.image_size = view.size;
-  const FrameContext context{std::make_shared<Camera>(camera),
-                             std::make_shared<ScalePyramid>(extractor.scales())};
-
-  Map map;
-  int worst = std::numeric_limits<int>::max();
-  double error = 0;
-  {
-    Mapper mapper(map);
-    Tracker tracker(map, mapper, random_vocabulary());
-    std::atomic<bool> done{false};
-    std::thread reader([&map, &done] { read_until(map, done); });
-    const Pose T_w0 = synthetic::room_T_wc(room, 0);
-    for (int i = 0; i < n_frames; ++i) {
-      const Pose T_wc = synthetic::room_T_wc(room, i / 30.0);
-      view.noise_seed = static_cast<std::uint64_t>(i);
-      const auto image = synthetic::render(world, T_wc.inverse(), view);
-      worst = std::min(
-          worst, tracker.track(build_rgbd_frame(
-                     context, i, i / 30.0, extractor.extract(image.grey).features, image.depth)));
-    }
-    // Let the mapper work off its queue while the reader still looks.
-    while (!mapper.idle()) std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    done = true;
-    reader.join();
-
-    const auto lock = map.read_lock();
-    map.for_each_keyframe([&](const KeyFrame& keyframe) {
-      const Pose truth = synthetic::room_T_wc(room, keyframe.frame->timestamp);
-      error = std::max(error, (keyframe.center() - (T_w0.inverse() * truth).translation()).norm());
-    });
+  const Options options = parse(argc, argv);
+  ImageRing images(kFramesPerLap, options.seed);
+  Counts counts;
+  Watchdog watchdog(options.patience);
+  Random random(options.seed);
+  const auto begin = Clock::now();
+  const auto end = begin + std::chrono::duration_cast<Clock::duration>(
+                               std::chrono::duration<double>(options.seconds));
+  for (std::uint64_t n = 0; Clock::now() < end; ++n) {
+    Session session(images, counts, watchdog, options.seed * 1000 + n);
+    const Clock::duration wanted = std::chrono::milliseconds(5000 + random.below(15000));
+    session.run(std::min<Clock::duration>(wanted, end - Clock::now()), random.chance(50));
   }
-
-  const auto violations = check_invariants(map, true);
-  for (const auto& violation : violations) std::printf("%s\n", violation.c_str());
-  std::printf(
-      "%d frames, %zu keyframes, %zu points, fewest inliers %d, largest keyframe error %.4f m\n",
-      n_frames, map.n_keyframes(), map.n_points(), worst, error);
-  // Images of 320 x 240 of walls 3 m away: a pixel is a centimetre.
-  return violations.empty() && worst >= 30 && error < 0.15 ? EXIT_SUCCESS : EXIT_FAILURE;
+  const std::chrono::duration<double> taken = Clock::now() - begin;
+  print(counts, watchdog, taken.count() / 60);
+  return eventful(counts) ? EXIT_SUCCESS : EXIT_FAILURE;
 }

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "driver/back_end.hpp"
+
+#include <cstdio>
+#include <cstdlib>
+
+#include "loops/loop_choice.hpp"
+#include "loops/loop_correction.hpp"
+#include "map/culling.hpp"
+#include "map/invariants.hpp"
+#include "map/keyframe_insertion.hpp"
+#include "matching/for_triangulation.hpp"
+#include "matching/fuse.hpp"
+#include "optimize/global_bundle_adjustment.hpp"
+#include "optimize/local_bundle_adjustment.hpp"
+#include "places/place_recognition.hpp"
+
+namespace orbslam::driver {
+namespace {
+
+constexpr int kGap = 10;  // keyframes after a loop that are not searched
+
+/// Protects a keyframe while it is looked at; false when it is dead already.
+class Lease {
+ public:
+  Lease(Map& map, KeyFrameIndex& index, KeyFrameId id) : map_(map), index_(index), id_(id) {
+    const auto lock = map_.write_lock();
+    alive_ = map_.find(id_) != nullptr;
+    if (alive_) map_.begin_lease(id_);
+  }
+  ~Lease() {
+    if (!alive_) return;
+    bool died;
+    {
+      const auto lock = map_.write_lock();
+      died = map_.end_lease(id_);
+    }
+    if (died) index_.erase(id_);
+  }
+  Lease(const Lease&) = delete;
+  Lease& operator=(const Lease&) = delete;
+  bool alive() const { return alive_; }
+
+ private:
+  Map& map_;
+  KeyFrameIndex& index_;
+  const KeyFrameId id_;
+  bool alive_;
+};
+
+}  // namespace
+
+void check_map(const Map& map, const char* when) {
+  const auto violations = check_invariants(map, true);
+  if (violations.empty()) return;
+  for (const auto& violation : violations) {
+    std::fprintf(stderr, "%s: %s\n", when, violation.c_str());
+  }
+  std::abort();
+}
+
+// ---- local mapping ------------------------------------------------------------------------------
+LocalMapping::LocalMapping(Map& map, KeyFrameIndex& index, Counts& counts)
+    : worker("local mapping", [this](KeyFrameId id) { process(id); }),
+      map_(map),
+      index_(index),
+      counts_(counts) {}
+
+void LocalMapping::start() {
+  for (const KeyFrameId keyframe : inserted_) worker.submit(keyframe);
+  inserted_.clear();
+}
+
+void LocalMapping::reset() {
+  worker.reset();
+  inserted_.clear();
+  recent_.clear();
+}
+
+void LocalMapping::process(KeyFrameId keyframe) {
+  ++counts_.keyframes;
+  process_new_keyframe(map_, keyframe, recent_);
+  cull_recent_points(map_, keyframe, 3, recent_);
+  const auto created =
+      create_new_points(map_, keyframe, NewPointOptions{}, &worker.waiting_flag.value());
+  recent_.insert(recent_.end(), created.begin(), created.end());
+  if (worker.n_waiting() == 0) fuse_with_neighbours(map_, keyframe, 10);
+  if (worker.lower_interrupt()) {
+    local_bundle_adjustment(map_, keyframe, &worker.interrupt_flag.value());
+    for (const KeyFrameId dead : cull_keyframes(map_, keyframe, true)) index_.erase(dead);
+  }
+  on_done(keyframe);
+}
+
+// ---- full bundle adjustment ---------------------------------------------------------------------
+FullAdjustment::FullAdjustment(Map& map, LocalMapping& mapping, Counts& counts)
+    : worker("full adjustment", [this](KeyFrameId) { process(); }),
+      map_(map),
+      mapping_(mapping),
+      counts_(counts) {}
+
+void FullAdjustment::start() {
+  cancel();
+  worker.submit(KeyFrameId(0));
+}
+
+void FullAdjustment::process() {
+  ++counts_.adjustments_begun;
+  const std::atomic<bool>& cancelled = worker.cancel_flag.value();
+  std::optional<Worker::OffDuty> off_duty(worker);
+  GatheredBundle bundle = gather_global_bundle(map_);
+  const BundleSummary summary = solve_global_bundle(bundle, GlobalBundleOptions{}, &cancelled, 2);
+  off_duty.reset();
+  bool committed = false;
+  if (!summary.aborted && !cancelled) {
+    Worker::Pause pause(mapping_.worker, true);
+    pause.wait();
+    committed = commit_global_bundle(map_, bundle).committed;
+  }
+  ++(committed ? counts_.adjustments_committed : counts_.adjustments_dropped);
+}
+
+// ---- loop closing -------------------------------------------------------------------------------
+LoopClosing::LoopClosing(Map& map, KeyFrameIndex& index, LocalMapping& mapping,
+                         FullAdjustment& adjustment, Counts& counts, int frames_per_lap,
+                         std::uint64_t seed)
+    : worker("loop closing", [this](KeyFrameId id) { process(id); }),
+      map_(map),
+      index_(index),
+      mapping_(mapping),
+      adjustment_(adjustment),
+      counts_(counts),
+      frames_per_lap_(frames_per_lap) {
+  options_.fix_scale = true;
+  options_.seed = seed;
+}
+
+void LoopClosing::reset() {
+  worker.reset();
+  consistency_.clear();
+  next_search_ = 1;
+  members_.clear();
+}
+
+void LoopClosing::process(KeyFrameId keyframe) {
+  const Lease lease(map_, index_, keyframe);
+  if (!lease.alive()) return;
+  const std::optional<Loop> loop = find_loop(keyframe);
+  members_.push_back(keyframe);
+  if (loop) close(*loop);
+}
+
+std::optional<Loop> LoopClosing::find_loop(KeyFrameId keyframe) {
+  std::vector<KeyFrameId> candidates;
+  if (keyframe.value < next_search_) {
+    consistency_.clear();
+  } else {
+    const double least_score = lowest_neighbour_score(map_, keyframe);
+    std::vector<KeyFrameId> proposed;
+    for (const PlaceCandidate& place : find_loop_candidates(index_, map_, keyframe, least_score)) {
+      proposed.push_back(place.keyframe);
+    }
+    candidates = consistency_.update(map_, proposed);
+    if (candidates.empty()) candidates = a_lap_before(keyframe);
+  }
+  index_keyframe(index_, map_, keyframe);
+
+  std::vector<Loop> loops;
+  for (const KeyFrameId candidate : candidates) {
+    if (worker.cancel_flag.is_set()) return std::nullopt;
+    auto loop = verify_loop_candidate(map_, keyframe, candidate, options_);
+    if (loop) loops.push_back(std::move(*loop));
+  }
+  counts_.verified += static_cast<int>(loops.size());
+  return choose_loop(map_, loops, options_.fix_scale);
+}
+
+std::vector<KeyFrameId> LoopClosing::a_lap_before(KeyFrameId keyframe) const {
+  const auto lock = map_.read_lock();
+  const KeyFrame* current = map_.find(keyframe);
+  if (!current) return {};
+  for (const KeyFrameId id : members_) {
+    const KeyFrame* other = map_.find(id);
+    if (!other || map_.weight(keyframe, id) > 0) continue;
+    const auto apart = current->frame->id - other->frame->id;
+    const auto views = apart % frames_per_lap_;
+    if (apart > frames_per_lap_ / 2 && (views <= 2 || views >= frames_per_lap_ - 2)) return {id};
+  }
+  return {};
+}
+
+void LoopClosing::close(const Loop& loop) {
+  adjustment_.cancel();  // what it refines is about to move
+  LoopCorrectionResult result;
+  {
+    // Nobody else moves the map as a whole while the correction is worked out.
+    const Worker::Pause no_adjustment(adjustment_.worker, true);
+    Worker::Pause pause(mapping_.worker, true);
+    pause.wait();
+    {
+      const auto lock = map_.write_lock();
+      map_.update_connections(loop.current);
+    }
+    LoopCorrection correction = plan_loop_correction(map_, loop, options_.fix_scale);
+    if (!optimize_essential_graph(correction, &worker.cancel_flag.value()).aborted) {
+      result = apply_loop_correction(map_, correction);
+    }
+    if (result.applied) check_map(map_, "after a loop");
+  }
+  if (!result.applied) {
+    ++counts_.corrections_dropped;
+    return;
+  }
+  ++counts_.loops_closed;
+  consistency_.clear();
+  next_search_ = loop.current.value + kGap;
+  adjustment_.start();
+}
+
+}  // namespace orbslam::driver

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "driver/images.hpp"
+
+#include "places/vocabulary_training.hpp"
+#include "synthetic/paths.hpp"
+#include "synthetic/world.hpp"
+
+namespace orbslam::driver {
+namespace {
+
+OrbOptions orb_options() {
+  OrbOptions orb;
+  orb.n_features = 450;
+  orb.n_levels = 6;
+  return orb;
+}
+
+synthetic::RenderOptions view_options() {
+  synthetic::RenderOptions view;
+  view.fx = view.fy = 200;
+  view.cx = 120;
+  view.cy = 90;
+  view.size = {240, 180};
+  view.noise = 2;
+  return view;
+}
+
+FrameContext context_for(const synthetic::RenderOptions& view, const OrbExtractor& extractor) {
+  CameraOptions camera;
+  camera.pinhole = {view.fx, view.fy, view.cx, view.cy};
+  camera.bf = 0.08 * view.fx;
+  camera.depth_ratio = 60;
+  camera.image_size = view.size;
+  return {std::make_shared<Camera>(camera), std::make_shared<ScalePyramid>(extractor.scales())};
+}
+
+}  // namespace
+
+ImageRing::ImageRing(int frames_per_lap, std::uint64_t seed) : extractor_(orb_options()) {
+  synthetic::RenderOptions options = view_options();
+  context_ = context_for(options, extractor_);
+  const Eigen::Vector3d room(7, 3, 6);
+  const synthetic::World world = synthetic::make_room(room, seed, 6);
+  TrainingSet descriptors;
+  for (int i = 0; i < frames_per_lap; ++i) {
+    options.noise_seed = static_cast<std::uint64_t>(i);
+    const Pose T_wc = synthetic::room_T_wc(room, i, frames_per_lap);
+    const synthetic::Rendering image = synthetic::render(world, T_wc.inverse(), options);
+    views_.push_back({image.grey, image.depth});
+    const Features features = extractor_.extract(image.grey).features;
+    descriptors.descriptors.insert(descriptors.descriptors.end(), features.descriptors.begin(),
+                                   features.descriptors.end());
+    descriptors.image_ends.push_back(descriptors.descriptors.size());
+  }
+  dark_ = {cv::Mat::zeros(views_[0].grey.size(), CV_8UC1),
+           cv::Mat::zeros(views_[0].depth.size(), CV_32FC1)};
+  TrainingOptions training;
+  training.branching = 9;
+  training.depth = 3;
+  training.seed = seed;
+  training.max_iterations = 5;
+  training.n_threads = 1;
+  vocabulary_ = train_vocabulary(descriptors, training);
+}
+
+std::shared_ptr<Frame> ImageRing::frame(std::int64_t view, FrameId id, double timestamp,
+                                        double depth_factor) {
+  return build(views_[static_cast<std::size_t>(view % size())], id, timestamp, depth_factor);
+}
+
+std::shared_ptr<Frame> ImageRing::dark_frame(FrameId id, double timestamp) {
+  return build(dark_, id, timestamp, 1);
+}
+
+std::shared_ptr<Frame> ImageRing::build(const View& view, FrameId id, double timestamp,
+                                        double depth_factor) {
+  cv::Mat depth;
+  view.depth.convertTo(depth, CV_32FC1, depth_factor);
+  auto frame =
+      build_rgbd_frame(context_, id, timestamp, extractor_.extract(view.grey).features, depth);
+  describe(*frame, *vocabulary_);
+  return frame;
+}
+
+}  // namespace orbslam::driver

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+#include "features/orb_extractor.hpp"
+#include "frame/build_frame.hpp"
+#include "places/vocabulary.hpp"
+
+namespace orbslam::driver {
+
+/// A camera that turns round in a room, once per lap; rendered when made, played as often as
+/// wanted.
+class ImageRing {
+ public:
+  ImageRing(int frames_per_lap, std::uint64_t seed);
+
+  int size() const { return static_cast<int>(views_.size()); }
+  /// The frame of the view number `view` (any number), described. Depths are stretched by
+  /// `depth_factor`: a drift that a loop can take out. One thread.
+  std::shared_ptr<Frame> frame(std::int64_t view, FrameId id, double timestamp,
+                               double depth_factor);
+  /// A frame on which nothing is seen.
+  std::shared_ptr<Frame> dark_frame(FrameId id, double timestamp);
+
+ private:
+  struct View {
+    cv::Mat grey, depth;
+  };
+  std::shared_ptr<Frame> build(const View& view, FrameId id, double timestamp, double depth_factor);
+
+  std::vector<View> views_;
+  View dark_;
+  OrbExtractor extractor_;
+  FrameContext context_;
+  std::shared_ptr<const Vocabulary> vocabulary_;
+};
+
+}  // namespace orbslam::driver
