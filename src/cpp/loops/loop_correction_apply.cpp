@@ -1,87 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The changes that a correction makes to the map. What can be worked out before the write section
-// is worked out under a read lock.
+// The changes that a correction makes to the map.
 #include <algorithm>
+#include <optional>
 
 #include "loops/essential_graph.hpp"
 #include "loops/loop_correction.hpp"
-#include "map/map_rewrite.hpp"
+#include "loops/prepared_correction.hpp"
 
 namespace orbslam {
 namespace {
 
-/// How the world moves at each vertex.
-class Movement {
- public:
-  explicit Movement(const LoopCorrection& correction) : correction_(correction) {
-    world_.reserve(correction.keyframes.size());
-    for (std::size_t k = 0; k < correction.keyframes.size(); ++k) {
-      world_.push_back(correction.graph.S_iw[k].inverse() * correction.uncorrected[k]);
-    }
-  }
-
-  void move_keyframe(const KeyFrame& keyframe, MapRewrite& rewrite) const {
-    const std::ptrdiff_t vertex = vertex_of(correction_.keyframes, keyframe.id);
-    const Similarity S_cw = vertex >= 0
-                                ? correction_.graph.S_iw[static_cast<std::size_t>(vertex)]
-                                : Similarity(keyframe.T_cw) * world_at(keyframe.id).inverse();
-    rewrite.move_keyframe(keyframe.id, S_cw.pose(), 1 / S_cw.scale());
-  }
-  void move_point(const MapPoint& point, std::uint32_t vertex, MapRewrite& rewrite) const {
-    rewrite.move_point(point.id, world_[vertex] * point.position);
-  }
-  /// A point that was not planned for.
-  void move_point(const MapPoint& point, MapRewrite& rewrite) const {
-    rewrite.move_point(point.id, world_at(point.reference_keyframe) * point.position);
-  }
-
- private:
-  const Similarity& world_at(KeyFrameId id) const {
-    return world_[vertex_before(correction_.keyframes, id)];
-  }
-
-  const LoopCorrection& correction_;
-  std::vector<Similarity> world_;  // per vertex: from the old world to the new one
-};
-
 bool is_applicable(const Map& map, const LoopCorrection& correction) {
   return !correction.keyframes.empty() && map.epoch() == correction.epoch &&
          map.find(correction.loop.current) && map.find(correction.loop.matched);
-}
-
-/// Everything in the map at this moment. The caller holds a lock. Returns the last keyframe.
-KeyFrameId prepare(const Map& map, const LoopCorrection& correction, const Movement& movement,
-                   MapRewrite& rewrite) {
-  KeyFrameId last;
-  map.for_each_keyframe([&](const KeyFrame& keyframe) {
-    movement.move_keyframe(keyframe, rewrite);
-    last = keyframe.id;
-  });
-  auto planned = correction.carried.begin();
-  map.for_each_point([&](const MapPoint& point) {
-    while (planned != correction.carried.end() && planned->first < point.id) ++planned;
-    if (planned != correction.carried.end() && planned->first == point.id) {
-      movement.move_point(point, planned->second, rewrite);
-    } else {
-      movement.move_point(point, rewrite);
-    }
-  });
-  rewrite.prepare(map);
-  return last;
-}
-
-/// Keyframes that the tracker inserted after the preparation, with the points it made of them.
-MapRewrite newcomers(const Map& map, KeyFrameId last, const Movement& movement) {
-  MapRewrite rewrite;
-  map.for_each_keyframe([&](const KeyFrame& keyframe) {
-    if (keyframe.id <= last) return;
-    movement.move_keyframe(keyframe, rewrite);
-    for (const MapPointId id : keyframe.map_points) {
-      const MapPoint* point = map.find(id);
-      if (point && point->reference_keyframe == keyframe.id) movement.move_point(*point, rewrite);
-    }
-  });
-  return rewrite;
 }
 
 /// Returns the number of changes. Points that gained an observation are appended to `added`.
@@ -109,46 +40,94 @@ int fuse(Map& map, const LoopCorrection& correction, std::vector<MapPointId>& ad
   return n_fused;
 }
 
-void describe_movement(const LoopCorrection& correction, const Pose& before, const Pose& after,
-                       LoopCorrectionResult& result) {
-  const std::ptrdiff_t vertex = vertex_of(correction.keyframes, correction.loop.current);
-  result.translation = (after.center() - before.center()).norm();
-  result.rotation = before.rotation().angularDistance(after.rotation());
-  result.scale = 1 / correction.graph.S_iw[static_cast<std::size_t>(vertex)].scale();
-}
-
 }  // namespace
 
-LoopCorrectionResult apply_loop_correction(Map& map, const LoopCorrection& correction) {
-  LoopCorrectionResult result;
-  const Movement movement(correction);
-  MapRewrite rewrite;
-  KeyFrameId last;
-  Pose before;
-  {
-    const auto lock = map.read_lock();
-    if (!is_applicable(map, correction)) return result;
-    before = map.T_cw(correction.loop.current);
-    last = prepare(map, correction, movement, rewrite);
+PreparedCorrection::PreparedCorrection(const Map& map, const LoopCorrection& correction)
+    : correction_(correction) {
+  if (!is_applicable(map, correction)) return;
+  world_.reserve(correction.keyframes.size());
+  for (std::size_t k = 0; k < correction.keyframes.size(); ++k) {
+    world_.push_back(correction.graph.S_iw[k].inverse() * correction.uncorrected[k]);
   }
-  const auto lock = map.write_lock();
-  if (!is_applicable(map, correction)) return result;
-  MapRewrite late = newcomers(map, last, movement);
+  map.for_each_keyframe([&](const KeyFrame& keyframe) {
+    move_keyframe(keyframe, rewrite_);
+    last_ = keyframe.id;
+  });
+  auto planned = correction.carried.begin();  // both ascend
+  map.for_each_point([&](const MapPoint& point) {
+    while (planned != correction.carried.end() && planned->first < point.id) ++planned;
+    const bool was_planned = planned != correction.carried.end() && planned->first == point.id;
+    move_point(point, was_planned ? world_[planned->second] : world_at(point.reference_keyframe),
+               rewrite_);
+  });
+  rewrite_.prepare(map);
+}
+
+const Similarity& PreparedCorrection::world_at(KeyFrameId id) const {
+  return world_[vertex_before(correction_.keyframes, id)];
+}
+
+void PreparedCorrection::move_keyframe(const KeyFrame& keyframe, MapRewrite& rewrite) const {
+  const std::ptrdiff_t vertex = vertex_of(correction_.keyframes, keyframe.id);
+  const Similarity S_cw = vertex >= 0 ? correction_.graph.S_iw[static_cast<std::size_t>(vertex)]
+                                      : Similarity(keyframe.T_cw) * world_at(keyframe.id).inverse();
+  rewrite.move_keyframe(keyframe.id, S_cw.pose(), 1 / S_cw.scale());
+}
+
+void PreparedCorrection::move_point(const MapPoint& point, const Similarity& world,
+                                    MapRewrite& rewrite) {
+  rewrite.move_point(point.id, world * point.position);
+}
+
+MapRewrite PreparedCorrection::newcomers(const Map& map) const {
+  MapRewrite rewrite;
+  map.for_each_keyframe([&](const KeyFrame& keyframe) {
+    if (keyframe.id <= last_) return;
+    move_keyframe(keyframe, rewrite);
+    for (const MapPointId id : keyframe.map_points) {
+      const MapPoint* point = map.find(id);
+      if (!point || point->reference_keyframe != keyframe.id) continue;
+      move_point(*point, world_at(keyframe.id), rewrite);
+    }
+  });
+  return rewrite;
+}
+
+LoopCorrectionResult PreparedCorrection::commit(Map& map) const {
+  LoopCorrectionResult result;
+  if (world_.empty() || !is_applicable(map, correction_)) return result;
+  const KeyFrameId current = correction_.loop.current;
+  const ScaledPose before = map.scaled_pose(current);
+  const MapRewrite late = newcomers(map);
   std::vector<MapPointId> added;
-  result.n_fused = fuse(map, correction, added);
-  rewrite.apply(map);
+  result.n_fused = fuse(map, correction_, added);
+  rewrite_.apply(map);
   late.apply(map);
   std::sort(added.begin(), added.end());
   added.erase(std::unique(added.begin(), added.end()), added.end());
   for (const MapPointId id : added) map.update_descriptor(id);
-  for (const KeyFrameId id : correction.group) {
+  for (const KeyFrameId id : correction_.group) {
     if (map.find(id)) map.update_connections(id);
   }
-  map.add_loop_edge(correction.loop.matched, correction.loop.current);
+  map.add_loop_edge(correction_.loop.matched, current);
   map.count_big_change();
-  describe_movement(correction, before, map.T_cw(correction.loop.current), result);
+
+  const ScaledPose after = map.scaled_pose(current);
   result.applied = true;
+  result.translation = (after.T_cw.center() - before.T_cw.center()).norm();
+  result.rotation = before.T_cw.rotation().angularDistance(after.T_cw.rotation());
+  result.scale = after.scale / before.scale;
   return result;
+}
+
+LoopCorrectionResult apply_loop_correction(Map& map, const LoopCorrection& correction) {
+  std::optional<PreparedCorrection> prepared;
+  {
+    const auto lock = map.read_lock();
+    prepared.emplace(map, correction);
+  }
+  const auto lock = map.write_lock();
+  return prepared->commit(map);
 }
 
 }  // namespace orbslam

@@ -83,6 +83,17 @@ TEST_F(Draft, PointsThatOneKeyframeTellsApartStayTwo) {
   EXPECT_EQ(fusions[2].replaced, elsewhere);
 }
 
+TEST_F(Draft, OnThisSideAKeyframeMaySeeBoth) {
+  FusionDraft drafted = draft({far});
+  drafted.fuse(0, 100, far);  // beside the one it has
+  drafted.fuse(1, slot_of(near, 3), far);
+  EXPECT_EQ(drafted.shared_points()[0].size(), 3U);
+  drafted.fuse(0, slot_of(near, 2), far);  // is free now, but the point is there already
+  const auto fusions = drafted.take_fusions();
+  ASSERT_EQ(fusions.size(), 2U);
+  EXPECT_EQ(fusions[1].replaced, near);
+}
+
 TEST_F(Draft, ReplacedPointsOfTheFarSideAreFollowed) {
   const MapPointId elsewhere = builder.add_point(kfs({1}));
   const MapPointId unrelated = builder.map.add_point({0, 0, 5}, kf(0), 0);

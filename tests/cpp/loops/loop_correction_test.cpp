@@ -6,6 +6,7 @@
 
 #include <thread>
 
+#include "loops/prepared_correction.hpp"
 #include "loops/ring_scene.hpp"
 #include "map/content_hash.hpp"
 #include "map/keyframe_insertion.hpp"
@@ -90,10 +91,62 @@ TEST(LoopCorrection, MakesOnePointOfTwo) {
   }
 }
 
-TEST(LoopCorrection, PointsFollowTheirKeyframes) {
-  // The geometry that was worked out beforehand is what the map works out itself.
-  RingScene scene(single_camera());
+TEST(LoopCorrection, TrustsTheMatches) {
+  RingScene scene;
+  // Two of them are where nobody would search for them.
+  std::vector<MapPointId>& matches = scene.loop.matches;
+  const auto is_match = [](MapPointId id) { return id.valid(); };
+  std::iter_swap(std::find_if(matches.begin(), matches.end(), is_match),
+                 std::find_if(matches.rbegin(), matches.rend(), is_match));
   correct(scene);
+  const auto& slots = scene.map.find(scene.current())->map_points;
+  for (std::size_t i = 0; i < slots.size(); ++i) {
+    if (!matches[i].valid()) continue;
+    EXPECT_EQ(slots[i], matches[i]);
+  }
+}
+
+TEST(LoopCorrection, PointsOfTheGroupMoveWithTheFirstThatSeesThem) {
+  RingScene scene;
+  const LoopCorrection correction = planned(scene);
+  const auto carrier = [&](MapPointId id) {
+    for (const auto& [point, vertex] : correction.carried) {
+      if (point == id) return correction.keyframes[vertex];
+    }
+    return KeyFrameId();
+  };
+  int n_others = 0;
+  for (const MapPointId id : scene.map.find(scene.current())->map_points) {
+    EXPECT_EQ(carrier(id), scene.current());
+    n_others += scene.map.find(id)->reference_keyframe != scene.current() ? 1 : 0;
+  }
+  EXPECT_GT(n_others, 100);
+  for (const MapPointId id : scene.loop.loop_points) {
+    EXPECT_EQ(carrier(id), scene.map.find(id)->reference_keyframe);
+  }
+  EXPECT_EQ(correction.carried.size(), scene.map.n_points());
+}
+
+TEST(LoopCorrection, SearchesInTheNeighboursToo) {
+  RingScene scene;
+  std::fill(scene.loop.matches.begin(), scene.loop.matches.end(), MapPointId());
+  const LoopCorrection correction = planned(scene);
+  std::vector<int> n(66, 0);
+  for (const LoopCorrection::Fusion& fusion : correction.fusions) {
+    ++n[static_cast<std::size_t>(fusion.keyframe.value)];
+  }
+  EXPECT_EQ(correction.group.front(), scene.current());
+  for (const KeyFrameId id : correction.group) {
+    EXPECT_GT(n[static_cast<std::size_t>(id.value)], 50) << id.value;
+  }
+}
+
+TEST(LoopCorrection, WhatFollowsFromPosesAndObservationsIsUpToDate) {
+  // What was worked out beforehand is what the map works out itself.
+  RingOptions options = single_camera();
+  options.flipped_bits = 12;
+  RingScene scene(options);
+  EXPECT_GT(correct(scene).n_fused, 100);
   for (const MapPointId id : scene.map.point_ids()) {
     const MapPoint written = *scene.map.find(id);
     scene.map.update_point(id);
@@ -107,6 +160,7 @@ TEST(LoopCorrection, PointsFollowTheirKeyframes) {
 
 TEST(LoopCorrection, WithMeasuredDepthNothingChangesItsScale) {
   RingScene scene;
+  scene.loop.S_cw = Similarity(1.01, scene.loop.S_cw.rotation(), scene.loop.S_cw.translation());
   LoopCorrection correction = planned(scene);
   for (const Similarity& S_iw : correction.graph.S_iw) EXPECT_EQ(S_iw.scale(), 1.0);
   EXPECT_EQ(apply_loop_correction(scene.map, correction).scale, 1.0);
@@ -174,22 +228,24 @@ TEST(LoopCorrection, KeyframesThatNobodyPlannedForFollow) {
   const LoopCorrection correction = planned(scene);
   EXPECT_EQ(correction.keyframes.back(), scene.current());
   const KeyFrameId late = insert(scene, 67);
+  const PreparedCorrection prepared(scene.map, correction);
+  const KeyFrameId last = insert(scene, 68);
   struct Seen {
     MapPointId point;
     Eigen::Vector3d p_c;
   };
   std::vector<std::pair<KeyFrameId, Seen>> before;
   const Pose T_rel = scene.map.T_cw(waiting) * scene.map.T_cw(scene.current()).inverse();
-  for (const KeyFrameId id : {waiting, late}) {
+  for (const KeyFrameId id : {waiting, late, last}) {
     for (const MapPointId point : scene.map.find(id)->map_points) {
       if (!scene.map.find(point)) continue;
       before.push_back({id, {point, scene.map.T_cw(id) * scene.map.find(point)->position}});
     }
   }
   ASSERT_GT(before.size(), 100U);
-  ASSERT_TRUE(apply_loop_correction(scene.map, correction).applied);
+  ASSERT_TRUE(prepared.commit(scene.map).applied);
   EXPECT_EQ(scene.violations(), "");
-  for (const KeyFrameId id : {waiting, late}) {
+  for (const KeyFrameId id : {waiting, late, last}) {
     const Pose now = scene.map.T_cw(id) * scene.map.T_cw(scene.current()).inverse();
     EXPECT_TRUE(now.matrix().isApprox(T_rel.matrix(), 1e-9));
   }
@@ -253,6 +309,12 @@ TEST(LoopCorrection, IsNotAppliedToAnotherMap) {
   const LoopCorrection correction = planned(scene);
   scene.map.clear();
   EXPECT_FALSE(apply_loop_correction(scene.map, correction).applied);
+  for (int k = 0; k < 66; ++k) {  // keyframes of the same ids, but of another map
+    scene.map.publish(scene.map.add_keyframe(make_raster_frame(k, 10), Pose()));
+  }
+  const std::uint64_t before = content_hash(scene.map);
+  EXPECT_FALSE(apply_loop_correction(scene.map, correction).applied);
+  EXPECT_EQ(content_hash(scene.map), before);
   RingScene twin;
   twin.map.clear();
   twin.map.add_keyframe(make_raster_frame(0, 10), Pose());

@@ -23,6 +23,7 @@ struct RingOptions {
   double half_view = 120;      ///< keypoints lie in columns up to this far from the middle [pixels]
   double turn_drift = 4e-4;    ///< between keyframes, about the vertical [rad]
   double log_scale_drift = 0;  ///< for a single camera
+  int flipped_bits = 0;        ///< of each descriptor
   std::uint64_t seed = 1;
 };
 
@@ -64,6 +65,7 @@ class RingScene {
   /// The frame that keyframe k (of any number) would be made of; its points' numbers follow.
   std::shared_ptr<Frame> make_frame(int k, std::vector<std::size_t>& seen) const {
     std::vector<FeatureSpec> features;
+    std::mt19937_64 random(static_cast<std::uint64_t>(k));
     const Pose T_cw = pose_at(k);
     const auto camera = synthetic_camera(options.monocular ? 0 : 40);
     for (const std::size_t i : near(k)) {
@@ -78,7 +80,7 @@ class RingScene {
       feature.depth = options.monocular ? -1.0F : static_cast<float>(p.z());
       feature.level =
           std::clamp(static_cast<int>(std::lround(std::log(9 / p.norm()) / std::log(1.2))), 0, 7);
-      feature.descriptor = walls_.descriptors[i];
+      feature.descriptor = flip_bits(walls_.descriptors[i], options.flipped_bits, random);
       features.push_back(feature);
       seen.push_back(i);
     }
