@@ -16,8 +16,7 @@ namespace orbslam {
 namespace {
 
 constexpr double kConverged = 1e-9;
-constexpr int kTrials = 11;           // of a step: ten rejected ones and the one accepted
-constexpr double kMaxLogScale = 100;  // with larger ones products could leave the range of doubles
+constexpr int kTrials = 11;  // of a step: ten rejected ones and the one accepted
 
 using Edge = PoseGraph::Edge;
 

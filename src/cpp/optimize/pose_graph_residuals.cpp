@@ -8,9 +8,6 @@
 namespace orbslam {
 namespace {
 
-// Farther than any step that could be accepted, and products of three such scales are in range.
-constexpr double kMaxLogScale = 100;
-
 /// A linear map of tangent vectors (omega, upsilon, sigma) of the kind adjoints and Jacobians of
 /// similarities are: [A, 0, 0; B, D, e; 0, 0, 1]. Products of the blocks take a third of the time.
 struct TangentMap {
@@ -34,11 +31,11 @@ struct TangentMap {
   }
 
   /// Makes this map follow the one from the view's parameters to its left tangent, which is
-  /// [J, 0, 0; [v]x J, 1, -v; 0, 0, 1] with the left Jacobian J and the shift v.
+  /// [J, 0, 0; 0, Q, 0; 0, 0, 1] with the left Jacobian J and the turn Q.
   void multiply_by_chart(const PoseGraphView& view) {
-    B = (B + D * skew(view.shift())) * view.left_jacobian();
     A = A * view.left_jacobian();
-    e -= D * view.shift();
+    B = B * view.left_jacobian();
+    D = D * view.turn();
   }
 };
 
@@ -62,14 +59,14 @@ void PoseGraphView::move(const double* parameters, int n_parameters) {
   const double log_scale = n_parameters == 7 ? parameters[6] : 0.0;
   valid_ = w.allFinite() && v.allFinite() && std::abs(log_scale) < kMaxLogScale;
   if (!valid_) return;
-  shift_ = v;
-  left_jacobian_ = rotation_left_jacobian(w);
-  Vector6d turn = Vector6d::Zero();
-  turn.head<3>() = w;
-  const Eigen::Quaterniond q = Pose::exp(turn).rotation();
+  Vector6d rotation = Vector6d::Zero();
+  rotation.head<3>() = w;
+  const Eigen::Quaterniond q = Pose::exp(rotation).rotation();
   const double growth = std::exp(log_scale);
+  left_jacobian_ = rotation_left_jacobian(w);
+  turn_ = growth * q.toRotationMatrix();
   S_iw_ = Similarity(growth * start_.scale(), q * start_.rotation(),
-                     growth * (q * start_.translation()) + v);
+                     turn_ * (start_.translation() + v));
 }
 
 Vector7d pose_graph_residual(const Similarity& S_ji, const Similarity& S_iw,

@@ -7,10 +7,16 @@
 
 namespace orbslam {
 
+/// Scales are kept between exp(-kMaxLogScale) and exp(kMaxLogScale): farther than any step that
+/// could be accepted, and products of a few stay in the range of doubles.
+inline constexpr double kMaxLogScale = 100;
+
 /// A vertex of a pose graph in a chart around its start: seven parameters (w, v, c) stand for
-/// S_iw = (exp(c) s, exp(w) R, exp(c) exp(w) t + v) with (s, R, t) the start. The camera turns and
-/// rescales about its own centre, then moves. To first order that is the left perturbation
-/// (rotation, translation, logarithm of the scale), and being a plain vector space it saves Ceres a
+/// S_iw = (exp(c) s, exp(w) R, exp(c) exp(w) (t + v)) with (s, R, t) the start. The camera turns
+/// and rescales about its own centre, and the centre moves by -R^T v / s whatever its turn and
+/// scale. To first order that is the left perturbation (rotation, translation, logarithm of the
+/// scale). Where scales or rotations have drifted far, steps that leave the centres alone take half
+/// the iterations of such that do not, and being a plain vector space the chart saves Ceres a
 /// product by a manifold's Jacobian per edge. Without the last parameter the scale is kept.
 class PoseGraphView {
  public:
@@ -22,14 +28,14 @@ class PoseGraphView {
   bool valid() const { return valid_; }
 
   const Similarity& S_iw() const { return S_iw_; }
-  const Eigen::Vector3d& shift() const { return shift_; }  ///< v
+  const Eigen::Matrix3d& turn() const { return turn_; }  ///< exp(c) exp(w)
   /// Left Jacobian of SO(3) at w: exp(w + d) = exp(left_jacobian * d) exp(w) to first order.
   const Eigen::Matrix3d& left_jacobian() const { return left_jacobian_; }
 
  private:
   Similarity start_, S_iw_;
+  Eigen::Matrix3d turn_ = Eigen::Matrix3d::Identity();
   Eigen::Matrix3d left_jacobian_ = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d shift_ = Eigen::Vector3d::Zero();
   bool valid_ = true;
 };
 
