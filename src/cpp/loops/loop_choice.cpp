@@ -97,13 +97,28 @@ LoopDrift assess(const Surroundings& around, const Loop& loop, const KeyFrameWay
   return drift;
 }
 
+/// Where two loops put the keyframe, one against the other.
+struct Difference {
+  double translation = 0, rotation = 0;
+
+  bool within(const Limits& limits) const {
+    return translation <= limits.translation && rotation <= limits.rotation;
+  }
+};
+
 bool contradict(const Loop& a, const Loop& b, const Surroundings& around, bool fix_scale) {
   const Pose place_a = a.S_cw.pose(), place_b = b.S_cw.pose();
-  const KeyFrameWay way = around.ways(a.matched, {b.matched}).front();
+  const Difference difference{(place_a.center() - place_b.center()).norm(),
+                              angle_between(place_a, place_b)};
   const double log_scale = std::log(a.S_cm.scale() / b.S_cm.scale());
-  const Limits limits = limits_of(way, around.scene_depth, log_scale, fix_scale, kTwoMeasurements);
-  return (place_a.center() - place_b.center()).norm() > limits.translation ||
-         angle_between(place_a, place_b) > limits.rotation;
+  const auto limits = [&](const KeyFrameWay& way) {
+    return limits_of(way, around.scene_depth, log_scale, fix_scale, kTwoMeasurements);
+  };
+  // Most agree closely; only for the others it matters how far apart their far ends are.
+  KeyFrameWay nowhere;
+  nowhere.length = 0;
+  if (difference.within(limits(nowhere))) return false;
+  return !difference.within(limits(around.ways(a.matched, {b.matched}).front()));
 }
 
 bool stronger(const Loop& a, const Loop& b) {
