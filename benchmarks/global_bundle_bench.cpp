@@ -94,29 +94,42 @@ BENCHMARK_CAPTURE(BM_GlobalBundle, stereo, false, true)->SIZES->ONCE;
 BENCHMARK_CAPTURE(BM_GlobalBundle, mono, true, true)->SIZES->ONCE;
 BENCHMARK_CAPTURE(BM_GlobalBundle, stereo_without_kernel, false, false)->Arg(1000)->ONCE;
 
-/// From raising the flag until the solver returns, raised at some moments of a run.
+/// From raising the flag until the solver returns, raised at moments spread over a run.
 void BM_AbortLatency(benchmark::State& state) {
   const LoopMap loop(loop_options(state, false));
   const GatheredBundle gathered = gather_global_bundle(loop.map);
-  double longest = 0;
+  double longest = 0, longest_wall = 0, sum = 0;
+  int n = 0;
   for (auto _ : state) {
-    for (int tenths = 2; tenths <= 30; tenths += 4) {
+    for (double part = 0.05; part < 4; part += 0.25) {
       GatheredBundle bundle = gathered;
-      std::atomic<bool> abort{false};
-      double raised = 0;
+      std::atomic<bool> abort{false}, done{false};
+      const Stopwatch run;
+      double raised = 0, wall_raised = 0;
       std::thread other([&] {
-        std::this_thread::sleep_for(std::chrono::milliseconds(100 * tenths));
-        raised = seconds_of(CLOCK_MONOTONIC);
+        while (!done && run.seconds() < part) {
+          std::this_thread::sleep_for(std::chrono::milliseconds(2));
+        }
+        raised = run.seconds();
+        wall_raised = run.wall_seconds();
         abort = true;
       });
       const bool aborted = solve_global_bundle(bundle, bundle_options(true), &abort, 1).aborted;
-      const double returned = seconds_of(CLOCK_MONOTONIC);
+      const double returned = run.seconds(), wall_returned = run.wall_seconds();
+      done = true;
       other.join();
-      if (aborted) longest = std::max(longest, returned - raised);
+      if (!aborted) continue;
+      longest = std::max(longest, returned - raised);
+      longest_wall = std::max(longest_wall, wall_returned - wall_raised);
+      sum += returned - raised;
+      ++n;
     }
-    state.SetIterationTime(longest);
+    state.SetIterationTime(longest_wall);
   }
-  state.counters["longest_wall_s"] = longest;
+  state.counters["longest_s"] = longest;
+  state.counters["longest_wall_s"] = longest_wall;
+  state.counters["mean_s"] = sum / n;
+  state.counters["aborted"] = n;
 }
 BENCHMARK(BM_AbortLatency)->Arg(1000)->ONCE;
 

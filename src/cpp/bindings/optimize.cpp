@@ -167,18 +167,23 @@ py::tuple solve_bundle_arrays(const std::vector<Pose>& T_cw, const std::vector<b
 
 void bind_bundle(py::module_& module) {
   py::class_<BundleOptions>(module, "BundleOptions", "How solve_bundle works.")
-      .def(py::init([](int robust_iterations, int final_iterations, bool robust, int n_threads) {
-             return BundleOptions{robust_iterations, final_iterations, robust, n_threads};
+      .def(py::init([](int robust_iterations, int final_iterations, bool robust, int n_threads,
+                       bool inverse_depth, double max_seconds) {
+             return BundleOptions{robust_iterations, final_iterations, robust,
+                                  n_threads,         inverse_depth,    max_seconds};
            }),
            "robust_iterations"_a = 5, "final_iterations"_a = 10, "robust"_a = true,
-           "n_threads"_a = 1)
+           "n_threads"_a = 1, "inverse_depth"_a = false, "max_seconds"_a = 0.0)
       .def_readwrite("robust_iterations", &BundleOptions::robust_iterations,
                      "Steps of the first stage, with Huber kernel if `robust`.")
       .def_readwrite("final_iterations", &BundleOptions::final_iterations,
                      "Steps of the second stage, on the inliers, without kernel. 0: none.")
       .def_readwrite("robust", &BundleOptions::robust, "Kernel in the first stage.")
-      .def_readwrite("n_threads", &BundleOptions::n_threads,
-                     "1 gives the same bytes in every run.");
+      .def_readwrite("n_threads", &BundleOptions::n_threads, "1 gives the same bytes in every run.")
+      .def_readwrite("inverse_depth", &BundleOptions::inverse_depth,
+                     "Step along inverse depths of points: for large maps, with one stage.")
+      .def_readwrite("max_seconds", &BundleOptions::max_seconds,
+                     "No step is begun that would probably end later; 0: no limit.");
   py::class_<BundleSummary>(module, "BundleSummary", "What solve_bundle did.")
       .def_readonly("initial_cost", &BundleSummary::initial_cost,
                     "Sum of (robustified) squared whitened residuals at the start.")

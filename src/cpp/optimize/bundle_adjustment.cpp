@@ -125,7 +125,7 @@ class BundleSolver final : public ceres::EvaluationCallback {
   /// was raised.
   bool minimise(int iterations, Damping damping, const std::atomic<bool>* abort,
                 const TimeLimit* limit, BundleSummary& summary) {
-    if (problem_.NumResidualBlocks() == 0) return is_raised(abort);
+    if (problem_.NumResidualBlocks() == 0 || is_raised(abort)) return is_raised(abort);
     const bool equal = damping == Damping::kEqual;
     BundleIterations rules(iterations, equal ? 0.0 : kConverged, abort, limit);
     ceres::Solver::Options solver = solver_options(iterations);
