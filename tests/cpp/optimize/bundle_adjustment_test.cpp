@@ -161,6 +161,56 @@ TEST(SolveBundle, ManyCamerasTakeTheSparseSolver) {
   EXPECT_LT(summary.final_cost, 0.1 * summary.initial_cost);
 }
 
+TEST(SolveBundle, InverseDepthsFindTheSameMinimum) {
+  for (const bool with_depth : {false, true}) {
+    BundleProblem by_coordinates = random_bundle(11, 8, 150, 2, with_depth);
+    by_coordinates.points.push_back({1, 2, 3});  // nobody sees it
+    BundleProblem by_inverse_depth = by_coordinates;
+    BundleOptions options;
+    options.robust_iterations = 30;
+    options.final_iterations = 0;
+    const BundleSummary expected = solve_bundle(by_coordinates, options, nullptr);
+    options.inverse_depth = true;
+    const BundleSummary summary = solve_bundle(by_inverse_depth, options, nullptr);
+    EXPECT_NEAR(summary.final_cost, expected.final_cost, 1e-4 * expected.final_cost);
+    EXPECT_LE(summary.iterations, expected.iterations);
+    EXPECT_EQ(by_inverse_depth.points.back(), Eigen::Vector3d(1, 2, 3));
+    for (std::size_t i = 0; i < by_coordinates.points.size(); ++i) {
+      EXPECT_LT((by_coordinates.points[i] - by_inverse_depth.points[i]).norm(), 0.02);
+    }
+  }
+}
+
+TEST(SolveBundle, InverseDepthsBearPointsThatLieNowhere) {
+  // Seen twice from nearly the same place, with a disparity of the wrong sign: beyond infinity.
+  BundleProblem problem = random_bundle(12, 6, 100, 2, false);
+  for (int k = 0; k < 5; ++k) {
+    const auto point = static_cast<std::uint32_t>(problem.points.size());
+    problem.points.emplace_back(0.2 * k, 0, 50);
+    for (const std::uint32_t camera : {1U, 2U}) {
+      BundleProblem::Observation o;
+      o.camera = camera;
+      o.point = point;
+      const auto pixel = problem.cameras[camera].pinhole.project(problem.cameras[camera].T_cw *
+                                                                 problem.points[point]);
+      o.u = static_cast<float>(pixel.x()) + (camera == 1U ? -6.0F : 6.0F);
+      o.v = static_cast<float>(pixel.y());
+      problem.observations.push_back(o);
+    }
+  }
+  BundleOptions options;
+  options.robust_iterations = 20;
+  options.final_iterations = 0;
+  options.inverse_depth = true;
+  const BundleSummary summary = solve_bundle(problem, options, nullptr);
+  EXPECT_LT(summary.final_cost, 0.1 * summary.initial_cost);
+  EXPECT_TRUE(all_finite(problem));
+  for (std::size_t i = 100; i < problem.points.size(); ++i) {
+    EXPECT_GT(problem.points[i].z(), 50);
+    EXPECT_LT(problem.points[i].norm(), 1e4);
+  }
+}
+
 TEST(SolveBundle, SinglePoseFixedOrFree) {
   BundleProblem one_fixed = random_bundle(4, 4, 60, 1, true);
   BundleSummary summary = solve_bundle(one_fixed, BundleOptions(), nullptr);

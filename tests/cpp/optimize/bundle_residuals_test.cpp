@@ -7,6 +7,7 @@
 #include <cmath>
 #include <random>
 
+#include "optimize/bundle_point.hpp"
 #include "optimize/gates.hpp"
 
 namespace orbslam {
@@ -145,6 +146,44 @@ TEST(BundleResiduals, CurvatureIsTheSumOfSquaredColumns) {
       (point.colwise().squaredNorm() + point_right.colwise().squaredNorm()).transpose();
   EXPECT_LT((pose_diagonal - pose_expected).norm(), 1e-9 * pose_expected.norm());
   EXPECT_LT((point_diagonal - point_expected).norm(), 1e-9 * point_expected.norm());
+}
+
+TEST(BundleResiduals, DerivativesByInverseDepthAreThoseOfTheResiduals) {
+  std::mt19937_64 random(7);
+  for (int trial = 0; trial < 100; ++trial) {
+    Scene scene(random, true, 0);
+    const Eigen::Map<const Eigen::Vector3d> start(scene.point.data());
+    BundlePoint chart(scene.view.T_cw().center() + Eigen::Vector3d(0.3, 0.1, -0.2), start);
+    scene.measurement.point = chart.position().data();
+    scene.measurement.chart = &chart.jacobian();
+    std::array<double, 3> at{};
+    for (double& parameter : at) parameter = uniform(random, -0.02, 0.02);
+    const ImageResiduals<true> image(&scene.measurement);
+    const RightResidual<true> right(&scene.measurement);
+    const auto residuals = [&](const std::array<double, 3>& parameters) {
+      chart.move(parameters.data());
+      scene.update();
+      Eigen::Vector4d e;
+      image.Evaluate(nullptr, e.data(), nullptr);
+      right.Evaluate(nullptr, e.data() + 2, nullptr);
+      return e;
+    };
+    residuals(at);
+    Eigen::Matrix<double, 4, 3, Eigen::RowMajor> J;
+    Eigen::Vector2d e;
+    double* image_jacobians[] = {nullptr, J.data()};
+    double* right_jacobians[] = {nullptr, J.data() + 6};
+    image.Evaluate(nullptr, e.data(), image_jacobians);
+    right.Evaluate(nullptr, e.data(), right_jacobians);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double step = 1e-6;
+      std::array<double, 3> more = at, less = at;
+      more[i] += step;
+      less[i] -= step;
+      const Eigen::Vector4d numeric = (residuals(more) - residuals(less)) / (2 * step);
+      EXPECT_LT((numeric - J.col(static_cast<int>(i))).norm(), 1e-5 * (1 + numeric.norm()));
+    }
+  }
 }
 
 TEST(BundleResiduals, PointOnTheCameraPlaneIsHarmless) {
