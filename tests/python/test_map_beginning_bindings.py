@@ -152,6 +152,37 @@ def test_full_bundle_adjustment(views: TwoViews) -> None:
     assert core.check_invariants(world, require_words=True) == []
 
 
+def test_full_bundle_adjustment_in_steps(views: TwoViews) -> None:
+    world = core.Map()
+    assert views.create(world).ok
+    rng = np.random.default_rng(3)
+    for point in world.point_ids():
+        world.set_position(point, world.point_position(point) + rng.uniform(-0.01, 0.01, 3))
+    before = world.content_hash()
+
+    bundle = core.gather_global_bundle(world)
+    assert (bundle.n_keyframes, bundle.n_points) == (2, world.n_points)
+    assert bundle.n_observations == 2 * world.n_points
+    assert not bundle.solved
+    assert not core.commit_global_bundle(world, bundle).committed
+    late = core.GlobalBundleOptions(max_seconds=1e-9)
+    summary = core.solve_global_bundle(bundle, late)
+    assert summary.timed_out and not bundle.solved
+    assert world.content_hash() == before
+
+    summary = core.solve_global_bundle(bundle, core.GlobalBundleOptions(iterations=15))
+    assert bundle.solved and not summary.timed_out
+    assert summary.final_cost < 0.1 * summary.initial_cost
+    assert world.content_hash() == before
+    world.erase_point(world.point_ids()[0])
+    commit = core.commit_global_bundle(world, bundle)
+    assert commit.committed
+    assert (commit.n_followed_keyframes, commit.n_followed_points) == (0, 0)
+    assert world.big_change_index == 1
+    assert core.check_invariants(world, require_words=True) == []
+    assert not core.commit_global_bundle(world, bundle).committed  # once
+
+
 def test_temporary_points() -> None:
     last, current = view(0, depth=DEPTH), view(SHIFT, depth=DEPTH)
     world = core.Map()
