@@ -104,8 +104,9 @@ std::vector<KeyFrameWay> KeyFrameGraph::shortest_ways(KeyFrameId from,
   std::vector<KeyFrameWay> ways(to.size());
   const std::int32_t start = node_of(from);
   if (start == kNone) return ways;
-  std::vector<std::int32_t> targets;
-  for (const KeyFrameId id : to) targets.push_back(node_of(id));
+  std::vector<std::int32_t> targets(to.size());
+  std::transform(to.begin(), to.end(), targets.begin(),
+                 [this](KeyFrameId id) { return node_of(id); });
   const std::vector<Reached> reached = search(start, targets, metres_per_radian);
   std::transform(targets.begin(), targets.end(), ways.begin(),
                  [&](std::int32_t target) { return way_to(target, reached); });
