@@ -6,15 +6,17 @@ Mur-Artal and Tardos, "ORB-SLAM2", 2017, section III-C.
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 import logging
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from orbslam2py import _core as core
 from orbslam2py.errors import SettingsError
-from orbslam2py.threads import Worker
+from orbslam2py.threads import Worker, WorkerState
 from orbslam2py.timing import StageStatistics, StageTimer
 
 _log = logging.getLogger(__name__)
@@ -113,14 +115,53 @@ class FullAdjustment:
         self.records: list[FullAdjustmentRecord] = []
         #: Milliseconds per step.
         self.statistics = StageStatistics()
+        self._numbers = itertools.count()
+        self._latest: tuple[int, FullAdjustmentRecord] | None = None
+        #: Its jobs are numbers that tell one adjustment from another.
         self.worker: Worker[int] = Worker(
             "full bundle adjustment", self._process, threaded=threaded
         )
 
-    def start(self) -> None:
-        """Begin one; a running one is given up."""
+    def start(self) -> int:
+        """Begin one; a running one is given up. Returns its number."""
         self.cancel()
-        self.worker.submit(self.map_index)
+        number = next(self._numbers)
+        self.worker.submit(number)
+        return number
+
+    def start_and_wait(self) -> FullAdjustmentRecord:
+        """Begin one, and wait for its end.
+
+        It is given up when the worker is to stand still for longer (localization mode), and when
+        another one, a reset or the shutdown takes its place, maybe before it has begun: then
+        nothing is counted in its record.
+        """
+        number = self.start()
+        worker = self.worker
+        try:
+            worker.wait_until(
+                lambda: worker.idle or worker.held or worker.state is WorkerState.FAILED
+            )
+        except KeyboardInterrupt:
+            self.cancel()
+            raise
+        worker.raise_if_failed()
+        if worker.held:
+            self.cancel()
+        latest = self._latest
+        if latest is not None and latest[0] == number:
+            return latest[1]
+        return FullAdjustmentRecord(self.map_index, 0, 0, 0, 0, 0.0, 0.0, used=False)
+
+    @contextlib.contextmanager
+    def kept_away(self) -> Iterator[None]:
+        """Give up a running one, and let none begin or end meanwhile.
+
+        For those that are about to move the map themselves: one that somebody else asks for waits.
+        """
+        with self.worker.pause(brief=True):
+            self.cancel()
+            yield
 
     def cancel(self, timeout: float | None = None) -> None:
         """Give up a running one. On return it will not touch the map any more."""
@@ -130,8 +171,8 @@ class FullAdjustment:
         """Do one now, in the caller's thread; for when the workers have ended."""
         return self._adjust(self.map_index, core.StopFlag())
 
-    def _process(self, map_index: int) -> None:
-        self._adjust(map_index, self.worker.cancel_flag)
+    def _process(self, number: int) -> None:
+        self._latest = number, self._adjust(self.map_index, self.worker.cancel_flag)
 
     def _adjust(self, map_index: int, cancelled: core.StopFlag) -> FullAdjustmentRecord:
         timer = StageTimer()

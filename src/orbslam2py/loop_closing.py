@@ -173,8 +173,8 @@ class LoopClosing:
 
     # ---- correction ------------------------------------------------------------------------------
     def _close(self, loop: core.Loop, timer: StageTimer) -> None:
-        self._adjustment.cancel()  # what it refines is about to move
-        with self._mapping.pause(brief=True) as ticket:
+        # What an adjustment refines is about to move.
+        with self._adjustment.kept_away(), self._mapping.pause(brief=True) as ticket:
             with timer("wait"):
                 ticket.wait()
             self._map.update_connections(loop.current)

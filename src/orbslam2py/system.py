@@ -436,7 +436,8 @@ class System:
     def optimize(self) -> FullAdjustmentRecord:
         """Refine all keyframes and points together, now (full bundle adjustment).
 
-        Tracking may go on meanwhile. A Ctrl-C gives up and leaves the map as it was.
+        Tracking may go on meanwhile. A Ctrl-C gives up and leaves the map as it was; so do a loop
+        that is closed meanwhile, a reset, the shutdown and a switch to localization mode.
 
         Returns
         -------
@@ -455,13 +456,7 @@ class System:
         adjustment = self._back_end.adjustment
         if adjustment.worker.ended:
             return adjustment.run()
-        adjustment.start()
-        try:
-            adjustment.worker.wait_until_idle()
-        except KeyboardInterrupt:
-            adjustment.cancel()
-            raise
-        return adjustment.records[-1]
+        return adjustment.start_and_wait()
 
     def wait_until_idle(self, timeout: float | None = None) -> bool:
         """Wait until every keyframe has been processed, and full adjustments have ended.

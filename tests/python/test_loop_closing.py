@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 
@@ -80,8 +82,11 @@ class FakeAdjustment:
         self.calls = calls
         self.options = SimpleNamespace(enabled=True)
 
-    def cancel(self) -> None:
-        self.calls.append("cancel adjustment")
+    @contextlib.contextmanager
+    def kept_away(self) -> Iterator[None]:
+        self.calls.append("no adjustment")
+        yield
+        self.calls.append("adjustments again")
 
     def start(self) -> None:
         self.calls.append("start adjustment")
@@ -197,7 +202,8 @@ def test_a_confirmed_loop_is_closed_and_told(scene: Scene) -> None:
     scene.consistency.consistent.append([4])
     scene.process(20)
     assert scene.calls == [
-        *("cancel adjustment", "connections", "plan", "graph", "apply", "start adjustment")
+        *("no adjustment", "connections", "plan", "graph", "apply", "adjustments again"),
+        "start adjustment",
     ]
     (closed,) = scene.events
     assert scene.closing.loops == [closed]

@@ -29,8 +29,10 @@ class ImageRing {
  private:
   struct View {
     cv::Mat grey, depth;
+    Features features;
   };
-  std::shared_ptr<Frame> build(const View& view, FrameId id, double timestamp, double depth_factor);
+  std::shared_ptr<Frame> build(const Features& features, const cv::Mat& depth, FrameId id,
+                               double timestamp) const;
 
   std::vector<View> views_;
   View dark_;
