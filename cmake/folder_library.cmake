@@ -17,6 +17,9 @@ if(ORBSLAM2PY_SANITIZE)
     -fsanitize=${ORBSLAM2PY_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer
     -Wno-maybe-uninitialized)  # GCC 12 reports false ones inside instrumented library headers
   target_link_options(orbslam_options INTERFACE -fsanitize=${ORBSLAM2PY_SANITIZE})
+  # Under the address sanitizer Eigen aligns memory itself, but not in libceres, which was compiled
+  # without: what one allocates the other could not free.
+  target_compile_definitions(orbslam_options INTERFACE EIGEN_MALLOC_ALREADY_ALIGNED=1)
 endif()
 
 # orbslam_folder(NAME [DEPENDS folder...] [PUBLIC lib...] [PRIVATE lib...] [AVX2 source...])

@@ -214,10 +214,6 @@ TEST(OptimizePoseGraph, CostsAreSumsOverAllEdges) {
 }
 
 TEST(OptimizePoseGraph, SuiteSparseAndEigenAgree) {
-#if defined(__SANITIZE_ADDRESS__) && !EIGEN_MALLOC_ALREADY_ALIGNED
-  GTEST_SKIP() << "under the address sanitizer Eigen allocates in another way than inside Ceres' "
-                  "library; compile with EIGEN_MALLOC_ALREADY_ALIGNED=1";
-#endif
   PoseGraph graph = walk(200, 5, 0.02, 0.03);
   drift(graph, 5, 0.02, 0.1, 0.02);
   PoseGraph other = graph;
