@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "driver/images.hpp"
 
+#include <cmath>
+
 #include "places/vocabulary_training.hpp"
-#include "synthetic/paths.hpp"
 #include "synthetic/world.hpp"
 
 namespace orbslam::driver {
 namespace {
 
+constexpr double kPi = 3.14159265358979323846;
+
 OrbOptions orb_options() {
   OrbOptions orb;
-  orb.n_features = 450;
+  orb.n_features = 500;
   orb.n_levels = 6;
   return orb;
 }
@@ -34,6 +37,13 @@ FrameContext context_for(const synthetic::RenderOptions& view, const OrbExtracto
   return {std::make_shared<Camera>(camera), std::make_shared<ScalePyramid>(extractor.scales())};
 }
 
+/// Turning steadily on the spot, the camera held at arm's length. `turn` in radians.
+Pose T_wc_at(double turn) {
+  const Eigen::Quaterniond heading(Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitY()));
+  const Eigen::Vector3d arm(0, 0.1 * std::sin(3 * turn), 0.8);
+  return Pose(heading, heading * arm);
+}
+
 }  // namespace
 
 ImageRing::ImageRing(int frames_per_lap, std::uint64_t seed) : extractor_(orb_options()) {
@@ -44,7 +54,7 @@ ImageRing::ImageRing(int frames_per_lap, std::uint64_t seed) : extractor_(orb_op
   TrainingSet descriptors;
   for (int i = 0; i < frames_per_lap; ++i) {
     options.noise_seed = static_cast<std::uint64_t>(i);
-    const Pose T_wc = synthetic::room_T_wc(room, i, frames_per_lap);
+    const Pose T_wc = T_wc_at(2 * kPi * i / frames_per_lap);
     const synthetic::Rendering image = synthetic::render(world, T_wc.inverse(), options);
     views_.push_back({image.grey, image.depth, extractor_.extract(image.grey).features});
     const Features& features = views_.back().features;

@@ -49,7 +49,7 @@ void System::track_next() {
 
 std::shared_ptr<Frame> System::next_frame() {
   // In localization mode the camera turns back, so that it stays in the map.
-  const std::int64_t step = tracker_.localization_only ? -1 : 1;
+  const std::int64_t step = tracker_.localization_only() ? -1 : 1;
   view_ = std::max<std::int64_t>(view_ + step, 0);
   if (jump_requested_.exchange(false)) {
     view_ = std::max<std::int64_t>(view_ - images_.size() / 4, 0);
@@ -91,8 +91,9 @@ void System::switch_mode() {
     const auto lock = map_.read_lock();
     n_keyframes = map_.n_keyframes();
   }
-  const bool wanted = localization_wanted_ && n_keyframes > 0;
-  if (wanted == tracker_.localization_only) return;
+  // In a smaller map the camera, which turns back, would soon be outside.
+  const bool wanted = localization_wanted_ && n_keyframes > 5;
+  if (wanted == tracker_.localization_only()) return;
   const Watchdog::Scope watched(watchdog_, wanted ? "localization on" : "localization off");
   if (wanted) {
     const std::lock_guard lock(mode_mutex_);
@@ -103,7 +104,7 @@ void System::switch_mode() {
   } else {
     release_mode();
   }
-  tracker_.localization_only = wanted;
+  tracker_.use_localization(wanted);
   ++counts_.mode_switches;
 }
 

@@ -55,7 +55,7 @@ Tracked Tracker::track(std::shared_ptr<Frame> image) {
   velocity_.reset();
   if (consecutive) velocity_ = *frame.T_cw * last_->T_cw->inverse();
   lost_ = false;
-  if (localization_only) {
+  if (localization_only_) {
     ++counts_.localized;
   } else if (needs_keyframe(frame)) {
     insert(frame, 100);
@@ -80,7 +80,7 @@ Tracked Tracker::lose() {
 bool Tracker::find_pose(TrackedFrame& frame) {
   if (lost_ ? !relocalize(frame) : !predict(frame)) return false;
   n_inliers_ = track_local_map(frame, discarded_);
-  return n_inliers_ >= 2 * kFewestInliers;
+  return n_inliers_ >= kFewestInliers + 5;
 }
 
 bool Tracker::predict(TrackedFrame& frame) {
@@ -143,7 +143,9 @@ bool Tracker::needs_keyframe(const TrackedFrame& frame) const {
   const int n_reference = count_tracked_points(map_, reference_, 3);
   const bool weak = n_inliers_ < 0.75 * n_reference;
   const bool idle = mapping_.worker.idle();
-  if (!weak && (!idle || frame.frame->id < last_keyframe_ + 4)) return false;
+  // The camera turns fast: a keyframe is out of view after a dozen frames.
+  const FrameId since = frame.frame->id - last_keyframe_;
+  if (!weak && since < (idle ? 3 : 5)) return false;
   if (idle) return true;
   mapping_.worker.interrupt();
   return mapping_.worker.n_waiting() < 3;

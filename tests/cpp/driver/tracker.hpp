@@ -23,7 +23,12 @@ class Tracker {
   /// The last frame with a pose, nullptr before the map begins.
   const TrackedFrame* last() const { return last_ ? &*last_ : nullptr; }
 
-  bool localization_only = false;
+  bool localization_only() const { return localization_only_; }
+  /// Also turns the camera round, so that its velocity is another.
+  void use_localization(bool only) {
+    localization_only_ = only;
+    velocity_.reset();
+  }
 
  private:
   bool find_pose(TrackedFrame& frame);
@@ -43,7 +48,7 @@ class Tracker {
   KeyFrameId reference_;
   FrameId last_keyframe_ = 0;
   int n_inliers_ = 0;
-  bool lost_ = false;
+  bool lost_ = false, localization_only_ = false;
   std::vector<MapPointId> discarded_;
 };
 
