@@ -1792,7 +1792,7 @@ class BundleOptions:
     """
     How solve_bundle works.
     """
-    def __init__(self, robust_iterations: typing.SupportsInt | typing.SupportsIndex = 5, final_iterations: typing.SupportsInt | typing.SupportsIndex = 10, robust: bool = True, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> None:
+    def __init__(self, robust_iterations: typing.SupportsInt | typing.SupportsIndex = 5, final_iterations: typing.SupportsInt | typing.SupportsIndex = 10, robust: bool = True, n_threads: typing.SupportsInt | typing.SupportsIndex = 1, inverse_depth: bool = False, max_seconds: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         ...
     @property
     def final_iterations(self) -> int:
@@ -1801,6 +1801,22 @@ class BundleOptions:
         """
     @final_iterations.setter
     def final_iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def inverse_depth(self) -> bool:
+        """
+        Step along inverse depths of points: for large maps, with one stage.
+        """
+    @inverse_depth.setter
+    def inverse_depth(self, arg0: bool) -> None:
+        ...
+    @property
+    def max_seconds(self) -> float:
+        """
+        No step is begun that would probably end later; 0: no limit.
+        """
+    @max_seconds.setter
+    def max_seconds(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
     def n_threads(self) -> int:

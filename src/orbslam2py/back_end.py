@@ -63,6 +63,7 @@ class BackEnd:
             self.map,
             self.mapping.worker,
             adjustment,
+            monocular=not sensor.has_depth,
             threaded=threaded,
             on_done=_announce_adjustment(self.events),
         )

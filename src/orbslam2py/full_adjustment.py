@@ -50,7 +50,7 @@ class FullAdjustmentRecord:
     used: bool
     """False: given up because of another loop, a reset or the shutdown, or it gained nothing."""
     milliseconds: dict[str, float] = field(default_factory=dict)
-    """Time per step: gather, solve, wait, commit."""
+    """Time per step: gather, solve, wait, commit, local (if there were new keyframes)."""
 
 
 def check_time_limit(seconds: float | None, *, deterministic: bool) -> None:
@@ -88,6 +88,8 @@ class FullAdjustment:
         Stands still while the result is written.
     options : FullAdjustmentOptions
         Iterations and time limit.
+    monocular : bool
+        The map has no scale of its own.
     threaded : bool
         In a thread of its own, or inline.
     on_done : callable
@@ -100,11 +102,13 @@ class FullAdjustment:
         mapping: Worker[int],
         options: FullAdjustmentOptions,
         *,
+        monocular: bool,
         threaded: bool,
         on_done: Callable[[FullAdjustmentRecord], None],
     ) -> None:
         self._map = world
         self._mapping = mapping
+        self._monocular = monocular
         self.options = options
         self._on_done = on_done
         #: One core is left for tracking; a single thread gives the same bytes in every run.
@@ -171,6 +175,11 @@ class FullAdjustment:
         """Do one now, in the caller's thread; for when the workers have ended."""
         return self._adjust(self.map_index, core.StopFlag())
 
+    def _refine_newest(self, cancelled: core.StopFlag) -> None:
+        """Fit keyframes that were made meanwhile, and only moved along, to the refined map."""
+        newest = int(core.snapshot_keyframes(self._map).ids[-1])
+        core.local_bundle_adjustment(self._map, newest, cancelled, self._monocular)
+
     def _process(self, number: int) -> None:
         self._latest = number, self._adjust(self.map_index, self.worker.cancel_flag)
 
@@ -190,7 +199,11 @@ class FullAdjustment:
                 with timer("wait"):
                     ticket.wait()
                 with timer("commit"):
-                    used = core.commit_global_bundle(self._map, bundle).committed
+                    commit = core.commit_global_bundle(self._map, bundle)
+                used = commit.committed
+                if commit.n_followed_keyframes > 0:
+                    with timer("local"):
+                        self._refine_newest(cancelled)
         record = FullAdjustmentRecord(
             map_index=map_index,
             n_keyframes=bundle.n_keyframes,
