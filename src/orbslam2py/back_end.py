@@ -118,8 +118,12 @@ class BackEnd:
         self.events.post(self.events.callbacks.on_map_change, change)
 
     def wait_until_idle(self, timeout: float | None) -> bool:
-        """Wait until every worker is idle; False when one took longer than `timeout` seconds."""
-        return all(worker.wait_until_idle(timeout) for worker in self.map_workers)
+        """Wait until every worker is idle.
+
+        False when one took longer than `timeout` seconds, or holds work back for a pause that may
+        last.
+        """
+        return all(worker.wait_until_idle(timeout, unless_held=True) for worker in self.map_workers)
 
     def finish(
         self, *, drain: bool, wait_for_adjustment: bool, timeout: float | None

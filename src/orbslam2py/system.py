@@ -437,7 +437,8 @@ class System:
         """Refine all keyframes and points together, now (full bundle adjustment).
 
         Tracking may go on meanwhile. A Ctrl-C gives up and leaves the map as it was; so do a loop
-        that is closed meanwhile, a reset, the shutdown and a switch to localization mode.
+        that is closed meanwhile, another call, a reset, the shutdown and a switch to localization
+        mode.
 
         Returns
         -------
@@ -467,8 +468,6 @@ class System:
             False when `timeout` seconds passed first, or keyframes wait for the end of localization
             mode.
         """
-        if self._tracking.localization_only:
-            timeout = 0.0  # what has not been done by now waits for the end of the mode
         return self._back_end.wait_until_idle(timeout)
 
     def shutdown(

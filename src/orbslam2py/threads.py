@@ -134,7 +134,10 @@ class Worker(Generic[Job]):
         WorkerError
             If a step failed, now or earlier, or the thread did not end in time.
         """
-        if drain and self._thread is not None:
+        thread = self._thread  # others may call this at the same time
+        if thread is threading.current_thread():
+            thread = None  # a step ends its worker, and cannot wait for itself
+        if drain and thread is not None:
             self.wait_until(
                 lambda: self._error is not None or self._is_idle() or self.held, timeout
             )
@@ -145,11 +148,11 @@ class Worker(Generic[Job]):
             self.interrupt_flag.set()
             self.cancel_flag.set()
             self._condition.notify_all()
-        if self._thread is not None and self._thread is not threading.current_thread():
+        if thread is not None:
             deadline = None if timeout is None else time.monotonic() + timeout
-            while self._thread.is_alive():
-                self._thread.join(_WAIT_SLICE)
-                if deadline is not None and time.monotonic() > deadline and self._thread.is_alive():
+            while thread.is_alive():
+                thread.join(_WAIT_SLICE)
+                if deadline is not None and time.monotonic() > deadline and thread.is_alive():
                     raise WorkerError(f"{self.name} did not end within {timeout} s")
             self._thread = None
         self.raise_if_failed()
@@ -328,11 +331,17 @@ class Worker(Generic[Job]):
         self.wait_until(done)
         self.raise_if_failed()
 
-    def wait_until_idle(self, timeout: float | None = None) -> bool:
-        """Wait until every job is done; False when `timeout` seconds passed first."""
-        done = self.wait_until(lambda: self._is_idle() or self._error is not None, timeout)
+    def wait_until_idle(self, timeout: float | None = None, *, unless_held: bool = False) -> bool:
+        """Wait until every job is done; False when `timeout` seconds passed first.
+
+        With `unless_held` also False as soon as a pause is in force that may last.
+        """
+        self.wait_until(
+            lambda: self._is_idle() or self._error is not None or (unless_held and self.held),
+            timeout,
+        )
         self.raise_if_failed()
-        return done
+        return self.idle
 
     def raise_if_failed(self) -> None:
         """Raise `WorkerError`, with the original as its cause, if a step has failed."""

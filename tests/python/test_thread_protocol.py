@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Requests between threads, each in the interleaving in which the original hangs or goes wrong.
 
-The table of requests and the numbers of the hazards are those of docs/architecture.md, "Threads".
+D14 and D17 with a number are defects of the original in spec 14, section 8, and 17, section 4.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import pytest
 from interleaving import LIMIT, Call, Stage
 from orbslam2py import _core
 from orbslam2py.errors import StateError, WorkerError
+from orbslam2py.events import Callbacks, KeyframeAdded
 from orbslam2py.records import TrackingState
 from orbslam2py.sensor import Sensor
 from orbslam2py.system import System
@@ -258,6 +259,23 @@ def test_optimize_ends_when_localization_mode_comes_on(slam: System, stage: Stag
     assert not call.result().used
     with pytest.raises(StateError, match="localization"):
         slam.optimize()
+
+
+def test_who_waits_for_the_workers_is_told_when_localization_mode_comes_on(
+    slam: System, stage: Stage
+) -> None:
+    """What has not been done by then may wait for long."""
+    solve = stage.gate("solve_global_bundle")
+    refine(slam)
+    solve.wait_entered()
+    call = Call(slam.wait_until_idle)
+    slam.localization_mode = True
+    track(slam, 30)
+    assert call.result() is False
+    solve.open()
+    slam.localization_mode = False
+    track(slam, 31)
+    assert slam.wait_until_idle(LIMIT)
 
 
 # ---- loops and full adjustments ------------------------------------------------------------------
@@ -627,6 +645,45 @@ def test_shutdown_while_a_reset_waits(slam: System, stage: Stage) -> None:
     except StateError as error:
         assert "shut down" in str(error)
     assert slam.n_resets == 1
+
+
+@pytest.mark.parametrize("drain", [False, True])
+def test_shutdown_in_two_threads_at_once(slam: System, stage: Stage, drain: bool) -> None:
+    close = stage.loops(slam)
+    plan = stage.gate("plan_loop_correction")
+    close(last_keyframe(slam))
+    plan.wait_entered()
+    calls = []
+    for _ in range(2):
+        finishing = stage.entering(slam._back_end.loop_closing.worker, "finish")
+        calls.append(Call(slam.shutdown, drain=drain))
+        assert finishing.wait(LIMIT)
+    plan.open()
+    for call in calls:
+        call.result()
+    assert worker_threads() == []
+
+
+@pytest.mark.parametrize("drain", [False, True])
+def test_shutdown_by_a_callback(drain: bool) -> None:
+    """Which the thread of the callbacks cannot wait for."""
+    ended = threading.Event()
+    systems: list[System] = []
+    tracked = threading.Event()
+
+    def ends(_: KeyframeAdded) -> None:
+        assert tracked.wait(LIMIT)
+        systems.pop().shutdown(drain=drain)
+        ended.set()
+
+    system = new_system(Sensor.RGBD, callbacks=Callbacks(on_keyframe=ends))
+    systems.append(system)
+    track(system, 0)
+    tracked.set()
+    assert ended.wait(LIMIT)
+    with pytest.raises(StateError, match="shut down"):
+        track(system, 1)
+    system.shutdown()
 
 
 def test_optimize_ends_with_the_shutdown(slam: System, stage: Stage) -> None:
