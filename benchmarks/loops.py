@@ -40,7 +40,8 @@ from tables import new_table, verdict
 from orbslam2py.errors import DatasetError
 from orbslam2py.evaluation import Alignment, evaluate_trajectory
 from orbslam2py.lap_evaluation import lap_error, scale_drift
-from orbslam2py.runner import RunOptions, RunResult, SequenceRunner
+from orbslam2py.run_result import RunOptions, RunResult
+from orbslam2py.runner import SequenceRunner
 from orbslam2py.sensor import Sensor
 from orbslam2py.trajectory import Trajectory
 from orbslam2py.vocabulary import load_vocabulary

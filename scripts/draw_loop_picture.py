@@ -21,7 +21,8 @@ from matplotlib.figure import Figure
 
 from orbslam2py.evaluation import Similarity, align
 from orbslam2py.lap_evaluation import lap_error
-from orbslam2py.runner import RunOptions, RunResult, SequenceRunner
+from orbslam2py.run_result import RunOptions, RunResult
+from orbslam2py.runner import SequenceRunner
 from orbslam2py.sensor import Sensor
 from orbslam2py.trajectory import Trajectory
 from orbslam2py.vocabulary import load_vocabulary

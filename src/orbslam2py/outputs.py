@@ -23,7 +23,7 @@ from orbslam2py._rotations import quaternions_from_rotations
 from orbslam2py.errors import DatasetError
 from orbslam2py.plots import draw_trajectory
 from orbslam2py.report import RunEvaluation
-from orbslam2py.runner import FrameRow, RunResult
+from orbslam2py.run_result import FrameRow, RunResult
 from orbslam2py.sensor import Sensor
 from orbslam2py.trajectory import Trajectory, write_kitti, write_tum
 

@@ -17,7 +17,7 @@ from orbslam2py.evaluation import Alignment, Evaluation, evaluate_trajectory
 from orbslam2py.events import LoopClosed
 from orbslam2py.full_adjustment import FullAdjustmentRecord
 from orbslam2py.records import TrackingState
-from orbslam2py.runner import RunResult
+from orbslam2py.run_result import RunResult
 from orbslam2py.sensor import Sensor
 from orbslam2py.trajectory import Trajectory
 

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from orbslam2py import _core as core
 from orbslam2py.initialization import DepthInitializer
+from orbslam2py.keyframe_decision import KeyframeClock, KeyframeDecision
 from orbslam2py.local_mapping import LocalMapping
 from orbslam2py.monocular_initialization import MonocularInitializer
 from orbslam2py.records import Reason, TrackingState
@@ -72,6 +73,9 @@ class Tracking:
         self._sensor = sensor
         self._max_frames = max_frames
         self._limits = thresholds or TrackingThresholds()
+        self._keyframe_decision = KeyframeDecision(
+            world, mapping.worker, sensor, max_frames, self._limits
+        )
         self._initializer = initializer or DepthInitializer(world, vocabulary, mapping)
         self._relocalizer = relocalizer
         #: Pose only: no keyframes, no new points. A choice of the user, kept over resets.
@@ -132,9 +136,15 @@ class Tracking:
             core.discard_temporary(frame)
         else:
             with timer("keyframe"):
-                if self._needs_keyframe(frame, outcome.n_inliers):
+                since = KeyframeClock(
+                    last_keyframe=self._last_keyframe_frame_id,
+                    last_relocalization=self._last_relocalization_frame_id,
+                )
+                outcome.is_keyframe = self._keyframe_decision.wanted(
+                    frame, self.reference_keyframe, outcome.n_inliers, since
+                )
+                if outcome.is_keyframe:
                     self._create_keyframe(frame)
-                    outcome.is_keyframe = True
         # Outliers went into the keyframe, where bundle adjustment decides about them; the next
         # frame must not start from them.
         frame.discard_outliers()
@@ -399,43 +409,6 @@ class Tracking:
             self._velocity = None
 
     # ---- keyframes -------------------------------------------------------------------------------
-    def _needs_keyframe(self, frame: core.TrackedFrame, n_inliers: int) -> bool:
-        n_keyframes = self._map.n_keyframes
-        if self._mapping.worker.pausing:
-            return False
-        recently_relocalized = frame.id < self._last_relocalization_frame_id + self._max_frames
-        if recently_relocalized and n_keyframes > self._max_frames:
-            return False
-
-        min_observations = 2 if n_keyframes <= 2 else 3
-        n_reference = core.count_tracked_points(
-            self._map, self.reference_keyframe, min_observations
-        )
-        tracked_close, untracked_close = frame.n_close_tracked_untracked()
-        needs_close_points = self._sensor.has_depth and (
-            tracked_close < self._limits.few_close_points
-            and untracked_close > self._limits.many_untracked_close_points
-        )
-        idle = self._mapping.worker.idle
-        ratio = 0.4 if n_keyframes < 2 else 0.75
-        if not self._sensor.has_depth:
-            ratio = 0.9
-
-        one_second_passed = frame.id >= self._last_keyframe_frame_id + self._max_frames
-        tracking_is_weak = self._sensor.has_depth and (
-            n_inliers < 0.25 * n_reference or needs_close_points
-        )
-        sees_new_things = n_inliers < ratio * n_reference or needs_close_points
-        wanted = (one_second_passed or idle or tracking_is_weak) and (
-            sees_new_things and n_inliers > self._limits.reference_matches
-        )
-        if not wanted or idle:
-            return wanted
-        self._mapping.worker.interrupt()
-        # A busy mapper gets no keyframes of a single camera: they would come at every frame.
-        queue = self._limits.keyframe_queue if self._sensor.has_depth else 0
-        return self._mapping.worker.n_waiting < queue
-
     def _create_keyframe(self, frame: core.TrackedFrame) -> None:
         core.describe(frame.frame, self._vocabulary)
         keyframe = core.insert_keyframe(self._map, frame, create_points=self._sensor.has_depth)

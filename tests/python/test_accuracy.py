@@ -9,7 +9,8 @@ import pytest
 
 from orbslam2py.datasets import open_sequence
 from orbslam2py.report import evaluate_run, make_report
-from orbslam2py.runner import RunOptions, SequenceRunner
+from orbslam2py.run_result import RunOptions
+from orbslam2py.runner import SequenceRunner
 from orbslam2py.sensor import Sensor
 
 pytestmark = [pytest.mark.shared, pytest.mark.slow]

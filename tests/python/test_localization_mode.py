@@ -15,7 +15,8 @@ from mapped_world import MappedWorld, pose_error
 from orbslam2py import _core as core
 from orbslam2py.local_mapping import LocalMapping
 from orbslam2py.records import TrackingRecord, TrackingState
-from orbslam2py.runner import RunOptions, SequenceRunner
+from orbslam2py.run_result import RunOptions
+from orbslam2py.runner import SequenceRunner
 from orbslam2py.sensor import Sensor
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.system import System

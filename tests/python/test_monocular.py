@@ -17,7 +17,8 @@ from orbslam2py.evaluation import Alignment, evaluate_trajectory
 from orbslam2py.outputs import OutputWriter
 from orbslam2py.records import Reason, TrackingRecord, TrackingState
 from orbslam2py.report import make_report
-from orbslam2py.runner import RunOptions, SequenceRunner
+from orbslam2py.run_result import RunOptions
+from orbslam2py.runner import SequenceRunner
 from orbslam2py.sensor import Sensor
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.system import System

@@ -23,7 +23,7 @@ from orbslam2py.plots import draw_trajectory
 from orbslam2py.prefetch import Prefetcher
 from orbslam2py.records import Reason, TrackingRecord, TrackingState
 from orbslam2py.report import peak_memory_mb
-from orbslam2py.runner import FrameRow, RunOptions
+from orbslam2py.run_result import FrameRow, RunOptions
 from orbslam2py.sensor import Sensor
 from orbslam2py.system import System
 from orbslam2py.timing import StageStatistics, StageTimer

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orbslam2py import _core, initialization, tracking
+from orbslam2py import _core, initialization, keyframe_decision, tracking
 from orbslam2py.records import Reason, TrackingState
 from orbslam2py.sensor import Sensor
 from orbslam2py.timing import StageTimer
@@ -249,6 +249,7 @@ class Scene:
 def core(monkeypatch: pytest.MonkeyPatch) -> FakeCore:
     core = FakeCore()
     monkeypatch.setattr(tracking, "core", core)
+    monkeypatch.setattr(keyframe_decision, "core", core)
     return core
 
 
@@ -649,7 +650,8 @@ def test_keyframe_decision(scene: Scene, case: Case) -> None:
     inserted = list(scene.mapping.inserted)
 
     # Too few inliers to go on tracking are enough for a decision.
-    scene.tracking._limits = tracking.TrackingThresholds(local_map_inliers=1, map_matches=1)
+    limits = tracking.TrackingThresholds(local_map_inliers=1, map_matches=1)
+    scene.tracking._limits = scene.tracking._keyframe_decision.limits = limits
     scene.map.n_keyframes = case.n_keyframes
     scene.core.n_reference = case.n_reference
     worker = scene.mapping.worker

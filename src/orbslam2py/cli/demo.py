@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from orbslam2py.cli.run import run_and_write
-from orbslam2py.runner import RunOptions
+from orbslam2py.run_result import RunOptions
 from orbslam2py.sensor import Sensor
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
