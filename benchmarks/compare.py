@@ -5,7 +5,10 @@ The yardstick is OpenCV's own ORB in one thread. It is measured in turns with ea
 both see the same state of the machine; "there" means the machine of the reference's figures.
 
     python benchmarks/compare.py                 everything that this checkout allows
-    python benchmarks/compare.py --only steps    steps, vocabularies, sequences, python, locks
+    python benchmarks/compare.py --only steps    steps, vocabularies, sequences, python, locks,
+                                                 loops
+
+The curve of the costs of loops goes to build/bench/loop_cost.png.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import cv2
+import loop_cost
 import reference
 import steps
 import vocabularies
@@ -28,7 +32,7 @@ from steps import Row
 from tables import new_table, verdict
 from yardstick import Yardstick
 
-PARTS = ("steps", "vocabularies", "sequences", "python", "locks")
+PARTS = ("steps", "vocabularies", "sequences", "python", "locks", "loops")
 
 
 def steps_table(title: str, rows: list[Row]) -> object:
@@ -67,6 +71,26 @@ def steps_table(title: str, rows: list[Row]) -> object:
     table.caption = "\n".join(notes)
     table.caption_justify = "left"
     return table
+
+
+def loop_tables(yardstick: Yardstick, build: Path, pictures: Path) -> Iterator[object]:
+    """Steps of closing a loop, by size of the map; draws the curve."""
+    missing = loop_cost.missing_programs(build)
+    if missing:
+        yield (
+            f"[yellow]Loops: left out, {build} lacks {', '.join(missing)} "
+            "(cmake --preset release, then cmake --build build/release --target benchmarks)"
+        )
+        return
+    measured = loop_cost.measure(yardstick, build)
+    yield steps_table(
+        f"Closing a loop in a map of {loop_cost.LIMIT_SIZE} keyframes",
+        list(loop_cost.rows(measured)),
+    )
+    yield loop_cost.sizes_table(measured)
+    picture = pictures / "loop_cost.png"
+    loop_cost.draw(measured, picture)
+    yield f"Curve: {picture}"
 
 
 def _verdict(row: Row) -> str:
@@ -118,6 +142,9 @@ def main() -> None:
     parser.add_argument(
         "--build", type=Path, default=Path("build/release"), help="build folder of the benchmarks"
     )
+    parser.add_argument(
+        "--pictures", type=Path, default=Path("build/bench"), help="folder of the curves"
+    )
     parser.add_argument("--width", type=int, default=150, help="columns of the output")
     arguments = parser.parse_args()
     chosen = set(arguments.only or PARTS)
@@ -149,6 +176,7 @@ def main() -> None:
         ("sequences", lambda: sequence_tables(yardstick, arguments.runs)),
         ("python", python_table),
         ("locks", lambda: lock_tables(library)),
+        ("loops", lambda: loop_tables(yardstick, arguments.build, arguments.pictures)),
     ):
         if part in chosen:
             for table in tables():

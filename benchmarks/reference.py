@@ -190,3 +190,14 @@ SEQUENCE_SPEED_RATIO = 1.5
 PYTHON_SHARE = 0.03
 #: Longest write sections [ms]: a local window, a whole map of 1000 keyframes.
 LOCK_HOLD_MS = (2.0, 20.0)
+#: Parts of closing a loop in a map of 1000 keyframes.
+LOOPS = {
+    "detection": Figure("detection query", None, limit=10.0),
+    "verification": Figure("Sim(3) verification", None, limit=10.0),
+    "correction": Figure("correction and fusion", None, limit=400.0),
+    "correction_lock": Figure("correction, write lock", None, limit=LOCK_HOLD_MS[1]),
+    "essential_graph": Figure("essential graph", None, limit=500.0),
+    "full_adjustment": Figure("full adjustment", None, limit=15000.0),
+}
+#: Tracking's 99th percentile while a full adjustment runs over the one without.
+ADJUSTMENT_TRACKING_RATIO = 2.0
