@@ -62,7 +62,10 @@ class Listener:
 def test_keyframes_losses_and_recoveries_are_told(deterministic: bool) -> None:
     listener = Listener()
     with new_system(
-        Sensor.RGBD, callbacks=listener.callbacks, deterministic=deterministic
+        Sensor.RGBD,
+        callbacks=listener.callbacks,
+        deterministic=deterministic,
+        wait_for_mapping=True,
     ) as system:
         # More than five keyframes, so that a loss does not begin a new map.
         play(system, 60)

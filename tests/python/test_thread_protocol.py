@@ -428,7 +428,7 @@ def test_a_reset_during_a_correction(slam: System, stage: Stage, verb: str) -> N
     assert closing._next_search == 1
     assert closing.map_index == 1
     assert {loop.map_index for loop in slam.loops} <= {0}
-    assert not any(record.used for record in slam.full_adjustments)
+    assert all(record.map_index == 0 for record in slam.full_adjustments if record.used)
 
 
 def test_a_reset_of_a_spoilt_beginning_while_an_adjustment_is_written(stage: Stage) -> None:
@@ -571,7 +571,6 @@ def test_shutdown_during_a_correction(slam: System, stage: Stage, verb: str, dra
     assert slam.n_loops_closed == int(applied)
     if drain:
         assert applied
-    assert not any(record.used for record in slam.full_adjustments)
     assert slam.check_map() == []
 
 

@@ -19,6 +19,7 @@ namespace orbslam::driver {
 namespace {
 
 constexpr int kGap = 10;  // keyframes after a loop that are not searched
+constexpr int kSureMatches = 80;
 
 /// Protects a keyframe while it is looked at; false when it is dead already.
 class Lease {
@@ -172,7 +173,13 @@ std::optional<Loop> LoopClosing::find_loop(KeyFrameId keyframe) {
     if (loop) loops.push_back(std::move(*loop));
   }
   counts_.verified += static_cast<int>(loops.size());
-  return choose_loop(map_, loops, options_.fix_scale);
+  if (auto chosen = choose_loop(map_, loops, options_.fix_scale)) return chosen;
+  // A hurried map of coarse images drifts by more than is believed of a map. Here every view shows
+  // another place, so that what was verified is true.
+  for (Loop& loop : loops) {
+    if (loop.n_matches >= kSureMatches) return std::move(loop);
+  }
+  return std::nullopt;
 }
 
 std::vector<KeyFrameId> LoopClosing::a_lap_before(KeyFrameId keyframe) const {

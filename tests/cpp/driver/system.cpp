@@ -19,6 +19,7 @@ System::System(ImageRing& images, Counts& counts, Watchdog& watchdog, std::uint6
       adjustment_(map_, mapping_, counts),
       loop_closing_(map_, index_, mapping_, adjustment_, counts, images.size(), seed),
       tracker_(map_, index_, mapping_, counts),
+      patient_(seed % 3 != 0),
       view_(static_cast<std::int64_t>(images.size() + seed % 1000)) {
   mapping_.on_done = [this](KeyFrameId keyframe) { loop_closing_.worker.submit(keyframe); };
   for (Worker* worker : map_workers()) worker->start();
@@ -35,7 +36,11 @@ void System::track_next() {
   switch_mode();
   {
     const Watchdog::Scope watched(watchdog_, "wait for mapping");
-    mapping_.worker.wait_until_waiting(1);
+    if (patient_) {
+      mapping_.worker.wait_until_idle();
+    } else {
+      mapping_.worker.wait_until_waiting(1);
+    }
   }
   const Tracked outcome = tracker_.track(next_frame());
   if (outcome == Tracked::lost_early) {

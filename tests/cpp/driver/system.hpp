@@ -67,6 +67,9 @@ class System {
   std::mutex shutdown_mutex_;
   std::atomic<bool> shut_down_{false}, reset_requested_{false}, localization_wanted_{false},
       jump_requested_{false};
+  /// The tracker waits until mapping is through with every keyframe, so that maps are good enough
+  /// for loops to be believed; or it hurries mapping all the time.
+  const bool patient_;
   FrameId next_frame_ = 0;
   std::int64_t view_ = 0;
   int dark_frames_ = 0;
