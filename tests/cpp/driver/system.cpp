@@ -35,7 +35,7 @@ void System::track_next() {
   if (reset_requested_) reset_now();
   switch_mode();
   {
-    const Watchdog::Scope watched(watchdog_, "wait for mapping");
+    const Watchdog::Scope watched(watchdog_, "wait for mapping", 10);
     if (patient_) {
       mapping_.worker.wait_until_idle();
     } else {
