@@ -91,6 +91,7 @@ def loop_tables(yardstick: Yardstick, build: Path, pictures: Path) -> Iterator[o
     picture = pictures / "loop_cost.png"
     loop_cost.draw(measured, picture)
     yield f"Curve: {picture}"
+    yield loop_cost.tracking_table()
 
 
 def _verdict(row: Row) -> str:

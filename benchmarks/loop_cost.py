@@ -9,15 +9,18 @@ from __future__ import annotations
 import itertools
 import json
 import math
+import statistics
 import subprocess
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
 import reference
 from matplotlib.figure import Figure
 from steps import Row
-from tables import new_table
+from tables import new_table, verdict
 from yardstick import Times, Yardstick
 
 SIZES = (250, 500, 1000, 2000, 4000)
@@ -229,3 +232,45 @@ def draw(steps: list[Step], path: Path) -> None:
 def rows(steps: list[Step]) -> Iterator[Row]:
     """Steps at the size of the limits."""
     return (step.unit for step in steps if step.unit is not None)
+
+
+# ---- tracking meanwhile --------------------------------------------------------------------------
+def tracking_table() -> object:
+    """Tracking's times with and without full adjustments beside it, and theirs beside tracking."""
+    script = Path(__file__).with_name("loop_tracking.py")
+    command = [sys.executable, str(script), "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise RuntimeError(f"{' '.join(command)}: {done.stderr}")
+    found = json.loads(done.stdout)
+    table = new_table(
+        f"Tracking in real time (every {found['period_ms']:.0f} ms) while the map of "
+        f"{found['keyframes']} keyframes and {found['points']} points is adjusted",
+        [""],
+        ["measured", "limit", "met"],
+    )
+    p99 = []
+    for name, key in (("without", "without_ms"), ("meanwhile", "during_ms")):
+        values = np.percentile(found[key], (50, 95, 99))
+        p99.append(float(values[2]))
+        shown = " / ".join(f"{value:.1f}" for value in values)
+        table.add_row(f"track ms {name}: median / p95 / p99", shown, "", "")
+    ratio, most = p99[1] / p99[0], reference.ADJUSTMENT_TRACKING_RATIO
+    table.add_row("p99 meanwhile / without", f"{ratio:.2f}", f"{most:g}", verdict(ratio <= most))
+    seconds = found["adjustment_s"]
+    limit = (reference.LOOPS["full_adjustment"].limit or 0) / 1e3
+    if seconds:
+        shown = f"{statistics.median(seconds):.1f} ({max(seconds):.1f})"
+        table.add_row(
+            "full adjustment s: median (longest)",
+            shown,
+            f"{limit:g}",
+            verdict(max(seconds) < limit),
+        )
+    table.caption = (
+        f"{len(found['without_ms'])} and {len(found['during_ms'])} frames of the same images; "
+        f"{found['tracked']} of {found['frames']} tracked\n{len(seconds)} adjustments to their "
+        f"end, {found['used']} used; accepted steps: {found['iterations']}"
+    )
+    table.caption_justify = "left"
+    return table
