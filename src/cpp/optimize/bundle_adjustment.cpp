@@ -13,6 +13,7 @@
 #include "optimize/bundle_point.hpp"
 #include "optimize/bundle_residuals.hpp"
 #include "optimize/gates.hpp"
+#include "optimize/single_openmp_thread.hpp"
 
 namespace orbslam {
 namespace {
@@ -135,6 +136,7 @@ class BundleSolver final : public ceres::EvaluationCallback {
     }
     solver.callbacks.push_back(&rules);
     ceres::Solver::Summary report;
+    const SingleOpenMpThread single;
     ceres::Solve(solver, &problem_, &report);
     summary.iterations += rules.successful();
     summary.timed_out = rules.timed_out();

@@ -11,6 +11,7 @@
 #include "base/errors.hpp"
 #include "optimize/bundle_iterations.hpp"
 #include "optimize/pose_graph_residuals.hpp"
+#include "optimize/single_openmp_thread.hpp"
 
 namespace orbslam {
 namespace {
@@ -152,6 +153,7 @@ class PoseGraphSolver final : public ceres::EvaluationCallback {
     solver.logging_type = ceres::SILENT;
     solver.callbacks.push_back(&rules);
     ceres::Solver::Summary report;
+    const SingleOpenMpThread single;
     ceres::Solve(solver, &problem_, &report);
   }
 
