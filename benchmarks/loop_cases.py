@@ -96,7 +96,7 @@ _ROOMS = SyntheticWorld.TWO_ROOMS
 CASES = (
     Case(_CORRIDOR, Sensor.STEREO, 1, 1.5),
     Case(_CORRIDOR, Sensor.RGBD, 1, 1.5, depth_noise=0.03),
-    Case(_CORRIDOR, Sensor.MONOCULAR, 1, 1.5, 1000, 8, size=(400, 300), fps=15, speed=0.7),
+    Case(_CORRIDOR, Sensor.MONOCULAR, 1, 1.5, 1000, 5, size=(480, 360), fps=15, speed=0.7),
     Case(_EIGHT, Sensor.STEREO, 2, 1.2),
     Case(_EIGHT, Sensor.RGBD, 2, 1.2, depth_noise=0.03),
     Case(_BLOCK, Sensor.STEREO, 1, 1.2, 1000, size=(496, 150), speed=10),
