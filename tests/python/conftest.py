@@ -3,16 +3,38 @@
 
 from __future__ import annotations
 
+import gc
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from interleaving import LIMIT, Stage
+from orbslam2py.sensor import Sensor
+from orbslam2py.system import System
+from small_sequences import new_system, play
+from watchdog import watchdog, worker_threads
 
 _CHECKOUT = Path(__file__).resolve().parents[2]
 
 
 def _shared_folder() -> Path:
     return Path(os.environ.get("ORBSLAM2PY_SHARED", _CHECKOUT.parent / "shared"))
+
+
+@pytest.fixture(autouse=True)
+def _no_hang_and_no_thread_left(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Serve ``@pytest.mark.watchdog(seconds)``: no test hangs, and none leaves a thread behind."""
+    mark = request.node.get_closest_marker("watchdog")
+    if mark is None:
+        yield
+        return
+    before = worker_threads()
+    with watchdog(*mark.args):
+        yield
+        gc.collect()
+        assert worker_threads() == before
 
 
 @pytest.fixture(scope="session")
@@ -25,3 +47,21 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no extra data in {folder}: set ORBSLAM2PY_SHARED to its folder")
     return folder
+
+
+@pytest.fixture
+def slam() -> Iterator[System]:
+    """A system with a small map whose workers have nothing to do."""
+    system = new_system(Sensor.RGBD, wait_for_mapping=True)
+    play(system, 30)
+    assert system.wait_until_idle(LIMIT)
+    assert system.n_keyframes >= 3
+    yield system
+    system.shutdown(drain=False, timeout=LIMIT)
+
+
+@pytest.fixture
+def stage(monkeypatch: pytest.MonkeyPatch) -> Iterator[Stage]:
+    stage = Stage(monkeypatch)
+    yield stage
+    stage.open_all()

@@ -162,3 +162,17 @@ class Stage:
     def open_all(self) -> None:
         for gate in self._gates:
             gate.open()
+
+
+def last_keyframe(slam: System) -> int:
+    return int(slam._map.keyframe_ids()[-1])
+
+
+def refine(slam: System) -> None:
+    """Ask for a full adjustment, as a loop does."""
+    slam._back_end.adjustment.start()
+
+
+def settle(slam: System) -> None:
+    assert slam._back_end.wait_until_idle(LIMIT)
+    assert slam.check_map() == []

@@ -8,7 +8,7 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -21,21 +21,14 @@ from orbslam2py import _core, _files
 from orbslam2py.sensor import Sensor
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.trajectory import read_tum
-from watchdog import watchdog, worker_threads
+
+pytestmark = pytest.mark.watchdog(40)
 
 N = 14
 BAD = 6
 """The frame that is spoilt."""
 FILES = ("trajectory.txt", "trajectory_online.txt", "keyframes.txt", "trajectory_kitti.txt")
 FILES += ("frames.csv", "points.ply", "trajectory.png", "report.json", "settings.yaml")
-
-
-@pytest.fixture(autouse=True)
-def _no_hang_and_no_thread_left() -> Iterator[None]:
-    before = worker_threads()
-    with watchdog(40):
-        yield
-        assert worker_threads() == before
 
 
 @pytest.fixture(scope="module")

@@ -3,10 +3,8 @@
 
 from __future__ import annotations
 
-import gc
 import logging
 import threading
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -24,16 +22,8 @@ from orbslam2py.records import TrackingState
 from orbslam2py.sensor import Sensor
 from orbslam2py.system import System
 from small_sequences import black, new_system, play, track
-from watchdog import watchdog, worker_threads
 
-
-@pytest.fixture(autouse=True)
-def _no_hang_and_no_thread_left() -> Iterator[None]:
-    before = worker_threads()
-    with watchdog(60):
-        yield
-        gc.collect()
-        assert worker_threads() == before
+pytestmark = pytest.mark.watchdog(60)
 
 
 class Listener:

@@ -3,9 +3,7 @@
 
 from __future__ import annotations
 
-import gc
 import threading
-from collections.abc import Iterator
 from functools import lru_cache
 
 import numpy as np
@@ -21,18 +19,10 @@ from orbslam2py.sensor import Sensor
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.system import System
 from small_sequences import black, images, new_system, play, track
-from watchdog import watchdog, worker_threads
+
+pytestmark = pytest.mark.watchdog(60)
 
 WITH_DEPTH = [Sensor.STEREO, Sensor.RGBD]
-
-
-@pytest.fixture(autouse=True)
-def _no_hang_and_no_thread_left() -> Iterator[None]:
-    before = worker_threads()
-    with watchdog(60):
-        yield
-        gc.collect()
-        assert worker_threads() == before
 
 
 @pytest.fixture(params=WITH_DEPTH)

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
@@ -19,16 +17,8 @@ from orbslam2py.sensor import Sensor
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.system import System
 from orbslam2py.trajectory import Trajectory
-from watchdog import watchdog, worker_threads
 
-
-@pytest.fixture(autouse=True)
-def _no_hang_and_no_thread_left() -> Iterator[None]:
-    before = worker_threads()
-    with watchdog(300):
-        yield
-        gc.collect()
-        assert worker_threads() == before
+pytestmark = pytest.mark.watchdog(300)
 
 
 @lru_cache

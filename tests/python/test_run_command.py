@@ -8,7 +8,6 @@ import logging
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
@@ -21,7 +20,8 @@ from orbslam2py.sensor import Sensor
 from orbslam2py.settings import Settings
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.trajectory import read_tum
-from watchdog import watchdog, worker_threads
+
+pytestmark = pytest.mark.watchdog(40)
 
 N = 24
 STAGES = ["extract", "stereo", "predict", "local_map", "keyframe", "track"]
@@ -37,14 +37,6 @@ FILES = {
     "report.json",
     "settings.yaml",
 }
-
-
-@pytest.fixture(autouse=True)
-def _no_hang_and_no_thread_left() -> Iterator[None]:
-    before = worker_threads()
-    with watchdog(40):
-        yield
-        assert worker_threads() == before
 
 
 @pytest.fixture(scope="module")

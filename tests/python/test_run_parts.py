@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
@@ -27,15 +26,9 @@ from orbslam2py.run_result import FrameRow, RunOptions
 from orbslam2py.sensor import Sensor
 from orbslam2py.system import System
 from orbslam2py.timing import StageStatistics, StageTimer
-from watchdog import watchdog, worker_threads
+from watchdog import worker_threads
 
-
-@pytest.fixture(autouse=True)
-def _no_hang_and_no_thread_left() -> Iterator[None]:
-    before = worker_threads()
-    with watchdog(20):
-        yield
-        assert worker_threads() == before
+pytestmark = pytest.mark.watchdog(20)
 
 
 # ---- reading ahead -------------------------------------------------------------------------------

@@ -3,11 +3,9 @@
 
 from __future__ import annotations
 
-import gc
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -22,18 +20,10 @@ from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.system import System
 from orbslam2py.trajectory import write_tum
 from small_sequences import ate, images, new_system, play, track
-from watchdog import watchdog, worker_threads
+
+pytestmark = pytest.mark.watchdog(30)
 
 SENSORS = [Sensor.STEREO, Sensor.RGBD]
-
-
-@pytest.fixture(autouse=True)
-def _no_hang_and_no_thread_left() -> Iterator[None]:
-    before = worker_threads()
-    with watchdog(30):
-        yield
-        gc.collect()
-        assert worker_threads() == before
 
 
 @pytest.fixture(params=SENSORS)

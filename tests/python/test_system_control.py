@@ -6,7 +6,6 @@ from __future__ import annotations
 import gc
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -17,18 +16,11 @@ from orbslam2py.errors import StateError, WorkerError
 from orbslam2py.records import Reason, TrackingState
 from orbslam2py.sensor import Sensor
 from small_sequences import ate, black, new_system, play, sequence, track
-from watchdog import watchdog, worker_threads
+from watchdog import worker_threads
+
+pytestmark = pytest.mark.watchdog(30)
 
 SENSORS = [Sensor.STEREO, Sensor.RGBD]
-
-
-@pytest.fixture(autouse=True)
-def _no_hang_and_no_thread_left() -> Iterator[None]:
-    before = worker_threads()
-    with watchdog(30):
-        yield
-        gc.collect()
-        assert worker_threads() == before
 
 
 @pytest.fixture(params=SENSORS)

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -16,18 +14,10 @@ from orbslam2py.records import Reason, TrackingState
 from orbslam2py.sensor import Sensor
 from orbslam2py.system import System
 from small_sequences import images, new_system, play, sequence, track
-from watchdog import watchdog, worker_threads
+
+pytestmark = pytest.mark.watchdog(30)
 
 SENSORS = [Sensor.STEREO, Sensor.RGBD]
-
-
-@pytest.fixture(autouse=True)
-def _no_hang_and_no_thread_left() -> Iterator[None]:
-    before = worker_threads()
-    with watchdog(30):
-        yield
-        gc.collect()
-        assert worker_threads() == before
 
 
 @pytest.fixture(params=SENSORS)

@@ -11,17 +11,10 @@ import pytest
 
 from orbslam2py.errors import OrbSlamError, StateError, WorkerError
 from orbslam2py.threads import CallGuard, Worker, WorkerState
-from watchdog import watchdog, worker_threads
+
+pytestmark = pytest.mark.watchdog(10)
 
 NAME = "worker under test"
-
-
-@pytest.fixture(autouse=True)
-def _no_hang_and_no_thread_left() -> Iterator[None]:
-    before = worker_threads()
-    with watchdog(10):
-        yield
-        assert worker_threads() == before
 
 
 class Gate:
