@@ -20,7 +20,6 @@ from orbslam2py.builtin_settings import resolve_settings
 from orbslam2py.errors import ImageError, StateError, WorkerError
 from orbslam2py.events import (
     Callbacks,
-    LoopClosed,
     Relocalized,
     TrackingLost,
 )
@@ -33,17 +32,15 @@ from orbslam2py.full_adjustment import (
 from orbslam2py.initialization import DepthInitializer
 from orbslam2py.localization_mode import LocalizationSwitch
 from orbslam2py.map_views import (
-    MapSnapshot,
     frame_features,
     frame_trajectory,
-    keyframe_trajectory,
-    take_snapshot,
 )
 from orbslam2py.monocular_initialization import MonocularInitializer
 from orbslam2py.records import TrackingRecord, TrackingState
 from orbslam2py.relocalization import Relocalizer
 from orbslam2py.sensor import Sensor
 from orbslam2py.settings import Settings
+from orbslam2py.system_results import SystemResults
 from orbslam2py.threads import CallGuard
 from orbslam2py.timing import StageStatistics, StageTimer
 from orbslam2py.tracking import Tracking
@@ -57,7 +54,7 @@ _log = logging.getLogger(__name__)
 _PATIENCE = 60.0
 
 
-class System:
+class System(SystemResults):
     """Visual SLAM for one camera, a stereo pair or an RGB-D camera.
 
     Parameters
@@ -526,78 +523,6 @@ class System:
                 raise
             if not isinstance(error, WorkerError):  # else it is the same one
                 _log.exception("shutdown after an error failed as well")
-
-    # ---- results ---------------------------------------------------------------------------------
-    @property
-    def state(self) -> TrackingState:
-        """State after the last track call."""
-        return self._tracking.state
-
-    @property
-    def n_keyframes(self) -> int:
-        """Keyframes in the map."""
-        return int(self._map.n_keyframes)
-
-    @property
-    def n_map_points(self) -> int:
-        """Points in the map."""
-        return int(self._map.n_points)
-
-    @property
-    def n_loops_closed(self) -> int:
-        """Loops closed so far, over all maps."""
-        return len(self._back_end.loop_closing.loops)
-
-    @property
-    def loops(self) -> list[LoopClosed]:
-        """The loops closed so far, over all maps."""
-        return list(self._back_end.loop_closing.loops)
-
-    @property
-    def full_adjustments(self) -> list[FullAdjustmentRecord]:
-        """The full bundle adjustments so far, also those that were given up."""
-        return list(self._back_end.adjustment.records)
-
-    @property
-    def n_relocalizations(self) -> int:
-        """How often tracking was found again after a loss."""
-        return self._tracking.n_relocalizations
-
-    def trajectory(self) -> Trajectory:
-        """Poses of all images of the present map, after the latest optimisation.
-
-        Returns
-        -------
-        Trajectory
-            Time stamps, ``T_wc`` (n, 4, 4) relative to keyframe 0, and which frames were lost.
-        """
-        return self.trajectories()[-1]
-
-    def trajectories(self) -> list[Trajectory]:
-        """One trajectory per map: those ended by resets, then the present one."""
-        with self._trajectory_lock:
-            present = frame_trajectory(self._recorder, self._map)
-            return [*self._finished_trajectories, present]
-
-    def keyframe_trajectory(self) -> Trajectory:
-        """Poses of the keyframes, relative to keyframe 0."""
-        return keyframe_trajectory(self._map)
-
-    def map_snapshot(self) -> MapSnapshot:
-        """A copy of keyframe poses and points; may be called while the system runs."""
-        return take_snapshot(self._map)
-
-    def map_hash(self) -> int:
-        """Hash over poses, points and observations: equal for equal maps."""
-        return int(self._map.content_hash())
-
-    def check_map(self) -> list[str]:
-        """Violated invariants of the map, one sentence each; empty if it is consistent."""
-        return list(core.check_invariants(self._map, require_words=True))
-
-    def stage_statistics(self) -> dict[str, dict[str, float]]:
-        """Median, mean and p99 milliseconds per stage of tracking, mapping and loop closing."""
-        return {**self._statistics.summary(), **self._back_end.statistics()}
 
 
 def _abandon(back_end: BackEnd) -> None:
