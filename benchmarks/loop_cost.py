@@ -270,7 +270,8 @@ def tracking_table() -> object:
     table.caption = (
         f"{len(found['without_ms'])} and {len(found['during_ms'])} frames of the same images; "
         f"{found['tracked']} of {found['frames']} tracked\n{len(seconds)} adjustments to their "
-        f"end, {found['used']} used; accepted steps: {found['iterations']}"
+        f"end, {found['used']} used; accepted steps: {found['iterations']}\n"
+        "Other programs disturb the ratio: it means something on an otherwise idle computer only."
     )
     table.caption_justify = "left"
     return table

@@ -62,36 +62,37 @@ class Measured:
 
 
 class Adjuster:
-    """Adjusts again and again in a thread, as a user's thread would."""
+    """Adjusts in another thread, as a user's thread would."""
 
     def __init__(
         self, system: System, made: MadeUpMap, ring: list[int], rng: np.random.Generator
     ) -> None:
         self._system, self._made, self._ring, self._rng = system, made, ring, rng
-        self._stop = threading.Event()
-        self.running = False
+        self._thread: threading.Thread | None = None
         self.done: list[tuple[float, FullAdjustmentRecord]] = []
-        self._thread = threading.Thread(target=self._run)
 
-    def start(self) -> None:
-        """Begin."""
+    @property
+    def running(self) -> bool:
+        """An adjustment has begun and not ended."""
+        return self._thread is not None and self._thread.is_alive()
+
+    def begin(self) -> None:
+        """Let the ring drift, and begin one."""
+        poses = self._made.drifted(self._rng)
+        for keyframe, pose in zip(self._ring, poses, strict=True):
+            self._system._map.set_pose(keyframe, pose)
+        self._thread = threading.Thread(target=self._run)
         self._thread.start()
 
-    def stop(self) -> None:
-        """Let the last one end."""
-        self._stop.set()
-        self._thread.join()
+    def wait(self) -> None:
+        """For the end of the one that runs."""
+        if self._thread is not None:
+            self._thread.join()
 
     def _run(self) -> None:
-        while not self._stop.is_set():
-            poses = self._made.drifted(self._rng)
-            for keyframe, pose in zip(self._ring, poses, strict=True):
-                self._system._map.set_pose(keyframe, pose)
-            self.running = True
-            begin = time.perf_counter()
-            record = self._system.optimize()
-            self.running = False
-            self.done.append((time.perf_counter() - begin, record))
+        begin = time.perf_counter()
+        record = self._system.optimize()
+        self.done.append((time.perf_counter() - begin, record))
 
 
 def track_all(
@@ -101,8 +102,9 @@ def track_all(
     times, tracked = [], 0
     begin = time.perf_counter()
     for i, image in enumerate(images):
-        if i == _WARM_UP and adjuster is not None:
-            adjuster.start()
+        # Between two frames, so that making the drift disturbs none.
+        if i >= _WARM_UP and adjuster is not None and not adjuster.running:
+            adjuster.begin()
         wait = begin + i * period - time.perf_counter()
         if wait > 0:
             time.sleep(wait)
@@ -142,9 +144,9 @@ def measure(size: MapSize, n_frames: int, passes: int) -> Measured:
                 result.without_ms += times
                 continue
             result.during_ms += times
-            adjuster.stop()
-            for seconds, record in adjuster.done[:-1]:  # the last one ran on without tracking
+            for seconds, record in adjuster.done:
                 result.add(seconds, record)
+            adjuster.wait()  # this one had no tracking beside it to its end
     return result
 
 
