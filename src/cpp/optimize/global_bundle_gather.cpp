@@ -47,31 +47,67 @@ std::vector<bool> largest_part(const BundleProblem& problem) {
   return chosen;
 }
 
-/// Takes away the other cameras, the points that only they see, and those that are nowhere.
+/// Takes away the other cameras, their observations, and the points that are then seen by nobody.
 GatheredBundle reduce(const GatheredBundle& all, const std::vector<bool>& cameras, const Map& map) {
   GatheredBundle kept(map);
+  kept.epoch = all.epoch;
+  kept.big_changes = all.big_changes;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
-    if (cameras[i]) kept.add_camera(*map.find(all.keyframes[i]), false);
+    if (!cameras[i]) continue;
+    kept.camera_of.emplace(all.keyframes[i], static_cast<std::uint32_t>(kept.keyframes.size()));
+    kept.keyframes.push_back(all.keyframes[i]);
+    kept.problem.cameras.push_back(all.problem.cameras[i]);
   }
-  std::vector<bool> seen(all.points.size(), false);
-  for (const BundleProblem::Observation& o : all.problem.observations) {
-    if (cameras[o.camera]) seen[o.point] = true;
-  }
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    if (seen[i]) kept.add_point(*map.find(all.points[i]), map);
+  constexpr std::uint32_t kNobody = ~std::uint32_t{0};
+  std::uint32_t last = kNobody;  // observations of a point follow each other
+  for (std::size_t i = 0; i < all.problem.observations.size(); ++i) {
+    BundleProblem::Observation o = all.problem.observations[i];
+    if (!cameras[o.camera]) continue;
+    if (o.point != last) {
+      last = o.point;
+      kept.points.push_back(all.points[last]);
+      kept.problem.points.push_back(all.problem.points[last]);
+    }
+    o.camera = kept.camera_of.at(all.keyframes[o.camera]);
+    o.point = static_cast<std::uint32_t>(kept.points.size() - 1);
+    kept.problem.observations.push_back(o);
+    kept.keypoints.push_back(all.keypoints[i]);
   }
   return kept;
+}
+
+/// Copies points in slices, between which others may write: tracking notes something in the map at
+/// every frame and would wait for the whole of a large one.
+void gather_points(const Map& map, const std::vector<MapPointId>& ids, GatheredBundle& bundle) {
+  constexpr std::size_t kSlice = 2048;
+  for (std::size_t begin = 0; begin < ids.size(); begin += kSlice) {
+    const auto lock = map.read_lock();
+    if (map.epoch() != bundle.epoch) return;  // nothing of it will be committed
+    const std::size_t end = std::min(begin + kSlice, ids.size());
+    for (std::size_t i = begin; i < end; ++i) {
+      const MapPoint* point = map.find(ids[i]);
+      if (!point || !point->position.allFinite()) continue;
+      const std::size_t n_before = bundle.problem.observations.size();
+      bundle.add_point(*point, map);
+      if (bundle.problem.observations.size() > n_before) continue;
+      bundle.points.pop_back();
+      bundle.problem.points.pop_back();
+    }
+  }
 }
 
 }  // namespace
 
 GatheredBundle gather_global_bundle(const Map& map) {
-  const auto lock = map.read_lock();
   GatheredBundle bundle(map);
-  map.for_each_keyframe([&](const KeyFrame& keyframe) { bundle.add_camera(keyframe, false); });
-  map.for_each_point([&](const MapPoint& point) {
-    if (!point.observations.empty() && point.position.allFinite()) bundle.add_point(point, map);
-  });
+  std::vector<MapPointId> points;
+  {
+    const auto lock = map.read_lock();
+    bundle = GatheredBundle(map);
+    map.for_each_keyframe([&](const KeyFrame& keyframe) { bundle.add_camera(keyframe, false); });
+    points = map.point_ids();
+  }
+  gather_points(map, points, bundle);
   if (bundle.keyframes.empty()) return bundle;
   const std::vector<bool> tied = largest_part(bundle.problem);
   if (std::count(tied.begin(), tied.end(), false) > 0) bundle = reduce(bundle, tied, map);
