@@ -11,28 +11,13 @@
 #include "frame/image_input.hpp"
 #include "frame/stereo_kernels.hpp"
 #include "frame/stereo_matching.hpp"
+#include "measure.hpp"
 #include "synthetic/paths.hpp"
 #include "synthetic/world.hpp"
 
 namespace {
 
 using namespace orbslam;
-
-/// Runs `work` and reports the median and the 99th percentile.
-template <class Work>
-void measure(benchmark::State& state, Work work) {
-  std::vector<double> milliseconds;
-  for (auto _ : state) {
-    const auto begin = std::chrono::steady_clock::now();
-    work();
-    const std::chrono::duration<double, std::milli> taken =
-        std::chrono::steady_clock::now() - begin;
-    milliseconds.push_back(taken.count());
-  }
-  std::sort(milliseconds.begin(), milliseconds.end());
-  state.counters["median_ms"] = milliseconds[milliseconds.size() / 2];
-  state.counters["p99_ms"] = milliseconds[milliseconds.size() * 99 / 100];
-}
 
 /// A rendered pair and its features, of the sizes and numbers of well-known data sets.
 struct Pair {

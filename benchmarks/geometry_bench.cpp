@@ -10,6 +10,7 @@
 #include "geometry/epnp.hpp"
 #include "geometry/pnp_ransac.hpp"
 #include "geometry/two_view.hpp"
+#include "measure.hpp"
 
 namespace {
 
@@ -19,22 +20,6 @@ const Pinhole pinhole{520, 525, 320, 240};
 
 double uniform(RandomIntegers& random, double low, double high) {
   return low + (high - low) * static_cast<double>(random.below(1U << 30U)) / (1U << 30U);
-}
-
-/// Runs `work` and reports the median and the 99th percentile.
-template <class Work>
-void measure(benchmark::State& state, Work work) {
-  std::vector<double> milliseconds;
-  for (auto _ : state) {
-    const auto begin = std::chrono::steady_clock::now();
-    work();
-    const std::chrono::duration<double, std::milli> taken =
-        std::chrono::steady_clock::now() - begin;
-    milliseconds.push_back(taken.count());
-  }
-  std::sort(milliseconds.begin(), milliseconds.end());
-  state.counters["median_ms"] = milliseconds[milliseconds.size() / 2];
-  state.counters["p99_ms"] = milliseconds[milliseconds.size() * 99 / 100];
 }
 
 void BM_ReconstructTwoViews(benchmark::State& state, bool planar) {

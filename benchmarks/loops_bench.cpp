@@ -10,26 +10,10 @@
 #include "loops/loop_choice.hpp"
 #include "loops/loop_scene.hpp"
 #include "loops/loop_verification.hpp"
+#include "measure.hpp"
 
 namespace orbslam {
 namespace {
-
-/// Runs `work` and reports the median and the 99th percentile.
-template <class Work>
-void measure(benchmark::State& state, Work work) {
-  std::vector<double> milliseconds;
-  for (auto _ : state) {
-    const auto begin = std::chrono::steady_clock::now();
-    work();
-    const std::chrono::duration<double, std::milli> taken =
-        std::chrono::steady_clock::now() - begin;
-    milliseconds.push_back(taken.count());
-  }
-  std::sort(milliseconds.begin(), milliseconds.end());
-  state.counters["median_ms"] = milliseconds[milliseconds.size() / 2];
-  state.counters["min_ms"] = milliseconds.front();
-  state.counters["p99_ms"] = milliseconds[milliseconds.size() * 99 / 100];
-}
 
 /// About 1000 features per keyframe, of which the given percentage has moved since: they match by
 /// words and are wrong.

@@ -7,27 +7,12 @@
 #include <chrono>
 #include <vector>
 
+#include "measure.hpp"
 #include "optimize/golden.hpp"
 
 namespace {
 
 using namespace orbslam;
-
-/// Runs `work` and reports the median and the 99th percentile.
-template <class Work>
-void measure(benchmark::State& state, Work work) {
-  std::vector<double> milliseconds;
-  for (auto _ : state) {
-    const auto begin = std::chrono::steady_clock::now();
-    work();
-    const std::chrono::duration<double, std::milli> taken =
-        std::chrono::steady_clock::now() - begin;
-    milliseconds.push_back(taken.count());
-  }
-  std::sort(milliseconds.begin(), milliseconds.end());
-  state.counters["median_ms"] = milliseconds[milliseconds.size() / 2];
-  state.counters["p99_ms"] = milliseconds[milliseconds.size() * 99 / 100];
-}
 
 void BM_OptimizePose(benchmark::State& state, const char* set) {
   const testing::PoseProblem problem = testing::golden_pose_problem(set);
