@@ -102,9 +102,9 @@ CASES = (
     Case(_BLOCK, Sensor.STEREO, 1, 1.2, 1000, size=(496, 150), speed=10),
     Case(_REPEATING, Sensor.STEREO, 1, 1.5),
     Case(_REPEATING, Sensor.RGBD, 1, 1.5, depth_noise=0.03),
-    Case(_REPEATING, Sensor.MONOCULAR, 1, 1.5, 1000, 8, size=(400, 300), fps=15, speed=0.7),
+    Case(_REPEATING, Sensor.MONOCULAR, 1, 1.5, 1000, 5, size=(480, 360), fps=15, speed=0.7),
     Case(_STREET, Sensor.STEREO, 0, None, 1000, size=(496, 150), speed=10),
     Case(_ROOMS, Sensor.STEREO, 0, speed=0.6),
     Case(_ROOMS, Sensor.RGBD, 0, depth_noise=0.03, speed=0.6),
-    Case(_ROOMS, Sensor.MONOCULAR, 0, None, 1000, 8, size=(400, 300), fps=15, speed=0.4),
+    Case(_ROOMS, Sensor.MONOCULAR, 0, None, 1000, 5, size=(480, 360), fps=15, speed=0.4),
 )
