@@ -36,8 +36,8 @@ GlobalBundleResult global_bundle_adjustment(Map& map, const GlobalBundleOptions&
 /// was just inserted and has not been processed) are left out: nothing says where they are relative
 /// to the rest. If the map falls apart, the part with most keyframes is taken. The first keyframe
 /// of the bundle is fixed: it is keyframe 0 unless that one has lost its points. Takes the read
-/// lock in short sections, so that tracking does not wait for a large map; what changes between them
-/// is taken as it is found.
+/// lock in short sections, so that tracking does not wait for a large map; what changes between
+/// them is taken as it is found.
 GatheredBundle gather_global_bundle(const Map& map);
 
 /// Solves a gathered bundle in place, without a lock. It counts as solved, and may be committed,
