@@ -272,7 +272,7 @@ def _relocalization_speed(arguments: argparse.Namespace, sensor: str) -> None:
         core.find_relocalization_candidates = lambda *_: chosen
         for name, enough in limits.items():
             relocalizer = Relocalizer(
-                system._map, system._index, 0, RelocalizationThresholds(enough=enough)
+                system._map, system._back_end.index, 0, RelocalizationThresholds(enough=enough)
             )
             candidates = relocalizer._candidates(core.TrackedFrame(frame))
             times_of(

@@ -211,7 +211,15 @@ def test_tracked_frame() -> None:
     np.testing.assert_array_equal(tracked.T_cw.matrix, np.eye(4))
     tracked.T_cw = None
     assert tracked.T_cw is None
-    tracked.reference_keyframe = 8
+    world = core.Map()
+    keyframe = world.add_keyframe(frame, core.Pose())
+    core.anchor_frame(world, tracked, keyframe)
+    world.count_big_change()
+    core.anchor_frame(world, tracked, keyframe)
+    assert (tracked.reference_keyframe, tracked.big_change) == (keyframe, 1)
+    other = core.TrackedFrame(frame)
+    other.share_anchor(tracked)
+    assert (other.reference_keyframe, other.big_change) == (keyframe, 1)
 
     tracked.associate(4, 17, np.array([1.0, 2.0, 3.0]))
     assert tracked.map_points.dtype == np.int64
@@ -229,7 +237,7 @@ def test_tracked_frame() -> None:
     tracked.associate(5, 18, np.zeros(3))
     tracked.clear_associations()
     assert (tracked.map_points == -1).all()
-    assert tracked.reference_keyframe == 8
+    assert tracked.reference_keyframe == keyframe
 
 
 def test_monocular_frame_of_a_distorting_lens() -> None:

@@ -155,7 +155,7 @@ def described(world: MappedWorld, shown: Images) -> core.TrackedFrame:
 
 
 def relocalizer(world: MappedWorld, seed: int = 0) -> Relocalizer:
-    return Relocalizer(world.system._map, world.system._index, seed)
+    return Relocalizer(world.system._map, world.system._back_end.index, seed)
 
 
 def test_found_frame_has_pose_and_matches(world: MappedWorld) -> None:
