@@ -3,8 +3,11 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
 from collections.abc import Callable
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -176,3 +179,16 @@ def refine(slam: System) -> None:
 def settle(slam: System) -> None:
     assert slam._back_end.wait_until_idle(LIMIT)
     assert slam.check_map() == []
+
+
+def run_to_the_end(code: str, timeout: float) -> None:
+    """Run a script that prints "end": its interpreter ends as well, in time and in silence."""
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=Path(__file__).parent,
+        capture_output=True,
+        text=True,
+        timeout=timeout,
+        check=False,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "end\n", "")

@@ -4,36 +4,15 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 core = pytest.importorskip("orbslam2py._core", reason="the extension module is not built")
 
-WIDTH, HEIGHT = 320, 240
+from block_wall import HEIGHT, WIDTH, ten_words, texture  # noqa: E402
+
 DEPTH = 2.5  # metres: one pixel to the side is one centimetre
 SHIFT = 4  # centimetres between the two keyframes
 DRIFT = 0.03  # metres that the map puts the second one too far
-
-
-def texture(shift: int) -> npt.NDArray[np.uint8]:
-    """A wall of grey blocks, seen from `shift` centimetres further to the right."""
-    blocks = np.random.default_rng(0).integers(0, 256, (30, 80), dtype=np.uint8)
-    wall = np.kron(blocks, np.ones((8, 8), dtype=np.uint8))
-    return np.ascontiguousarray(wall[:, shift : shift + WIDTH])
-
-
-def vocabulary() -> core.Vocabulary:
-    rng = np.random.default_rng(1)
-    return core.Vocabulary.from_table(
-        10,
-        1,
-        core.Scoring.L1,
-        core.Weighting.TF_IDF,
-        np.zeros(10, np.uint32),
-        np.ones(10, np.uint8),
-        rng.integers(0, 256, (10, 32), np.uint8),
-        np.ones(10),
-    )
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +23,7 @@ def world() -> core.Map:
     )
     options.depth_ratio = 40.0
     context = core.FrameContext(core.Camera(options), core.ScalePyramid(1.2, 8))
-    world, recent, words = core.Map(), core.RecentPoints(), vocabulary()
+    world, recent, words = core.Map(), core.RecentPoints(), ten_words()
     for shift, x in ((0, 0.0), (SHIFT, SHIFT / 100 + DRIFT)):
         extraction = core.OrbExtractor(core.OrbOptions(n_features=400)).extract(texture(shift))
         metres = np.full((HEIGHT, WIDTH), DEPTH, dtype=np.float32)

@@ -9,31 +9,10 @@ import pytest
 
 core = pytest.importorskip("orbslam2py._core", reason="the extension module is not built")
 
+from block_wall import HEIGHT, WIDTH, ten_words, texture  # noqa: E402
 from orbslam2py.errors import StateError  # noqa: E402
 
-WIDTH, HEIGHT = 320, 240
 DEPTH = 2.5  # metres: one pixel to the side is one centimetre
-
-
-def texture(shift: int) -> npt.NDArray[np.uint8]:
-    """A wall of grey blocks, seen from `shift` centimetres further to the right."""
-    blocks = np.random.default_rng(0).integers(0, 256, (30, 80), dtype=np.uint8)
-    wall = np.kron(blocks, np.ones((8, 8), dtype=np.uint8))
-    return np.ascontiguousarray(wall[:, shift : shift + WIDTH])
-
-
-def vocabulary() -> core.Vocabulary:
-    rng = np.random.default_rng(1)
-    return core.Vocabulary.from_table(
-        10,
-        1,
-        core.Scoring.L1,
-        core.Weighting.TF_IDF,
-        np.zeros(10, np.uint32),
-        np.ones(10, np.uint8),
-        rng.integers(0, 256, (10, 32), np.uint8),
-        np.ones(10),
-    )
 
 
 class Scene:
@@ -45,7 +24,7 @@ class Scene:
         )
         options.depth_ratio = 40.0
         self.context = core.FrameContext(core.Camera(options), core.ScalePyramid(1.2, 8))
-        self.vocabulary = vocabulary()
+        self.vocabulary = ten_words()
         self.map = core.Map()
         self.recent = core.RecentPoints()
 

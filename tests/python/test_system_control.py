@@ -4,13 +4,11 @@
 from __future__ import annotations
 
 import gc
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from interleaving import run_to_the_end
 from orbslam2py import _core
 from orbslam2py.errors import StateError, WorkerError
 from orbslam2py.records import Reason, TrackingState
@@ -100,15 +98,7 @@ def test_interpreter_ends_without_shutdown() -> None:
         "play(system, 12)\n"
         "print('end')\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=Path(__file__).parent,
-        capture_output=True,
-        text=True,
-        timeout=25,
-        check=False,
-    )
-    assert (done.returncode, done.stdout, done.stderr) == (0, "end\n", "")
+    run_to_the_end(code, timeout=25)
 
 
 # ---- reset ---------------------------------------------------------------------------------------

@@ -6,14 +6,11 @@ D14 and D17 with a number are defects of the original in spec 14, section 8, and
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import threading
-from pathlib import Path
 
 import pytest
 
-from interleaving import LIMIT, Call, Stage, last_keyframe, refine, settle
+from interleaving import LIMIT, Call, Stage, last_keyframe, refine, run_to_the_end, settle
 from orbslam2py import _core
 from orbslam2py.errors import StateError, WorkerError
 from orbslam2py.events import Callbacks, KeyframeAdded
@@ -368,15 +365,7 @@ def test_the_interpreter_ends_while_an_adjustment_is_solved() -> None:
         "assert entered.wait(15)\n"
         "print('end')\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=Path(__file__).parent,
-        capture_output=True,
-        text=True,
-        timeout=45,
-        check=False,
-    )
-    assert (done.returncode, done.stdout, done.stderr) == (0, "end\n", "")
+    run_to_the_end(code, timeout=45)
 
 
 # ---- workers that fail ---------------------------------------------------------------------------

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A wall of grey blocks and words for it: the smallest world that keyframes can be matched in."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from orbslam2py import _core as core
+
+WIDTH, HEIGHT = 320, 240
+
+
+def texture(shift: int) -> npt.NDArray[np.uint8]:
+    """The wall, seen from `shift` pixels further to the right."""
+    blocks = np.random.default_rng(0).integers(0, 256, (30, 80), dtype=np.uint8)
+    wall = np.kron(blocks, np.ones((8, 8), dtype=np.uint8))
+    return np.ascontiguousarray(wall[:, shift : shift + WIDTH])
+
+
+def ten_words() -> core.Vocabulary:
+    """A vocabulary of ten random words."""
+    rng = np.random.default_rng(1)
+    return core.Vocabulary.from_table(
+        10,
+        1,
+        core.Scoring.L1,
+        core.Weighting.TF_IDF,
+        np.zeros(10, np.uint32),
+        np.ones(10, np.uint8),
+        rng.integers(0, 256, (10, 32), np.uint8),
+        np.ones(10),
+    )
