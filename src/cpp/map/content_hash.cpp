@@ -3,18 +3,15 @@
 
 #include <cstring>
 
+#include "base/mix.hpp"
+
 namespace orbslam {
 namespace {
 
-/// Words are mixed in order with the finalizer of splitmix64, which is bijective per word.
+/// Words are mixed in, in order.
 class Hash {
  public:
-  void add(std::uint64_t word) {
-    state_ += word + 0x9e3779b97f4a7c15U;
-    state_ = (state_ ^ (state_ >> 30)) * 0xbf58476d1ce4e5b9U;
-    state_ = (state_ ^ (state_ >> 27)) * 0x94d049bb133111ebU;
-    state_ ^= state_ >> 31;
-  }
+  void add(std::uint64_t word) { state_ = mix(state_ + word); }
   void add(std::int64_t value) { add(static_cast<std::uint64_t>(value)); }
   void add(double value) {
     std::uint64_t bits;

@@ -12,7 +12,6 @@
 namespace orbslam {
 namespace {
 
-constexpr double kLeastViewCosine = 0.5;  // 60 degrees from the mean direction
 constexpr std::int32_t kNoMatch = -1;
 
 void require_size(const std::vector<MapPointId>& matches, const Frame& frame,
@@ -103,13 +102,9 @@ void search_loop_points(const Frame& frame, const Similarity& S_cw, const PointB
                         float radius_factor, const Free& free, const Take& take) {
   const Projector projector(frame, S_cw.pose());
   for (std::size_t i = 0; i < points.size(); ++i) {
-    ImagePoint image;
-    if (!projector.project_into_keyframe(points.positions[i], image)) continue;
-    const Eigen::Vector3d ray = points.positions[i] - projector.center();
-    const double distance = ray.norm();
-    if (!in_scale_range(distance, points.min_distances[i], points.max_distances[i])) continue;
-    if (!(ray.dot(points.mean_directions[i]) >= kLeastViewCosine * distance)) continue;
-    const int level = frame.scales->predict_level(points.max_distances[i], distance);
+    ExpectedView view;
+    if (!expect_in_keyframe(projector, frame, points, i, view)) continue;
+    const auto& [image, level] = view;
     const std::int32_t best =
         best_keypoint(frame, {image.u, image.v, level, radius_factor, kDescriptorLow},
                       points.descriptors[i], free);

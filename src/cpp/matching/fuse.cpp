@@ -14,7 +14,6 @@ namespace {
 
 constexpr double kMonoGate = 5.99;             // chi-square, 95 %, 2 degrees of freedom
 constexpr double kStereoGate = 7.8;            // 3 degrees of freedom, rounded as in the original
-constexpr double kLeastViewCosine = 0.5;       // 60 degrees from the mean direction
 constexpr std::size_t kSecondDegree = 5;       // neighbours of a neighbour that take part
 constexpr std::size_t kRefreshedAtOnce = 200;  // points per write section, to keep it short
 constexpr float kNeighbourRadius = 3.0F;
@@ -54,14 +53,9 @@ void find_fusions(const PointBatch& points, const std::vector<std::uint8_t>& obs
   fusions.clear();
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (observed[i]) continue;
-    ImagePoint image;
-    if (!projector.project_into_keyframe(points.positions[i], image)) continue;
-    const Eigen::Vector3d ray = points.positions[i] - projector.center();
-    const double distance = ray.norm();
-    if (!in_scale_range(distance, points.min_distances[i], points.max_distances[i])) continue;
-    if (!(ray.dot(points.mean_directions[i]) >= kLeastViewCosine * distance)) continue;
-
-    const int level = frame.scales->predict_level(points.max_distances[i], distance);
+    ExpectedView view;
+    if (!expect_in_keyframe(projector, frame, points, i, view)) continue;
+    const auto& [image, level] = view;
     frame.grid.features_in_area(
         frame.keypoints, static_cast<float>(image.u), static_cast<float>(image.v),
         radius_factor * frame.scales->scale(level), level - 1, level, candidates);

@@ -3,6 +3,7 @@
 
 #include "base/pose.hpp"
 #include "frame/frame.hpp"
+#include "map/point_batch.hpp"
 
 namespace orbslam {
 
@@ -56,6 +57,26 @@ class Projector {
 /// Whether a point that is `distance` away can show the scales it was seen at (10 to 20 % slack).
 inline bool in_scale_range(double distance, double min_distance, double max_distance) {
   return distance >= 0.8 * min_distance && distance <= 1.2 * max_distance;
+}
+
+/// Where a keyframe should show a point, and on which level of its pyramid.
+struct ExpectedView {
+  ImagePoint image;
+  int level = 0;
+};
+
+/// The view of a point of the batch; false when it is out of sight, at a scale it was not seen at,
+/// or more than 60 degrees from its mean viewing direction.
+inline bool expect_in_keyframe(const Projector& projector, const Frame& frame,
+                               const PointBatch& points, std::size_t i, ExpectedView& view) {
+  constexpr double kLeastViewCosine = 0.5;
+  if (!projector.project_into_keyframe(points.positions[i], view.image)) return false;
+  const Eigen::Vector3d ray = points.positions[i] - projector.center();
+  const double distance = ray.norm();
+  if (!in_scale_range(distance, points.min_distances[i], points.max_distances[i])) return false;
+  if (!(ray.dot(points.mean_directions[i]) >= kLeastViewCosine * distance)) return false;
+  view.level = frame.scales->predict_level(points.max_distances[i], distance);
+  return true;
 }
 
 }  // namespace orbslam

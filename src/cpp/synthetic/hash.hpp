@@ -3,16 +3,11 @@
 
 #include <cstdint>
 
+#include "base/mix.hpp"
+
 namespace orbslam::synthetic {
 
-/// A bijection of 64-bit words whose output bits look independent (finaliser of SplitMix64).
-inline std::uint64_t mix(std::uint64_t x) {
-  x += 0x9e3779b97f4a7c15ULL;
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebULL;
-  return x ^ (x >> 31);
-}
-
+using orbslam::mix;
 inline std::uint64_t mix(std::uint64_t a, std::uint64_t b) { return mix(mix(a) ^ b); }
 
 /// Numbers drawn one after the other from a seed; the same on every platform.
