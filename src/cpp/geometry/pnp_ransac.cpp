@@ -17,15 +17,7 @@ void check(const PnpProblem& problem, const PnpOptions& options) {
   if (problem.pixels.cols() != n || problem.sigma2.size() != n) {
     throw std::invalid_argument("points, pixels and sigma2 must have the same length");
   }
-  const RansacOptions& ransac = options.ransac;
-  const bool valid = ransac.probability > 0 && ransac.probability < 1 && ransac.inlier_ratio >= 0 &&
-                     ransac.inlier_ratio <= 1 && ransac.max_iterations >= 1 &&
-                     ransac.exponent >= 1 && options.max_chi2 > 0;
-  if (!valid) {
-    throw std::invalid_argument(
-        "PnP options: 0 < probability < 1, 0 <= inlier_ratio <= 1, max_iterations >= 1, exponent "
-        ">= 1 and max_chi2 > 0");
-  }
+  check(options.ransac, options.max_chi2, "PnP options");
 }
 
 }  // namespace

@@ -52,4 +52,14 @@ int ransac_iterations(std::size_t count, const RansacOptions& options) {
   return std::max(1, static_cast<int>(iterations));
 }
 
+void check(const RansacOptions& options, double max_chi2, const char* what) {
+  const bool valid = options.probability > 0 && options.probability < 1 &&
+                     options.inlier_ratio >= 0 && options.inlier_ratio <= 1 &&
+                     options.max_iterations >= 1 && options.exponent >= 1 && max_chi2 > 0;
+  if (valid) return;
+  throw std::invalid_argument(std::string(what) +
+                              ": 0 < probability < 1, 0 <= inlier_ratio <= 1, max_iterations >= 1, "
+                              "exponent >= 1 and max_chi2 > 0");
+}
+
 }  // namespace orbslam

@@ -56,4 +56,8 @@ struct RansacOptions {
 /// inliers; 0 when there are fewer than min_inliers, so that no model can be found.
 int ransac_iterations(std::size_t count, const RansacOptions& options);
 
+/// Throws std::invalid_argument, beginning with `what`, when an option or the gate max_chi2 is out
+/// of range.
+void check(const RansacOptions& options, double max_chi2, const char* what);
+
 }  // namespace orbslam

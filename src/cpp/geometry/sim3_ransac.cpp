@@ -18,15 +18,7 @@ void check(const Sim3Problem& problem, const Sim3Options& options) {
     throw std::invalid_argument(
         "points_1, points_2, sigma2_1 and sigma2_2 must have the same length");
   }
-  const RansacOptions& ransac = options.ransac;
-  const bool valid = ransac.probability > 0 && ransac.probability < 1 && ransac.inlier_ratio >= 0 &&
-                     ransac.inlier_ratio <= 1 && ransac.max_iterations >= 1 &&
-                     ransac.exponent >= 1 && options.max_chi2 > 0;
-  if (!valid) {
-    throw std::invalid_argument(
-        "Sim3 options: 0 < probability < 1, 0 <= inlier_ratio <= 1, max_iterations >= 1, exponent "
-        ">= 1 and max_chi2 > 0");
-  }
+  check(options.ransac, options.max_chi2, "Sim3 options");
 }
 
 /// Pixels and gates of a camera's own points.
