@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from orbslam2py.sensor import Sensor
-from orbslam2py.settings import Settings
-from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence, SyntheticWorld
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings.settings import Settings
+from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence, SyntheticWorld
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from orbslam2py.evaluation import align, match_poses
-from orbslam2py.events import LoopClosed
-from orbslam2py.trajectory import Trajectory
+from orbslam2py.evaluation.metrics import align, match_poses
+from orbslam2py.slam.events import LoopClosed
+from orbslam2py.trajectory.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 

@@ -21,11 +21,11 @@ import numpy as np
 from made_up_map import MadeUpMap, MapSize
 
 from orbslam2py.datasets import Images
-from orbslam2py.full_adjustment import FullAdjustmentRecord
-from orbslam2py.records import TrackingState
-from orbslam2py.sensor import Sensor
-from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence, SyntheticWorld
-from orbslam2py.system import System
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
+from orbslam2py.slam.records import TrackingState
+from orbslam2py.slam.system import System
+from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence, SyntheticWorld
 
 #: Frames after the start of a run that do not count: the map begins.
 _WARM_UP = 20

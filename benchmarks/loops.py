@@ -38,13 +38,13 @@ from rich.table import Table
 from tables import new_table, verdict
 
 from orbslam2py.errors import DatasetError
-from orbslam2py.evaluation import Alignment, evaluate_trajectory
-from orbslam2py.lap_evaluation import lap_error, scale_drift
-from orbslam2py.run_result import RunOptions, RunResult
-from orbslam2py.runner import SequenceRunner
-from orbslam2py.sensor import Sensor
-from orbslam2py.trajectory import Trajectory
-from orbslam2py.vocabulary import load_vocabulary
+from orbslam2py.evaluation.laps import lap_error, scale_drift
+from orbslam2py.evaluation.metrics import Alignment, evaluate_trajectory
+from orbslam2py.runs.result import RunOptions, RunResult
+from orbslam2py.runs.runner import SequenceRunner
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.trajectory.trajectory import Trajectory
+from orbslam2py.vocabulary.vocabulary import load_vocabulary
 
 #: A revisit has to be closed in so many of the runs.
 LEAST_CLOSED = 0.9

@@ -21,9 +21,9 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from orbslam2py.settings import OrbSettings
-from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
-from orbslam2py.system import System
+from orbslam2py.settings.settings import OrbSettings
+from orbslam2py.slam.system import System
+from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
 
 TARGET_KB_PER_FRAME = 0.5
 SIZE = (160, 120)

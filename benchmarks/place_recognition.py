@@ -21,7 +21,7 @@ from rich.console import Console
 from rich.table import Table
 
 from orbslam2py import _core as core
-from orbslam2py.vocabulary import default_vocabulary_path, load_vocabulary
+from orbslam2py.vocabulary.vocabulary import default_vocabulary_path, load_vocabulary
 
 
 @dataclass

@@ -27,8 +27,8 @@ import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py.datasets import open_sequence
-from orbslam2py.sensor import Sensor
-from orbslam2py.system import System
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.system import System
 
 _CLASSES = (
     core.Map,

@@ -28,14 +28,14 @@ import numpy as np
 from orbslam2py import System, TrackingState
 from orbslam2py import _core as core
 from orbslam2py.datasets.base import Images
-from orbslam2py.front_end import FrontEnd
-from orbslam2py.records import Reason
-from orbslam2py.relocalization import RelocalizationThresholds, Relocalizer
-from orbslam2py.report import peak_memory_mb
-from orbslam2py.sensor import Sensor
-from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence, SyntheticWorld
-from orbslam2py.timing import StageTimer
-from orbslam2py.vocabulary import load_vocabulary
+from orbslam2py.runs.report import peak_memory_mb
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.front_end import FrontEnd
+from orbslam2py.slam.records import Reason
+from orbslam2py.slam.relocalization import RelocalizationThresholds, Relocalizer
+from orbslam2py.slam.timing import StageTimer
+from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence, SyntheticWorld
+from orbslam2py.vocabulary.vocabulary import load_vocabulary
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "python"))
 from mapped_world import MappedWorld, PoseError, beside

@@ -17,7 +17,7 @@ from reference import Figure
 from yardstick import GOLDEN, Measurement, Yardstick, shared_folder
 
 from orbslam2py import _core as core
-from orbslam2py.vocabulary import load_vocabulary
+from orbslam2py.vocabulary.vocabulary import load_vocabulary
 
 SCALE_FACTOR, N_LEVELS = 1.2, 8
 

@@ -23,7 +23,7 @@ from steps import Row
 from yardstick import Yardstick
 
 from orbslam2py import _core as core
-from orbslam2py.vocabulary import load_vocabulary, save_vocabulary
+from orbslam2py.vocabulary.vocabulary import load_vocabulary, save_vocabulary
 
 BRANCHING, DEPTH = 10, 6
 

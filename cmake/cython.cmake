@@ -1,5 +1,5 @@
 # orbslam_cython_module(NAME SOURCE): compiles a .pyx of the Python package into an extension
-# module that is installed beside it.
+# module that is installed beside it, in the room where its source lies.
 function(orbslam_cython_module NAME SOURCE)
   set(generated ${CMAKE_CURRENT_BINARY_DIR}/${NAME}.cpp)
   add_custom_command(
@@ -10,6 +10,8 @@ function(orbslam_cython_module NAME SOURCE)
   Python_add_library(${NAME} MODULE WITH_SOABI ${generated})
   # Generated code does not follow our warning rules.
   target_compile_options(${NAME} PRIVATE -O3 -w)
-  install(TARGETS ${NAME} DESTINATION orbslam2py COMPONENT python)
+  get_filename_component(folder ${SOURCE} DIRECTORY)
+  file(RELATIVE_PATH room ${PROJECT_SOURCE_DIR}/src ${folder})
+  install(TARGETS ${NAME} DESTINATION ${room} COMPONENT python)
   add_dependencies(orbslam2py_python ${NAME})
 endfunction()

@@ -19,13 +19,13 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from orbslam2py.evaluation import Similarity, align
-from orbslam2py.lap_evaluation import lap_error
-from orbslam2py.run_result import RunOptions, RunResult
-from orbslam2py.runner import SequenceRunner
-from orbslam2py.sensor import Sensor
-from orbslam2py.trajectory import Trajectory
-from orbslam2py.vocabulary import load_vocabulary
+from orbslam2py.evaluation.laps import lap_error
+from orbslam2py.evaluation.metrics import Similarity, align
+from orbslam2py.runs.result import RunOptions, RunResult
+from orbslam2py.runs.runner import SequenceRunner
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.trajectory.trajectory import Trajectory
+from orbslam2py.vocabulary.vocabulary import load_vocabulary
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.append(str(ROOT / "benchmarks"))

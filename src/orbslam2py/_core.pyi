@@ -1263,7 +1263,7 @@ class TrainingOptions:
         ...
 class Vocabulary:
     """
-    A tree over ORB descriptors whose leaves are the visual words. Immutable; shared by threads and systems. See orbslam2py.vocabulary for reading any format.
+    A tree over ORB descriptors whose leaves are the visual words. Immutable; shared by threads and systems. See orbslam2py.vocabulary.vocabulary for reading any format.
     """
     @staticmethod
     def from_table(branching: typing.SupportsInt | typing.SupportsIndex, depth: typing.SupportsInt | typing.SupportsIndex, scoring: Scoring, weighting: Weighting, parents: typing.Annotated[numpy.typing.ArrayLike, numpy.uint32], is_word: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8], centres: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8], weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> Vocabulary:

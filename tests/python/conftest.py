@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from interleaving import LIMIT, Stage
-from orbslam2py.sensor import Sensor
-from orbslam2py.system import System
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.system import System
 from small_sequences import new_system, play
 from watchdog import watchdog, worker_threads
 

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from orbslam2py import _core
-from orbslam2py.system import System
-from orbslam2py.threads import Worker
+from orbslam2py.slam.system import System
+from orbslam2py.slam.worker import Worker
 
 #: Seconds after which something that should happen is held to have hung.
 LIMIT = 15.0

@@ -10,10 +10,10 @@ import numpy as np
 
 from orbslam2py import System, TrackingState
 from orbslam2py.datasets.base import Images
-from orbslam2py.evaluation import align
-from orbslam2py.records import TrackingRecord
-from orbslam2py.sensor import Sensor
-from orbslam2py.synthetic import SyntheticSequence
+from orbslam2py.evaluation.metrics import align
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.records import TrackingRecord
+from orbslam2py.synthetic.sequence import SyntheticSequence
 
 Array = np.ndarray
 

@@ -6,11 +6,11 @@ from __future__ import annotations
 from functools import lru_cache
 
 from orbslam2py.datasets.base import Images
-from orbslam2py.evaluation import evaluate_trajectory
-from orbslam2py.records import TrackingRecord
-from orbslam2py.sensor import Sensor
-from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
-from orbslam2py.system import System
+from orbslam2py.evaluation.metrics import evaluate_trajectory
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.records import TrackingRecord
+from orbslam2py.slam.system import System
+from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
 
 SIZE = (320, 240)
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from orbslam2py.datasets import open_sequence
-from orbslam2py.report import evaluate_run, make_report
-from orbslam2py.run_result import RunOptions
-from orbslam2py.runner import SequenceRunner
-from orbslam2py.sensor import Sensor
+from orbslam2py.runs.report import evaluate_run, make_report
+from orbslam2py.runs.result import RunOptions
+from orbslam2py.runs.runner import SequenceRunner
+from orbslam2py.settings.sensor import Sensor
 
 pytestmark = [pytest.mark.shared, pytest.mark.slow]
 

@@ -18,9 +18,9 @@ import pytest
 import orbslam2py
 from command_line import CommandLine, Outcome, Results
 from orbslam2py import _core, _files
-from orbslam2py.sensor import Sensor
-from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
-from orbslam2py.trajectory import read_tum
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
+from orbslam2py.trajectory.trajectory import read_tum
 
 pytestmark = pytest.mark.watchdog(40)
 
@@ -413,7 +413,7 @@ def test_a_picture_that_cannot_be_drawn(
     def draw(*_: object, **__: object) -> None:
         raise ValueError("no font")
 
-    monkeypatch.setattr("orbslam2py.outputs.draw_trajectory", draw)
+    monkeypatch.setattr("orbslam2py.runs.outputs.draw_trajectory", draw)
     done = run(command, rgbd)
     assert done.code == 1
     assert "cannot make trajectory.png: no font" in done.err

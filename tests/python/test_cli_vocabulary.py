@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from orbslam2py.cli import main
-from orbslam2py.vocabulary import load_vocabulary
+from orbslam2py.vocabulary.vocabulary import load_vocabulary
 
 TEXT = Path(__file__).parents[1] / "data" / "golden" / "bow" / "voc_small_k10L3.txt"
 

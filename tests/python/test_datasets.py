@@ -10,7 +10,6 @@ import cv2
 import numpy as np
 import pytest
 
-from orbslam2py.builtin_settings import builtin_settings
 from orbslam2py.datasets import (
     EurocSequence,
     KittiSequence,
@@ -21,7 +20,8 @@ from orbslam2py.datasets import (
     recognise,
 )
 from orbslam2py.errors import DatasetError, ImageError, SettingsError
-from orbslam2py.sensor import Sensor
+from orbslam2py.settings.builtin import builtin_settings
+from orbslam2py.settings.sensor import Sensor
 
 SIZE = (48, 64)  # rows, columns
 

@@ -12,7 +12,7 @@ from evo.core.trajectory import PoseTrajectory3D
 from scipy.spatial.transform import Rotation
 
 from orbslam2py.errors import DatasetError
-from orbslam2py.evaluation import (
+from orbslam2py.evaluation.metrics import (
     Alignment,
     Similarity,
     align,
@@ -20,7 +20,7 @@ from orbslam2py.evaluation import (
     one_second_pairs,
     segment_errors,
 )
-from orbslam2py.trajectory import Trajectory
+from orbslam2py.trajectory.trajectory import Trajectory
 
 
 def wander(n: int, seed: int = 0, rate: float = 10.0) -> Trajectory:

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orbslam2py.events import (
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.events import (
     Callbacks,
     KeyframeAdded,
     MapChangeCause,
@@ -18,9 +19,8 @@ from orbslam2py.events import (
     Relocalized,
     TrackingLost,
 )
-from orbslam2py.records import TrackingState
-from orbslam2py.sensor import Sensor
-from orbslam2py.system import System
+from orbslam2py.slam.records import TrackingState
+from orbslam2py.slam.system import System
 from small_sequences import black, new_system, play, track
 
 pytestmark = pytest.mark.watchdog(60)

@@ -15,8 +15,8 @@ from pathlib import Path
 import pytest
 
 from command_line import Results
-from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
-from orbslam2py.trajectory import read_tum
+from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
+from orbslam2py.trajectory.trajectory import read_tum
 from watchdog import watchdog
 
 N = 30
@@ -101,11 +101,11 @@ MOMENTS = [
     ("orbslam2py._core", "match_local_map", 10, ()),
     ("orbslam2py._core", "local_bundle_adjustment", 1, ()),
     ("orbslam2py._core", "process_new_keyframe", 2, ("--deterministic",)),
-    ("orbslam2py.system", "System.wait_until_idle", 1, ()),
-    ("orbslam2py.system", "System.shutdown", 1, ()),
-    ("orbslam2py.report", "evaluate_trajectory", 1, ()),
-    ("orbslam2py.outputs", "draw_trajectory", 1, ()),
-    ("orbslam2py.outputs", "OutputWriter._remove_stale", 1, ()),
+    ("orbslam2py.slam.system", "System.wait_until_idle", 1, ()),
+    ("orbslam2py.slam.system", "System.shutdown", 1, ()),
+    ("orbslam2py.runs.report", "evaluate_trajectory", 1, ()),
+    ("orbslam2py.runs.outputs", "draw_trajectory", 1, ()),
+    ("orbslam2py.runs.outputs", "OutputWriter._remove_stale", 1, ()),
 ]
 
 
@@ -130,7 +130,9 @@ def test_once(lap: Path, module: str, name: str, n: int, options: tuple[str, ...
 
 
 def test_while_the_vocabulary_is_loaded(lap: Path) -> None:
-    code, err = finish(start(lap.parent, "orbslam2py.vocabulary", "load_vocabulary", 1, 1))
+    code, err = finish(
+        start(lap.parent, "orbslam2py.vocabulary.vocabulary", "load_vocabulary", 1, 1)
+    )
     assert (code, err) == (130, "")
     assert not (lap.parent / "r").exists(), "nothing was computed"
 
@@ -158,7 +160,7 @@ def test_while_an_image_does_not_come(lap: Path) -> None:
 
 
 def test_twice_while_writing_gives_up(lap: Path) -> None:
-    code, _ = finish(start(lap.parent, "orbslam2py.outputs", "draw_trajectory", 1, 2))
+    code, _ = finish(start(lap.parent, "orbslam2py.runs.outputs", "draw_trajectory", 1, 2))
     assert code == 130
     names = {path.name for path in (lap.parent / "r").iterdir()}
     assert "trajectory.txt" in names

@@ -10,8 +10,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from orbslam2py.errors import DatasetError
-from orbslam2py.lap_evaluation import lap_error, scale_drift
-from orbslam2py.trajectory import Trajectory
+from orbslam2py.evaluation.laps import lap_error, scale_drift
+from orbslam2py.trajectory.trajectory import Trajectory
 
 
 def circle(n: int, radius: float = 10.0, turns: float = 1.2) -> Trajectory:

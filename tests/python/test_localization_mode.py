@@ -11,13 +11,13 @@ import pytest
 
 from mapped_world import MappedWorld, pose_error
 from orbslam2py import _core as core
-from orbslam2py.local_mapping import LocalMapping
-from orbslam2py.records import TrackingRecord, TrackingState
-from orbslam2py.run_result import RunOptions
-from orbslam2py.runner import SequenceRunner
-from orbslam2py.sensor import Sensor
-from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
-from orbslam2py.system import System
+from orbslam2py.runs.result import RunOptions
+from orbslam2py.runs.runner import SequenceRunner
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.local_mapping import LocalMapping
+from orbslam2py.slam.records import TrackingRecord, TrackingState
+from orbslam2py.slam.system import System
+from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
 from small_sequences import black, images, new_system, play, track
 
 pytestmark = pytest.mark.watchdog(60)

@@ -13,12 +13,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from orbslam2py import _core, loop_closing
+from orbslam2py import _core
 from orbslam2py.errors import StateError
-from orbslam2py.events import LoopClosed
-from orbslam2py.loop_closing import LoopClosing
-from orbslam2py.sensor import Sensor
-from orbslam2py.threads import Worker
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam import loop_closing
+from orbslam2py.slam.events import LoopClosed
+from orbslam2py.slam.loop_closing import LoopClosing
+from orbslam2py.slam.worker import Worker
 
 
 @dataclass(frozen=True)

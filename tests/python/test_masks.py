@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from orbslam2py.errors import ImageError
-from orbslam2py.records import TrackingRecord, TrackingState
-from orbslam2py.sensor import Sensor
-from orbslam2py.system import System
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.records import TrackingRecord, TrackingState
+from orbslam2py.slam.system import System
 from small_sequences import images, sequence
 from watchdog import watchdog
 

@@ -13,16 +13,16 @@ import cv2
 import numpy as np
 import pytest
 
-from orbslam2py.evaluation import Alignment, evaluate_trajectory
-from orbslam2py.outputs import OutputWriter
-from orbslam2py.records import Reason, TrackingRecord, TrackingState
-from orbslam2py.report import make_report
-from orbslam2py.run_result import RunOptions
-from orbslam2py.runner import SequenceRunner
-from orbslam2py.sensor import Sensor
-from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
-from orbslam2py.system import System
-from orbslam2py.trajectory import Trajectory, write_tum
+from orbslam2py.evaluation.metrics import Alignment, evaluate_trajectory
+from orbslam2py.runs.outputs import OutputWriter
+from orbslam2py.runs.report import make_report
+from orbslam2py.runs.result import RunOptions
+from orbslam2py.runs.runner import SequenceRunner
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.records import Reason, TrackingRecord, TrackingState
+from orbslam2py.slam.system import System
+from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
+from orbslam2py.trajectory.trajectory import Trajectory, write_tum
 from watchdog import watchdog
 
 OPTIONS = SyntheticOptions(world="corridor", sensor="mono", size=(320, 240), noise=1)

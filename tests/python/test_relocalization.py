@@ -18,11 +18,11 @@ import pytest
 from mapped_world import MappedWorld, beside
 from orbslam2py import _core as core
 from orbslam2py.datasets.base import Images
-from orbslam2py.records import Reason, TrackingState
-from orbslam2py.relocalization import Relocalizer
-from orbslam2py.sensor import Sensor
-from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
-from orbslam2py.timing import StageTimer
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.records import Reason, TrackingState
+from orbslam2py.slam.relocalization import Relocalizer
+from orbslam2py.slam.timing import StageTimer
+from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
 from watchdog import watchdog
 
 SIZE = (480, 360)

@@ -17,15 +17,15 @@ from rich.progress import Progress, TextColumn
 import orbslam2py
 from orbslam2py.cli.run import _Display
 from orbslam2py.errors import DatasetError
-from orbslam2py.outputs import link_latest, prepare_output_folder, write_ply
-from orbslam2py.plots import draw_trajectory
-from orbslam2py.prefetch import Prefetcher
-from orbslam2py.records import Reason, TrackingRecord, TrackingState
-from orbslam2py.report import peak_memory_mb
-from orbslam2py.run_result import FrameRow, RunOptions
-from orbslam2py.sensor import Sensor
-from orbslam2py.system import System
-from orbslam2py.timing import StageStatistics, StageTimer
+from orbslam2py.runs.outputs import link_latest, prepare_output_folder, write_ply
+from orbslam2py.runs.plots import draw_trajectory
+from orbslam2py.runs.prefetch import Prefetcher
+from orbslam2py.runs.report import peak_memory_mb
+from orbslam2py.runs.result import FrameRow, RunOptions
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.records import Reason, TrackingRecord, TrackingState
+from orbslam2py.slam.system import System
+from orbslam2py.slam.timing import StageStatistics, StageTimer
 from watchdog import worker_threads
 
 pytestmark = pytest.mark.watchdog(20)

@@ -12,11 +12,11 @@ import pytest
 
 from orbslam2py.datasets.base import Images, LiveFrame
 from orbslam2py.errors import DatasetError
-from orbslam2py.report import make_report
-from orbslam2py.run_result import RunOptions
-from orbslam2py.runner import SequenceRunner
-from orbslam2py.sensor import Sensor
-from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+from orbslam2py.runs.report import make_report
+from orbslam2py.runs.result import RunOptions
+from orbslam2py.runs.runner import SequenceRunner
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
 
 
 def recorded(sensor: Sensor) -> SyntheticSequence:

@@ -15,10 +15,10 @@ from hypothesis import HealthCheck, given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from orbslam2py.builtin_settings import BUILTIN_NAMES, builtin_settings, resolve_settings
 from orbslam2py.errors import SettingsError
-from orbslam2py.sensor import Sensor
-from orbslam2py.settings import (
+from orbslam2py.settings.builtin import BUILTIN_NAMES, builtin_settings, resolve_settings
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings.settings import (
     CameraRectification,
     CameraSettings,
     DepthSettings,

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from orbslam2py.builtin_settings import builtin_settings
 from orbslam2py.cli.app import app
 from orbslam2py.datasets import (
     ImageFolder,
@@ -31,10 +30,11 @@ from orbslam2py.datasets import (
 from orbslam2py.datasets.image_folder import natural_key
 from orbslam2py.datasets.time_files import read_time_file
 from orbslam2py.errors import DatasetError, ImageError, OrbSlamError, SettingsError, StateError
-from orbslam2py.front_end import FrontEnd
-from orbslam2py.sensor import Sensor
-from orbslam2py.settings import Settings
-from orbslam2py.timing import StageTimer
+from orbslam2py.settings.builtin import builtin_settings
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings.settings import Settings
+from orbslam2py.slam.front_end import FrontEnd
+from orbslam2py.slam.timing import StageTimer
 
 MONO = Sensor.MONOCULAR
 SIZE = (96, 128)  # rows, columns

@@ -20,11 +20,11 @@ from functools import lru_cache
 
 from orbslam2py.datasets.base import Images
 from orbslam2py.errors import StateError
-from orbslam2py.events import Callbacks
-from orbslam2py.sensor import Sensor
-from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
-from orbslam2py.system import System
-from orbslam2py.vocabulary import load_vocabulary
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.events import Callbacks
+from orbslam2py.slam.system import System
+from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
+from orbslam2py.vocabulary.vocabulary import load_vocabulary
 from watchdog import watchdog, worker_threads
 
 SECONDS = float(os.environ.get("ORBSLAM2PY_STRESS_SECONDS", "15"))

@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from orbslam2py import Sensor, open_sequence
-from orbslam2py._synthetic_scenes import LAPS, ROOM_BESIDE
 from orbslam2py.cli.synthesize import parse_size, synthesize
 from orbslam2py.datasets.base import Layout
 from orbslam2py.errors import DatasetError, SettingsError
-from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence, SyntheticWorld
+from orbslam2py.synthetic.scenes import LAPS, ROOM_BESIDE
+from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence, SyntheticWorld
 
 SMALL = (160, 120)
 WORLDS = list(SyntheticWorld)

@@ -11,8 +11,8 @@ import pytest
 from interleaving import run_to_the_end
 from orbslam2py import _core
 from orbslam2py.errors import StateError, WorkerError
-from orbslam2py.records import Reason, TrackingState
-from orbslam2py.sensor import Sensor
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.records import Reason, TrackingState
 from small_sequences import ate, black, new_system, play, sequence, track
 from watchdog import worker_threads
 
@@ -93,7 +93,7 @@ def test_error_of_the_caller_passes_through() -> None:
 def test_interpreter_ends_without_shutdown() -> None:
     code = (
         "from small_sequences import new_system, play\n"
-        "from orbslam2py.sensor import Sensor\n"
+        "from orbslam2py.settings.sensor import Sensor\n"
         "system = new_system(Sensor.STEREO)\n"
         "play(system, 12)\n"
         "print('end')\n"

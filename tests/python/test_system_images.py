@@ -10,9 +10,9 @@ import pytest
 
 from orbslam2py.datasets.base import Images
 from orbslam2py.errors import ImageError
-from orbslam2py.records import Reason, TrackingState
-from orbslam2py.sensor import Sensor
-from orbslam2py.system import System
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.records import Reason, TrackingState
+from orbslam2py.slam.system import System
 from small_sequences import images, new_system, play, sequence, track
 
 pytestmark = pytest.mark.watchdog(30)

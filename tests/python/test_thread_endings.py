@@ -13,11 +13,11 @@ import pytest
 from interleaving import LIMIT, Call, Stage, last_keyframe, refine, run_to_the_end, settle
 from orbslam2py import _core
 from orbslam2py.errors import StateError, WorkerError
-from orbslam2py.events import Callbacks, KeyframeAdded
-from orbslam2py.records import TrackingState
-from orbslam2py.sensor import Sensor
-from orbslam2py.system import System
-from orbslam2py.threads import WorkerState
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.events import Callbacks, KeyframeAdded
+from orbslam2py.slam.records import TrackingState
+from orbslam2py.slam.system import System
+from orbslam2py.slam.worker import WorkerState
 from small_sequences import black, new_system, play, track
 from watchdog import worker_threads
 
@@ -351,7 +351,7 @@ def test_the_interpreter_ends_while_an_adjustment_is_solved() -> None:
         "import threading\n"
         "from orbslam2py import _core\n"
         "from small_sequences import new_system, play\n"
-        "from orbslam2py.sensor import Sensor\n"
+        "from orbslam2py.settings.sensor import Sensor\n"
         "entered, real = threading.Event(), _core.solve_global_bundle\n"
         "def solve(bundle, options, cancelled, n_threads):\n"
         "    entered.set()\n"

@@ -13,9 +13,9 @@ import pytest
 from interleaving import LIMIT, Call, Stage, last_keyframe, refine, settle
 from orbslam2py import _core
 from orbslam2py.errors import StateError
-from orbslam2py.records import TrackingState
-from orbslam2py.sensor import Sensor
-from orbslam2py.system import System
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.records import TrackingState
+from orbslam2py.slam.system import System
 from small_sequences import new_system, play, track
 
 pytestmark = pytest.mark.watchdog(60)

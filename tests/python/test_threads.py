@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from orbslam2py.errors import OrbSlamError, StateError, WorkerError
-from orbslam2py.threads import CallGuard, Worker, WorkerState
+from orbslam2py.slam.worker import CallGuard, Worker, WorkerState
 
 pytestmark = pytest.mark.watchdog(10)
 

@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orbslam2py import _core, initialization, keyframe_decision, tracking
-from orbslam2py.records import Reason, TrackingState
-from orbslam2py.sensor import Sensor
-from orbslam2py.timing import StageTimer
-from orbslam2py.tracking import Tracking, TrackingOutcome
+from orbslam2py import _core
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam import initialization, keyframe_decision, tracking
+from orbslam2py.slam.records import Reason, TrackingState
+from orbslam2py.slam.timing import StageTimer
+from orbslam2py.slam.tracking import Tracking, TrackingOutcome
 
 MAX_FRAMES = 30
 OUTLIERS = np.array([7, 9])

@@ -15,15 +15,15 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from orbslam2py._files import atomic_write
-from orbslam2py._rotations import (
+from orbslam2py.errors import DatasetError
+from orbslam2py.trajectory.rotations import (
     inverse_poses,
     nearest_rotations,
     quaternions_from_rotations,
     rotation_angles,
     rotations_from_quaternions,
 )
-from orbslam2py.errors import DatasetError
-from orbslam2py.trajectory import (
+from orbslam2py.trajectory.trajectory import (
     Trajectory,
     TrajectoryFormat,
     read_euroc,

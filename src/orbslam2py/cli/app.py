@@ -10,7 +10,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from orbslam2py import __version__
+from orbslam2py._version import __version__
 from orbslam2py.cli import calibrate, demo, evaluate, run, synthesize, vocabulary
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.errors import OrbSlamError

@@ -12,11 +12,11 @@ from rich.markup import escape
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from orbslam2py.calibration import Calibration
-from orbslam2py.calibration import calibrate as calibrate_views
-from orbslam2py.calibration_plot import draw_residuals
-from orbslam2py.camera_files import CameraFileFormat, read_camera_file
-from orbslam2py.chessboard_views import Board, BoardViews, find_views
+from orbslam2py.calibration.calibration import Calibration
+from orbslam2py.calibration.calibration import calibrate as calibrate_views
+from orbslam2py.calibration.camera_files import CameraFileFormat, read_camera_file
+from orbslam2py.calibration.chessboard import Board, BoardViews, find_views
+from orbslam2py.calibration.plot import draw_residuals
 from orbslam2py.errors import SettingsError
 
 Output = Annotated[Path, typer.Option("--output", "-o", help="Settings file to write.")]

@@ -9,9 +9,9 @@ from typing import Annotated
 import typer
 
 from orbslam2py.cli.run import run_and_write
-from orbslam2py.run_result import RunOptions
-from orbslam2py.sensor import Sensor
-from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+from orbslam2py.runs.result import RunOptions
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
 
 DEFAULT_OUTPUT = Path("runs/demo")
 

@@ -17,13 +17,13 @@ from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.interrupts import StopOnInterrupt
 from orbslam2py.datasets import open_source
 from orbslam2py.datasets.base import LiveSource, Sequence
-from orbslam2py.outputs import OutputWriter, link_latest, prepare_output_folder
-from orbslam2py.report import evaluate_run, make_report
-from orbslam2py.run_result import FrameRow, RunOptions, RunResult
-from orbslam2py.runner import SequenceRunner
-from orbslam2py.sensor import Sensor
-from orbslam2py.system import System
-from orbslam2py.vocabulary import load_vocabulary
+from orbslam2py.runs.outputs import OutputWriter, link_latest, prepare_output_folder
+from orbslam2py.runs.report import evaluate_run, make_report
+from orbslam2py.runs.result import FrameRow, RunOptions, RunResult
+from orbslam2py.runs.runner import SequenceRunner
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.system import System
+from orbslam2py.vocabulary.vocabulary import load_vocabulary
 
 EXAMPLE = """
 **Example**

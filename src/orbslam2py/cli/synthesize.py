@@ -13,8 +13,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from orbslam2py.datasets.base import Layout
 from orbslam2py.errors import SettingsError
-from orbslam2py.sensor import Sensor
-from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence, SyntheticWorld
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence, SyntheticWorld
 
 EXAMPLE = """
 **Example**

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbslam2py.errors import DatasetError
-from orbslam2py.sensor import Sensor
-from orbslam2py.settings import Settings
-from orbslam2py.trajectory import Trajectory
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings.settings import Settings
+from orbslam2py.trajectory.trajectory import Trajectory
 
 _log = logging.getLogger(__name__)
 

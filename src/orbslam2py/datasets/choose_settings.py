@@ -7,10 +7,10 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
-from orbslam2py.builtin_settings import BUILTIN_NAMES, builtin_settings
 from orbslam2py.errors import DatasetError
-from orbslam2py.sensor import Sensor
-from orbslam2py.settings import Settings
+from orbslam2py.settings.builtin import BUILTIN_NAMES, builtin_settings
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings.settings import Settings
 
 #: What a caller may give: settings, a file, a built-in name, or None to let the folder decide.
 SettingsChoice = Settings | str | Path | None

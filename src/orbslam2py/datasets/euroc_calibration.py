@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from orbslam2py._rotations import inverse_poses, nearest_rotations, poses_from
-from orbslam2py._settings_reader import read_matrix
-from orbslam2py._yaml_scanner import Entry, parse_number, scan
-from orbslam2py.builtin_settings import EUROC_CLOSE_FACTOR, EUROC_STEREO_ORB
 from orbslam2py.datasets.rectification import rectification_of_pair
 from orbslam2py.errors import DatasetError
-from orbslam2py.sensor import Sensor
-from orbslam2py.settings import CameraSettings, DepthSettings, OrbSettings, Settings
+from orbslam2py.settings.builtin import EUROC_CLOSE_FACTOR, EUROC_STEREO_ORB
+from orbslam2py.settings.opencv_yaml import Entry, parse_number, scan
+from orbslam2py.settings.reader import read_matrix
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings.settings import CameraSettings, DepthSettings, OrbSettings, Settings
+from orbslam2py.trajectory.rotations import inverse_poses, nearest_rotations, poses_from
 
 Array = NDArray[np.float64]
 

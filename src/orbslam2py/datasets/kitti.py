@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbslam2py._text_lines import content_lines, number_of
-from orbslam2py.builtin_settings import KITTI_VIEWERS
 from orbslam2py.datasets.base import Images, Layout, Stamps, require_frames
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.images import read_image
 from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.errors import DatasetError, SettingsError
-from orbslam2py.sensor import Sensor
-from orbslam2py.settings import CameraSettings, DepthSettings, OrbSettings, Settings
-from orbslam2py.trajectory import Trajectory, read_kitti
+from orbslam2py.settings.builtin import KITTI_VIEWERS
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings.settings import CameraSettings, DepthSettings, OrbSettings, Settings
+from orbslam2py.trajectory.trajectory import Trajectory, read_kitti
 
 _log = logging.getLogger(__name__)
 

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from orbslam2py.builtin_settings import resolve_settings
 from orbslam2py.datasets.base import (
     Images,
     Layout,
@@ -18,9 +17,10 @@ from orbslam2py.datasets.base import (
     choose_sensor,
 )
 from orbslam2py.datasets.choose_settings import SettingsChoice, choose_settings
-from orbslam2py.sensor import Sensor
-from orbslam2py.settings import Settings
-from orbslam2py.trajectory import Trajectory
+from orbslam2py.settings.builtin import resolve_settings
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings.settings import Settings
+from orbslam2py.trajectory.trajectory import Trajectory
 
 
 class RecordedSequence(ABC):

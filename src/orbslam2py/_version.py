@@ -1,0 +1,7 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which version is installed."""
+
+from importlib.metadata import version
+
+#: As in pyproject.toml.
+__version__ = version("orbslam2py")

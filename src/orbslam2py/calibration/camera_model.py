@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The camera that calibration files of other programs are read into, and checks they share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbslam2py.errors import SettingsError
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings.settings import CameraSettings, OrbSettings, Settings
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class CameraModel:
+    """A pinhole camera with OpenCV's distortion.
+
+    Attributes
+    ----------
+    K
+        Camera matrix (3, 3), pixels.
+    distortion
+        k1, k2, p1, p2, k3, (5,).
+    size
+        Width and height [pixels]; None if the file does not tell.
+    """
+
+    K: Array
+    distortion: Array
+    size: tuple[int, int] | None
+
+    def settings(self, fps: float, n_features: int) -> Settings:
+        """Make settings for this camera alone."""
+        k1, k2, p1, p2, k3 = self.distortion.tolist()
+        width, height = self.size or (None, None)
+        camera = CameraSettings(
+            *(self.K[0, 0], self.K[1, 1], self.K[0, 2], self.K[1, 2]),
+            *(k1, k2, p1, p2, k3),
+            width=width,
+            height=height,
+            fps=fps,
+        )
+        return Settings(Sensor.MONOCULAR, camera, OrbSettings(n_features=n_features))
+
+
+def numbers_of(path: Path, where: str, value: object, count: tuple[int, ...]) -> Array:
+    """Make float64 (n,) finite numbers of a value in a file; `count` names the lengths allowed."""
+    try:
+        found = np.asarray(value, dtype=np.float64).reshape(-1)
+    except (TypeError, ValueError):
+        found = np.zeros(0)
+        count = count or (1,)
+    if (count and found.size not in count) or not np.isfinite(found).all():
+        wanted = " or ".join(map(str, count))
+        raise SettingsError(f"{path}: {where} must hold {wanted} finite numbers, found {value!r}")
+    return found
+
+
+def require_supported(path: Path, what: str, name: object, supported: tuple[str, ...]) -> None:
+    """Raise `SettingsError` unless a model is one of those supported."""
+    if name not in supported:
+        raise SettingsError(
+            f"{path}: {what} {name} is not supported; supported: {', '.join(supported)}. Calibrate "
+            "anew with one of these, or undistort the images first"
+        )
+
+
+def checked_camera_matrix(path: Path, K: NDArray[Any]) -> Array:
+    """Check a camera matrix (3, 3): no skew, focal lengths above 0."""
+    K = numbers_of(path, "the camera matrix", K, (9,)).reshape(3, 3)
+    if K[0, 0] <= 0 or K[1, 1] <= 0:
+        raise SettingsError(f"{path}: focal lengths {K[0, 0]:g}, {K[1, 1]:g} must be above 0")
+    if abs(K[0, 1]) > 1e-6 * K[0, 0]:
+        raise SettingsError(f"{path}: a camera with skew ({K[0, 1]:g}) is not supported")
+    return K
+
+
+def five_coefficients(path: Path, coefficients: NDArray[Any]) -> Array:
+    """Bring 0, 4, 5 or more coefficients to k1, k2, p1, p2, k3; further ones must be zero."""
+    given = numbers_of(path, "the distortion", coefficients, ())
+    if given.size not in (0, 4, 5, 8, 12, 14):
+        raise SettingsError(
+            f"{path}: {given.size} distortion coefficients; there must be k1, k2, p1, p2 and "
+            "perhaps k3"
+        )
+    if np.any(given[5:]):
+        raise SettingsError(
+            f"{path}: distortion with {given.size} coefficients (rational, thin prism or tilted "
+            "model) is not supported; supported: k1, k2, p1, p2, k3"
+        )
+    five = np.zeros(5)
+    five[: min(given.size, 5)] = given[:5]
+    return five
+
+
+def checked_size(path: Path, size: list[Any]) -> tuple[int, int]:
+    """Check an image size: whole numbers above 0."""
+    width, height = (float(value) for value in size)
+    if not (width.is_integer() and height.is_integer() and min(width, height) >= 1):
+        raise SettingsError(f"{path}: an image size of {width:g} x {height:g} makes no sense")
+    return int(width), int(height)

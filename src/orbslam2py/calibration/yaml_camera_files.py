@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Calibration files in YAML: Kalibr's camchain and ROS's camera_info."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from orbslam2py.calibration.camera_model import (
+    CameraModel,
+    checked_camera_matrix,
+    checked_size,
+    five_coefficients,
+    numbers_of,
+    require_supported,
+)
+from orbslam2py.datasets.rectification import rectification_of_pair
+from orbslam2py.errors import SettingsError
+from orbslam2py.settings.builtin import EUROC_CLOSE_FACTOR
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings.settings import (
+    CameraRectification,
+    CameraSettings,
+    DepthSettings,
+    OrbSettings,
+    Settings,
+    StereoRectification,
+)
+
+Array = NDArray[np.float64]
+
+
+def parse_yaml(path: Path, text: str) -> Mapping[str, Any]:
+    """Parse a file that holds named values."""
+    # OpenCV's head line, which some write, is no YAML.
+    text = re.sub(r"\A%YAML:1\.0\s*(?:\n---)?", "", text)
+    try:
+        document = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise SettingsError(f"{path} is no YAML: {error}") from error
+    if not isinstance(document, Mapping):
+        raise SettingsError(f"{path} holds no named values")
+    return document
+
+
+def _value(path: Path, where: str, values: Mapping[str, Any], key: str) -> Any:
+    if key not in values:
+        raise SettingsError(f"{path}: {where}{key} is missing")
+    return values[key]
+
+
+# ---- Kalibr --------------------------------------------------------------------------------------
+def kalibr_settings(
+    path: Path, document: Mapping[str, Any], number: int | None, fps: float, n_features: int
+) -> Settings:
+    """Make settings of a camchain: of one camera, or of the pair of the first two."""
+    names = sorted(
+        (key for key in document if re.fullmatch(r"cam\d+", str(key))), key=lambda key: int(key[3:])
+    )
+    if not names:
+        raise SettingsError(f"{path} has no cam0; is it a camchain of Kalibr?")
+    if number is not None and f"cam{number}" not in names:
+        raise SettingsError(f"{path} has no cam{number}; there are: {', '.join(names)}")
+    if number is not None or len(names) == 1:
+        name = names[0] if number is None else f"cam{number}"
+        return _kalibr_camera(path, name, document[name]).settings(fps, n_features)
+    left, right = (_kalibr_camera(path, name, document[name]) for name in names[:2])
+    where = f"{names[1]}."
+    T = numbers_of(path, f"{where}T_cn_cnm1", _value(path, where, document[names[1]], "T_cn_cnm1"),
+                 (16,)).reshape(4, 4)  # fmt: skip
+    if np.abs(T[:3, :3] @ T[:3, :3].T - np.eye(3)).max() > 1e-3:
+        raise SettingsError(f"{path}: {where}T_cn_cnm1 is no 4 x 4 rigid transform")
+    if left.size is None or left.size != right.size:
+        raise SettingsError(f"{path}: the cameras of a pair must have the same resolution")
+    rectification = rectification_of_pair(
+        (left.K, right.K), (left.distortion, right.distortion), T, left.size
+    )
+    return _pair_settings(path, rectification, fps, n_features)
+
+
+def _kalibr_camera(path: Path, name: str, values: object) -> CameraModel:
+    if not isinstance(values, Mapping):
+        raise SettingsError(f"{path}: {name} holds no named values")
+    where = f"{name}."
+    model = _value(path, where, values, "camera_model")
+    require_supported(path, f"{where}camera_model", model, ("pinhole",))
+    distortion_model = values.get("distortion_model", "none")
+    require_supported(path, f"{where}distortion_model", distortion_model, ("radtan", "none"))
+    intrinsics = _value(path, where, values, "intrinsics")
+    fx, fy, cx, cy = numbers_of(path, f"{where}intrinsics", intrinsics, (4,))
+    coefficients = np.zeros(0)
+    if distortion_model == "radtan":
+        given = _value(path, where, values, "distortion_coeffs")
+        coefficients = numbers_of(path, f"{where}distortion_coeffs", given, (4,))
+    resolution = _value(path, where, values, "resolution")
+    return CameraModel(
+        np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]),
+        five_coefficients(path, coefficients),
+        checked_size(path, numbers_of(path, f"{where}resolution", resolution, (2,)).tolist()),
+    )
+
+
+# ---- ROS -----------------------------------------------------------------------------------------
+_ROS_MODELS = ("plumb_bob", "rational_polynomial", "radtan")
+
+
+def ros_camera(path: Path, values: Mapping[str, Any]) -> CameraModel:
+    """Read the raw camera of a camera_info."""
+    model = values.get("distortion_model", "plumb_bob") or "plumb_bob"
+    require_supported(path, "distortion_model", model, _ROS_MODELS)
+    size = [_value(path, "", values, key) for key in ("image_width", "image_height")]
+    K = _ros_matrix(path, values, ("camera_matrix", "K", "k"), (9,)).reshape(3, 3)
+    return CameraModel(
+        checked_camera_matrix(path, K),
+        five_coefficients(
+            path, _ros_matrix(path, values, ("distortion_coefficients", "D", "d"), ())
+        ),
+        checked_size(path, numbers_of(path, "image_width and image_height", size, (2,)).tolist()),
+    )
+
+
+def _ros_matrix(
+    path: Path, values: Mapping[str, Any], names: tuple[str, ...], count: tuple[int, ...]
+) -> Array:
+    name = next((name for name in names if name in values), None)
+    if name is None:
+        raise SettingsError(f"{path}: {names[0]} is missing")
+    value = values[name]
+    if isinstance(value, Mapping):
+        value = _value(path, f"{name}.", value, "data")
+    return numbers_of(path, name, value, count)
+
+
+def ros_pair_settings(
+    left: tuple[Path, Mapping[str, Any]],
+    right: tuple[Path, Mapping[str, Any]],
+    fps: float,
+    n_features: int,
+) -> Settings:
+    """Make settings of the files (path, values) of a rectified pair."""
+    cameras = []
+    for path, values in (left, right):
+        raw = ros_camera(path, values)
+        assert raw.size is not None
+        R = _ros_matrix(path, values, ("rectification_matrix", "R", "r"), (9,)).reshape(3, 3)
+        P = _ros_matrix(path, values, ("projection_matrix", "P", "p"), (12,)).reshape(3, 4)
+        cameras.append(CameraRectification(raw.K, raw.distortion, R, P, *raw.size))
+    if (cameras[0].width, cameras[0].height) != (cameras[1].width, cameras[1].height):
+        raise SettingsError(f"{left[0]} and {right[0]} have different image sizes")
+    P_left, P_right = cameras[0].P, cameras[1].P
+    if np.abs(P_left[:, :3] - P_right[:, :3]).max() > 1e-3 or abs(P_left[0, 3]) > 1e-6:
+        raise SettingsError(
+            f"{left[0]} and {right[0]} are no rectified pair: their projection_matrix must be "
+            "equal but for the last column, which is 0 for the left camera"
+        )
+    return _pair_settings(right[0], StereoRectification(*cameras), fps, n_features)
+
+
+def _pair_settings(
+    path: Path, rectification: StereoRectification, fps: float, n_features: int
+) -> Settings:
+    P, P_right = rectification.left.P, rectification.right.P
+    bf = -float(P_right[0, 3])
+    if bf <= 0 or abs(float(P_right[1, 3])) > 1e-3 * abs(bf):
+        raise SettingsError(
+            f"{path}: the second camera must stand to the right of the first; as it is, the "
+            f"projection matrix is shifted by {-P_right[0, 3]:g}, {-P_right[1, 3]:g} pixel metres"
+        )
+    camera = CameraSettings(
+        *(float(P[0, 0]), float(P[1, 1]), float(P[0, 2]), float(P[1, 2])),
+        width=rectification.left.width,
+        height=rectification.left.height,
+        fps=fps,
+        bf=bf,
+    )
+    return Settings(
+        Sensor.STEREO,
+        camera,
+        OrbSettings(n_features=n_features),
+        DepthSettings(EUROC_CLOSE_FACTOR),
+        rectification,
+    )

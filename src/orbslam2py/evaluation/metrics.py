@@ -1,0 +1,353 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How far an estimated trajectory is from the true one.
+
+Absolute trajectory error and relative pose error as Sturm et al. (IROS 2012) define them, errors
+over path segments as the KITTI odometry benchmark does (Geiger et al., CVPR 2012).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbslam2py.errors import DatasetError
+from orbslam2py.trajectory.association import MAX_DIFFERENCE, associate
+from orbslam2py.trajectory.rotations import Array, inverse_poses, rotation_angles
+from orbslam2py.trajectory.trajectory import Trajectory
+
+#: Lengths of KITTI's path segments [m].
+SEGMENT_LENGTHS = (100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0)
+_SEGMENT_STEP = 10  # frames between the starts of segments
+_SECOND_TOLERANCE = 0.1  # how far "one second later" may be off [s]
+
+
+class Alignment(str, Enum):
+    """How the estimate is moved onto the truth before the absolute error is taken."""
+
+    SE3 = "se3"
+    SIM3 = "sim3"
+    NONE = "none"
+
+    def __str__(self) -> str:
+        return self.value
+
+
+@dataclass(frozen=True, eq=False)
+class Similarity:
+    """A similarity transform ``y = scale * R @ x + t``.
+
+    Attributes
+    ----------
+    scale
+        Ratio of lengths, above 0.
+    R
+        Rotation, float64 (3, 3).
+    t
+        Translation, float64 (3,).
+    """
+
+    scale: float
+    R: Array
+    t: Array
+
+    @classmethod
+    def identity(cls) -> Similarity:
+        """Make the transform that changes nothing."""
+        return cls(1.0, np.eye(3), np.zeros(3))
+
+    def inverse(self) -> Similarity:
+        """Make the transform that undoes this one."""
+        return Similarity(1 / self.scale, self.R.T, -(self.R.T @ self.t) / self.scale)
+
+    def apply(self, points: Array) -> Array:
+        """Transform points (n, 3)."""
+        moved: Array = self.scale * points @ self.R.T + self.t
+        return moved
+
+    def apply_to_poses(self, T_wc: Array) -> Array:
+        """Transform camera poses (n, 4, 4): positions as points, orientations turned."""
+        moved: Array = T_wc.copy()
+        moved[:, :3, :3] = self.R @ T_wc[:, :3, :3]
+        moved[:, :3, 3] = self.apply(T_wc[:, :3, 3])
+        return moved
+
+
+@dataclass(frozen=True)
+class ErrorStatistics:
+    """Figures over many errors of one kind, in their unit."""
+
+    rmse: float
+    mean: float
+    median: float
+    max: float
+
+    @classmethod
+    def of(cls, errors: Array) -> ErrorStatistics:
+        """Take the figures of at least one error (n,)."""
+        return cls(
+            rmse=float(np.sqrt(np.mean(errors**2))),
+            mean=float(np.mean(errors)),
+            median=float(np.median(errors)),
+            max=float(np.max(errors)),
+        )
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """An estimate compared with the truth.
+
+    Attributes
+    ----------
+    matched_poses
+        Poses of the estimate that have a true pose at their time.
+    alignment
+        How they were aligned.
+    transform
+        From the estimate's world to the true one.
+    ate
+        Distance of aligned and true positions [m].
+    rpe_translation, rpe_rotation
+        Error of the motion from one matched pose to the next [m], [deg]; None for a single pose.
+    rpe_translation_1s, rpe_rotation_1s
+        The same over one second; None if the sequence is shorter or has no time stamps.
+    t_rel_percent, r_rel_deg_per_100m
+        KITTI's mean errors over segments of 100 to 800 m; None for shorter paths.
+    """
+
+    matched_poses: int
+    alignment: Alignment
+    transform: Similarity
+    ate: ErrorStatistics
+    rpe_translation: ErrorStatistics | None
+    rpe_rotation: ErrorStatistics | None
+    rpe_translation_1s: ErrorStatistics | None
+    rpe_rotation_1s: ErrorStatistics | None
+    t_rel_percent: float | None
+    r_rel_deg_per_100m: float | None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the figures under the names that reports use; None where there is none."""
+        return {
+            "matched_poses": self.matched_poses,
+            "ate_alignment": str(self.alignment),
+            "ate_scale": self.transform.scale,
+            "ate_rmse_m": self.ate.rmse,
+            "ate_mean_m": self.ate.mean,
+            "ate_median_m": self.ate.median,
+            "ate_max_m": self.ate.max,
+            "rpe_translation_rmse_m": _rmse(self.rpe_translation),
+            "rpe_rotation_rmse_deg": _rmse(self.rpe_rotation),
+            "rpe_translation_rmse_m_1s": _rmse(self.rpe_translation_1s),
+            "rpe_rotation_rmse_deg_1s": _rmse(self.rpe_rotation_1s),
+            "t_rel_percent": self.t_rel_percent,
+            "r_rel_deg_per_100m": self.r_rel_deg_per_100m,
+        }
+
+
+def evaluate_trajectory(
+    estimate: Trajectory,
+    truth: Trajectory,
+    alignment: Alignment = Alignment.SE3,
+    *,
+    max_difference: float = MAX_DIFFERENCE,
+    timed: bool = True,
+) -> Evaluation:
+    """Compare an estimate with the truth.
+
+    Parameters
+    ----------
+    estimate
+        Lost poses are left out.
+    truth
+        True poses of the same camera in any world.
+    alignment
+        ``se3`` for metric estimates, ``sim3`` for those of one camera, ``none`` if both share one
+        world. With ``sim3`` the relative errors are those of the scaled estimate.
+    max_difference
+        Poses belong together if their time stamps differ by less [s].
+    timed
+        False if the time stamps are only frame numbers: no figures over one second then.
+
+    Raises
+    ------
+    DatasetError
+        If no time stamps match.
+    """
+    estimate = estimate.select(~estimate.lost)
+    truth = truth.select(~truth.lost)
+    i, j = match_poses(estimate, truth, max_difference)
+    transform = Similarity.identity()
+    if alignment is not Alignment.NONE:
+        transform = align(
+            estimate.positions[i], truth.positions[j], with_scale=alignment is Alignment.SIM3
+        )
+    times = estimate.timestamps[i]
+    aligned, true = transform.apply_to_poses(estimate.T_wc[i]), truth.T_wc[j]
+    next_pose = (np.arange(len(i) - 1), np.arange(1, len(i)))
+    translation, rotation = _relative_statistics(aligned, true, next_pose)
+    after_second = one_second_pairs(times) if timed else (next_pose[0][:0], next_pose[1][:0])
+    translation_1s, rotation_1s = _relative_statistics(aligned, true, after_second)
+    segments = segment_errors(aligned, true)
+    return Evaluation(
+        matched_poses=len(i),
+        alignment=alignment,
+        transform=transform,
+        ate=ErrorStatistics.of(np.linalg.norm(aligned[:, :3, 3] - true[:, :3, 3], axis=1)),
+        rpe_translation=translation,
+        rpe_rotation=rotation,
+        rpe_translation_1s=translation_1s,
+        rpe_rotation_1s=rotation_1s,
+        t_rel_percent=float(segments[:, 0].mean() * 100) if len(segments) else None,
+        r_rel_deg_per_100m=float(np.degrees(segments[:, 1].mean()) * 100)
+        if len(segments)
+        else None,
+    )
+
+
+def align(points: Array, targets: Array, *, with_scale: bool = False) -> Similarity:
+    """Find the transform that moves points nearest to their targets (Umeyama, PAMI 1991).
+
+    Parameters
+    ----------
+    points, targets
+        float64 (n, 3), at least one.
+    with_scale
+        Whether lengths may change. They do not if one of the sets is a single place, where no
+        scale can be seen; a rotation that cannot be seen is chosen so that nothing is turned.
+
+    Returns
+    -------
+    Similarity
+        Always finite.
+    """
+    centre, target_centre = points.mean(axis=0), targets.mean(axis=0)
+    x, y = points - centre, targets - target_centre
+    U, stretch, Vt = np.linalg.svd(y.T @ x / len(x))
+    signs = np.array([1.0, 1.0, np.sign(np.linalg.det(U) * np.linalg.det(Vt))])
+    R = U @ (signs[:, None] * Vt) if stretch[0] > 0 else np.eye(3)
+    scale = 1.0
+    spread, target_spread = np.mean(np.sum(x**2, axis=1)), np.mean(np.sum(y**2, axis=1))
+    if with_scale and spread > 1e-18 and target_spread > 1e-18:
+        fitted = float(np.sum(stretch * signs) / spread)
+        scale = fitted if fitted > 1e-12 else 1.0
+    return Similarity(scale, R, target_centre - scale * R @ centre)
+
+
+def relative_errors(
+    estimate: Array, truth: Array, pairs: tuple[NDArray[np.int64], NDArray[np.int64]]
+) -> tuple[Array, Array]:
+    """Take the errors of motions between pairs of poses.
+
+    Parameters
+    ----------
+    estimate, truth
+        Poses ``T_wc`` (n, 4, 4) of the same moments.
+    pairs
+        Indices of the first and the second pose of each motion, (k,) each.
+
+    Returns
+    -------
+    translations, rotations
+        Size of the difference of estimated and true motion, (k,) [m] and (k,) [rad].
+    """
+    first, second = pairs
+    moved = inverse_poses(estimate[first]) @ estimate[second]
+    true_moved = inverse_poses(truth[first]) @ truth[second]
+    error = inverse_poses(true_moved) @ moved
+    return np.linalg.norm(error[:, :3, 3], axis=1), rotation_angles(error[:, :3, :3])
+
+
+def one_second_pairs(times: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pair every pose with the one nearest to a second later, if there is one within 0.1 s.
+
+    Parameters
+    ----------
+    times
+        Seconds in increasing order, (n,).
+    """
+    if not len(times):
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    wanted = times + 1.0
+    after = np.clip(np.searchsorted(times, wanted), 0, len(times) - 1)
+    before = np.clip(after - 1, 0, None)
+    nearer = np.where(
+        np.abs(times[before] - wanted) <= np.abs(times[after] - wanted), before, after
+    )
+    first = np.flatnonzero(np.abs(times[nearer] - wanted) <= _SECOND_TOLERANCE)
+    return first.astype(np.int64), nearer[first].astype(np.int64)
+
+
+def segment_errors(estimate: Array, truth: Array) -> Array:
+    """Take KITTI's errors over path segments of 100 to 800 m.
+
+    Segments start at every tenth pose and end at the first pose more than their length further
+    along the true path.
+
+    Parameters
+    ----------
+    estimate, truth
+        Poses ``T_wc`` (n, 4, 4) of the same moments.
+
+    Returns
+    -------
+    Array
+        (k, 2): translation error per metre of length, and rotation error [rad] per metre.
+    """
+    steps = np.linalg.norm(np.diff(truth[:, :3, 3], axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    starts = np.arange(0, len(truth), _SEGMENT_STEP)
+    errors = []
+    for length in SEGMENT_LENGTHS:
+        ends = np.searchsorted(along, along[starts] + length, side="right")
+        inside = ends < len(truth)
+        translation, rotation = relative_errors(estimate, truth, (starts[inside], ends[inside]))
+        errors.append(np.stack([translation / length, rotation / length], axis=1))
+    return np.concatenate(errors)
+
+
+def match_poses(
+    estimate: Trajectory, truth: Trajectory, max_difference: float = MAX_DIFFERENCE
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Find which poses belong together by their time stamps.
+
+    Returns
+    -------
+    i, j
+        Indices into the estimate and into the truth, (k,) each, k > 0.
+
+    Raises
+    ------
+    DatasetError
+        If no time stamps match.
+    """
+    i, j = associate(estimate.timestamps, truth.timestamps, max_difference)
+    if not len(i):
+        raise DatasetError(
+            f"no poses to compare: no time stamps of estimate ({_span(estimate)}) and ground truth "
+            f"({_span(truth)}) differ by less than {max_difference} s"
+        )
+    return i, j
+
+
+def _relative_statistics(
+    estimate: Array, truth: Array, pairs: tuple[NDArray[np.int64], NDArray[np.int64]]
+) -> tuple[ErrorStatistics | None, ErrorStatistics | None]:
+    if not len(pairs[0]):
+        return None, None
+    translations, rotations = relative_errors(estimate, truth, pairs)
+    return ErrorStatistics.of(translations), ErrorStatistics.of(np.degrees(rotations))
+
+
+def _rmse(statistics: ErrorStatistics | None) -> float | None:
+    return None if statistics is None else statistics.rmse
+
+
+def _span(trajectory: Trajectory) -> str:
+    if not len(trajectory):
+        return "no poses"
+    times = trajectory.timestamps
+    return f"{len(times)} poses from {times.min():.3f} to {times.max():.3f} s"

@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What users see of the map: copies, taken while the system may be running."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from orbslam2py import _core as core
+from orbslam2py.slam.records import FrameFeatures
+from orbslam2py.trajectory.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class MapSnapshot:
+    """A consistent copy of the map, in the frame of keyframe 0's first pose (the world)."""
+
+    keyframe_ids: npt.NDArray[np.int64]
+    """(k,) ascending."""
+    keyframe_timestamps: npt.NDArray[np.float64]
+    """(k,) seconds."""
+    keyframe_T_wc: npt.NDArray[np.float64]
+    """(k, 4, 4) camera to world."""
+    point_ids: npt.NDArray[np.int64]
+    """(p,) ascending."""
+    point_positions: npt.NDArray[np.float64]
+    """(p, 3) world [m]."""
+    loop_edges: npt.NDArray[np.int64]
+    """(l, 2) ids of the keyframes that a closed loop connects."""
+
+
+def take_snapshot(world: core.Map) -> MapSnapshot:
+    """Copy keyframe poses, points and loop edges in one consistent view."""
+    snapshot = core.snapshot_map(world)
+    keyframes, points = snapshot.keyframes, snapshot.points
+    return MapSnapshot(
+        keyframe_ids=keyframes.ids,
+        keyframe_timestamps=keyframes.timestamps,
+        keyframe_T_wc=keyframes.T_wc,
+        point_ids=points.ids,
+        point_positions=points.positions,
+        loop_edges=snapshot.loop_edges,
+    )
+
+
+def keyframe_trajectory(world: core.Map) -> Trajectory:
+    """Poses of the keyframes, relative to keyframe 0."""
+    keyframes = core.snapshot_keyframes(world)
+    T_wc = keyframes.T_wc
+    if len(T_wc):
+        T_wc = np.linalg.inv(T_wc[0]) @ T_wc
+    return Trajectory(timestamps=keyframes.timestamps, T_wc=T_wc)
+
+
+def frame_trajectory(recorder: core.TrajectoryRecorder, world: core.Map) -> Trajectory:
+    """Poses of all recorded frames, relative to keyframe 0, after the latest optimisation."""
+    poses = recorder.rebuild(world)
+    return Trajectory(
+        timestamps=poses.timestamps, T_wc=poses.T_wc, lost=poses.lost, indices=poses.frames
+    )
+
+
+def frame_features(frame: core.TrackedFrame) -> FrameFeatures:
+    """Copy the keypoints of a frame and what they were matched to."""
+    ids = frame.map_points
+    return FrameFeatures(
+        keypoints=frame.frame.keypoints,
+        levels=frame.frame.levels,
+        depths=frame.frame.depth,
+        map_point_ids=ids,
+        inliers=(ids >= 0) & (frame.outlier == 0),
+    )

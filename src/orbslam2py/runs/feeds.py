@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Frames one after the other, from a recording or a camera, as a run takes them."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Generator
+from dataclasses import dataclass
+from typing import TypeGuard
+
+import numpy as np
+import numpy.typing as npt
+
+from orbslam2py.datasets.base import Images, LiveSource, Sequence
+from orbslam2py.runs.prefetch import Prefetcher
+
+#: Seconds between two looks at whether the run was stopped.
+_WAIT_SLICE = 0.2
+
+
+@dataclass(frozen=True)
+class FedFrame:
+    """One frame.
+
+    Attributes
+    ----------
+    index
+        In the sequence; counts the images that a camera delivered.
+    timestamp, text
+        Seconds, as number and as the source's text.
+    item
+        The images; an exception if they could not be read; None if the frame is to be dropped.
+    """
+
+    index: int
+    timestamp: float
+    text: str
+    item: Images | Exception | None
+
+
+class RecordedFeed:
+    """Frames of a sequence, read ahead.
+
+    Parameters
+    ----------
+    sequence : Sequence
+        Images and time stamps.
+    indices : list of int
+        Which frames, in order.
+    realtime : bool
+        Play the time stamps, and drop frames that are overtaken.
+    """
+
+    is_live = False
+    n_lost = 0
+
+    def __init__(self, sequence: Sequence, indices: list[int], *, realtime: bool) -> None:
+        self._sequence = sequence
+        self._indices = indices
+        self._realtime = realtime
+        self.n_frames: int | None = len(indices)
+
+    def frames(self, stop: threading.Event) -> Generator[FedFrame, None, None]:
+        """Yield the frames, at the time they are due if real time is played, until `stop`."""
+        sequence = self._sequence
+        clock = _Clock(sequence.timestamps, self._indices, stop) if self._realtime else None
+        with Prefetcher[Images](sequence, self._indices, stop=stop) as images:
+            for position, (index, item) in enumerate(images):
+                dropped = clock is not None and clock.must_drop(position)
+                if stop.is_set():
+                    return
+                timestamp = float(sequence.timestamps[index])
+                text = sequence.timestamp_text(index)
+                yield FedFrame(index, timestamp, text, None if dropped else item)
+
+
+class LiveFeed:
+    """Images of a camera, the newest one whenever one is asked for.
+
+    Parameters
+    ----------
+    camera : LiveSource
+        The images.
+    max_frames : int, optional
+        End after so many; else only `stop` ends it.
+    """
+
+    is_live = True
+
+    def __init__(self, camera: LiveSource, max_frames: int | None) -> None:
+        self._camera = camera
+        self._max_frames = max_frames
+        self.n_frames: int | None = None
+
+    @property
+    def n_lost(self) -> int:
+        """Images so far that came while an earlier one was worked on."""
+        return self._camera.n_dropped
+
+    def frames(self, stop: threading.Event) -> Generator[FedFrame, None, None]:
+        """Yield images until `stop`."""
+        index = 0
+        with self._camera as camera:
+            while not stop.is_set() and index != self._max_frames:
+                frame = camera.take(_WAIT_SLICE)
+                if frame is not None:
+                    yield FedFrame(index, frame.timestamp, frame.text, frame.images)
+                    index += 1
+
+
+def is_sequence(source: Sequence | LiveSource) -> TypeGuard[Sequence]:
+    """Whether the source has a known length."""
+    return hasattr(source, "__len__")
+
+
+class _Clock:
+    """Plays time stamps: a frame is dropped when the next one has come before it was taken."""
+
+    def __init__(
+        self, timestamps: npt.NDArray[np.float64], indices: list[int], stop: threading.Event
+    ) -> None:
+        self._due = np.asarray(timestamps)[indices]
+        self._stop = stop
+        self._offset: float | None = None
+
+    def must_drop(self, position: int) -> bool:
+        """Wait until the frame is due; True if its successor is already there."""
+        now = time.perf_counter()
+        if self._offset is None:
+            self._offset = now - float(self._due[position])
+            return False
+        early = float(self._due[position]) + self._offset - now
+        if early > 0:
+            self._stop.wait(early)
+            return False
+        has_next = position + 1 < len(self._due)
+        return has_next and now >= float(self._due[position + 1]) + self._offset

@@ -1,0 +1,261 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Files that a run leaves behind."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import io
+import json
+import logging
+import os
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from orbslam2py._files import atomic_write
+from orbslam2py.errors import DatasetError
+from orbslam2py.runs.plots import draw_trajectory
+from orbslam2py.runs.report import RunEvaluation
+from orbslam2py.runs.result import FrameRow, RunResult
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.trajectory.rotations import quaternions_from_rotations
+from orbslam2py.trajectory.trajectory import Trajectory, write_kitti, write_tum
+
+_log = logging.getLogger(__name__)
+
+STAGES = ("wait", "extract", "stereo", "predict", "local_map", "keyframe", "track")
+
+
+def prepare_output_folder(folder: Path | None, name: str, *, force: bool) -> Path:
+    """Make the folder that takes the results, and see that it can be written.
+
+    Parameters
+    ----------
+    folder : Path, optional
+        The folder; ``runs/<name>-<time>`` if None.
+    name : str
+        Name of the sequence.
+    force : bool
+        Accept a folder that holds files.
+
+    Raises
+    ------
+    DatasetError
+        If it is not empty (without `force`), not a folder, or not writable.
+    """
+    if folder is None:
+        stem = Path("runs") / f"{name}-{time.strftime('%Y%m%d-%H%M%S')}"
+        folder = stem
+        for number in range(2, 100):
+            if not folder.exists():
+                break
+            folder = stem.with_name(f"{stem.name}-{number}")
+    if folder.exists() and not folder.is_dir():
+        raise DatasetError(f"{folder} is not a folder; give another one with --output")
+    if folder.exists() and any(folder.iterdir()) and not force:
+        raise DatasetError(f"{folder} is not empty; give another --output, or --force to overwrite")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / ".write-test"
+        probe.write_bytes(b"x")
+        probe.unlink()
+    except OSError as error:
+        raise DatasetError(
+            f"cannot write to {folder}: {error.strerror}; give another folder with --output"
+        ) from error
+    return folder
+
+
+def link_latest(folder: Path) -> None:
+    """Point ``runs/latest`` to the newest run in ``runs`` (where links are possible)."""
+    link = Path("runs") / "latest"
+    if folder.resolve().parent != link.parent.resolve():
+        return
+    temporary = link.with_name(f".latest-{os.getpid()}")
+    try:
+        temporary.symlink_to(os.path.relpath(folder.resolve(), link.parent.resolve()))
+        temporary.replace(link)
+    except OSError as error:
+        _log.debug("no link runs/latest: %s", error)
+        with contextlib.suppress(OSError):
+            temporary.unlink()
+
+
+class OutputWriter:
+    """Writes every result file of a run; one that fails does not hinder the others.
+
+    Parameters
+    ----------
+    folder : Path
+        Where to.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        #: Messages about files that could not be written, with the place of their copy.
+        self.problems: list[str] = []
+        self._rescue: Path | None = None
+        self._written: set[str] = set()
+
+    def write_all(
+        self, result: RunResult, report: dict[str, Any], evaluation: RunEvaluation | None
+    ) -> None:
+        """Write all files of the run."""
+        self._write("settings.yaml", result.settings.save)
+        self._write_trajectories(result)
+        self._write("frames.csv", lambda path: _write_frames(path, result.rows))
+        points = anchored_points(result)
+        self._write("points.ply", lambda path: write_ply(path, points))
+        if len(result.tracked_trajectory()):
+            self._write("trajectory.png", lambda path: _draw(path, result, evaluation, report))
+        self._write(
+            "report.json", lambda path: _write_text(path, json.dumps(report, indent=2) + "\n")
+        )
+        self._remove_stale()
+
+    def _remove_stale(self) -> None:
+        """Remove what an earlier run left in the folder and this one has no counterpart of."""
+        for path in [self.folder / "trajectory.png", *self.folder.glob("trajectory_map*.txt")]:
+            if path.name not in self._written:
+                with contextlib.suppress(OSError):
+                    path.unlink()
+
+    def _write_trajectories(self, result: RunResult) -> None:
+        *earlier, last = result.trajectories
+        for number, trajectory in enumerate(earlier):
+            self._write_tum(f"trajectory_map{number}.txt", result, trajectory)
+        self._write_tum("trajectory.txt", result, last)
+        self._write_tum("trajectory_online.txt", result, result.online_trajectory())
+        self._write_tum("keyframes.txt", result, result.keyframes)
+        self._write("trajectory_kitti.txt", lambda path: write_kitti(path, last, len(result.rows)))
+
+    def _write_tum(self, name: str, result: RunResult, trajectory: Trajectory) -> None:
+        texts = [result.rows[int(i)].timestamp for i in trajectory.indices]
+        self._write(name, lambda path: write_tum(path, trajectory, texts))
+
+    def _write(self, name: str, write: Callable[[Path], object]) -> None:
+        self._written.add(name)
+        try:
+            write(self.folder / name)
+        except OSError as error:
+            self._keep_elsewhere(name, write, error)
+        except Exception as error:
+            _log.exception("unexpected error; please report it")
+            self.problems.append(f"cannot make {name}: {str(error) or type(error).__name__}")
+
+    def _keep_elsewhere(self, name: str, write: Callable[[Path], object], error: OSError) -> None:
+        message = f"cannot write {self.folder / name}: {error.strerror or error}"
+        try:
+            if self._rescue is None:
+                self._rescue = Path(tempfile.mkdtemp(prefix="orbslam2py-"))
+            write(self._rescue / name)
+            message += f"; kept in {self._rescue / name}"
+        except OSError as second:
+            message += f"; neither in the temporary folder ({second.strerror or second})"
+        self.problems.append(message)
+
+
+def anchored_points(result: RunResult) -> npt.NDArray[np.float64]:
+    """Map points (p, 3) in the frame of keyframe 0, like the trajectories."""
+    snapshot = result.snapshot
+    if not len(snapshot.keyframe_T_wc):
+        return snapshot.point_positions
+    T_0w = np.linalg.inv(snapshot.keyframe_T_wc[0])
+    points: npt.NDArray[np.float64] = snapshot.point_positions @ T_0w[:3, :3].T + T_0w[:3, 3]
+    return points
+
+
+def write_ply(path: Path, points: npt.NDArray[np.float64]) -> None:
+    """Write points (p, 3) [m] as a binary PLY file that common viewers open."""
+    header = (
+        "ply\nformat binary_little_endian 1.0\ncomment camera frame of keyframe 0: "
+        f"x right, y down, z forward [m]\nelement vertex {len(points)}\n"
+        "property float x\nproperty float y\nproperty float z\nend_header\n"
+    )
+    with atomic_write(path, binary=True) as stream:
+        stream.write(header.encode())
+        stream.write(np.ascontiguousarray(points, dtype="<f4").tobytes())
+
+
+def _write_text(path: Path, text: str) -> None:
+    with atomic_write(path) as stream:
+        stream.write(text)
+
+
+def _write_frames(path: Path, rows: list[FrameRow]) -> None:
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(
+        ["index", "timestamp", "map", "state", "reason", "inliers", "matches", "keyframe"]
+        + ["reference_keyframe", "tx", "ty", "tz", "qx", "qy", "qz", "qw"]
+        + [f"ms_{stage}" for stage in STAGES]
+    )
+    for row in rows:
+        writer.writerow(_frame_fields(row))
+    _write_text(path, stream.getvalue())
+
+
+def _frame_fields(row: FrameRow) -> list[object]:
+    record = row.record
+    if record is None:
+        return [row.index, row.timestamp, "", row.state, row.reason] + [""] * (11 + len(STAGES))
+    pose: list[object] = [""] * 7
+    if record.T_wc is not None:
+        quaternion = quaternions_from_rotations(record.T_wc[None, :3, :3])[0]
+        values = [*record.T_wc[:3, 3], *quaternion]
+        pose = [f"{value:.9f}" for value in values]
+    reference = record.reference_keyframe if record.reference_keyframe >= 0 else ""
+    stages = [f"{record.milliseconds.get(stage, 0.0):.3f}" for stage in STAGES]
+    return [
+        row.index,
+        row.timestamp,
+        record.map_index,
+        row.state,
+        row.reason,
+        record.n_inliers,
+        record.n_matches,
+        int(record.is_keyframe),
+        reference,
+        *pose,
+        *stages,
+    ]
+
+
+def _loop_positions(result: RunResult) -> npt.NDArray[np.float64]:
+    """Both ends of every loop of the last map, (l, 2, 3), in the frame of keyframe 0."""
+    snapshot = result.snapshot
+    rows = np.searchsorted(snapshot.keyframe_ids, snapshot.loop_edges)
+    return np.asarray(result.keyframes.positions[rows])
+
+
+def _draw(
+    path: Path, result: RunResult, evaluation: RunEvaluation | None, report: dict[str, Any]
+) -> None:
+    last = result.tracked_trajectory()
+    begin = float(last.timestamps[0])
+    truth = None
+    subtitle = (
+        f"{report['tracked']} of {report['frames']} frames tracked, "
+        f"{report['keyframes']} keyframes, {report['map_points']} points"
+    )
+    if evaluation is not None:
+        truth = (evaluation.truth.timestamps - begin, evaluation.truth.positions)
+        subtitle += f", ATE {report['ate_rmse_m']:.4f} m"
+    draw_trajectory(
+        path,
+        title=f"{report['sequence']} ({report['sensor']})",
+        subtitle=subtitle,
+        positions=last.positions,
+        seconds=last.timestamps - begin,
+        keyframes=result.keyframes.positions,
+        points=anchored_points(result),
+        truth=truth,
+        loops=_loop_positions(result),
+        unit="units" if result.options.sensor is Sensor.MONOCULAR else "m",
+    )

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The figures of a run: report.json."""
+
+from __future__ import annotations
+
+import logging
+import resource
+import sys
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from orbslam2py._version import __version__
+from orbslam2py.errors import OrbSlamError
+from orbslam2py.evaluation.metrics import Alignment, Evaluation, evaluate_trajectory
+from orbslam2py.runs.result import RunResult
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.events import LoopClosed
+from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
+from orbslam2py.slam.records import TrackingState
+from orbslam2py.trajectory.trajectory import Trajectory
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class RunEvaluation:
+    """A run against ground truth."""
+
+    figures: Evaluation
+    """Of all tracked frames."""
+    keyframes_ate_rmse: float
+    """Of the keyframes alone [m]."""
+    truth: Trajectory
+    """Ground truth over the time of the run, in the estimate's frame."""
+
+
+def evaluate_run(result: RunResult) -> RunEvaluation | None:
+    """Compare the last map's trajectory with the sequence's ground truth.
+
+    Returns
+    -------
+    RunEvaluation or None
+        None if there is no ground truth, or too few poses have a partner in it.
+    """
+    estimate = result.tracked_trajectory()
+    try:
+        truth = result.sequence.ground_truth()
+        if truth is None or not len(estimate):
+            return None
+        # The unit of length of a single camera is its own.
+        monocular = result.options.sensor is Sensor.MONOCULAR
+        alignment = Alignment.SIM3 if monocular else Alignment.SE3
+        figures = evaluate_trajectory(estimate, truth, alignment)
+        keyframes = evaluate_trajectory(result.keyframes, truth, alignment)
+    except (OrbSlamError, OSError) as error:
+        _log.warning("no comparison with ground truth: %s", error)
+        return None
+    begin, end = estimate.timestamps[0] - 0.02, estimate.timestamps[-1] + 0.02
+    during = truth.select((truth.timestamps >= begin) & (truth.timestamps <= end))
+    T_wc = figures.transform.inverse().apply_to_poses(during.T_wc)
+    return RunEvaluation(figures, keyframes.ate.rmse, Trajectory(during.timestamps, T_wc))
+
+
+def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str, Any]:
+    """Everything report.json holds."""
+    options = result.options
+    n_done = len(result.rows)
+    n_tracked = result.n_tracked
+    n_frames = n_done if result.n_frames is None else result.n_frames
+    report: dict[str, Any] = {
+        "version": __version__,
+        "sequence": result.sequence.name,
+        "layout": result.sequence.layout,
+        "sensor": options.sensor.value,
+        "settings": result.settings.to_yaml(),
+        "deterministic": options.deterministic,
+        "realtime": options.realtime,
+        "seed": options.seed,
+        "frames": n_frames,
+        "tracked": n_tracked,
+        "tracked_fraction": n_tracked / n_frames if n_frames else 0.0,
+        "skipped_frames": result.n_skipped,
+        "dropped_frames": result.n_dropped,
+        "keyframes": len(result.keyframes),
+        "map_points": len(result.snapshot.point_ids),
+        "loops_closed": len(result.loops),
+        "relocalisations": result.n_relocalizations,
+        "resets": result.n_resets,
+        "initialisation_reasons": initialization_reasons(result),
+        "interrupted": result.interrupted,
+        "seconds": result.seconds,
+        "frames_per_second": _rate(n_done, result.seconds),
+        "slam_frames_per_second": _rate(n_done, result.slam_seconds),
+        "peak_memory_mb": peak_memory_mb(),
+        "milliseconds": result.stages,
+        "loops": [loop_entry(loop) for loop in result.loops],
+        "full_adjustments": [adjustment_entry(a) for a in result.full_adjustments],
+    }
+    if evaluation is not None:
+        report |= evaluation.figures.as_dict()
+        report["ate_keyframes_rmse_m"] = evaluation.keyframes_ate_rmse
+    return report
+
+
+def loop_entry(loop: LoopClosed) -> dict[str, Any]:
+    """What report.json says about a loop."""
+    return {
+        "map": loop.map_index,
+        "keyframes": [loop.matched_keyframe, loop.current_keyframe],
+        "timestamps": [loop.matched_timestamp, loop.current_timestamp],
+        "inliers": loop.n_inliers,
+        "matches": loop.n_matches,
+        "fused_points": loop.n_fused,
+        "scale": loop.scale,
+        "correction_m": loop.translation,
+        "correction_deg": loop.rotation_deg,
+        "milliseconds": _rounded(loop.milliseconds),
+    }
+
+
+def adjustment_entry(record: FullAdjustmentRecord) -> dict[str, Any]:
+    """What report.json says about a full bundle adjustment."""
+    return {
+        "map": record.map_index,
+        "keyframes": record.n_keyframes,
+        "points": record.n_points,
+        "observations": record.n_observations,
+        "iterations": record.iterations,
+        "initial_cost": record.initial_cost,
+        "final_cost": record.final_cost,
+        "used": record.used,
+        "milliseconds": _rounded(record.milliseconds),
+    }
+
+
+def _rounded(milliseconds: dict[str, float]) -> dict[str, float]:
+    return {step: round(value, 4) for step, value in milliseconds.items()}
+
+
+def initialization_reasons(result: RunResult) -> dict[str, int]:
+    """Why there was no map yet: how many frames had each reason, the most frequent first."""
+    return dict(
+        Counter(
+            row.reason
+            for row in result.rows
+            if row.record is not None and row.record.state is TrackingState.NOT_INITIALIZED
+        ).most_common()
+    )
+
+
+def peak_memory_mb() -> float:
+    """Largest resident memory of this process so far, in megabytes."""
+    # A child inherits ru_maxrss of the program that started it; Linux' own figure is the process's.
+    status = Path("/proc/self/status")
+    if status.exists():
+        for line in status.read_text().splitlines():
+            if line.startswith("VmHWM:"):
+                return int(line.split()[1]) / 1e3
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / (1e6 if sys.platform == "darwin" else 1e3)
+
+
+def _rate(count: int, seconds: float) -> float:
+    return count / seconds if seconds > 0 else 0.0

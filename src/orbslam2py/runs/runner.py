@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Run the system over a recorded sequence, or on a camera."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from orbslam2py import _core as core
+from orbslam2py.datasets.base import Images, LiveSource, Sequence
+from orbslam2py.errors import DatasetError, ImageError, OrbSlamError
+from orbslam2py.runs.feeds import FedFrame, LiveFeed, RecordedFeed, is_sequence
+from orbslam2py.runs.result import DROPPED, FrameRow, RunOptions, RunResult
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings.settings import Settings
+from orbslam2py.slam.records import TrackingRecord
+from orbslam2py.slam.system import System
+from orbslam2py.trajectory.trajectory import Trajectory
+
+_log = logging.getLogger(__name__)
+
+
+#: Seconds between two looks at whether to stop.
+_WAIT_SLICE = 0.2
+
+#: Called after every frame with the row and the system.
+Progress = Callable[[FrameRow, System], None]
+
+
+class SequenceRunner:
+    """Feeds a sequence or a camera's images to a `System` and collects the results.
+
+    A Ctrl-C, or a failure, ends the run early; what was computed is in the result.
+
+    Parameters
+    ----------
+    sequence : Sequence or LiveSource
+        Images and time stamps.
+    settings : Settings
+        For the system.
+    vocabulary : Vocabulary
+        For the system.
+    options : RunOptions
+        Which frames, and how.
+    """
+
+    def __init__(
+        self,
+        sequence: Sequence | LiveSource,
+        settings: Settings,
+        vocabulary: core.Vocabulary | None,
+        options: RunOptions,
+    ) -> None:
+        self._vocabulary = vocabulary
+        self._options = options
+        self._feed: RecordedFeed | LiveFeed
+        if is_sequence(sequence):
+            indices = options.indices(len(sequence))
+            self._feed = RecordedFeed(sequence, indices, realtime=options.realtime)
+        else:
+            options.check_for_camera()
+            self._feed = LiveFeed(cast(LiveSource, sequence), options.max_frames)
+        self.result = RunResult(
+            *(sequence, settings, options, self._feed.n_frames), is_live=self._feed.is_live
+        )
+
+    def run(
+        self, progress: Progress | None = None, stop: threading.Event | None = None
+    ) -> RunResult:
+        """Process the frames.
+
+        Parameters
+        ----------
+        progress : callable, optional
+            Called after every frame.
+        stop : threading.Event, optional
+            Ends the run after the present frame when it is set: the only end of a camera's run
+            unless `RunOptions.max_frames` tells one.
+
+        Returns
+        -------
+        RunResult
+            Also when the run was stopped, by Ctrl-C as well, or something failed: see
+            `RunResult.interrupted` and `RunResult.error`.
+        """
+        result, options = self.result, self._options
+        begin = time.perf_counter()
+        system = System(
+            result.settings,
+            options.sensor,
+            self._vocabulary,
+            deterministic=options.deterministic,
+            wait_for_mapping=not (options.realtime or self._feed.is_live),
+            loop_closing=options.loop_closing,
+            full_adjustment=options.full_adjustment,
+            full_adjustment_time_limit=options.full_adjustment_time_limit,
+            seed=options.seed,
+        )
+        stop = stop or threading.Event()
+        try:
+            self._process(system, progress, stop)
+            self._wait_for_mapping(system, stop)
+        except KeyboardInterrupt:
+            stop.set()
+        except Exception as error:
+            self._take_note(error)
+        result.interrupted = stop.is_set() and not result.is_live
+        if result.interrupted:
+            _log.warning("interrupted; saving what was done so far")
+        self._shut_down(system)
+        self._collect(system)
+        result.seconds = time.perf_counter() - begin
+        return result
+
+    # ---- one pass over the frames ----------------------------------------------------------------
+    def _process(self, system: System, progress: Progress | None, stop: threading.Event) -> None:
+        result = self.result
+        try:
+            with contextlib.closing(self._feed.frames(stop)) as frames:
+                for position, frame in enumerate(frames):
+                    if position == self._options.localize_after:
+                        # The map is to be complete, whatever the speed of mapping.
+                        self._wait_for_mapping(system, stop)
+                        system.localization_mode = True
+                    row = self._track(system, frame)
+                    result.rows.append(row)
+                    if progress is not None:
+                        progress(row, system)
+        finally:
+            if result.is_live:
+                result.n_frames = len(result.rows)
+                result.n_lost_by_camera = self._feed.n_lost
+
+    def _track(self, system: System, frame: FedFrame) -> FrameRow:
+        if frame.item is None:
+            return _row(frame, None, DROPPED)
+        if isinstance(frame.item, Exception):
+            if not isinstance(frame.item, (OrbSlamError, OSError)):
+                raise frame.item
+            return self._skip(frame, frame.item)
+        begin = time.perf_counter()
+        try:
+            record = self._call(system, frame.item, frame.timestamp)
+        except ImageError as error:
+            return self._skip(frame, error)
+        finally:
+            self.result.slam_seconds += time.perf_counter() - begin
+        return _row(frame, record, str(record.reason))
+
+    def _call(self, system: System, images: Images, timestamp: float) -> TrackingRecord:
+        mask = images.mask
+        if self._options.sensor is Sensor.STEREO:
+            right = _second(images.right)
+            if mask is None:
+                return system.track_stereo(images.image, right, timestamp)
+            # The mask is the left image's; what it hides there needs no partner.
+            return system.track_stereo(images.image, right, timestamp, mask=(mask, None))
+        if self._options.sensor is Sensor.RGBD:
+            depth = _second(images.depth)
+            if mask is None:
+                return system.track_rgbd(images.image, depth, timestamp)
+            return system.track_rgbd(images.image, depth, timestamp, mask=mask)
+        if mask is None:
+            return system.track_monocular(images.image, timestamp)
+        return system.track_monocular(images.image, timestamp, mask=mask)
+
+    def _skip(self, frame: FedFrame, error: Exception) -> FrameRow:
+        _log.warning("frame %d skipped: %s", frame.index, error)
+        return _row(frame, None, str(error))
+
+    # ---- the end ---------------------------------------------------------------------------------
+    def _wait_for_mapping(self, system: System, stop: threading.Event) -> None:
+        begin = time.perf_counter()
+        idle = False
+        while not (idle or stop.is_set() or system.localization_mode):
+            idle = system.wait_until_idle(_WAIT_SLICE)
+        self.result.slam_seconds += time.perf_counter() - begin
+
+    def _shut_down(self, system: System) -> None:
+        try:
+            system.shutdown(drain=not self.result.interrupted and self.result.error is None)
+        except Exception as error:
+            if self.result.error is None:
+                self._take_note(error)
+
+    def _take_note(self, error: Exception) -> None:
+        self.result.error = error
+        if not isinstance(error, OrbSlamError):
+            _log.error("unexpected error; please report it", exc_info=error)
+
+    def _collect(self, system: System) -> None:
+        result = self.result
+        trajectories = system.trajectories()
+        last_map = len(trajectories) - 1
+        by_frame: dict[tuple[int, int], int] = {}
+        by_time: dict[float, int] = {}
+        for position, row in enumerate(result.rows):
+            if row.record is not None:
+                by_frame[row.record.map_index, row.record.frame_id] = position
+                if row.record.map_index == last_map:
+                    by_time[row.record.timestamp] = position
+        result.trajectories = [
+            _renumber(t, [by_frame.get((number, int(i)), -1) for i in t.indices])
+            for number, t in enumerate(trajectories)
+        ]
+        keyframes = system.keyframe_trajectory()
+        result.keyframes = _renumber(
+            keyframes, [by_time.get(float(t), -1) for t in keyframes.timestamps]
+        )
+        result.snapshot = system.map_snapshot()
+        result.stages = system.stage_statistics()
+        result.n_resets = system.n_resets
+        result.n_relocalizations = system.n_relocalizations
+        result.loops = system.loops
+        result.full_adjustments = system.full_adjustments
+
+
+def _renumber(trajectory: Trajectory, positions: list[int]) -> Trajectory:
+    """Give every pose the position of its row; an interrupt may have left a pose without one."""
+    indices = np.array(positions, np.int64)
+    return replace(trajectory, indices=indices).select(indices >= 0)
+
+
+def _row(frame: FedFrame, record: TrackingRecord | None, reason: str) -> FrameRow:
+    return FrameRow(frame.index, frame.text, record, reason)
+
+
+def _second(array: npt.NDArray[Any] | None) -> npt.NDArray[Any]:
+    if array is None:
+        raise DatasetError("the sequence delivers no second image for this sensor")
+    return array

@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What must be known before the first image: sensor, camera, features, depth."""
+
+from orbslam2py.settings.builtin import BUILTIN_NAMES, builtin_settings, resolve_settings
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings.settings import (
+    CameraRectification,
+    CameraSettings,
+    DepthSettings,
+    OrbSettings,
+    Settings,
+    StereoRectification,
+    ViewerSettings,
+)
+
+__all__ = [
+    "BUILTIN_NAMES",
+    "CameraRectification",
+    "CameraSettings",
+    "DepthSettings",
+    "OrbSettings",
+    "Sensor",
+    "Settings",
+    "StereoRectification",
+    "ViewerSettings",
+    "builtin_settings",
+    "resolve_settings",
+]

@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which keys a settings file may hold, what their values may be, and who needs them.
+
+One table serves the reader, the checks of the dataclasses and the writer.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from numbers import Real
+
+from orbslam2py.settings.sensor import Sensor
+
+_ALL = frozenset(Sensor)
+_DEPTH_SENSORS = frozenset({Sensor.STEREO, Sensor.RGBD})
+_RGBD = frozenset({Sensor.RGBD})
+
+
+@dataclass(frozen=True)
+class Rule:
+    """The values a key allows: the sentence for the user and the test."""
+
+    text: str
+    allows: Callable[[float], bool]
+
+
+@dataclass(frozen=True)
+class Key:
+    """One key of a settings file.
+
+    Attributes
+    ----------
+    name
+        As written in the file.
+    group, field
+        Where the value lives in `orbslam2py.settings.Settings`.
+    kind
+        ``float``, ``int`` or ``bool`` (written 0 or 1).
+    rule
+        Allowed values.
+    sensors
+        Who uses the key; for other sensors it may stand in the file and is not looked at.
+    required
+        Whether those sensors cannot do without it.
+    """
+
+    name: str
+    group: str
+    field: str
+    kind: type[float] | type[int] | type[bool]
+    rule: Rule
+    sensors: frozenset[Sensor] = _ALL
+    required: bool = False
+
+
+def _above_zero(limit: float, unit: str = "") -> Rule:
+    text = f"greater than 0 and at most {limit:g}{unit and ' '}{unit}"
+    return Rule(text, lambda value: 0 < value <= limit)
+
+
+def _between(low: float, high: float, unit: str = "") -> Rule:
+    return Rule(f"{low:g} to {high:g}{unit and ' '}{unit}", lambda value: low <= value <= high)
+
+
+_FOCAL = _above_zero(1e5, "pixels")
+_CENTRE = _between(-1e5, 1e5, "pixels")
+_COEFFICIENT = _between(-1e4, 1e4)
+_SIZE = _between(1, 65535, "pixels")
+_WIDTH = _above_zero(1e6)
+_PLACE = _between(-1e6, 1e6)
+
+KEYS: tuple[Key, ...] = (
+    Key("Camera.fx", "camera", "fx", float, _FOCAL, required=True),
+    Key("Camera.fy", "camera", "fy", float, _FOCAL, required=True),
+    Key("Camera.cx", "camera", "cx", float, _CENTRE, required=True),
+    Key("Camera.cy", "camera", "cy", float, _CENTRE, required=True),
+    Key("Camera.k1", "camera", "k1", float, _COEFFICIENT),
+    Key("Camera.k2", "camera", "k2", float, _COEFFICIENT),
+    Key("Camera.p1", "camera", "p1", float, _COEFFICIENT),
+    Key("Camera.p2", "camera", "p2", float, _COEFFICIENT),
+    Key("Camera.k3", "camera", "k3", float, _COEFFICIENT),
+    Key("Camera.width", "camera", "width", int, _SIZE),
+    Key("Camera.height", "camera", "height", int, _SIZE),
+    Key("Camera.fps", "camera", "fps", float, _above_zero(1e5, "Hz")),
+    Key(
+        "Camera.bf",
+        "camera",
+        "bf",
+        float,
+        _above_zero(1e6, "pixel metres (baseline times fx)"),
+        _DEPTH_SENSORS,
+        True,
+    ),
+    Key("Camera.RGB", "camera", "rgb", bool, Rule("0 (BGR) or 1 (RGB)", lambda v: v in (0, 1))),
+    Key(
+        "ThDepth",
+        "depth",
+        "close_factor",
+        float,
+        _above_zero(1e6, "baselines"),
+        _DEPTH_SENSORS,
+        True,
+    ),
+    Key(
+        "DepthMapFactor",
+        "depth",
+        "raw_per_metre",
+        float,
+        _between(0, 1e9, "raw units per metre"),
+        _RGBD,
+    ),
+    Key("ORBextractor.nFeatures", "orb", "n_features", int, _between(1, 1e6), required=True),
+    Key(
+        "ORBextractor.scaleFactor",
+        "orb",
+        "scale_factor",
+        float,
+        Rule("greater than 1 and at most 2", lambda value: 1 < value <= 2),
+        required=True,
+    ),
+    Key("ORBextractor.nLevels", "orb", "n_levels", int, _between(1, 16), required=True),
+    Key("ORBextractor.iniThFAST", "orb", "ini_th_fast", int, _between(1, 255), required=True),
+    Key("ORBextractor.minThFAST", "orb", "min_th_fast", int, _between(1, 255), required=True),
+    Key("Viewer.KeyFrameSize", "viewer", "keyframe_size", float, _WIDTH),
+    Key("Viewer.KeyFrameLineWidth", "viewer", "keyframe_line_width", float, _WIDTH),
+    Key("Viewer.GraphLineWidth", "viewer", "graph_line_width", float, _WIDTH),
+    Key("Viewer.PointSize", "viewer", "point_size", float, _WIDTH),
+    Key("Viewer.CameraSize", "viewer", "camera_size", float, _WIDTH),
+    Key("Viewer.CameraLineWidth", "viewer", "camera_line_width", float, _WIDTH),
+    Key("Viewer.ViewpointX", "viewer", "viewpoint_x", float, _PLACE),
+    Key("Viewer.ViewpointY", "viewer", "viewpoint_y", float, _PLACE),
+    Key("Viewer.ViewpointZ", "viewer", "viewpoint_z", float, _PLACE),
+    Key("Viewer.ViewpointF", "viewer", "viewpoint_f", float, _WIDTH),
+)
+
+RECTIFICATION_KEYS: tuple[str, ...] = tuple(
+    f"{side}.{name}"
+    for side in ("LEFT", "RIGHT")
+    for name in ("K", "D", "R", "P", "width", "height")
+)
+
+# Keys of ORB-SLAM3 files (and of the live camera examples) that we read past. Its `Camera.type`
+# is looked at: another lens than a pinhole would give wrong results silently.
+CAMERA_TYPE_KEY = "Camera.type"
+_IGNORED = frozenset(
+    {
+        CAMERA_TYPE_KEY,
+        "Camera.k4",
+        "Camera.newWidth",
+        "Camera.newHeight",
+        "Camera.imageScale",
+        "Camera.lappingBegin",
+        "Camera.lappingEnd",
+        "Viewer.imageViewScale",
+        "loopClosing",
+        "thFarPoints",
+        "Tbc",
+        "Tlr",
+    }
+)
+_IGNORED_PREFIXES = ("Camera1.", "Camera2.", "File.", "IMU.", "RGBD.", "Stereo.", "System.")
+
+_KNOWN = frozenset(key.name for key in KEYS) | frozenset(RECTIFICATION_KEYS) | _IGNORED
+
+
+def is_known(name: str) -> bool:
+    """Whether a settings file may hold this key."""
+    return name in _KNOWN or name.startswith(_IGNORED_PREFIXES)
+
+
+def nearest(name: str, candidates: Iterable[str] = _KNOWN) -> str | None:
+    """Find the candidate spelt most alike, whatever the case; None if nothing comes close."""
+    by_lower = {candidate.lower(): candidate for candidate in sorted(candidates)}
+    matches = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=0.6)
+    return by_lower[matches[0]] if matches else None
+
+
+def convert(key: Key, value: float) -> float | int | bool:
+    """Check a finite number against the rule of its key and give it the key's type.
+
+    Raises
+    ------
+    ValueError
+        With a sentence for the user.
+    """
+    if not math.isfinite(value):
+        raise ValueError(f"{key.name} is not finite; allowed: {key.rule.text}")
+    if key.kind is not float and not float(value).is_integer():
+        raise ValueError(f"{key.name} is {value:g}, but must be a whole number: {key.rule.text}")
+    if not key.rule.allows(value):
+        raise ValueError(f"{key.name} is {value:g}; allowed: {key.rule.text}")
+    return key.kind(value)
+
+
+def check_group(group: str, values: object) -> list[str]:
+    """Say what is wrong with the values of one settings dataclass.
+
+    Good values get the type of their key, so that NumPy's numbers become Python's own.
+    """
+    problems = []
+    for key in KEYS:
+        if key.group != group:
+            continue
+        value = getattr(values, key.field)
+        if value is None or (key.name == "Camera.bf" and value == 0):
+            continue  # image size unknown, a camera without depth
+        if not isinstance(value, Real):
+            problems.append(f"{key.name} ({key.field}) is {value!r}, not a number")
+            continue
+        try:
+            object.__setattr__(values, key.field, convert(key, float(value)))
+        except ValueError as error:
+            problems.append(str(error))
+    return problems

@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""An ORB-SLAM settings file to `Settings`, with every problem reported at once."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbslam2py.errors import SettingsError
+from orbslam2py.settings import keys as schema
+from orbslam2py.settings.opencv_yaml import Document, Entry, Problem, parse_number, scan
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings.settings import (
+    CameraRectification,
+    CameraSettings,
+    DepthSettings,
+    OrbSettings,
+    Settings,
+    StereoRectification,
+    ViewerSettings,
+    thresholds_swapped,
+)
+
+_log = logging.getLogger(__name__)
+_MOST_PROBLEMS = 30
+_GROUPS: dict[str, type[Any]] = {
+    "camera": CameraSettings,
+    "depth": DepthSettings,
+    "orb": OrbSettings,
+    "viewer": ViewerSettings,
+}
+
+
+def read_settings(path: Path, sensor: Sensor, *, allow_unknown: bool) -> Settings:
+    """See `Settings.load`."""
+    try:
+        text = path.read_text(encoding="utf-8", errors="replace")
+    except OSError as error:
+        raise SettingsError(
+            f"cannot open settings file {path}: {error.strerror or error}"
+        ) from error
+    document = scan(text)
+    problems = document.problems
+    if not document.entries and not problems:
+        problems.append(Problem(None, "the file holds no settings"))
+    _check_names(document, path, allow_unknown)
+    _check_camera_type(document)
+    values = _read_groups(document, sensor)
+    rectification = None
+    if sensor is Sensor.STEREO:
+        rectification = _read_rectification(document)
+    _raise_if_any(path, problems)
+
+    groups: dict[str, Any] = {
+        name: kind(**values[name])
+        for name, kind in _GROUPS.items()
+        if name != "depth" or sensor.has_depth
+    }
+    settings = Settings(sensor=sensor, rectification=rectification, **groups)
+    for warning in _doubts(settings):
+        _log.warning("%s: %s", path, warning)
+    return settings
+
+
+def _raise_if_any(path: Path, problems: list[Problem]) -> None:
+    if not problems:
+        return
+    ordered = sorted(problems, key=lambda problem: (problem.line is None, problem.line or 0))
+    lines = [problem.located(path) for problem in ordered[:_MOST_PROBLEMS]]
+    if len(ordered) > _MOST_PROBLEMS:
+        lines.append(f"... and {len(ordered) - _MOST_PROBLEMS} more")
+    if len(ordered) > 1:
+        lines.insert(0, f"{len(ordered)} problems in settings file {path}:")
+    raise SettingsError("\n".join(lines))
+
+
+def _check_names(document: Document, path: Path, allow_unknown: bool) -> None:
+    for entry in document.entries.values():
+        if schema.is_known(entry.key):
+            continue
+        nearest = schema.nearest(entry.key)
+        advice = f"did you mean {nearest}?" if nearest else "remove it or allow unknown keys"
+        problem = Problem(entry.line, f"unknown key {entry.key}; {advice}")
+        if allow_unknown:
+            _log.warning("%s", problem.located(path))
+        else:
+            document.problems.append(problem)
+
+
+def _check_camera_type(document: Document) -> None:
+    entry = document.entries.get(schema.CAMERA_TYPE_KEY)
+    if entry is not None and str(entry.value).lower() not in ("pinhole", "rectified"):
+        document.problems.append(
+            Problem(entry.line, f"{entry.key} is {entry.value}; allowed: PinHole, Rectified")
+        )
+
+
+def _read_groups(document: Document, sensor: Sensor) -> dict[str, dict[str, Any]]:
+    values: dict[str, dict[str, Any]] = {name: {} for name in _GROUPS}
+    for key in schema.KEYS:
+        if sensor not in key.sensors:
+            continue
+        entry = document.entries.get(key.name)
+        if entry is None:
+            if key.required:
+                document.problems.append(_missing(document, key, sensor))
+            continue
+        try:
+            number = _scalar(entry)
+            # ORB-SLAM's files may say 0 for "unknown rate".
+            if not (key.name == "Camera.fps" and number == 0):
+                values[key.group][key.field] = schema.convert(key, number)
+        except ValueError as error:
+            document.problems.append(Problem(entry.line, str(error)))
+    orb = values["orb"]
+    if orb.get("min_th_fast", 0) > orb.get("ini_th_fast", 255):
+        line = document.entries["ORBextractor.minThFAST"].line
+        text = thresholds_swapped(orb["min_th_fast"], orb["ini_th_fast"])
+        document.problems.append(Problem(line, text))
+    return values
+
+
+def _missing(document: Document, key: schema.Key, sensor: Sensor) -> Problem:
+    text = f"{key.name} is missing; {sensor} needs it: {key.rule.text}"
+    successor = key.name.replace("Camera.", "Camera1.")
+    if successor != key.name and successor in document.entries:
+        text += f" (rename {successor}, the name of ORB-SLAM3)"
+    return Problem(None, text)
+
+
+def _scalar(entry: Entry) -> float:
+    if not isinstance(entry.value, str):
+        raise ValueError(f"{entry.key} must be one number, not a list or a map")
+    try:
+        return parse_number(entry.value)
+    except ValueError as error:
+        key = next((key for key in schema.KEYS if key.name == entry.key), None)
+        allowed = f"; allowed: {key.rule.text}" if key else ""
+        raise ValueError(f"{entry.key}: {error}{allowed}") from None
+
+
+def _read_rectification(document: Document) -> StereoRectification | None:
+    present = [name for name in schema.RECTIFICATION_KEYS if name in document.entries]
+    if not present:
+        return None
+    missing = [name for name in schema.RECTIFICATION_KEYS if name not in document.entries]
+    if missing:
+        text = f"calibration parameters to rectify stereo are missing: {', '.join(missing)}"
+        document.problems.append(Problem(document.entries[present[0]].line, text))
+        return None
+    cameras = [_read_camera_rectification(document, side) for side in ("LEFT", "RIGHT")]
+    left, right = cameras
+    return StereoRectification(left, right) if left and right else None
+
+
+def _read_camera_rectification(document: Document, side: str) -> CameraRectification | None:
+    values: dict[str, Any] = {}
+    first_line = document.entries[f"{side}.K"].line
+    for name in ("K", "D", "R", "P", "width", "height"):
+        entry = document.entries[f"{side}.{name}"]
+        try:
+            if name in ("width", "height"):
+                number = _scalar(entry)
+                if not number.is_integer() or not 1 <= number <= 65535:
+                    raise ValueError(
+                        f"{entry.key} is {number:g}; allowed: whole numbers 1 to 65535"
+                    )
+                values[name] = int(number)
+            else:
+                values[name] = read_matrix(entry)
+        except ValueError as error:
+            document.problems.append(Problem(entry.line, str(error)))
+    if len(values) < 6:
+        return None
+    try:
+        return CameraRectification(**values)
+    except SettingsError as error:
+        document.problems.append(Problem(first_line, f"{side}: {error}"))
+        return None
+
+
+def read_matrix(entry: Entry) -> NDArray[np.float64]:
+    """Make the float64 (rows, cols) matrix of an entry with rows, cols and data.
+
+    Raises
+    ------
+    ValueError
+        With a sentence for the user.
+    """
+    if not isinstance(entry.value, Mapping):
+        raise ValueError(f"{entry.key} must be a matrix with rows, cols and data")
+    missing = [name for name in ("rows", "cols", "data") if name not in entry.value]
+    if missing:
+        raise ValueError(f"{entry.key} has no {' and no '.join(missing)}")
+    shape = []
+    for name in ("rows", "cols"):
+        number = _scalar(entry.value[name])
+        if not number.is_integer() or not 1 <= number <= 1000:
+            raise ValueError(f"{entry.key}: {name} is {number:g}; allowed: 1 to 1000")
+        shape.append(int(number))
+    data = entry.value["data"].value
+    if not isinstance(data, tuple):
+        raise ValueError(f"{entry.key}: data must be a list [...]")
+    if len(data) != shape[0] * shape[1]:
+        raise ValueError(
+            f"{entry.key} should hold {shape[0]} x {shape[1]} = {shape[0] * shape[1]} numbers, "
+            f"found {len(data)}"
+        )
+    try:
+        return np.array([parse_number(item) for item in data], dtype=np.float64).reshape(shape)
+    except ValueError as error:
+        raise ValueError(f"{entry.key}: {error}") from None
+
+
+def _doubts(settings: Settings) -> list[str]:
+    """Say what is allowed but probably a mistake."""
+    camera, found = settings.camera, []
+    if camera.width is not None and not 0 <= camera.cx < camera.width:
+        found.append(f"Camera.cx {camera.cx:g} lies outside the image ({camera.width} wide)")
+    if camera.height is not None and not 0 <= camera.cy < camera.height:
+        found.append(f"Camera.cy {camera.cy:g} lies outside the image ({camera.height} high)")
+    if settings.orb.n_features < 200:
+        found.append(f"ORBextractor.nFeatures {settings.orb.n_features} is very few")
+    if settings.sensor is Sensor.STEREO and camera.is_distorted:
+        found.append("stereo input must be rectified; distortion must be zero")
+    if settings.rectification is not None:
+        P = settings.rectification.left.P
+        expected = np.array([P[0, 0], P[1, 1], P[0, 2], P[1, 2]])
+        given = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
+        if np.abs(expected - given).max() > 1e-3:
+            found.append("Camera.fx, fy, cx, cy differ from LEFT.P")
+        if abs(camera.bf + settings.rectification.right.P[0, 3]) > 1e-3:
+            found.append("Camera.bf differs from -RIGHT.P[0,3]")
+    return found

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What happens in a running system, for callbacks: plain data, delivered outside of its threads.
+
+>>> def closed(event: LoopClosed) -> None:
+...     print(f"loop {event.current_keyframe} -> {event.matched_keyframe}")
+>>> callbacks = Callbacks(on_loop=closed)
+>>> system = System("tum1", "rgbd", callbacks=callbacks)  # doctest: +SKIP
+"""
+
+from __future__ import annotations
+
+import enum
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from orbslam2py.slam.worker import Worker
+
+_log = logging.getLogger(__name__)
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LoopClosed:
+    """A place was seen again, and the drift gathered meanwhile was taken out."""
+
+    map_index: int
+    """0 for the first map; grows with every reset."""
+    current_keyframe: int
+    matched_keyframe: int
+    """The keyframe that showed the place before."""
+    current_timestamp: float
+    """Seconds."""
+    matched_timestamp: float
+    n_inliers: int
+    """Matches that agree with the refined similarity."""
+    n_matches: int
+    """Keypoints of the current keyframe that show points around the matched one."""
+    n_fused: int
+    """Points that were found to be the same on both sides."""
+    scale: float
+    """Lengths around the current keyframe were multiplied by it; 1 with stereo and RGB-D."""
+    S_cm: FloatArray
+    """(4, 4) similarity: camera of the matched keyframe to camera of the current one."""
+    translation: float
+    """Metres by which the current keyframe was moved."""
+    rotation_deg: float
+    """Degrees by which it was turned."""
+    milliseconds: dict[str, float] = field(default_factory=dict)
+    """Time per step: detect, verify, wait, plan, graph, apply."""
+
+
+@dataclass(frozen=True)
+class KeyframeAdded:
+    """Local mapping is through with a new keyframe."""
+
+    map_index: int
+    keyframe: int
+    timestamp: float
+    """Seconds."""
+    T_wc: FloatArray
+    """(4, 4) camera to world, as it is now."""
+    n_keyframes: int
+    """In the map."""
+    n_map_points: int
+
+
+@dataclass(frozen=True)
+class TrackingLost:
+    """No pose was found for an image, after one that had one."""
+
+    map_index: int
+    frame_id: int
+    timestamp: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class Relocalized:
+    """A pose was found again."""
+
+    map_index: int
+    frame_id: int
+    timestamp: float
+    T_wc: FloatArray
+    """(4, 4) camera to world."""
+
+
+class MapChangeCause(str, enum.Enum):
+    """Why the map as a whole is another one than before."""
+
+    LOOP = "loop"
+    """A loop was closed."""
+    FULL_ADJUSTMENT = "full adjustment"
+    """All keyframes and points were refined together."""
+    RESET = "reset"
+    """The map was dropped; the next one begins."""
+
+    def __str__(self) -> str:
+        return self.value
+
+
+@dataclass(frozen=True)
+class MapChanged:
+    """Poses and points moved as a whole: what was drawn before is out of date."""
+
+    map_index: int
+    cause: MapChangeCause
+
+
+@dataclass(frozen=True)
+class Callbacks:
+    """Functions that are told what happens.
+
+    They run one after the other in a thread of their own (in deterministic mode: in the thread of
+    the track call), so that a slow one delays neither tracking nor mapping, and hold no lock of the
+    system; they may call the system's methods. An exception is logged and goes no further.
+    """
+
+    on_loop: Callable[[LoopClosed], None] | None = None
+    on_keyframe: Callable[[KeyframeAdded], None] | None = None
+    on_lost: Callable[[TrackingLost], None] | None = None
+    on_relocalized: Callable[[Relocalized], None] | None = None
+    on_map_change: Callable[[MapChanged], None] | None = None
+
+
+Event = TypeVar("Event")
+
+
+class EventDispatcher:
+    """Delivers events to the user's functions, in order.
+
+    Parameters
+    ----------
+    callbacks : Callbacks
+        Who wants to know.
+    threaded : bool
+        In a thread of its own, or inline.
+    """
+
+    def __init__(self, callbacks: Callbacks, *, threaded: bool) -> None:
+        self.callbacks = callbacks
+        self.worker: Worker[Callable[[], None]] = Worker(
+            "callbacks", lambda deliver: deliver(), threaded=threaded
+        )
+
+    def post(self, callback: Callable[[Event], None] | None, event: Event) -> None:
+        """Queue an event for a callback; nothing happens when there is none."""
+        if callback is None or self.worker.ended:
+            return
+
+        def deliver() -> None:
+            try:
+                callback(event)
+            except Exception:
+                _log.exception("a callback failed on %s", type(event).__name__)
+
+        self.worker.submit(deliver)

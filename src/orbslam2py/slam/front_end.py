@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""From images to frames: input checks, grey values, features, depth."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from orbslam2py import _core as core
+from orbslam2py.errors import ImageError
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings.settings import Settings
+from orbslam2py.slam.timing import StageTimer
+
+Mask = npt.NDArray[np.uint8]
+#: For a pair: one mask for both images, or (left, right), either of which may be None.
+PairMask = Mask | tuple[Mask | None, Mask | None]
+
+
+class FrontEnd:
+    """Builds frames from images; the first image fixes the size.
+
+    Parameters
+    ----------
+    settings : Settings
+        Calibration and extractor settings.
+    sensor : Sensor
+        Which images come.
+    """
+
+    def __init__(self, settings: Settings, sensor: Sensor) -> None:
+        self._settings = settings
+        self._sensor = sensor
+        self._context: core.FrameContext | None = None
+        self._size: tuple[int, int] | None = None
+        options = _orb_options(settings)
+        self._extractor = core.OrbExtractor(options)
+        self._initial_extractor = core.OrbExtractor(_orb_options(settings, factor=2))
+        self._pair_extractor = core.PairExtractor(options) if sensor is Sensor.STEREO else None
+
+    def monocular(
+        self,
+        image: npt.NDArray[np.uint8],
+        frame_id: int,
+        timestamp: float,
+        timer: StageTimer,
+        mask: Mask | None = None,
+        *,
+        initializing: bool = False,
+    ) -> core.Frame:
+        """Frame of a single camera; with twice as many features while the map begins."""
+        self._check(image, "image")
+        _check_mask(mask, image, "mask")
+        context = self._context_for(image)
+        with timer("extract"):
+            grey = core.to_grey(image, self._settings.camera.rgb)
+            extractor = self._initial_extractor if initializing else self._extractor
+            return core.build_monocular_frame(
+                context, frame_id, timestamp, extractor.extract(grey, mask)
+            )
+
+    def stereo(
+        self,
+        left: npt.NDArray[np.uint8],
+        right: npt.NDArray[np.uint8],
+        frame_id: int,
+        timestamp: float,
+        timer: StageTimer,
+        mask: PairMask | None = None,
+    ) -> core.Frame:
+        """Frame of a rectified pair."""
+        assert self._pair_extractor is not None
+        self._check(left, "left image")
+        self._check(right, "right image")
+        if left.shape != right.shape:
+            raise ImageError(f"left and right image differ: shapes {left.shape} and {right.shape}")
+        if isinstance(mask, tuple) and len(mask) != 2:
+            raise ImageError(f"a tuple of masks must hold two (left, right), got {len(mask)}")
+        left_mask, right_mask = mask if isinstance(mask, tuple) else (mask, mask)
+        _check_mask(left_mask, left, "left mask")
+        _check_mask(right_mask, right, "right mask")
+        context = self._context_for(left)
+        with timer("extract"):
+            left_grey = core.to_grey(left, self._settings.camera.rgb)
+            right_grey = core.to_grey(right, self._settings.camera.rgb)
+            features_left, features_right = self._pair_extractor.extract(
+                left_grey, right_grey, left_mask, right_mask
+            )
+        with timer("stereo"):
+            return core.build_stereo_frame(
+                context, frame_id, timestamp, features_left, features_right
+            )
+
+    def rgbd(
+        self,
+        image: npt.NDArray[np.uint8],
+        depth: npt.NDArray[np.generic],
+        frame_id: int,
+        timestamp: float,
+        timer: StageTimer,
+        mask: Mask | None = None,
+    ) -> core.Frame:
+        """Frame of a colour image with registered depth."""
+        self._check(image, "image")
+        if not isinstance(depth, np.ndarray) or depth.ndim != 2:
+            shape = getattr(depth, "shape", None)
+            raise ImageError(f"depth must be an array of shape (height, width), got {shape}")
+        if depth.shape != image.shape[:2]:
+            raise ImageError(
+                f"depth has size {depth.shape}, the image {image.shape[:2]}; "
+                "depth must be registered to the image"
+            )
+        if depth.dtype.kind not in "uif":
+            raise ImageError(f"depth must hold numbers (uint16, float32...), got {depth.dtype}")
+        _check_mask(mask, image, "mask")
+        context = self._context_for(image)
+        with timer("extract"):
+            grey = core.to_grey(image, self._settings.camera.rgb)
+            extraction = self._extractor.extract(grey, mask)
+        with timer("stereo"):
+            metres = core.to_depth_metres(depth, self._settings.depth_factor)
+            return core.build_rgbd_frame(context, frame_id, timestamp, extraction, metres)
+
+    def _check(self, image: npt.NDArray[np.uint8], what: str) -> None:
+        if not isinstance(image, np.ndarray):
+            raise ImageError(f"{what} must be a NumPy array, got {type(image).__name__}")
+        if image.dtype != np.uint8:
+            raise ImageError(f"{what} must be uint8, got {image.dtype}")
+        if image.size == 0:
+            raise ImageError(f"{what} is empty, shape {image.shape}")
+        if not (image.ndim == 2 or (image.ndim == 3 and image.shape[2] in (1, 3, 4))):
+            raise ImageError(
+                f"{what} must have shape (height, width) or (height, width, 3 or 4), "
+                f"got {image.shape}"
+            )
+        if self._size is not None and image.shape[:2] != self._size:
+            raise ImageError(
+                f"{what} has size {image.shape[1]}x{image.shape[0]}, the first image had "
+                f"{self._size[1]}x{self._size[0]}; the size must not change"
+            )
+
+    def _context_for(self, image: npt.NDArray[np.uint8]) -> core.FrameContext:
+        if self._context is None:
+            height, width = image.shape[:2]
+            camera = core.Camera(_camera_options(self._settings, width, height))
+            self._context = core.FrameContext(camera, self._extractor.scales)
+            self._size = (height, width)
+        return self._context
+
+
+def _check_mask(mask: Mask | None, image: npt.NDArray[np.uint8], what: str) -> None:
+    if mask is None:
+        return
+    if not isinstance(mask, np.ndarray) or mask.dtype != np.uint8:
+        kind = mask.dtype if isinstance(mask, np.ndarray) else type(mask).__name__
+        raise ImageError(f"{what} must be a NumPy array of uint8 (0: ignore), got {kind}")
+    if mask.shape != image.shape[:2]:
+        raise ImageError(
+            f"{what} has shape {mask.shape}; it must be that of the image, {image.shape[:2]}"
+        )
+
+
+def _orb_options(settings: Settings, factor: int = 1) -> core.OrbOptions:
+    return core.OrbOptions(
+        n_features=factor * settings.orb.n_features,
+        scale_factor=settings.orb.scale_factor,
+        n_levels=settings.orb.n_levels,
+        initial_threshold=settings.orb.ini_th_fast,
+        minimum_threshold=settings.orb.min_th_fast,
+    )
+
+
+def _camera_options(settings: Settings, width: int, height: int) -> core.CameraOptions:
+    camera = settings.camera
+    return core.CameraOptions(
+        fx=camera.fx,
+        fy=camera.fy,
+        cx=camera.cx,
+        cy=camera.cy,
+        width=width,
+        height=height,
+        distortion=(camera.k1, camera.k2, camera.p1, camera.p2, camera.k3),
+        bf=camera.bf,
+        depth_ratio=settings.depth.close_factor if settings.depth is not None else 0.0,
+    )
+
+
+def intrinsics(camera: core.Camera) -> npt.NDArray[np.float64]:
+    """Focal lengths and principal point fx, fy, cx, cy of a camera, float64 (4,), pixels."""
+    pinhole = camera.pinhole
+    return np.array([pinhole.fx, pinhole.fy, pinhole.cx, pinhole.cy])

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Local mapping: what happens to the map for every new keyframe.
+
+Mur-Artal, Montiel and Tardos, 2015, section VI.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from orbslam2py import _core as core
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.timing import StageStatistics, StageTimer
+from orbslam2py.slam.worker import Worker
+
+
+class LocalMapping:
+    """Integrates keyframes: points, fusion, bundle adjustment, culling.
+
+    A waiting keyframe goes before fusion, bundle adjustment and culling of the present one.
+
+    Parameters
+    ----------
+    world : orbslam2py._core.Map
+        The map.
+    sensor : Sensor
+        Decides thresholds.
+    index : orbslam2py._core.KeyFrameIndex
+        Forgets the keyframes that are culled.
+    threaded : bool
+        In a thread of its own, or inline at `start`.
+    """
+
+    def __init__(
+        self,
+        world: core.Map,
+        sensor: Sensor,
+        index: core.KeyFrameIndex,
+        *,
+        threaded: bool,
+    ) -> None:
+        self._map = world
+        self._index = index
+        self._monocular = sensor is Sensor.MONOCULAR
+        #: ``on_done(keyframe_id)``: takes the finished keyframe (loop closing).
+        self.on_done: Callable[[int], None] = lambda keyframe: None
+        self._inserted: list[int] = []
+        self._recent_points = core.RecentPoints()
+        self._point_options = core.NewPointOptions()
+        self._point_options.monocular = self._monocular
+        self._point_options.n_neighbours = self._n_neighbours = 20 if self._monocular else 10
+        self._min_observations = 2 if self._monocular else 3
+        #: Milliseconds per part of the work, over all keyframes.
+        self.statistics = StageStatistics()
+        self.worker: Worker[int] = Worker("local mapping", self.process, threaded=threaded)
+
+    def insert_keyframe(self, keyframe: int) -> None:
+        """Take note of a keyframe; its mapping begins with `start`."""
+        self._inserted.append(keyframe)
+
+    def start(self) -> None:
+        """Queue the inserted keyframes; a running bundle adjustment is asked to end early.
+
+        Not before the frame is recorded: its pose relative to its keyframe would be wrong once
+        mapping has moved that keyframe.
+        """
+        inserted, self._inserted = self._inserted, []
+        self.worker.submit(*inserted)
+
+    def reset(self) -> None:
+        """Drop waiting keyframes and the points under probation."""
+        self.worker.reset()
+        self._inserted.clear()
+        self._recent_points.clear()
+
+    def process(self, keyframe: int) -> None:
+        """Everything that is done for one keyframe."""
+        timer = StageTimer()
+        with timer("mapping"):
+            with timer("mapping.insert"):
+                core.process_new_keyframe(self._map, keyframe, self._recent_points)
+            with timer("mapping.cull_points"):
+                core.cull_recent_points(
+                    self._map, keyframe, self._min_observations, self._recent_points
+                )
+            with timer("mapping.new_points"):
+                new_points = core.create_new_points(
+                    self._map, keyframe, self._point_options, self.worker.waiting_flag
+                )
+                self._recent_points.extend(new_points)
+            if not self.worker.n_waiting:
+                with timer("mapping.fuse"):
+                    core.fuse_with_neighbours(self._map, keyframe, self._n_neighbours)
+            if self.worker.lower_interrupt():
+                self._refine(keyframe, timer)
+        self.statistics.add(timer.milliseconds)
+        self.on_done(keyframe)
+
+    def _refine(self, keyframe: int, timer: StageTimer) -> None:
+        if self._map.n_keyframes > 2:
+            with timer("mapping.local_bundle_adjustment"):
+                core.local_bundle_adjustment(
+                    self._map, keyframe, self.worker.interrupt_flag, self._monocular
+                )
+        with timer("mapping.cull_keyframes"):
+            culled = core.cull_keyframes(self._map, keyframe, only_close=not self._monocular)
+            for dead in culled.tolist():
+                self._index.erase(dead)

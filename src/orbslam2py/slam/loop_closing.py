@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Loop closing: recognises places seen before, and takes out the drift gathered meanwhile.
+
+Mur-Artal, Montiel and Tardos, 2015, section VII; for stereo and RGB-D the scale is known, Mur-Artal
+and Tardos, 2017, section III-C. Candidates that drift cannot explain, or that contradict each
+other, are refused: places that look alike make perfect matches.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from orbslam2py import _core as core
+from orbslam2py.errors import StateError
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.events import LoopClosed
+from orbslam2py.slam.full_bundle_adjustment import FullAdjustment
+from orbslam2py.slam.timing import StageStatistics, StageTimer
+from orbslam2py.slam.worker import Worker
+
+_log = logging.getLogger(__name__)
+
+#: Keyframes after a loop that are not searched for another one.
+_GAP = 10
+
+
+@dataclass(frozen=True)
+class _Proposals:
+    """Keyframes that look like the present one."""
+
+    consistent: list[int]
+    """The same part of the map has been proposed by the keyframes before."""
+    others: list[int]
+
+
+class LoopClosing:
+    """Third stage of the pipeline: takes every keyframe that local mapping has finished.
+
+    Parameters
+    ----------
+    world : orbslam2py._core.Map
+        The map.
+    index : orbslam2py._core.KeyFrameIndex
+        Which keyframes contain which words.
+    sensor : Sensor
+        A single camera's scale drifts, others' is known.
+    mapping : Worker
+        Stands still while a loop is closed.
+    adjustment : FullAdjustment
+        Begun after every loop.
+    enabled : bool
+        False: keyframes are only entered into the index, by which lost frames are found again.
+    seed : int
+        Seed of the draws.
+    threaded : bool
+        In a thread of its own, or inline.
+    on_loop : callable
+        ``on_loop(event)``, after each loop.
+    """
+
+    def __init__(
+        self,
+        world: core.Map,
+        index: core.KeyFrameIndex,
+        sensor: Sensor,
+        mapping: Worker[int],
+        adjustment: FullAdjustment,
+        *,
+        enabled: bool,
+        seed: int,
+        threaded: bool,
+        on_loop: Callable[[LoopClosed], None],
+    ) -> None:
+        self._map = world
+        self._index = index
+        self._fix_scale = sensor.has_depth
+        self._mapping = mapping
+        self._adjustment = adjustment
+        self._enabled = enabled
+        self._options = core.LoopVerificationOptions(fix_scale=self._fix_scale, seed=seed % 2**64)
+        self._on_loop = on_loop
+        self._consistency = core.LoopConsistency()
+        self._next_search = 1
+        #: 0 for the first map; grows with every reset.
+        self.map_index = 0
+        #: Loops closed so far, over all maps.
+        self.loops: list[LoopClosed] = []
+        #: The last keyframe that arrived, -1 before the first.
+        self.last_keyframe = -1
+        #: Milliseconds per step.
+        self.statistics = StageStatistics()
+        self.worker: Worker[int] = Worker("loop closing", self.process, threaded=threaded)
+
+    def insert_keyframe(self, keyframe: int) -> None:
+        """Queue a keyframe."""
+        self.worker.submit(keyframe)
+
+    def reset(self) -> None:
+        """Drop waiting keyframes and what the last ones proposed."""
+        self.worker.reset()
+        self._consistency.clear()
+        self._next_search = 1
+        self.last_keyframe = -1
+
+    def process(self, keyframe: int) -> None:
+        """Everything that is done with one keyframe."""
+        timer = StageTimer()
+        with self._lease(keyframe) as alive:
+            if alive:
+                loop = self._find_loop(keyframe, timer)
+                if loop is not None:
+                    self._close(loop, timer)
+        self.last_keyframe = keyframe
+        self.statistics.add({f"loop.{step}": ms for step, ms in timer.milliseconds.items()})
+
+    @contextlib.contextmanager
+    def _lease(self, keyframe: int) -> Iterator[bool]:
+        """Keep a keyframe alive; yields False when it is dead already."""
+        try:
+            self._map.begin_lease(keyframe)
+        except StateError:
+            yield False
+            return
+        try:
+            yield True
+        finally:
+            if self._map.end_lease(keyframe):
+                self._index.erase(keyframe)
+
+    # ---- is this a place seen before? ------------------------------------------------------------
+    def _find_loop(self, keyframe: int, timer: StageTimer) -> core.Loop | None:
+        with timer("detect"):
+            proposals = self._detect(keyframe)
+            core.index_keyframe(self._index, self._map, keyframe)
+        if not proposals.consistent:
+            return None
+        with timer("verify"):
+            return self._verify(keyframe, proposals)
+
+    def _detect(self, keyframe: int) -> _Proposals:
+        if not self._enabled or keyframe < self._next_search:
+            self._consistency.clear()
+            return _Proposals([], [])
+        least_score = core.lowest_neighbour_score(self._map, keyframe)
+        found = core.find_loop_candidates(self._index, self._map, keyframe, least_score)
+        candidates = [place.keyframe for place in found]
+        consistent = list(self._consistency.update(self._map, candidates))
+        return _Proposals(consistent, [c for c in candidates if c not in consistent])
+
+    def _verify(self, keyframe: int, proposals: _Proposals) -> core.Loop | None:
+        """Choose the loop that geometry confirms, unless another place fits as well."""
+
+        def confirmed(candidates: list[int]) -> list[core.Loop]:
+            loops = (
+                core.verify_loop_candidate(self._map, keyframe, candidate, self._options)
+                for candidate in candidates
+            )
+            return [loop for loop in loops if loop is not None]
+
+        loops = confirmed(proposals.consistent)
+        best = core.choose_loop(self._map, loops, self._fix_scale)
+        if best is None:
+            return None
+        loops += confirmed(proposals.others)
+        if core.choose_loop(self._map, loops, self._fix_scale) is None:
+            _log.info("keyframe %d looks like several places; no loop closed", keyframe)
+            return None
+        return best
+
+    # ---- correction ------------------------------------------------------------------------------
+    def _close(self, loop: core.Loop, timer: StageTimer) -> None:
+        # What an adjustment refines is about to move.
+        with self._adjustment.kept_away(), self._mapping.pause(brief=True) as ticket:
+            with timer("wait"):
+                ticket.wait()
+            self._map.update_connections(loop.current)
+            with timer("plan"):
+                correction = core.plan_loop_correction(self._map, loop, self._fix_scale)
+            with timer("graph"):
+                graph = core.optimize_essential_graph(correction, self.worker.cancel_flag)
+            if graph.aborted:
+                return
+            with timer("apply"):
+                result = core.apply_loop_correction(self._map, correction)
+        if not result.applied:
+            return
+        self._consistency.clear()
+        self._next_search = loop.current + _GAP
+        closed = LoopClosed(
+            map_index=self.map_index,
+            current_keyframe=loop.current,
+            matched_keyframe=loop.matched,
+            current_timestamp=self._map.keyframe_timestamp(loop.current),
+            matched_timestamp=self._map.keyframe_timestamp(loop.matched),
+            n_inliers=loop.n_inliers,
+            n_matches=loop.n_matches,
+            n_fused=result.n_fused,
+            scale=result.scale,
+            S_cm=loop.S_cm,
+            translation=result.translation,
+            rotation_deg=math.degrees(result.rotation),
+            milliseconds=dict(timer.milliseconds),
+        )
+        self.loops.append(closed)
+        _log.info(
+            "loop closed: keyframe %d shows the place of %d; moved by %.3f m",
+            *(loop.current, loop.matched, result.translation),
+        )
+        self._on_loop(closed)
+        if self._adjustment.options.enabled:
+            self._adjustment.start()

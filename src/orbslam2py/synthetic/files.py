@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Synthetic sequences as folders in the layouts of TUM RGB-D, KITTI odometry and EuRoC."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import json
+import os
+import secrets
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from orbslam2py.datasets.base import Layout
+from orbslam2py.errors import DatasetError, SettingsError
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.trajectory.rotations import quaternions_from_rotations
+
+if TYPE_CHECKING:
+    from orbslam2py.synthetic.sequence import SyntheticSequence
+
+Progress = Callable[[int, int], None]
+
+#: Holds the options; marks folders that may be replaced.
+MARKER = "synthetic.json"
+
+
+_SENSORS = {
+    Layout.TUM: (Sensor.MONOCULAR, Sensor.RGBD),
+    Layout.KITTI: (Sensor.MONOCULAR, Sensor.STEREO),
+    Layout.EUROC: (Sensor.MONOCULAR, Sensor.STEREO),
+}
+
+
+def choose_layout(layout: Layout | str | None, sensor: Sensor) -> Layout:
+    """Return the layout, or the usual one of the sensor.
+
+    Raises
+    ------
+    SettingsError
+        If there is no such layout, or it has no place for the sensor's images.
+    """
+    if layout is None:
+        return Layout.KITTI if sensor is Sensor.STEREO else Layout.TUM
+    try:
+        chosen = Layout(layout)
+    except ValueError:
+        names = ", ".join(str(member) for member in Layout)
+        raise SettingsError(f"layout is '{layout}'; there are {names}") from None
+    if sensor not in _SENSORS[chosen]:
+        fitting = " or ".join(str(item) for item in Layout if sensor in _SENSORS[item])
+        raise SettingsError(f"layout {chosen} has no place for {sensor}; take {fitting}")
+    return chosen
+
+
+def write_sequence(
+    sequence: SyntheticSequence,
+    folder: Path,
+    layout: Layout | str | None = None,
+    *,
+    force: bool = False,
+    progress: Progress | None = None,
+) -> Path:
+    """Write a sequence; see `SyntheticSequence.write`."""
+    chosen = choose_layout(layout, sequence.sensor)
+    writers = {
+        Layout.TUM: _write_tum,
+        Layout.KITTI: _write_kitti,
+        Layout.EUROC: _write_euroc,
+    }
+    with _replaced_at_the_end(folder, force=force) as temporary:
+        writers[chosen](sequence, temporary, progress or (lambda done, total: None))
+        about: dict[str, Any] = dataclasses.asdict(sequence.options) | {"layout": str(chosen)}
+        _write_text(temporary / MARKER, [json.dumps(about, indent=2, default=str)])
+    return folder
+
+
+# ---- layouts -------------------------------------------------------------------------------------
+
+
+def _write_tum(sequence: SyntheticSequence, folder: Path, progress: Progress) -> None:
+    rgb, depth, pairs = ["# timestamp filename"], ["# timestamp filename"], []
+    (folder / "rgb").mkdir()
+    if sequence.sensor is Sensor.RGBD:
+        (folder / "depth").mkdir()
+    for i in range(len(sequence)):
+        images = sequence.load(i)
+        stamp = sequence.timestamp_text(i)
+        _write_image(folder / "rgb" / f"{stamp}.png", images.image)
+        rgb.append(f"{stamp} rgb/{stamp}.png")
+        if images.depth is not None:
+            _write_image(folder / "depth" / f"{stamp}.png", images.depth)
+            depth.append(f"{stamp} depth/{stamp}.png")
+            pairs.append(f"{rgb[-1]} {depth[-1]}")
+        progress(i + 1, len(sequence))
+    _write_text(folder / "rgb.txt", rgb)
+    if sequence.sensor is Sensor.RGBD:
+        _write_text(folder / "depth.txt", depth)
+        _write_text(folder / "associations.txt", pairs)
+    T_wc = sequence.ground_truth().T_wc
+    quaternions = quaternions_from_rotations(T_wc[:, :3, :3])
+    lines = ["# timestamp tx ty tz qx qy qz qw (camera to world)"]
+    for i, (T, q) in enumerate(zip(T_wc, quaternions, strict=True)):
+        lines.append(f"{sequence.timestamp_text(i)} {_numbers([*T[:3, 3], *q])}")
+    _write_text(folder / "groundtruth.txt", lines)
+    # The layout has no calibration of its own.
+    sequence.default_settings().save(folder / "settings.yaml")
+
+
+def _write_kitti(sequence: SyntheticSequence, folder: Path, progress: Progress) -> None:
+    stereo = sequence.sensor is Sensor.STEREO
+    for name in ("image_0", "image_1")[: 1 + stereo]:
+        (folder / name).mkdir()
+    for i in range(len(sequence)):
+        images = sequence.load(i)
+        _write_image(folder / "image_0" / f"{i:06d}.png", images.image)
+        if images.right is not None:
+            _write_image(folder / "image_1" / f"{i:06d}.png", images.right)
+        progress(i + 1, len(sequence))
+    _write_text(folder / "times.txt", [sequence.timestamp_text(i) for i in range(len(sequence))])
+    camera = sequence.camera
+    calibration = []
+    for number in range(1 + stereo):
+        P = np.hstack([camera.matrix, [[-camera.bf * number], [0.0], [0.0]]])
+        calibration.append(f"P{number}: {_numbers(P.ravel())}")
+    _write_text(folder / "calib.txt", calibration)
+    poses = [_numbers(T[:3].ravel()) for T in sequence.ground_truth().T_wc]
+    _write_text(folder / "poses.txt", poses)
+
+
+def _write_euroc(sequence: SyntheticSequence, folder: Path, progress: Progress) -> None:
+    top = folder / "mav0"
+    cameras = [top / "cam0", top / "cam1"][: 1 + (sequence.sensor is Sensor.STEREO)]
+    for number, camera in enumerate(cameras):
+        (camera / "data").mkdir(parents=True)
+        _write_text(camera / "sensor.yaml", _sensor_yaml(sequence, number))
+    # Names of equal length sort by time.
+    stamps = [f"{nanoseconds:019d}" for nanoseconds in sequence.nanoseconds]
+    for i, stamp in enumerate(stamps):
+        images = sequence.load(i)
+        for camera, image in zip(cameras, (images.image, images.right), strict=False):
+            assert image is not None
+            _write_image(camera / "data" / f"{stamp}.png", image)
+        progress(i + 1, len(sequence))
+    for camera in cameras:
+        rows = [f"{stamp},{stamp}.png" for stamp in stamps]
+        _write_text(camera / "data.csv", ["#timestamp [ns],filename", *rows])
+    T_wc = sequence.ground_truth().T_wc
+    lines = [
+        "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], "
+        "q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z []"
+    ]
+    for stamp, T, q in zip(stamps, T_wc, quaternions_from_rotations(T_wc[:, :3, :3]), strict=True):
+        lines.append(f"{stamp},{_numbers([*T[:3, 3], q[3], *q[:3]], ',')}")
+    truth = top / "state_groundtruth_estimate0"
+    truth.mkdir()
+    _write_text(truth / "data.csv", lines)
+
+
+def _sensor_yaml(sequence: SyntheticSequence, number: int) -> list[str]:
+    """Describe a camera; the body frame of the rig is that of its left camera."""
+    camera = sequence.camera
+    T_BS = np.eye(4)
+    T_BS[0, 3] = sequence.baseline * number
+    return [
+        "%YAML:1.0",
+        "sensor_type: camera",
+        "comment: synthetic, without distortion",
+        "T_BS:",
+        "  cols: 4",
+        "  rows: 4",
+        f"  data: [{_numbers(T_BS.ravel(), ', ')}]",
+        f"rate_hz: {camera.fps:g}",
+        f"resolution: [{camera.width}, {camera.height}]",
+        "camera_model: pinhole",
+        f"intrinsics: [{_numbers([camera.fx, camera.fy, camera.cx, camera.cy], ', ')}]",
+        "distortion_model: radial-tangential",
+        "distortion_coefficients: [0.0, 0.0, 0.0, 0.0]",
+    ]
+
+
+# ---- files ---------------------------------------------------------------------------------------
+
+
+@contextlib.contextmanager
+def _replaced_at_the_end(folder: Path, *, force: bool) -> Iterator[Path]:
+    """Yield a temporary folder that takes the place of `folder` if the block ends well."""
+    _check_replaceable(folder, force=force)
+    target = Path(os.path.realpath(folder))
+    token = secrets.token_hex(4)
+    temporary = target.with_name(f".{target.name}.{token}.tmp")
+    temporary.mkdir(parents=True)
+    try:
+        yield temporary
+        _check_replaceable(folder, force=force)
+        if target.exists() and any(target.iterdir()):
+            old = target.with_name(f".{target.name}.{token}.old")
+            target.replace(old)
+            temporary.replace(target)
+            shutil.rmtree(old)
+        else:
+            temporary.replace(target)
+    except BaseException:
+        shutil.rmtree(temporary, ignore_errors=True)
+        raise
+
+
+def _check_replaceable(folder: Path, *, force: bool) -> None:
+    if not folder.exists():
+        return
+    if not folder.is_dir():
+        raise DatasetError(f"{folder} is not a folder; give another name")
+    if not any(folder.iterdir()):
+        return
+    if not force:
+        raise DatasetError(f"{folder} is not empty; give another name, or --force to replace it")
+    if not (folder / MARKER).is_file():
+        raise DatasetError(
+            f"{folder} holds no {MARKER}, so it was not written by this command and is not "
+            "replaced; give another name or remove it yourself"
+        )
+
+
+def _write_image(path: Path, image: NDArray[Any]) -> None:
+    # Not cv2.imwrite: it tells that it failed, but not why.
+    done, png = cv2.imencode(".png", image)
+    if not done:
+        raise OSError(f"cannot encode {path}")
+    path.write_bytes(png.tobytes())
+
+
+def _write_text(path: Path, lines: list[str]) -> None:
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _numbers(values: Any, separator: str = " ") -> str:
+    # repr keeps all digits of a float.
+    return separator.join(repr(float(value)) for value in values)

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Paths over time: poses with time stamps, their files, and which belong together."""
+
+from orbslam2py.trajectory.association import MAX_DIFFERENCE, associate
+from orbslam2py.trajectory.trajectory import (
+    Trajectory,
+    TrajectoryFormat,
+    read_euroc,
+    read_kitti,
+    read_trajectory,
+    read_tum,
+    write_kitti,
+    write_tum,
+)
+
+__all__ = [
+    "MAX_DIFFERENCE",
+    "Trajectory",
+    "TrajectoryFormat",
+    "associate",
+    "read_euroc",
+    "read_kitti",
+    "read_trajectory",
+    "read_tum",
+    "write_kitti",
+    "write_tum",
+]

@@ -1,0 +1,377 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Vocabularies: find, read, convert and train them.
+
+A vocabulary is a tree over ORB descriptors whose leaves are visual words; relocalization, loop
+closing and matching by words need one. The package ships one. ``ORBvoc.txt`` and other files in its
+format can be used as well: they are parsed once and kept in the binary format from then on.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gzip
+import hashlib
+import logging
+import os
+import re
+import threading
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from orbslam2py import _core as core
+from orbslam2py.errors import ImageError, VocabularyError
+from orbslam2py.vocabulary import _textio
+from orbslam2py.vocabulary.files import Progress, VocabularyFormat, detect_format, read_nodes
+
+__all__ = [
+    "ENVIRONMENT_VARIABLE",
+    "VocabularyFormat",
+    "VocabularyInfo",
+    "convert_vocabulary",
+    "default_vocabulary_path",
+    "load_vocabulary",
+    "read_training_images",
+    "save_vocabulary",
+    "train_vocabulary",
+    "vocabulary_info",
+]
+
+ENVIRONMENT_VARIABLE = "ORBSLAM2PY_VOCABULARY"
+IMAGE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".pgm", ".ppm", ".bmp", ".tif", ".tiff"})
+_SUFFIXES_OF_TEXT = re.compile(r"(\.txt|\.ya?ml|\.tar|\.tgz|\.gz)+$", re.IGNORECASE)
+_log = logging.getLogger(__name__)
+
+
+# ---- load ----------------------------------------------------------------------------------------
+def default_vocabulary_path() -> Path:
+    """Path of the vocabulary that comes with the package."""
+    return Path(__file__).parent.parent / "data" / "default.bvoc"
+
+
+def load_vocabulary(
+    path: str | os.PathLike[str] | None = None,
+    *,
+    cache: bool = True,
+    progress: Progress | None = None,
+) -> core.Vocabulary:
+    """Open a vocabulary of any format, told by its content.
+
+    Parameters
+    ----------
+    path : path, optional
+        Default: the file that the environment variable ``ORBSLAM2PY_VOCABULARY`` names, else the
+        vocabulary of the package.
+    cache : bool
+        Keep a binary copy of a text file beside it (or in the user's cache folder), and use it the
+        next time as long as the text file does not change.
+    progress : callable, optional
+        Called with the fraction done, 0 to 1, while a text file is parsed. An exception ends it.
+
+    Returns
+    -------
+    Vocabulary
+        Immutable; threads and systems may share it.
+
+    Raises
+    ------
+    VocabularyError
+        Naming the file and, for text files, the first bad line.
+    """
+    if path is None:
+        path = os.environ.get(ENVIRONMENT_VARIABLE) or default_vocabulary_path()
+    chosen = Path(path).expanduser()
+    file_format = detect_format(chosen)
+    if file_format is VocabularyFormat.BINARY:
+        return core.Vocabulary.open(str(chosen))
+    if not cache:
+        return read_nodes(chosen, file_format, progress)
+
+    source = _stamp(chosen)
+    for copy in _cache_places(chosen):
+        cached = _open_cache(copy)
+        if cached is not None and cached.source == source:
+            return cached
+    vocabulary = read_nodes(chosen, file_format, progress)
+    return _keep(vocabulary, chosen, source) or vocabulary
+
+
+def _stamp(path: Path) -> core.VocabularySource:
+    """Size, time and samples of a file: a change is noticed without reading all of it."""
+    sample = 1 << 20
+    try:
+        status = path.stat()
+        digest = hashlib.blake2b(digest_size=8)
+        with path.open("rb") as file:
+            for start in (0, status.st_size // 2, max(0, status.st_size - sample)):
+                file.seek(start)
+                digest.update(file.read(sample))
+    except OSError as error:
+        raise VocabularyError(f"{path}: {error.strerror}") from error
+    content = int.from_bytes(digest.digest(), "little")
+    return core.VocabularySource(status.st_size, status.st_mtime_ns, content)
+
+
+def _cache_places(path: Path) -> tuple[Path, Path]:
+    name = _SUFFIXES_OF_TEXT.sub("", path.name) + ".bvoc"
+    home = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
+    folder = Path(home).expanduser() / "orbslam2py"
+    key = hashlib.blake2b(os.fsencode(path.resolve()), digest_size=8).hexdigest()
+    return path.with_name(name), folder / f"{key}-{name}"
+
+
+def _open_cache(path: Path) -> core.Vocabulary | None:
+    with contextlib.suppress(VocabularyError):
+        return core.Vocabulary.open(str(path))
+    return None
+
+
+def _keep(
+    vocabulary: core.Vocabulary, path: Path, source: core.VocabularySource
+) -> core.Vocabulary | None:
+    """Write the binary copy and open it, so that processes share its pages; None if impossible."""
+    for copy in _cache_places(path):
+        if copy.exists():
+            present = _open_cache(copy)
+            if present is None or present.source == core.VocabularySource():
+                continue  # not a copy that we made: somebody's own file
+        with contextlib.suppress(OSError, VocabularyError):
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            vocabulary.save(str(copy), f"Converted from {path.name}.", source)
+            _log.info("kept a binary copy of %s in %s", path, copy)
+            return core.Vocabulary.open(str(copy))
+    return None
+
+
+# ---- save and convert ----------------------------------------------------------------------------
+def save_vocabulary(
+    vocabulary: core.Vocabulary,
+    path: str | os.PathLike[str],
+    *,
+    comment: str | None = None,
+    progress: Progress | None = None,
+) -> None:
+    """Write a vocabulary; the name decides: ``.bvoc``, ``.txt`` or ``.txt.gz``.
+
+    Parameters
+    ----------
+    vocabulary : Vocabulary
+    path : path
+        Replaced only when everything has been written.
+    comment : str, optional
+        Origin and licence, kept in the binary format; default: that of the vocabulary.
+    progress : callable, optional
+        Called with the fraction done, 0 to 1.
+
+    Raises
+    ------
+    VocabularyError
+        If the name has another ending or the file cannot be written.
+    """
+    target = Path(path).expanduser()
+    if target.suffix == ".bvoc":
+        vocabulary.save(str(target), comment, core.VocabularySource())
+    elif target.suffix == ".txt":
+        _write_text(vocabulary, target, Path.open, progress)
+    elif target.name.endswith(".txt.gz"):
+        _write_text(vocabulary, target, gzip.GzipFile, progress)
+    else:
+        raise VocabularyError(f"{target}: the name must end with .bvoc, .txt or .txt.gz")
+    if progress is not None:
+        progress(1.0)
+
+
+def _write_text(
+    vocabulary: core.Vocabulary,
+    target: Path,
+    opener: Callable[[Path, str], AbstractContextManager[_textio._Target]],
+    progress: Progress | None,
+) -> None:
+    header = (
+        vocabulary.branching,
+        vocabulary.depth,
+        int(vocabulary.scoring),
+        int(vocabulary.weighting),
+    )
+    report = None if progress is None else lambda n: progress(n / vocabulary.n_nodes)
+    part = target.with_name(f"{target.name}.part{os.getpid()}")
+    try:
+        with opener(part, "wb") as file:
+            _textio.write_vocabulary_text(file, header, vocabulary.table(), report)
+        part.replace(target)
+    except OSError as error:
+        raise VocabularyError(f"{target}: cannot be written: {error.strerror}") from error
+    finally:
+        with contextlib.suppress(OSError):
+            part.unlink()
+
+
+def convert_vocabulary(
+    source: str | os.PathLike[str],
+    target: str | os.PathLike[str],
+    *,
+    progress: Progress | None = None,
+) -> core.Vocabulary:
+    """Read any format, write another, see :func:`save_vocabulary`; returns what was read.
+
+    Raises
+    ------
+    VocabularyError
+        If one cannot be read or the other not be written.
+    """
+    vocabulary = load_vocabulary(source, cache=False, progress=_half(progress, 0.0))
+    comment = vocabulary.comment or f"Converted from {Path(source).name}."
+    save_vocabulary(vocabulary, target, comment=comment, progress=_half(progress, 0.5))
+    return vocabulary
+
+
+def _half(progress: Progress | None, begin: float) -> Progress | None:
+    return None if progress is None else lambda done: progress(begin + done / 2)
+
+
+# ---- look ----------------------------------------------------------------------------------------
+@dataclass(frozen=True)
+class VocabularyInfo:
+    """What a vocabulary file holds."""
+
+    path: Path
+    format: VocabularyFormat
+    size: int
+    """Bytes on disk."""
+    branching: int
+    depth: int
+    scoring: str
+    weighting: str
+    n_nodes: int
+    """The root included."""
+    n_words: int
+    n_stopped: int
+    """Words of weight 0, which are ignored."""
+    hash: int
+    comment: str
+
+
+def vocabulary_info(path: str | os.PathLike[str] | None = None) -> VocabularyInfo:
+    """Read a vocabulary as a whole, check all of it, and say what it is.
+
+    Raises
+    ------
+    VocabularyError
+        If it is damaged or not a vocabulary.
+    """
+    chosen = Path(path or os.environ.get(ENVIRONMENT_VARIABLE) or default_vocabulary_path())
+    vocabulary = load_vocabulary(chosen, cache=False)
+    vocabulary.check_content()
+    _, is_word, _, weights = vocabulary.table()
+    return VocabularyInfo(
+        path=chosen,
+        format=detect_format(chosen),
+        size=chosen.stat().st_size,
+        branching=vocabulary.branching,
+        depth=vocabulary.depth,
+        scoring=vocabulary.scoring.name,
+        weighting=vocabulary.weighting.name,
+        n_nodes=vocabulary.n_nodes,
+        n_words=vocabulary.n_words,
+        n_stopped=int(np.count_nonzero((is_word != 0) & (weights == 0))),
+        hash=vocabulary.hash,
+        comment=vocabulary.comment,
+    )
+
+
+# ---- train ---------------------------------------------------------------------------------------
+def read_training_images(folder: str | os.PathLike[str]) -> list[Path]:
+    """All images below a folder, sorted by name.
+
+    Raises
+    ------
+    VocabularyError
+        If there are none.
+    """
+    root = Path(folder).expanduser()
+    images = sorted(p for p in root.rglob("*") if p.suffix.lower() in IMAGE_SUFFIXES)
+    if not images:
+        raise VocabularyError(f"{root}: no images ({', '.join(sorted(IMAGE_SUFFIXES))}) found")
+    return images
+
+
+def train_vocabulary(
+    images: Iterable[str | os.PathLike[str]],
+    options: core.TrainingOptions | None = None,
+    *,
+    features: core.OrbOptions | None = None,
+    progress: Callable[[str, float], object] | None = None,
+) -> core.Vocabulary | None:
+    """Train a vocabulary on the features of images.
+
+    Parameters
+    ----------
+    images : iterable of path
+        Photographs like those of the places to recognise, one of each place.
+    options : TrainingOptions, optional
+    features : OrbOptions, optional
+        How features are found; default: 2000 per image.
+    progress : callable, optional
+        Called with the name of the step and the fraction done; returning False cancels.
+
+    Returns
+    -------
+    Vocabulary or None
+        Equal for equal images, options and seed, whatever the number of threads. None when
+        cancelled.
+
+    Raises
+    ------
+    ImageError
+        If a file is not an image.
+    SettingsError, VocabularyError
+        If options are out of range or the images have no features.
+    """
+    options = options or core.TrainingOptions()
+    options.check()
+    features = features or core.OrbOptions(n_features=2000)
+    report = progress or (lambda step, fraction: None)
+
+    descriptors = _describe_images([Path(image) for image in images], features, options, report)
+    if descriptors is None:
+        return None
+    ends = np.cumsum([len(rows) for rows in descriptors]).tolist()
+    rows = np.concatenate([np.empty((0, 32), np.uint8), *descriptors])
+    descriptors.clear()
+    return core.train_vocabulary(rows, ends, options, lambda done: report("Clustering", done))
+
+
+def _describe_images(
+    paths: list[Path],
+    features: core.OrbOptions,
+    options: core.TrainingOptions,
+    report: Callable[[str, float], object],
+) -> list[npt.NDArray[np.uint8]] | None:
+    """Descriptors of every image, in order; None when cancelled."""
+    of_thread = threading.local()
+
+    def describe(path: Path) -> npt.NDArray[np.uint8]:
+        if not hasattr(of_thread, "extractor"):
+            of_thread.extractor = core.OrbExtractor(features)
+        image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        if image is None:
+            raise ImageError(f"{path}: cannot be read as an image")
+        descriptors: npt.NDArray[np.uint8] = of_thread.extractor.extract(image).descriptors
+        return descriptors
+
+    results: list[npt.NDArray[np.uint8]] = []
+    pool = ThreadPoolExecutor(options.n_threads or os.cpu_count() or 1)
+    try:
+        for descriptors in pool.map(describe, paths):
+            results.append(descriptors)
+            if report("Reading images", len(results) / len(paths)) is False:
+                return None
+    finally:
+        pool.shutdown(cancel_futures=True)
+    return results
