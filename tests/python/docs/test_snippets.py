@@ -73,13 +73,13 @@ class Page:
                 self.check(block, mark.text)
 
     def check(self, block: Block, expression: str) -> None:
-        names = {"report": self.report, "frames": self.frames, "folder": self.folder}
+        names = {"report_of": self.report_of, "frames_of": self.frames_of, "folder": self.folder}
         assert eval(expression, self.namespace | names), f"below {block.place}: {expression}"
 
-    def report(self, name: str) -> dict[str, Any]:
+    def report_of(self, name: str) -> dict[str, Any]:
         return dict(json.loads((self.folder / name / "report.json").read_text()))
 
-    def frames(self, name: str) -> list[dict[str, str]]:
+    def frames_of(self, name: str) -> list[dict[str, str]]:
         with (self.folder / name / "frames.csv").open(newline="") as stream:
             return list(csv.DictReader(stream))
 
