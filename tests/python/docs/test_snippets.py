@@ -29,7 +29,7 @@ NOT_RUN = {
     "builds the checkout",
     "takes a minute; another test runs it",
     "needs a camera",
-    "downloads data",
+    "needs photographs that are not part of the project",
 }
 
 
