@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Links lead somewhere: between pages, to headings, to pictures, and from the code into the docs."""
+"""Links lead somewhere: to pages, headings and pictures; from the code into the docs as well."""
 
 from __future__ import annotations
 
@@ -10,9 +10,12 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+
 from support.documents import ROOT, anchors_of, documents, prose_of, read, tracked_files
 
-_LINK = re.compile(r"(?<!\\)!?\[(?:[^\[\]]|\[[^\]]*\])*\]\(\s*<?([^)\s>]+)>?(?:\s+\"[^\"]*\")?\s*\)")
+_LINK = re.compile(
+    r"(?<!\\)!?\[(?:[^\[\]]|\[[^\]]*\])*\]\(\s*<?([^)\s>]+)>?(?:\s+\"[^\"]*\")?\s*\)"
+)
 _POINTER = re.compile(r"docs/[\w/-]+\.md(?:#[\w-]+)?")
 
 #: Pages that the site makes of files elsewhere in the checkout; see scripts/docs_hooks.py.
@@ -63,7 +66,9 @@ def test_links_lead_somewhere(path: Path, command_reference: ModuleType) -> None
 
 def test_pointers_from_the_code_lead_somewhere() -> None:
     dead = []
-    for path in tracked_files("src", "tests", "benchmarks", "examples", "scripts", "Makefile", ".ci"):
+    for path in tracked_files(
+        "src", "tests", "benchmarks", "examples", "scripts", "Makefile", ".ci"
+    ):
         if path.suffix in {".png", ".bvoc", ".npz", ".npy", ".gz"} or not path.is_file():
             continue
         for pointer in _POINTER.findall(path.read_text(encoding="utf-8", errors="replace")):

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.documents import ROOT, cells_of, code_in, headings_of, prose_of, read, table_below
 
 import orbslam2py
 from orbslam2py.cli.exit_codes import ExitCode
@@ -24,6 +23,7 @@ from orbslam2py.slam.events import LoopClosed
 from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
 from orbslam2py.slam.records import Reason, TrackingState
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+from support.documents import ROOT, cells_of, code_in, headings_of, prose_of, read, table_below
 
 REFERENCE = ROOT / "docs/reference"
 ROOMS = (
@@ -32,7 +32,7 @@ ROOMS = (
 )
 
 
-# ---- settings.md -----------------------------------------------------------------------------------
+# ---- settings.md ---------------------------------------------------------------------------------
 GROUPS = {
     "Camera": ("camera", CameraSettings),
     "Depth": ("depth", DepthSettings),
@@ -69,7 +69,7 @@ def test_settings_page_lists_the_rectification() -> None:
     assert named == set(BUILTIN_NAMES)
 
 
-# ---- reasons.md ------------------------------------------------------------------------------------
+# ---- reasons.md ----------------------------------------------------------------------------------
 def test_reasons_page_lists_every_reason() -> None:
     page = read(REFERENCE / "reasons.md")
     rows = table_below(page, "Before there is a map") + table_below(page, "While there is a map")
@@ -78,7 +78,7 @@ def test_reasons_page_lists_every_reason() -> None:
     assert all(all(row) for row in rows), "a reason without meaning or help"
 
 
-# ---- files.md --------------------------------------------------------------------------------------
+# ---- files.md ------------------------------------------------------------------------------------
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of a single camera with ground truth."""
@@ -150,19 +150,23 @@ def test_files_page_lists_the_exit_codes() -> None:
 
 
 def test_states_of_frames_are_named() -> None:
-    row = next(r for r in table_below(read(REFERENCE / "files.md"), "frames.csv") if "state" in r[0])
+    row = next(
+        r for r in table_below(read(REFERENCE / "files.md"), "frames.csv") if "state" in r[0]
+    )
     told = set(code_in(row[2]))
     unseen = {TrackingState.SYSTEM_NOT_READY.name, TrackingState.NO_IMAGES_YET.name}
     assert told == {s.name for s in TrackingState} - unseen | {"SKIPPED", "DROPPED"}
 
 
-# ---- python/*.md -----------------------------------------------------------------------------------
+# ---- python/*.md ---------------------------------------------------------------------------------
 def documented(page: str) -> set[str]:
     return set(re.findall(r"^::: ([\w.]+)$", prose_of(read(REFERENCE / f"python/{page}.md")), re.M))
 
 
 def test_every_name_of_the_front_door_is_documented() -> None:
-    everywhere = {name.rpartition(".")[2] for page in ("system", *ROOMS) for name in documented(page)}
+    everywhere = {
+        name.rpartition(".")[2] for page in ("system", *ROOMS) for name in documented(page)
+    }
     assert set(orbslam2py.__all__) - {"__version__"} <= everywhere
 
 
@@ -172,7 +176,7 @@ def test_every_name_of_a_room_is_documented(room: str) -> None:
     assert documented(room) == {f"orbslam2py.{room}.{name}" for name in public}
 
 
-# ---- command.md ------------------------------------------------------------------------------------
+# ---- command.md ----------------------------------------------------------------------------------
 def test_every_command_has_a_section_with_an_example(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(ROOT / "scripts")
     reference = importlib.import_module("command_reference")

@@ -5,7 +5,9 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import importlib
 import io
+import itertools
 import json
 import os
 import re
@@ -17,11 +19,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
 from command_line import logging_restored
+from orbslam2py.cli import main
 from support.documentation_data import copy_data, make_data
 from support.documents import ROOT, SHELL, SHOWN, Block, blocks_of, documents
-
-from orbslam2py.cli import main
 
 #: All blocks that are not run, with the reason; see `test_all_others_run`.
 NOT_RUN = {
@@ -31,6 +33,10 @@ NOT_RUN = {
     "needs a camera",
     "needs photographs that are not part of the project",
 }
+
+
+#: What is added to the examples of long commands.
+SHORTER = {"demo": "--frames 12", "synthesize": "--frames 20 --size 320x240"}
 
 
 def runnable(path: Path) -> list[Block]:
@@ -96,7 +102,7 @@ class Page:
 
     def make_room(self, words: list[str]) -> None:
         """Remove a file that was given and that the command is to write."""
-        for option, value in zip(words, words[1:], strict=False):
+        for option, value in itertools.pairwise(words):
             if option in {"--output", "-o"} and (self.folder / value).is_file():
                 (self.folder / value).unlink()
 
@@ -150,6 +156,25 @@ def test_all_blocks_run(
         except BaseException as error:
             error.add_note(f"in the block at {block.place}") if hasattr(error, "add_note") else None
             raise
+
+
+def test_examples_of_the_commands_run(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those that the help shows, and the reference of the command line."""
+    copy_data(data, tmp_path)
+    (tmp_path / "rgbd_dataset_freiburg1_xyz").symlink_to(data / "rgbd_dataset_freiburg1_desk")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.syspath_prepend(ROOT / "scripts")
+    reference = importlib.import_module("command_reference")
+    page = Page(tmp_path)
+    for command in reference.commands():
+        for line in command.text_and_example()[1]:
+            if line == "orbslam2py run 0 --sensor mono --settings my.yaml":
+                continue  # needs a camera
+            code, printed = page.shell(f"{line} {SHORTER.get(line.split()[1], '')}")
+            assert code == 0, f"{line}\n{printed}"
 
 
 @pytest.mark.parametrize("path", documents(), ids=lambda p: str(p.relative_to(ROOT)))

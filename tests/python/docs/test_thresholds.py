@@ -10,6 +10,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+
 from support.documents import ROOT, cells_of, read
 
 HEADER = ("name in the code", "value")

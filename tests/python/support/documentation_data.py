@@ -84,7 +84,9 @@ def chessboard_views(K: np.ndarray, n: int) -> list[np.ndarray]:
     columns, rows, square, pixels = 9, 6, 0.025, 40
     row, column = np.mgrid[: rows + 1, : columns + 1]
     shades = np.where((row + column) % 2, 230, 30).astype(np.uint8)
-    board = np.pad(np.kron(shades, np.ones((pixels, pixels), np.uint8)), pixels, constant_values=230)
+    board = np.pad(
+        np.kron(shades, np.ones((pixels, pixels), np.uint8)), pixels, constant_values=230
+    )
     # From pixels of the picture to metres on the board, whose first inner corner is its origin.
     metres = np.diag([square / pixels, square / pixels, 1.0])
     metres[:2, 2] = (0.5 / pixels - 2) * square

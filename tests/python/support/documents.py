@@ -67,7 +67,7 @@ def blocks_of(path: Path) -> tuple[Block, ...]:
     """All fenced blocks, with the marks that belong to them."""
     blocks: list[Block] = []
     above: list[Mark] = []
-    fence = ""
+    fence = indent = ""
     for number, line in enumerate(read(path).splitlines(), start=1):
         opening = _FENCE.match(line)
         mark = _MARK.match(line)
@@ -84,9 +84,8 @@ def blocks_of(path: Path) -> tuple[Block, ...]:
             blocks[-1].marks.append(Mark("check", mark["text"], number))
         elif mark:
             above.append(Mark(mark["kind"], mark["text"], number))
-        elif line.strip():
-            if above:
-                raise ValueError(f"{path}:{above[0].line}: no block follows this comment")
+        elif line.strip() and above:
+            raise ValueError(f"{path}:{above[0].line}: no block follows this comment")
     return tuple(blocks)
 
 
