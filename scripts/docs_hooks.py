@@ -58,6 +58,11 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
     return markdown.replace(COMMANDS, reference())
 
 
+def on_page_content(html: str, **_: Any) -> str:
+    """Keep the source of diagrams out of the search."""
+    return html.replace('<pre class="mermaid">', '<pre class="mermaid" data-search-exclude>')
+
+
 def on_post_page(output: str, page: Any, **_: Any) -> str:
     """Load KaTeX and mermaid where they are needed, before the theme's own scripts."""
     wanted = [

@@ -2,5 +2,7 @@
 for (const element of document.querySelectorAll(".arithmatex")) {
   const text = element.textContent.trim()
   const displayMode = text.startsWith("\\[")
-  katex.render(text.slice(2, -2), element, { displayMode, throwOnError: false })
+  // TeX takes d_\min, KaTeX wants d_{\min}.
+  const formula = text.slice(2, -2).replace(/([_^])(\\(?:min|max|log|ln|exp)\b)/g, "$1{$2}")
+  katex.render(formula, element, { displayMode, throwOnError: false })
 }
