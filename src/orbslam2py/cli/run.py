@@ -17,13 +17,13 @@ from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.interrupts import StopOnInterrupt
 from orbslam2py.datasets import open_source
 from orbslam2py.datasets.base import LiveSource, Sequence
-from orbslam2py.runs.outputs import OutputWriter, link_latest, prepare_output_folder
-from orbslam2py.runs.report import evaluate_run, make_report
-from orbslam2py.runs.result import FrameRow, RunOptions, RunResult
-from orbslam2py.runs.runner import SequenceRunner
+from orbslam2py.runs.options import RunOptions
+from orbslam2py.runs.outputs import new_output_folder
+from orbslam2py.runs.result import FrameRow
+from orbslam2py.runs.run import FinishedRun, run_sequence
 from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.options import SystemOptions
 from orbslam2py.slam.system import System
-from orbslam2py.vocabulary.vocabulary import load_vocabulary
 
 EXAMPLE = """
 **Example**
@@ -131,12 +131,21 @@ def run(
     log_to(Console(stderr=True), quiet=quiet)  # opening warns already
     images = open_source(sequence, sensor, settings=settings, fps=fps, times=times, mask=mask)
     options = RunOptions(
-        *(sensor, deterministic, realtime, start, stride, max_frames, seed, localize),
-        loop_closing=loop_closing,
-        full_adjustment=full_adjustment,
-        full_adjustment_time_limit=full_adjustment_time_limit,
+        sensor,
+        SystemOptions(
+            deterministic=deterministic,
+            loop_closing=loop_closing,
+            full_adjustment=full_adjustment,
+            full_adjustment_time_limit=full_adjustment_time_limit,
+            seed=seed,
+        ),
+        realtime=realtime,
+        start=start,
+        stride=stride,
+        max_frames=max_frames,
+        localize_after=localize,
     )
-    code = run_and_write(
+    code = run_and_show(
         images, options, vocabulary=vocabulary, output=output, force=force, quiet=quiet
     )
     raise typer.Exit(code)
@@ -145,7 +154,7 @@ def run(
 run.__doc__ = f"{run.__doc__}\n{EXAMPLE}"
 
 
-def run_and_write(
+def run_and_show(
     sequence: Sequence | LiveSource,
     options: RunOptions,
     *,
@@ -154,38 +163,39 @@ def run_and_write(
     force: bool = False,
     quiet: bool = False,
 ) -> ExitCode:
-    """Run, write all files, show a table; returns the exit code."""
+    """Run, with a progress bar and a table at the end; returns the exit code."""
     console = Console(quiet=quiet)
     errors = Console(stderr=True)
     log_to(errors, quiet=quiet)
-    runner = SequenceRunner(sequence, sequence.settings, load_vocabulary(vocabulary), options)
-    folder = prepare_output_folder(output, sequence.name, force=force)
-    link_latest(folder)
-
-    writer = OutputWriter(folder)
-    with StopOnInterrupt() as interrupt:
-        with _progress_bar(console) as bar:
-            display = _Display(bar, runner.result.n_frames)
-            result = runner.run(display.show, interrupt.event)
-        evaluation = evaluate_run(result)
-        report = make_report(result, evaluation)
-        writer.write_all(result, report, evaluation)
-    console.print(_table(report))
-    console.print(f"Results are in [bold]{escape(str(folder))}[/]", highlight=False, soft_wrap=True)
-    code = _conclude(result, writer, errors)
-    interrupted = interrupt.event.is_set() and not result.is_live  # also while writing
+    n_frames = options.n_frames(sequence)
+    with StopOnInterrupt() as interrupt, _progress_bar(console) as bar:
+        done = run_sequence(
+            sequence,
+            options,
+            vocabulary=vocabulary,
+            output=output or new_output_folder(sequence.name),
+            force=force,
+            progress=_Display(bar, n_frames).show,
+            stop=interrupt.event,
+        )
+    console.print(_table(done.report))
+    folder = escape(str(done.folder))
+    console.print(f"Results are in [bold]{folder}[/]", highlight=False, soft_wrap=True)
+    code = _conclude(done, errors)
+    interrupted = interrupt.event.is_set() and not done.result.is_live  # also while writing
     if code is not ExitCode.FAILED and interrupted:
         return ExitCode.INTERRUPTED
     return code
 
 
-def _conclude(result: RunResult, writer: OutputWriter, errors: Console) -> ExitCode:
-    for problem in writer.problems:
+def _conclude(done: FinishedRun, errors: Console) -> ExitCode:
+    result = done.result
+    for problem in done.problems:
         _print_error(errors, "Error", problem)
     if result.error is not None:
         what = str(result.error) or type(result.error).__name__
         _print_error(errors, "Error", f"{what} (what was done until then is saved)")
-    if result.error is not None or writer.problems:
+    if result.error is not None or done.problems:
         return ExitCode.FAILED
     if result.n_tracked == 0 and not result.interrupted:
         _print_error(errors, "Nothing could be tracked", result.why_nothing_was_tracked())

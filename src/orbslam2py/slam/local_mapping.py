@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Local mapping: what happens to the map for every new keyframe.
 
-Mur-Artal, Montiel and Tardos, 2015, section VI.
+Mur-Artal, Montiel and Tardos, 2015, section VI; ``docs/method/mapping.md``.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 from orbslam2py import _core as core
 from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.thresholds import MappingThresholds
 from orbslam2py.slam.timing import StageStatistics, StageTimer
 from orbslam2py.slam.worker import Worker
 
@@ -21,7 +22,7 @@ class LocalMapping:
 
     Parameters
     ----------
-    world : orbslam2py._core.Map
+    slam_map : orbslam2py._core.Map
         The map.
     sensor : Sensor
         Decides thresholds.
@@ -29,17 +30,21 @@ class LocalMapping:
         Forgets the keyframes that are culled.
     threaded : bool
         In a thread of its own, or inline at `start`.
+    thresholds : MappingThresholds, optional
+        Limits.
     """
 
     def __init__(
         self,
-        world: core.Map,
+        slam_map: core.Map,
         sensor: Sensor,
         index: core.KeyFrameIndex,
         *,
         threaded: bool,
+        thresholds: MappingThresholds | None = None,
     ) -> None:
-        self._map = world
+        limits = thresholds or MappingThresholds()
+        self._map = slam_map
         self._index = index
         self._monocular = sensor is Sensor.MONOCULAR
         #: ``on_done(keyframe_id)``: takes the finished keyframe (loop closing).
@@ -48,8 +53,12 @@ class LocalMapping:
         self._recent_points = core.RecentPoints()
         self._point_options = core.NewPointOptions()
         self._point_options.monocular = self._monocular
-        self._point_options.n_neighbours = self._n_neighbours = 20 if self._monocular else 10
-        self._min_observations = 2 if self._monocular else 3
+        self._n_neighbours = limits.neighbours_monocular if self._monocular else limits.neighbours
+        self._point_options.n_neighbours = self._n_neighbours
+        self._min_observations = (
+            limits.observations_monocular if self._monocular else limits.observations
+        )
+        self._adjusted_keyframes = limits.adjusted_keyframes
         #: Milliseconds per part of the work, over all keyframes.
         self.statistics = StageStatistics()
         self.worker: Worker[int] = Worker("local mapping", self.process, threaded=threaded)
@@ -97,7 +106,7 @@ class LocalMapping:
         self.on_done(keyframe)
 
     def _refine(self, keyframe: int, timer: StageTimer) -> None:
-        if self._map.n_keyframes > 2:
+        if self._map.n_keyframes > self._adjusted_keyframes:
             with timer("mapping.local_bundle_adjustment"):
                 core.local_bundle_adjustment(
                     self._map, keyframe, self.worker.interrupt_flag, self._monocular
