@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "frame/nearest_keypoints.hpp"
 #include "map/map.hpp"
 
 namespace orbslam {
@@ -14,7 +15,7 @@ namespace orbslam {
 /// with the tracked frame too. Temporary points are dropped. Takes the write lock. Not published:
 /// process_new_keyframe() does.
 KeyFrameId insert_keyframe(Map& map, TrackedFrame& frame, bool create_points,
-                           std::size_t n_minimum = 100);
+                           std::size_t n_minimum = kFewestDepthPoints);
 
 /// Spec 13, section 3: adds the observations of points that the tracker matched, refreshes those
 /// points, recomputes covisibility, publishes the keyframe, and appends the points that were

@@ -32,10 +32,14 @@ struct FrustumView {
 /// per point. Throws StateError when the frame has no pose.
 std::vector<FrustumView> project_into(const TrackedFrame& frame, const PointBatch& points);
 
+inline constexpr double kFrontalCosine = 0.998;  ///< above: seen nearly as it was mapped
+inline constexpr float kFrontalRadius = 2.5F;    ///< pixels of the predicted level
+inline constexpr float kObliqueRadius = 4.0F;    ///< the same for all other views
+
 /// Search radius around a projected point, in pixels of its predicted level: points seen nearly
 /// as they were mapped are predicted better.
 inline float viewing_radius(float view_cosine) {
-  return static_cast<double>(view_cosine) > 0.998 ? 2.5F : 4.0F;
+  return static_cast<double>(view_cosine) > kFrontalCosine ? kFrontalRadius : kObliqueRadius;
 }
 
 struct LocalMapMatches {

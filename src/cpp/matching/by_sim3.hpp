@@ -10,6 +10,11 @@
 
 namespace orbslam {
 
+// Search radii of the three functions below, in pixels of the predicted level.
+inline constexpr float kSimilarityRadius = 7.5F;
+inline constexpr float kLoopRadius = 10.0F;
+inline constexpr float kLoopFusionRadius = 4.0F;
+
 /// Spec 06, 2.8: further matches between two keyframes of which S_12 is known roughly. `matches`
 /// holds per keypoint of `a` the matched point of `b`, or an invalid id; matches are added to it
 /// where the point of a keypoint, carried through the similarity and searched for in the other
@@ -18,7 +23,7 @@ namespace orbslam {
 /// when a keyframe is dead. Takes the read lock while it copies.
 /// Throws std::invalid_argument unless `matches` has one entry per keypoint of `a`.
 int match_by_similarity(const Map& map, KeyFrameId a, KeyFrameId b, const Similarity& S_ab,
-                        std::vector<MapPointId>& matches, float radius_factor = 7.5F);
+                        std::vector<MapPointId>& matches, float radius_factor = kSimilarityRadius);
 
 /// Spec 06, 2.7: points on the far side of a loop projected into a keyframe at its corrected place
 /// `S_cw`. `matches` holds per keypoint the matched point or an invalid id; free keypoints are
@@ -27,7 +32,7 @@ int match_by_similarity(const Map& map, KeyFrameId a, KeyFrameId b, const Simila
 /// Throws std::invalid_argument unless `matches` has one entry per keypoint.
 int match_loop_points(const Map& map, KeyFrameId keyframe, const Similarity& S_cw,
                       const std::vector<MapPointId>& points, std::vector<MapPointId>& matches,
-                      float radius_factor = 10.0F);
+                      float radius_factor = kLoopRadius);
 
 /// A point of the map and the keypoint of a keyframe that shows it.
 struct PointSighting {
@@ -39,6 +44,7 @@ struct PointSighting {
 /// and may be found by several points, since what is found shows which points are the same; in the
 /// order of `points`. Takes no lock.
 std::vector<PointSighting> find_loop_fusions(const Frame& frame, const Similarity& S_cw,
-                                             const PointBatch& points, float radius_factor = 4.0F);
+                                             const PointBatch& points,
+                                             float radius_factor = kLoopFusionRadius);
 
 }  // namespace orbslam

@@ -54,9 +54,12 @@ class Projector {
   double bf_;
 };
 
-/// Whether a point that is `distance` away can show the scales it was seen at (10 to 20 % slack).
+inline constexpr double kNearestFactor = 0.8;   ///< of a point's min_distance
+inline constexpr double kFarthestFactor = 1.2;  ///< of a point's max_distance
+
+/// Whether a point that is `distance` away can show the scales it was seen at (20 % slack).
 inline bool in_scale_range(double distance, double min_distance, double max_distance) {
-  return distance >= 0.8 * min_distance && distance <= 1.2 * max_distance;
+  return distance >= kNearestFactor * min_distance && distance <= kFarthestFactor * max_distance;
 }
 
 /// Where a keyframe should show a point, and on which level of its pyramid.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "frame/frame.hpp"
+#include "frame/nearest_keypoints.hpp"
 #include "map/point_batch.hpp"
 
 namespace orbslam {
@@ -15,7 +16,7 @@ namespace orbslam {
 /// temporary points left in `last` from before are dropped first. Returns the number of points
 /// made. Throws StateError when the frame has no pose.
 std::size_t add_temporary_points(TrackedFrame& last, PointBatch& points,
-                                 std::size_t n_minimum = 100);
+                                 std::size_t n_minimum = kFewestDepthPoints);
 
 /// Drops the associations with temporary points. Returns their number.
 std::size_t discard_temporary(TrackedFrame& frame);

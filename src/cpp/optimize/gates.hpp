@@ -15,4 +15,14 @@ inline constexpr double kHuberStereo = 2.7955321496988725;  // sqrt(7.815)
 inline constexpr double kSmallDecrease = 1e-3;
 inline constexpr int kSmallDecreases = 3;
 
+// Levenberg-Marquardt with damping by the identity, as the published system has it: the first
+// damping is this part of the largest diagonal entry of the normal matrix. A step is accepted when
+// its gain, the decrease over the predicted one plus kGainOffset, is positive; the damping is then
+// multiplied by 1 - (2 gain - 1)^3, at least kLeastDampingFactor and at most kMostDampingFactor.
+// Otherwise it is multiplied by 2, 4, 8 and so on.
+inline constexpr double kFirstDamping = 1e-5;
+inline constexpr double kGainOffset = 1e-3;
+inline constexpr double kLeastDampingFactor = 1.0 / 3.0;
+inline constexpr double kMostDampingFactor = 2.0 / 3.0;
+
 }  // namespace orbslam

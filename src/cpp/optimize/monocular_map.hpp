@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <limits>
 #include <vector>
 
@@ -9,6 +10,9 @@
 #include "optimize/bundle_adjustment.hpp"
 
 namespace orbslam {
+
+/// Points that the first map of a single camera must have at least.
+inline constexpr std::size_t kFewestInitialPoints = 100;
 
 enum class MonocularMapFailure {
   kNone,
@@ -47,6 +51,6 @@ struct MonocularMap {
 MonocularMap create_monocular_map(Map& map, TrackedFrame& initial, TrackedFrame& current,
                                   const Pose& T_21, const std::vector<int>& matches,
                                   const std::vector<Eigen::Vector3d>& points,
-                                  std::size_t min_points = 100);
+                                  std::size_t min_points = kFewestInitialPoints);
 
 }  // namespace orbslam
