@@ -12,7 +12,9 @@ struct ImagePoint {
   double u = 0, v = 0, right_u = 0, z = 0;
 };
 
-/// Projects many world points into one frame. All tests are written so that NaN fails them.
+/// Projects many world points into one frame; points on or behind the camera's plane are refused.
+/// All tests are written so that NaN fails them. See
+/// docs/method/tracking.md#matching-the-local-map.
 class Projector {
  public:
   Projector(const Frame& frame, const Pose& T_cw)
@@ -25,7 +27,7 @@ class Projector {
 
   const Eigen::Vector3d& center() const { return center_; }
 
-  /// Frames accept both ends of the image bounds (spec 05, section 3).
+  /// Frames accept both ends of the image bounds.
   bool project_into_frame(const Eigen::Vector3d& p_w, ImagePoint& image) const {
     return project(p_w, image) && bounds_.contains(image.u, image.v);
   }
