@@ -36,7 +36,8 @@ struct PnpPose {
 };
 
 /// RANSAC over EPnP, in slices: the tracker lets several candidate keyframes take turns. How the
-/// iterations are sliced does not change what is found.
+/// iterations are sliced does not change what is found. See
+/// docs/method/relocalization.md#pose-from-points.
 class PnpRansac {
  public:
   /// Throws std::invalid_argument when the arrays differ in length, or an option is out of range.
