@@ -40,8 +40,9 @@ class Refinement {
         width_(std::sqrt(options.max_chi2)),
         outlier_(outlier) {}
 
-  /// Levenberg-Marquardt on the matches that are not outliers, with the rules of spec 16,
-  /// section 1. Returns the number of iterations.
+  /// Levenberg-Marquardt (gates.hpp) on the matches that are not outliers. Ends after
+  /// `max_iterations`, after kSmallDecreases small decreases in a row, or when no damping lowers
+  /// the cost. Returns the number of iterations.
   int minimise(int max_iterations, Similarity& S_12) const {
     System system = evaluate(S_12);
     if (!std::isfinite(system.cost)) return 0;
