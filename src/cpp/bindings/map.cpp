@@ -318,7 +318,7 @@ void bind_local_map(py::module_& module) {
 
 void bind_keyframe_verbs(py::module_& module) {
   module.def("insert_keyframe", &insert_keyframe, "map"_a, "frame"_a, "create_points"_a,
-             "n_minimum"_a = std::size_t{100}, Release(),
+             "n_minimum"_a = kFewestDepthPoints, Release(),
              "Make a keyframe of a tracked frame, with points from its depths; its id.");
   module.def(
       "process_new_keyframe",

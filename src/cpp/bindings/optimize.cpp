@@ -344,7 +344,7 @@ void bind_monocular_map(py::module_& module) {
         return create_monocular_map(map, initial, current, T_21, partners, positions, min_points);
       },
       "map"_a, "initial"_a, "current"_a, "T_21"_a, "matches"_a, "points"_a,
-      "min_points"_a = std::size_t{100},
+      "min_points"_a = kFewestInitialPoints,
       "Make the first map of a single camera from two described frames.\n\n"
       "`T_21`: initial to current camera, up to scale. `matches`: (n,) int32, per initial "
       "keypoint\n"

@@ -24,13 +24,16 @@ struct GlobalBundleResult {
   BundleSummary summary;
 };
 
-/// Spec 16, section 4: refines all keyframes, unpublished ones included, and all points; the first
-/// keyframe is fixed and no observation is erased. One after the other the three steps below.
-/// After an abort, or when the map was cleared meanwhile, the map stays as it was.
+/// Full bundle adjustment: refines all keyframes, unpublished ones included, and all points; the
+/// first keyframe is fixed and no observation is erased. One after the other the three steps below.
+/// `abort` is polled once per iteration; nullptr: never. After an abort, or when the map was
+/// cleared meanwhile, the map stays as it was. See
+/// docs/method/adjustment.md#full-bundle-adjustment.
 GlobalBundleResult global_bundle_adjustment(Map& map, const GlobalBundleOptions& options,
                                             const std::atomic<bool>* abort, int n_threads = 1);
 
-// Its steps, for those that let the map change between them (spec 14, section 5).
+// Its steps, for those that let the map change between them: after a loop, tracking and mapping go
+// on while it is solved. See docs/method/loops.md#after-a-loop.
 
 /// All keyframes that are tied to each other by points, and these points. Others (a keyframe that
 /// was just inserted and has not been processed) are left out: nothing says where they are relative
