@@ -33,7 +33,7 @@ from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.front_end import FrontEnd
 from orbslam2py.slam.records import Reason
 from orbslam2py.slam.relocalization import RelocalizationThresholds, Relocalizer
-from orbslam2py.slam.timing import StageTimer
+from orbslam2py._timing import StageTimer
 from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence, SyntheticWorld
 from orbslam2py.vocabulary.vocabulary import load_vocabulary
 

@@ -25,7 +25,7 @@ from orbslam2py.runs.result import FrameRow, RunOptions
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.records import Reason, TrackingRecord, TrackingState
 from orbslam2py.slam.system import System
-from orbslam2py.slam.timing import StageStatistics, StageTimer
+from orbslam2py._timing import StageStatistics, StageTimer
 from watchdog import worker_threads
 
 pytestmark = pytest.mark.watchdog(20)

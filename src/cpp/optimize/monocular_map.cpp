@@ -8,7 +8,7 @@
 #include "base/errors.hpp"
 #include "map/anchor.hpp"
 #include "map/scene_depth.hpp"
-#include "optimize/global_bundle_adjustment.hpp"
+#include "optimize/full_bundle_adjustment.hpp"
 
 namespace orbslam {
 namespace {
@@ -128,8 +128,8 @@ MonocularMap create_monocular_map(Map& map, TrackedFrame& initial, TrackedFrame&
   check_matches(*initial.frame, *current.frame, matches, points);
   std::uint64_t epoch = 0;
   MonocularMap made = build(map, initial, current, T_21, matches, points, epoch);
-  GatheredBundle bundle = gather_global_bundle(map);
-  made.summary = solve_global_bundle(bundle, {kIterations, true}, nullptr, 1);
+  GatheredBundle bundle = gather_full_bundle(map);
+  made.summary = solve_full_bundle(bundle, {kIterations, true}, nullptr, 1);
 
   const auto lock = map.write_lock();
   if (map.epoch() != epoch) {

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Full bundle adjustment: all keyframes and points together, while the system goes on.
 
-Mur-Artal and Tardos, "ORB-SLAM2", 2017, section III-C;
+Mur-Artal and Tardos, "ORB-SLAM2", 2017, section III-D;
 ``docs/method/adjustment.md#full-bundle-adjustment``.
 """
 
@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from orbslam2py import _core as core
-from orbslam2py.slam.timing import StageStatistics, StageTimer
+from orbslam2py._timing import StageStatistics, StageTimer
 from orbslam2py.slam.worker import Worker, WorkerState
 
 _log = logging.getLogger(__name__)
@@ -83,7 +83,7 @@ class FullBundleAdjustment:
         self._map = slam_map
         self._mapping = mapping
         self._monocular = monocular
-        self._options = core.GlobalBundleOptions(
+        self._options = core.FullBundleOptions(
             iterations=_ITERATIONS, max_seconds=time_limit or 0.0
         )
         self._on_done = on_done
@@ -171,18 +171,16 @@ class FullBundleAdjustment:
         map_index = self._map.epoch
         with self.worker.off_duty():
             with timer("gather"):
-                bundle = core.gather_global_bundle(self._map)
+                bundle = core.gather_full_bundle(self._map)
             with timer("solve"):
-                summary = core.solve_global_bundle(
-                    bundle, self._options, cancelled, self._n_threads
-                )
+                summary = core.solve_full_bundle(bundle, self._options, cancelled, self._n_threads)
         used = False
         if not (summary.aborted or cancelled.is_set()):
             with self._mapping.pause(brief=True) as ticket:
                 with timer("wait"):
                     ticket.wait()
                 with timer("commit"):
-                    commit = core.commit_global_bundle(self._map, bundle)
+                    commit = core.commit_full_bundle(self._map, bundle)
                 used = commit.committed
                 if commit.n_followed_keyframes > 0:
                     with timer("local"):

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from orbslam2py import _core as core
+from orbslam2py._timing import StageStatistics, StageTimer
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.thresholds import MappingThresholds
-from orbslam2py.slam.timing import StageStatistics, StageTimer
 from orbslam2py.slam.worker import Worker
 
 

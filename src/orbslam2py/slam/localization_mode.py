@@ -14,9 +14,8 @@ from dataclasses import replace
 import numpy as np
 
 from orbslam2py import _core as core
-from orbslam2py.slam.estimates import PoseEstimate
 from orbslam2py.slam.pose_search import PoseSearch
-from orbslam2py.slam.records import Reason
+from orbslam2py.slam.records import PoseEstimate, Reason
 from orbslam2py.slam.worker import PauseTicket, Worker
 
 _log = logging.getLogger(__name__)

@@ -2,7 +2,7 @@
 """Loop closing: recognises places seen before, and takes out the drift gathered meanwhile.
 
 Mur-Artal, Montiel and Tardos, 2015, section VII; for stereo and RGB-D the scale is known, Mur-Artal
-and Tardos, 2017, section III-C. Candidates that drift cannot explain, or that contradict each
+and Tardos, 2017, section III-D. Candidates that drift cannot explain, or that contradict each
 other, are refused: places that look alike make perfect matches. Step by step:
 ``docs/method/loops.md``.
 """
@@ -16,13 +16,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from orbslam2py import _core as core
+from orbslam2py._timing import StageStatistics, StageTimer
 from orbslam2py.errors import StateError
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.events import LoopClosed
 from orbslam2py.slam.full_bundle_adjustment import FullBundleAdjustment
 from orbslam2py.slam.options import SystemOptions
 from orbslam2py.slam.thresholds import LoopThresholds
-from orbslam2py.slam.timing import StageStatistics, StageTimer
 from orbslam2py.slam.worker import Worker
 
 _log = logging.getLogger(__name__)

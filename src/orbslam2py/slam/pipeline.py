@@ -12,11 +12,11 @@ import threading
 from collections.abc import Callable
 
 from orbslam2py import _core as core
+from orbslam2py._timing import StageStatistics, StageTimer
 from orbslam2py.errors import ImageError
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
 from orbslam2py.slam.back_end import BackEnd
-from orbslam2py.slam.estimates import TrackingOutcome
 from orbslam2py.slam.events import Callbacks, Relocalized, TrackingLost
 from orbslam2py.slam.frame_recorder import FrameRecorder, frame_features
 from orbslam2py.slam.front_end import FrontEnd
@@ -25,10 +25,9 @@ from orbslam2py.slam.keyframe_decision import KeyframeDecision
 from orbslam2py.slam.localization_mode import LocalizationSwitch
 from orbslam2py.slam.options import SystemOptions
 from orbslam2py.slam.pose_search import PoseSearch
-from orbslam2py.slam.records import TrackingRecord, TrackingState
+from orbslam2py.slam.records import TrackingOutcome, TrackingRecord, TrackingState
 from orbslam2py.slam.relocalization import Relocalizer
 from orbslam2py.slam.thresholds import TrackingThresholds
-from orbslam2py.slam.timing import StageStatistics, StageTimer
 from orbslam2py.slam.tracking import Tracking
 
 _log = logging.getLogger(__name__)

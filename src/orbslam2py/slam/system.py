@@ -3,8 +3,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
+import threading
 import weakref
+from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 
@@ -24,7 +27,6 @@ from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
 from orbslam2py.slam.options import SystemOptions
 from orbslam2py.slam.pipeline import RESET_PATIENCE, BuildFrame, Pipeline
 from orbslam2py.slam.records import TrackingRecord, TrackingState
-from orbslam2py.slam.worker import CallGuard
 from orbslam2py.trajectory.trajectory import Trajectory
 from orbslam2py.vocabulary.vocabulary import load_vocabulary
 
@@ -453,6 +455,24 @@ class System:
                 raise
             if not isinstance(error, WorkerError):  # else it is the same one
                 _log.exception("shutdown after an error failed as well")
+
+
+class CallGuard:
+    """Allows one call at a time; a second one raises instead of waiting."""
+
+    def __init__(self, what: str) -> None:
+        self._what = what
+        self._lock = threading.Lock()
+
+    @contextlib.contextmanager
+    def __call__(self) -> Iterator[None]:
+        """Enter the guarded call."""
+        if not self._lock.acquire(blocking=False):
+            raise StateError(f"{self._what} is already running in another thread")
+        try:
+            yield
+        finally:
+            self._lock.release()
 
 
 def _abandon(back_end: BackEnd) -> None:
