@@ -39,9 +39,9 @@ class BackEnd:
     def __init__(self, sensor: Sensor, options: SystemOptions, callbacks: Callbacks) -> None:
         threaded = not options.deterministic
         self.map = core.Map()
-        self.index = core.KeyFrameIndex()
+        self.keyframe_index = core.KeyFrameIndex()
         self.events = EventDispatcher(callbacks, threaded=threaded)
-        self.mapping = LocalMapping(self.map, sensor, self.index, threaded=threaded)
+        self.mapping = LocalMapping(self.map, sensor, self.keyframe_index, threaded=threaded)
         self.adjustment = FullBundleAdjustment(
             self.map,
             self.mapping.worker,
@@ -52,7 +52,7 @@ class BackEnd:
         )
         self.loop_closing = LoopClosing(
             self.map,
-            self.index,
+            self.keyframe_index,
             sensor,
             self.mapping.worker,
             self.adjustment,
@@ -92,7 +92,7 @@ class BackEnd:
         self.loop_closing.reset()
         keep()
         ended = self.map.epoch
-        self.index.clear()
+        self.keyframe_index.clear()
         self.map.clear()
         self.events.post(MapChanged(ended, MapChangeCause.RESET))
 

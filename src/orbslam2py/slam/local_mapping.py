@@ -26,7 +26,7 @@ class LocalMapping:
         The map.
     sensor : Sensor
         Decides thresholds.
-    index : orbslam2py._core.KeyFrameIndex
+    keyframe_index : orbslam2py._core.KeyFrameIndex
         Forgets the keyframes that are culled.
     threaded : bool
         In a thread of its own, or inline at `start`.
@@ -38,14 +38,14 @@ class LocalMapping:
         self,
         slam_map: core.Map,
         sensor: Sensor,
-        index: core.KeyFrameIndex,
+        keyframe_index: core.KeyFrameIndex,
         *,
         threaded: bool,
         thresholds: MappingThresholds | None = None,
     ) -> None:
         limits = thresholds or MappingThresholds()
         self._map = slam_map
-        self._index = index
+        self._keyframe_index = keyframe_index
         self._monocular = sensor is Sensor.MONOCULAR
         #: ``on_done(keyframe_id)``: takes the finished keyframe (loop closing).
         self.on_done: Callable[[int], None] = lambda keyframe: None
@@ -114,4 +114,4 @@ class LocalMapping:
         with timer("mapping.cull_keyframes"):
             culled = core.cull_keyframes(self._map, keyframe, only_close=not self._monocular)
             for dead in culled.tolist():
-                self._index.erase(dead)
+                self._keyframe_index.erase(dead)

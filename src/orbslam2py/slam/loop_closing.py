@@ -44,7 +44,7 @@ class LoopClosing:
     ----------
     slam_map : orbslam2py._core.Map
         The map.
-    index : orbslam2py._core.KeyFrameIndex
+    keyframe_index : orbslam2py._core.KeyFrameIndex
         Which keyframes contain which words.
     sensor : Sensor
         A single camera's scale drifts, others' is known.
@@ -65,7 +65,7 @@ class LoopClosing:
     def __init__(
         self,
         slam_map: core.Map,
-        index: core.KeyFrameIndex,
+        keyframe_index: core.KeyFrameIndex,
         sensor: Sensor,
         mapping: Worker[int],
         adjustment: FullBundleAdjustment,
@@ -75,7 +75,7 @@ class LoopClosing:
         thresholds: LoopThresholds | None = None,
     ) -> None:
         self._map = slam_map
-        self._index = index
+        self._keyframe_index = keyframe_index
         self._fix_scale = sensor.has_depth
         self._mapping = mapping
         self._adjustment = adjustment
@@ -132,13 +132,13 @@ class LoopClosing:
             yield True
         finally:
             if self._map.end_lease(keyframe):
-                self._index.erase(keyframe)
+                self._keyframe_index.erase(keyframe)
 
     # ---- is this a place seen before? ------------------------------------------------------------
     def _find_loop(self, keyframe: int, timer: StageTimer) -> core.Loop | None:
         with timer("detect"):
             proposals = self._detect(keyframe)
-            core.index_keyframe(self._index, self._map, keyframe)
+            core.index_keyframe(self._keyframe_index, self._map, keyframe)
         if not proposals.consistent:
             return None
         with timer("verify"):
@@ -149,7 +149,7 @@ class LoopClosing:
             self._consistency.clear()
             return _Proposals([], [])
         least_score = core.lowest_neighbour_score(self._map, keyframe)
-        found = core.find_loop_candidates(self._index, self._map, keyframe, least_score)
+        found = core.find_loop_candidates(self._keyframe_index, self._map, keyframe, least_score)
         candidates = [place.keyframe for place in found]
         consistent = list(self._consistency.update(self._map, candidates))
         return _Proposals(consistent, [c for c in candidates if c not in consistent])

@@ -239,7 +239,7 @@ def _make_tracking(
         vocabulary,
         sensor,
         settings.max_frames,
-        Relocalizer(slam_map, back_end.index, seed),
+        Relocalizer(slam_map, back_end.keyframe_index, seed),
         TrackingThresholds(),
     )
     return Tracking(

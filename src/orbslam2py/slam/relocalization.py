@@ -38,7 +38,7 @@ class Relocalizer:
     ----------
     slam_map : orbslam2py._core.Map
         The map.
-    index : orbslam2py._core.KeyFrameIndex
+    keyframe_index : orbslam2py._core.KeyFrameIndex
         Which keyframes contain which words.
     seed : int
         Seed of the draws.
@@ -49,12 +49,12 @@ class Relocalizer:
     def __init__(
         self,
         slam_map: core.Map,
-        index: core.KeyFrameIndex,
+        keyframe_index: core.KeyFrameIndex,
         seed: int,
         thresholds: RelocalizationThresholds | None = None,
     ) -> None:
         self._map = slam_map
-        self._index = index
+        self._keyframe_index = keyframe_index
         self._seed = seed % 2**64
         self._limits = thresholds or RelocalizationThresholds()
 
@@ -83,7 +83,7 @@ class Relocalizer:
         return 0
 
     def _candidates(self, frame: core.TrackedFrame) -> list[_Candidate]:
-        found = core.find_relocalization_candidates(self._index, self._map, frame.features)
+        found = core.find_relocalization_candidates(self._keyframe_index, self._map, frame.features)
         candidates = []
         for place in found:
             matches = core.TrackedFrame(frame.features)
