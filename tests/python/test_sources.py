@@ -30,7 +30,7 @@ from orbslam2py.datasets import (
 from orbslam2py.datasets.image_folder import natural_key
 from orbslam2py.datasets.time_files import read_time_file
 from orbslam2py.errors import DatasetError, ImageError, OrbSlamError, SettingsError, StateError
-from orbslam2py.settings.builtin import builtin_settings
+from orbslam2py.settings import builtin_settings
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
 from orbslam2py.slam.front_end import FrontEnd

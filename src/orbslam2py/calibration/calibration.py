@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from orbslam2py._files import atomic_write
 from orbslam2py.calibration.chessboard import Board, BoardView, BoardViews, choose_views
 from orbslam2py.errors import DatasetError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import CameraSettings, OrbSettings, Settings
+from orbslam2py.settings import CameraSettings, OrbSettings, Sensor, Settings
 
 _log = logging.getLogger(__name__)
 

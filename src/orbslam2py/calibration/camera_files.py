@@ -30,7 +30,7 @@ from orbslam2py.calibration.yaml_camera_files import (
 )
 from orbslam2py.datasets.images import quiet_opencv
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings.settings import Settings
+from orbslam2py.settings import Settings
 
 
 class CameraFileFormat(str, Enum):

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import CameraSettings, OrbSettings, Settings
+from orbslam2py.settings import CameraSettings, OrbSettings, Sensor, Settings
 
 Array = NDArray[np.float64]
 

@@ -22,15 +22,14 @@ from orbslam2py.calibration.camera_model import (
 )
 from orbslam2py.datasets.rectification import rectification_of_pair
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings.builtin import EUROC_CLOSE_FACTOR
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import (
+from orbslam2py.settings import (
     CameraRectification,
     CameraSettings,
-    DepthSettings,
     OrbSettings,
+    Sensor,
     Settings,
     StereoRectification,
+    builtin_settings,
 )
 
 Array = NDArray[np.float64]
@@ -173,16 +172,19 @@ def _pair_settings(
             f"projection matrix is shifted by {-P_right[0, 3]:g}, {-P_right[1, 3]:g} pixel metres"
         )
     camera = CameraSettings(
-        *(float(P[0, 0]), float(P[1, 1]), float(P[0, 2]), float(P[1, 2])),
+        fx=float(P[0, 0]),
+        fy=float(P[1, 1]),
+        cx=float(P[0, 2]),
+        cy=float(P[1, 2]),
         width=rectification.left.width,
         height=rectification.left.height,
         fps=fps,
         bf=bf,
     )
     return Settings(
-        Sensor.STEREO,
-        camera,
-        OrbSettings(n_features=n_features),
-        DepthSettings(EUROC_CLOSE_FACTOR),
-        rectification,
+        sensor=Sensor.STEREO,
+        camera=camera,
+        orb=OrbSettings(n_features=n_features),
+        depth=builtin_settings("euroc", Sensor.STEREO).depth,
+        rectification=rectification,
     )

@@ -13,7 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from orbslam2py.datasets.base import Layout
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings import Sensor
 from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence, SyntheticWorld
 
 EXAMPLE = """

@@ -23,8 +23,7 @@ from orbslam2py.datasets.images import read_image
 from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.datasets.rectification import Rectifier
 from orbslam2py.errors import DatasetError, SettingsError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import Settings, StereoRectification
+from orbslam2py.settings import Sensor, Settings, StereoRectification
 from orbslam2py.trajectory.trajectory import Trajectory, read_euroc
 
 _log = logging.getLogger(__name__)

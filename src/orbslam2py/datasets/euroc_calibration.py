@@ -11,11 +11,14 @@ from numpy.typing import NDArray
 
 from orbslam2py.datasets.rectification import rectification_of_pair
 from orbslam2py.errors import DatasetError
-from orbslam2py.settings.builtin import EUROC_CLOSE_FACTOR, EUROC_STEREO_ORB
-from orbslam2py.settings.opencv_yaml import Entry, parse_number, scan
-from orbslam2py.settings.reader import read_matrix
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import CameraSettings, DepthSettings, OrbSettings, Settings
+from orbslam2py.settings import (
+    CameraSettings,
+    OrbSettings,
+    Sensor,
+    Settings,
+    builtin_settings,
+)
+from orbslam2py.settings.opencv_yaml import Entry, parse_number, read_matrix, scan
 from orbslam2py.trajectory.rotations import inverse_poses, nearest_rotations, poses_from
 
 Array = NDArray[np.float64]
@@ -116,6 +119,7 @@ def stereo_settings(left: SensorCalibration, right: SensorCalibration) -> Settin
         left.size,
     )
     P = rectification.left.P
+    published = builtin_settings("euroc", Sensor.STEREO)
     return Settings(
         sensor=Sensor.STEREO,
         camera=CameraSettings(
@@ -126,8 +130,8 @@ def stereo_settings(left: SensorCalibration, right: SensorCalibration) -> Settin
             bf=-float(rectification.right.P[0, 3]),
             rgb=True,
         ),
-        orb=EUROC_STEREO_ORB,
-        depth=DepthSettings(EUROC_CLOSE_FACTOR),
+        orb=published.orb,
+        depth=published.depth,
         rectification=rectification,
     )
 

@@ -16,9 +16,14 @@ from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.images import read_image
 from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.errors import DatasetError, SettingsError
-from orbslam2py.settings.builtin import KITTI_VIEWERS
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import CameraSettings, DepthSettings, OrbSettings, Settings
+from orbslam2py.settings import (
+    CameraSettings,
+    DepthSettings,
+    OrbSettings,
+    Sensor,
+    Settings,
+    builtin_settings,
+)
 from orbslam2py.trajectory.trajectory import Trajectory, read_kitti
 
 _log = logging.getLogger(__name__)
@@ -139,7 +144,7 @@ class KittiSequence(RecordedSequence):
                 camera=camera,
                 orb=OrbSettings(n_features=2000),
                 depth=DepthSettings(_CLOSE_FACTOR) if stereo else None,
-                viewer=KITTI_VIEWERS[self.sensor],
+                viewer=builtin_settings("kitti00-02", self.sensor).viewer,
             )
         except SettingsError as error:
             raise DatasetError(f"{path}: {error}") from error

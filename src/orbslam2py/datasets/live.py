@@ -19,7 +19,7 @@ from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.images import quiet_opencv
 from orbslam2py.datasets.unposed import UnposedSource
 from orbslam2py.errors import DatasetError, StateError
-from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings import Sensor
 
 _log = logging.getLogger(__name__)
 

@@ -13,8 +13,7 @@ from orbslam2py.datasets.base import Images, LiveFrame, LiveSource, Sequence
 from orbslam2py.datasets.image_folder import image_files
 from orbslam2py.datasets.images import read_image
 from orbslam2py.errors import DatasetError, ImageError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import Settings
+from orbslam2py.settings import Sensor, Settings
 from orbslam2py.trajectory.trajectory import Trajectory
 
 Mask = NDArray[np.uint8]

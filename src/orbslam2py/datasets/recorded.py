@@ -17,9 +17,7 @@ from orbslam2py.datasets.base import (
     choose_sensor,
 )
 from orbslam2py.datasets.choose_settings import SettingsChoice, choose_settings
-from orbslam2py.settings.builtin import resolve_settings
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import Settings
+from orbslam2py.settings import Sensor, Settings, resolve_settings
 from orbslam2py.trajectory.trajectory import Trajectory
 
 

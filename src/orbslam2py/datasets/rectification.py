@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbslam2py.errors import ImageError
-from orbslam2py.settings.settings import CameraRectification, StereoRectification
+from orbslam2py.settings import CameraRectification, StereoRectification
 
 Array = NDArray[np.float64]
 

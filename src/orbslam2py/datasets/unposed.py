@@ -15,9 +15,7 @@ from orbslam2py.datasets.base import Stamps, choose_sensor
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.time_files import read_time_file, stamps_of_rate
 from orbslam2py.errors import DatasetError, SettingsError
-from orbslam2py.settings.builtin import BUILTIN_NAMES, resolve_settings
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import CameraSettings, Settings
+from orbslam2py.settings import BUILTIN_NAMES, CameraSettings, Sensor, Settings, resolve_settings
 from orbslam2py.trajectory.trajectory import Trajectory
 
 _log = logging.getLogger(__name__)

@@ -19,8 +19,7 @@ from orbslam2py.datasets.images import quiet_opencv
 from orbslam2py.datasets.time_files import stamps_of_rate, stamps_of_seconds
 from orbslam2py.datasets.unposed import UnposedSource, chosen_stamps
 from orbslam2py.errors import DatasetError, ImageError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import Settings
+from orbslam2py.settings import Sensor, Settings
 
 _log = logging.getLogger(__name__)
 

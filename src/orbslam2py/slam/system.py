@@ -20,9 +20,8 @@ from orbslam2py.maps.snapshot import (
     frame_features,
     frame_trajectory,
 )
-from orbslam2py.settings.builtin import resolve_settings
 from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import Settings
+from orbslam2py.settings.settings import Settings, resolve_settings
 from orbslam2py.slam.back_end import BackEnd
 from orbslam2py.slam.events import (
     Callbacks,
@@ -138,7 +137,7 @@ class System(SystemResults):
             vocabulary,
             self._mapping,
             self.sensor,
-            settings.max_frames,
+            settings.max_keyframe_interval,
             initializer=self._initializer(),
             relocalizer=Relocalizer(self._map, back_end.index, seed),
         )

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from orbslam2py.datasets.base import Layout
 from orbslam2py.errors import DatasetError, SettingsError
-from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings import Sensor
 from orbslam2py.trajectory.rotations import quaternions_from_rotations
 
 if TYPE_CHECKING:

@@ -24,8 +24,7 @@ from numpy.typing import NDArray
 from orbslam2py import _core as core
 from orbslam2py.datasets.base import Images, Layout
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import CameraSettings, DepthSettings, OrbSettings, Settings
+from orbslam2py.settings import CameraSettings, DepthSettings, OrbSettings, Sensor, Settings
 from orbslam2py.synthetic.files import write_sequence
 from orbslam2py.synthetic.scenes import LAPS, ROOM_BESIDE, SyntheticWorld, make_scene
 from orbslam2py.trajectory.trajectory import Trajectory
