@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import CameraSettings, OrbSettings, Sensor, Settings
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +29,8 @@ class CameraModel:
         Width and height [pixels]; None if the file does not tell.
     """
 
-    K: Array
-    distortion: Array
+    K: FloatArray
+    distortion: FloatArray
     size: tuple[int, int] | None
 
     def settings(self, fps: float, n_features: int) -> Settings:
@@ -48,7 +47,7 @@ class CameraModel:
         return Settings(Sensor.MONOCULAR, camera, OrbSettings(n_features=n_features))
 
 
-def numbers_of(path: Path, where: str, value: object, count: tuple[int, ...]) -> Array:
+def numbers_of(path: Path, where: str, value: object, count: tuple[int, ...]) -> FloatArray:
     """Make float64 (n,) finite numbers of a value in a file; `count` names the lengths allowed."""
     try:
         found = np.asarray(value, dtype=np.float64).reshape(-1)
@@ -70,7 +69,7 @@ def require_supported(path: Path, what: str, name: object, supported: tuple[str,
         )
 
 
-def checked_camera_matrix(path: Path, K: NDArray[Any]) -> Array:
+def checked_camera_matrix(path: Path, K: NDArray[Any]) -> FloatArray:
     """Check a camera matrix (3, 3): no skew, focal lengths above 0."""
     K = numbers_of(path, "the camera matrix", K, (9,)).reshape(3, 3)
     if K[0, 0] <= 0 or K[1, 1] <= 0:
@@ -80,7 +79,7 @@ def checked_camera_matrix(path: Path, K: NDArray[Any]) -> Array:
     return K
 
 
-def five_coefficients(path: Path, coefficients: NDArray[Any]) -> Array:
+def five_coefficients(path: Path, coefficients: NDArray[Any]) -> FloatArray:
     """Bring 0, 4, 5 or more coefficients to k1, k2, p1, p2, k3; further ones must be zero."""
     given = numbers_of(path, "the distortion", coefficients, ())
     if given.size not in (0, 4, 5, 8, 12, 14):

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import FloatArray
 from orbslam2py.calibration.camera_model import (
     CameraModel,
     checked_camera_matrix,
@@ -31,8 +31,6 @@ from orbslam2py.settings import (
     StereoRectification,
     builtin_settings,
 )
-
-Array = NDArray[np.float64]
 
 
 def parse_yaml(path: Path, text: str) -> Mapping[str, Any]:
@@ -126,7 +124,7 @@ def ros_camera(path: Path, values: Mapping[str, Any]) -> CameraModel:
 
 def _ros_matrix(
     path: Path, values: Mapping[str, Any], names: tuple[str, ...], count: tuple[int, ...]
-) -> Array:
+) -> FloatArray:
     name = next((name for name in names if name in values), None)
     if name is None:
         raise SettingsError(f"{path}: {names[0]} is missing")

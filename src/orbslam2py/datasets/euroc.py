@@ -9,8 +9,8 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import ByteArray
 from orbslam2py._text_lines import content_lines
 from orbslam2py.datasets.base import Images, Layout, Stamps, require_frames
 from orbslam2py.datasets.choose_settings import SettingsChoice
@@ -165,7 +165,7 @@ class EurocSequence(RecordedSequence):
             )
         return self.settings.rectification
 
-    def _read(self, path: Path) -> NDArray[np.uint8]:
+    def _read(self, path: Path) -> ByteArray:
         return read_image(path, rgb=self.settings.camera.rgb)
 
     def _settings_folders(self) -> tuple[Path, ...]:

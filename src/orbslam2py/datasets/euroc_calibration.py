@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import FloatArray
 from orbslam2py.datasets.rectification import rectification_of_pair
 from orbslam2py.errors import DatasetError
 from orbslam2py.settings import (
@@ -20,8 +20,6 @@ from orbslam2py.settings import (
 )
 from orbslam2py.settings.opencv_yaml import Entry, parse_number, read_matrix, scan
 from orbslam2py.trajectory.rotations import inverse_poses, nearest_rotations, poses_from
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,14 +40,14 @@ class SensorCalibration:
         Images per second.
     """
 
-    T_BS: Array
-    intrinsics: Array
-    distortion: Array
+    T_BS: FloatArray
+    intrinsics: FloatArray
+    distortion: FloatArray
     size: tuple[int, int]
     rate: float
 
     @property
-    def camera_matrix(self) -> Array:
+    def camera_matrix(self) -> FloatArray:
         """Camera matrix (3, 3), pixels."""
         fx, fy, cx, cy = self.intrinsics
         return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
@@ -136,14 +134,14 @@ def stereo_settings(left: SensorCalibration, right: SensorCalibration) -> Settin
     )
 
 
-def _matrix(path: Path, entry: Entry) -> Array:
+def _matrix(path: Path, entry: Entry) -> FloatArray:
     try:
         return read_matrix(entry)
     except ValueError as error:
         raise DatasetError(f"{path}:{entry.line}: {error}") from None
 
 
-def _numbers(path: Path, entry: Entry, count: int) -> Array:
+def _numbers(path: Path, entry: Entry, count: int) -> FloatArray:
     items = (entry.value,) if isinstance(entry.value, str) else entry.value
     if not isinstance(items, tuple) or len(items) != count:
         raise DatasetError(f"{path}:{entry.line}: {entry.key} must hold {count} numbers")

@@ -6,9 +6,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from orbslam2py._arrays import FloatArray
 from orbslam2py.datasets.base import Images
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.images import read_image
@@ -98,7 +96,7 @@ class ImageFolder(UnposedSource):
         return len(self.paths)
 
     @property
-    def timestamps(self) -> NDArray[np.float64]:
+    def timestamps(self) -> FloatArray:
         """Time of every frame in seconds, float64 (n,)."""
         return self._stamps.seconds
 

@@ -8,8 +8,8 @@ import re
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py._text_lines import content_lines, number_of
 from orbslam2py.datasets.base import Images, Layout, Stamps, require_frames
 from orbslam2py.datasets.choose_settings import SettingsChoice
@@ -96,7 +96,7 @@ class KittiSequence(RecordedSequence):
             _log.warning("%s holds %d poses for %d frames", path, len(poses), len(self))
         return Trajectory(self.timestamps[:n], poses.T_wc[:n])
 
-    def _read(self, camera: str, index: int) -> NDArray[np.uint8]:
+    def _read(self, camera: str, index: int) -> ByteArray:
         return read_image(self._path(camera, index), rgb=self.settings.camera.rgb)
 
     def _path(self, camera: str, index: int) -> Path:
@@ -170,7 +170,7 @@ def _read_times(path: Path) -> Stamps:
     )
 
 
-def _read_calibration(path: Path) -> dict[str, NDArray[np.float64]]:
+def _read_calibration(path: Path) -> dict[str, FloatArray]:
     """Projection matrices (3, 4) by name; lines with other names (Tr) are left out."""
     projections = {}
     for line in content_lines(path):

@@ -12,8 +12,8 @@ from typing import Any, Protocol
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import ByteArray
 from orbslam2py.datasets.base import Images, LiveFrame
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.images import quiet_opencv
@@ -96,7 +96,7 @@ class LiveCamera(UnposedSource):
         self._thread: threading.Thread | None = None
         # Guards the fields below; notified when one of them changes.
         self._changed = threading.Condition()
-        self._newest: tuple[float, NDArray[np.uint8]] | None = None
+        self._newest: tuple[float, ByteArray] | None = None
         self._n_dropped = 0
         self._failure: str | None = None
         self._stopped = False

@@ -8,8 +8,8 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import FloatArray
 from orbslam2py.datasets.base import (
     Images,
     Layout,
@@ -72,7 +72,7 @@ class RecordedSequence(ABC):
         return len(self._stamps.texts)
 
     @property
-    def timestamps(self) -> NDArray[np.float64]:
+    def timestamps(self) -> FloatArray:
         """Time of every frame in seconds, float64 (n,)."""
         return self._stamps.seconds
 

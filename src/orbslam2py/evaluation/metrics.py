@@ -12,11 +12,11 @@ from enum import Enum
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.errors import DatasetError
 from orbslam2py.trajectory.association import MAX_DIFFERENCE, associate
-from orbslam2py.trajectory.rotations import Array, inverse_poses, rotation_angles
+from orbslam2py.trajectory.rotations import inverse_poses, rotation_angles
 from orbslam2py.trajectory.trajectory import Trajectory
 
 #: Lengths of KITTI's path segments [m].
@@ -51,8 +51,8 @@ class Similarity:
     """
 
     scale: float
-    R: Array
-    t: Array
+    R: FloatArray
+    t: FloatArray
 
     @classmethod
     def identity(cls) -> Similarity:
@@ -63,14 +63,14 @@ class Similarity:
         """Make the transform that undoes this one."""
         return Similarity(1 / self.scale, self.R.T, -(self.R.T @ self.t) / self.scale)
 
-    def apply(self, points: Array) -> Array:
+    def apply(self, points: FloatArray) -> FloatArray:
         """Transform points (n, 3)."""
-        moved: Array = self.scale * points @ self.R.T + self.t
+        moved: FloatArray = self.scale * points @ self.R.T + self.t
         return moved
 
-    def apply_to_poses(self, T_wc: Array) -> Array:
+    def apply_to_poses(self, T_wc: FloatArray) -> FloatArray:
         """Transform camera poses (n, 4, 4): positions as points, orientations turned."""
-        moved: Array = T_wc.copy()
+        moved: FloatArray = T_wc.copy()
         moved[:, :3, :3] = self.R @ T_wc[:, :3, :3]
         moved[:, :3, 3] = self.apply(T_wc[:, :3, 3])
         return moved
@@ -86,7 +86,7 @@ class ErrorStatistics:
     max: float
 
     @classmethod
-    def of(cls, errors: Array) -> ErrorStatistics:
+    def of(cls, errors: FloatArray) -> ErrorStatistics:
         """Take the figures of at least one error (n,)."""
         return cls(
             rmse=float(np.sqrt(np.mean(errors**2))),
@@ -208,7 +208,7 @@ def evaluate_trajectory(
     )
 
 
-def align(points: Array, targets: Array, *, with_scale: bool = False) -> Similarity:
+def align(points: FloatArray, targets: FloatArray, *, with_scale: bool = False) -> Similarity:
     """Find the transform that moves points nearest to their targets (Umeyama, PAMI 1991).
 
     Parameters
@@ -238,8 +238,8 @@ def align(points: Array, targets: Array, *, with_scale: bool = False) -> Similar
 
 
 def relative_errors(
-    estimate: Array, truth: Array, pairs: tuple[NDArray[np.int64], NDArray[np.int64]]
-) -> tuple[Array, Array]:
+    estimate: FloatArray, truth: FloatArray, pairs: tuple[IntArray, IntArray]
+) -> tuple[FloatArray, FloatArray]:
     """Take the errors of motions between pairs of poses.
 
     Parameters
@@ -261,7 +261,7 @@ def relative_errors(
     return np.linalg.norm(error[:, :3, 3], axis=1), rotation_angles(error[:, :3, :3])
 
 
-def one_second_pairs(times: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def one_second_pairs(times: FloatArray) -> tuple[IntArray, IntArray]:
     """Pair every pose with the one nearest to a second later, if there is one within 0.1 s.
 
     Parameters
@@ -281,7 +281,7 @@ def one_second_pairs(times: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]
     return first.astype(np.int64), nearer[first].astype(np.int64)
 
 
-def segment_errors(estimate: Array, truth: Array) -> Array:
+def segment_errors(estimate: FloatArray, truth: FloatArray) -> FloatArray:
     """Take KITTI's errors over path segments of 100 to 800 m.
 
     Segments start at every tenth pose and end at the first pose more than their length further
@@ -294,7 +294,7 @@ def segment_errors(estimate: Array, truth: Array) -> Array:
 
     Returns
     -------
-    Array
+    FloatArray
         (k, 2): translation error per metre of length, and rotation error [rad] per metre.
     """
     steps = np.linalg.norm(np.diff(truth[:, :3, 3], axis=0), axis=1)
@@ -311,7 +311,7 @@ def segment_errors(estimate: Array, truth: Array) -> Array:
 
 def match_poses(
     estimate: Trajectory, truth: Trajectory, max_difference: float = MAX_DIFFERENCE
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+) -> tuple[IntArray, IntArray]:
     """Find which poses belong together by their time stamps.
 
     Returns
@@ -334,7 +334,7 @@ def match_poses(
 
 
 def _relative_statistics(
-    estimate: Array, truth: Array, pairs: tuple[NDArray[np.int64], NDArray[np.int64]]
+    estimate: FloatArray, truth: FloatArray, pairs: tuple[IntArray, IntArray]
 ) -> tuple[ErrorStatistics | None, ErrorStatistics | None]:
     if not len(pairs[0]):
         return None, None

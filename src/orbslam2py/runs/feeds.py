@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import TypeGuard
 
 import numpy as np
-import numpy.typing as npt
 
+from orbslam2py._arrays import FloatArray
 from orbslam2py.datasets.base import Images, LiveSource, Sequence
 from orbslam2py.runs.prefetch import Prefetcher
 
@@ -117,9 +117,7 @@ def is_sequence(source: Sequence | LiveSource) -> TypeGuard[Sequence]:
 class _Clock:
     """Plays time stamps: a frame is dropped when the next one has come before it was taken."""
 
-    def __init__(
-        self, timestamps: npt.NDArray[np.float64], indices: list[int], stop: threading.Event
-    ) -> None:
+    def __init__(self, timestamps: FloatArray, indices: list[int], stop: threading.Event) -> None:
         self._due = np.asarray(timestamps)[indices]
         self._stop = stop
         self._offset: float | None = None

@@ -22,14 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbslam2py import _core as core
+from orbslam2py._arrays import ByteArray, FloatArray, IntArray
 from orbslam2py.datasets.base import Images, Layout
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import CameraSettings, DepthSettings, OrbSettings, Sensor, Settings
 from orbslam2py.synthetic.files import write_sequence
 from orbslam2py.synthetic.scenes import LAPS, ROOM_BESIDE, SyntheticWorld, make_scene
 from orbslam2py.trajectory.trajectory import Trajectory
-
-Array = NDArray[np.float64]
 
 #: Units of the depth images per metre, as in the TUM RGB-D data sets.
 DEPTH_PER_METRE = 5000.0
@@ -150,7 +149,7 @@ class SyntheticSequence:
         self._n_frames = options.frames or self._frames_of_whole_way()
         nanoseconds = np.arange(self._n_frames, dtype=np.float64) * (1e9 / self._fps)
         #: Time stamps, int64 (n,), nanoseconds from the start.
-        self.nanoseconds: NDArray[np.int64] = np.rint(nanoseconds).astype(np.int64)
+        self.nanoseconds: IntArray = np.rint(nanoseconds).astype(np.int64)
 
     @property
     def _size(self) -> tuple[int, int]:
@@ -180,7 +179,7 @@ class SyntheticSequence:
         return Sensor(self.options.sensor)
 
     @cached_property
-    def timestamps(self) -> Array:
+    def timestamps(self) -> FloatArray:
         """Seconds from the start, (n,)."""
         return np.asarray(self.nanoseconds / 1e9)
 
@@ -250,7 +249,7 @@ class SyntheticSequence:
         way = self._scene.way
         return way.length() if way is not None and self._world in LAPS else None
 
-    def T_wc(self, index: int) -> Array:
+    def T_wc(self, index: int) -> FloatArray:
         """Exact pose of the (left) camera, camera to world, (4, 4)."""
         if not 0 <= index < len(self):
             raise IndexError(f"frame {index} of {len(self)}")
@@ -258,7 +257,7 @@ class SyntheticSequence:
         yaw = math.radians(self.options.yaw)
         return self._scene.T_wc(seconds, self._speed, self.options.lateral, yaw)
 
-    def view(self, T_wc: Array, number: int = 0, *, exposure: float | None = None) -> Images:
+    def view(self, T_wc: FloatArray, number: int = 0, *, exposure: float | None = None) -> Images:
         """Render the images seen from anywhere.
 
         Parameters
@@ -326,8 +325,8 @@ class SyntheticSequence:
         return self._scene.make_world(self.options.seed)
 
     def _render(
-        self, T_wc: Array, number: int, exposure: float | None
-    ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        self, T_wc: FloatArray, number: int, exposure: float | None
+    ) -> tuple[ByteArray, NDArray[np.float32]]:
         T_cw = np.eye(4)
         T_cw[:3, :3] = T_wc[:3, :3].T
         T_cw[:3, 3] = -T_wc[:3, :3].T @ T_wc[:3, 3]

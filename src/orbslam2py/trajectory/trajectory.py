@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._files import atomic_write
 from orbslam2py._text_lines import content_lines, numbers_of
 from orbslam2py.errors import DatasetError
 from orbslam2py.trajectory.rotations import (
-    Array,
     nearest_rotations,
     poses_from,
     quaternions_from_rotations,
@@ -40,10 +40,10 @@ class Trajectory:
         Number of the input frame of each pose, int64 (n,).
     """
 
-    timestamps: NDArray[np.float64]
-    T_wc: NDArray[np.float64]
+    timestamps: FloatArray
+    T_wc: FloatArray
     lost: NDArray[np.bool_] = None  # type: ignore[assignment]  # filled in below
-    indices: NDArray[np.int64] = None  # type: ignore[assignment]
+    indices: IntArray = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         n = len(self.timestamps)
@@ -64,7 +64,7 @@ class Trajectory:
         return len(self.timestamps)
 
     @property
-    def positions(self) -> NDArray[np.float64]:
+    def positions(self) -> FloatArray:
         """Camera centres in the world, (n, 3)."""
         return self.T_wc[:, :3, 3]
 
@@ -179,7 +179,7 @@ def read_tum(path: str | Path) -> Trajectory:
     return Trajectory(table[:, 0], _poses(path, table[:, 1:4], table[:, 4:8]))
 
 
-def read_kitti(path: str | Path, timestamps: NDArray[np.float64] | None = None) -> Trajectory:
+def read_kitti(path: str | Path, timestamps: FloatArray | None = None) -> Trajectory:
     """Read 12 numbers per line, the upper three rows of ``T_wc``.
 
     Parameters
@@ -276,7 +276,7 @@ def _recognise_format(path: str | Path) -> TrajectoryFormat:
     return by_count[len(first.fields)]
 
 
-def _table(path: str | Path, rows: list[list[float]], columns: int) -> Array:
+def _table(path: str | Path, rows: list[list[float]], columns: int) -> FloatArray:
     table = np.array(rows, dtype=np.float64).reshape(-1, columns)
     if not np.isfinite(table).all():
         bad = int(np.flatnonzero(~np.isfinite(table).all(axis=1))[0])
@@ -284,7 +284,7 @@ def _table(path: str | Path, rows: list[list[float]], columns: int) -> Array:
     return table
 
 
-def _poses(path: str | Path, positions: Array, quaternions: Array) -> Array:
+def _poses(path: str | Path, positions: FloatArray, quaternions: FloatArray) -> FloatArray:
     norms = np.linalg.norm(quaternions, axis=1)
     if np.any(norms < 1e-6):
         raise DatasetError(f"{path}: the quaternion of pose {int(norms.argmin())} is zero")

@@ -23,9 +23,9 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from orbslam2py import _core as core
+from orbslam2py._arrays import ByteArray
 from orbslam2py.errors import ImageError, VocabularyError
 from orbslam2py.vocabulary import _textio
 from orbslam2py.vocabulary.files import Progress, VocabularyFormat, detect_format, read_nodes
@@ -352,20 +352,20 @@ def _describe_images(
     features: core.OrbOptions,
     options: core.TrainingOptions,
     report: Callable[[str, float], object],
-) -> list[npt.NDArray[np.uint8]] | None:
+) -> list[ByteArray] | None:
     """Descriptors of every image, in order; None when cancelled."""
     of_thread = threading.local()
 
-    def describe(path: Path) -> npt.NDArray[np.uint8]:
+    def describe(path: Path) -> ByteArray:
         if not hasattr(of_thread, "extractor"):
             of_thread.extractor = core.OrbExtractor(features)
         image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
         if image is None:
             raise ImageError(f"{path}: cannot be read as an image")
-        descriptors: npt.NDArray[np.uint8] = of_thread.extractor.extract(image).descriptors
+        descriptors: ByteArray = of_thread.extractor.extract(image).descriptors
         return descriptors
 
-    results: list[npt.NDArray[np.uint8]] = []
+    results: list[ByteArray] = []
     pool = ThreadPoolExecutor(options.n_threads or os.cpu_count() or 1)
     try:
         for descriptors in pool.map(describe, paths):
