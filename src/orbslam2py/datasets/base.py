@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py.errors import DatasetError
 from orbslam2py.settings import Sensor, Settings
-from orbslam2py.trajectory.trajectory import Trajectory
+from orbslam2py.trajectory import Trajectory
 
 _log = logging.getLogger(__name__)
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from orbslam2py._arrays import ByteArray
+from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py._text_lines import content_lines
 from orbslam2py.datasets.base import Images, Layout, Stamps, require_frames
 from orbslam2py.datasets.choose_settings import SettingsChoice
@@ -24,11 +25,9 @@ from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.datasets.rectification import Rectifier
 from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.settings import Sensor, Settings, StereoRectification
-from orbslam2py.trajectory.trajectory import Trajectory, read_euroc
+from orbslam2py.trajectory import Trajectory, read_euroc
 
 _log = logging.getLogger(__name__)
-
-_IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 
 def find_root(folder: Path) -> Path | None:
@@ -211,7 +210,7 @@ def _list_images(camera: Path) -> _CameraList:
 
 
 def _guess_path(camera: Path, stamp: str) -> Path:
-    candidates = [camera / "data" / (stamp + suffix) for suffix in _IMAGE_SUFFIXES]
+    candidates = [camera / "data" / (stamp + suffix) for suffix in IMAGE_SUFFIXES]
     return next((path for path in candidates if path.is_file()), candidates[0])
 
 
@@ -222,6 +221,6 @@ def _list_folder(folder: Path) -> _CameraList:
     found = sorted(
         (int(path.stem), path)
         for path in folder.iterdir()
-        if path.suffix.lower() in _IMAGE_SUFFIXES and path.stem.isdigit()
+        if path.suffix.lower() in IMAGE_SUFFIXES and path.stem.isdigit()
     )
     return _CameraList(folder, dict(found), {stamp: k for k, (stamp, _) in enumerate(found, 1)})

@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 from orbslam2py._arrays import FloatArray
+from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.datasets.base import Images
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.images import read_image
@@ -14,9 +15,6 @@ from orbslam2py.datasets.unposed import UnposedSource, chosen_stamps
 from orbslam2py.errors import DatasetError
 from orbslam2py.settings import Sensor, Settings
 
-IMAGE_SUFFIXES = frozenset(
-    {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm", ".jp2"}
-)
 _SETTINGS_FILE = "settings.yaml"
 
 

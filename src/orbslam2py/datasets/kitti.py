@@ -24,7 +24,7 @@ from orbslam2py.settings import (
     Settings,
     builtin_settings,
 )
-from orbslam2py.trajectory.trajectory import Trajectory, read_kitti
+from orbslam2py.trajectory import Trajectory, read_kitti
 
 _log = logging.getLogger(__name__)
 

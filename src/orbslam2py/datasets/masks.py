@@ -14,7 +14,7 @@ from orbslam2py.datasets.image_folder import image_files
 from orbslam2py.datasets.images import read_image
 from orbslam2py.errors import DatasetError, ImageError
 from orbslam2py.settings import Sensor, Settings
-from orbslam2py.trajectory.trajectory import Trajectory
+from orbslam2py.trajectory import Trajectory
 
 
 class StaticMask:

@@ -18,7 +18,7 @@ from orbslam2py.datasets.base import (
 )
 from orbslam2py.datasets.choose_settings import SettingsChoice, choose_settings
 from orbslam2py.settings import Sensor, Settings, resolve_settings
-from orbslam2py.trajectory.trajectory import Trajectory
+from orbslam2py.trajectory import Trajectory
 
 
 class RecordedSequence(ABC):

@@ -16,7 +16,7 @@ from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.time_files import read_time_file, stamps_of_rate
 from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.settings import BUILTIN_NAMES, CameraSettings, Sensor, Settings, resolve_settings
-from orbslam2py.trajectory.trajectory import Trajectory
+from orbslam2py.trajectory import Trajectory
 
 _log = logging.getLogger(__name__)
 

@@ -12,9 +12,9 @@ import cv2
 import numpy as np
 
 from orbslam2py._arrays import ByteArray, FloatArray
+from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.datasets.base import Images, Stamps
 from orbslam2py.datasets.choose_settings import SettingsChoice
-from orbslam2py.datasets.image_folder import IMAGE_SUFFIXES
 from orbslam2py.datasets.images import quiet_opencv
 from orbslam2py.datasets.time_files import stamps_of_rate, stamps_of_seconds
 from orbslam2py.datasets.unposed import UnposedSource, chosen_stamps

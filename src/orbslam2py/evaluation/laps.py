@@ -12,9 +12,9 @@ import numpy as np
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import DatasetError
-from orbslam2py.evaluation.metrics import Similarity, align, match_poses, relative_errors
-from orbslam2py.trajectory.association import MAX_DIFFERENCE
-from orbslam2py.trajectory.trajectory import Trajectory
+from orbslam2py.evaluation.alignment import Similarity, align, match_poses
+from orbslam2py.evaluation.metrics import relative_errors
+from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.slam.records import FrameFeatures
-from orbslam2py.trajectory.trajectory import Trajectory
+from orbslam2py.trajectory import Trajectory
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,8 @@ from orbslam2py.runs.plots import draw_trajectory
 from orbslam2py.runs.report import RunEvaluation
 from orbslam2py.runs.result import FrameRow, RunResult
 from orbslam2py.settings.sensor import Sensor
+from orbslam2py.trajectory import Trajectory, write_kitti, write_tum
 from orbslam2py.trajectory.rotations import quaternions_from_rotations
-from orbslam2py.trajectory.trajectory import Trajectory, write_kitti, write_tum
 
 _log = logging.getLogger(__name__)
 

@@ -28,7 +28,7 @@ from orbslam2py.errors import SettingsError
 from orbslam2py.settings import CameraSettings, DepthSettings, OrbSettings, Sensor, Settings
 from orbslam2py.synthetic.files import write_sequence
 from orbslam2py.synthetic.scenes import LAPS, ROOM_BESIDE, SyntheticWorld, make_scene
-from orbslam2py.trajectory.trajectory import Trajectory
+from orbslam2py.trajectory import Trajectory
 
 #: Units of the depth images per metre, as in the TUM RGB-D data sets.
 DEPTH_PER_METRE = 5000.0
