@@ -15,9 +15,9 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py.calibration.camera_model import (
     CameraModel,
     checked_camera_matrix,
+    checked_numbers,
     checked_size,
     five_coefficients,
-    numbers_of,
     require_supported,
 )
 from orbslam2py.datasets.rectification import rectification_of_pair
@@ -69,8 +69,8 @@ def kalibr_settings(
         return _kalibr_camera(path, name, document[name]).settings(fps, n_features)
     left, right = (_kalibr_camera(path, name, document[name]) for name in names[:2])
     where = f"{names[1]}."
-    T = numbers_of(path, f"{where}T_cn_cnm1", _value(path, where, document[names[1]], "T_cn_cnm1"),
-                 (16,)).reshape(4, 4)  # fmt: skip
+    given = _value(path, where, document[names[1]], "T_cn_cnm1")
+    T = checked_numbers(path, f"{where}T_cn_cnm1", given, (16,)).reshape(4, 4)
     if np.abs(T[:3, :3] @ T[:3, :3].T - np.eye(3)).max() > 1e-3:
         raise SettingsError(f"{path}: {where}T_cn_cnm1 is no 4 x 4 rigid transform")
     if left.size is None or left.size != right.size:
@@ -90,16 +90,16 @@ def _kalibr_camera(path: Path, name: str, values: object) -> CameraModel:
     distortion_model = values.get("distortion_model", "none")
     require_supported(path, f"{where}distortion_model", distortion_model, ("radtan", "none"))
     intrinsics = _value(path, where, values, "intrinsics")
-    fx, fy, cx, cy = numbers_of(path, f"{where}intrinsics", intrinsics, (4,))
+    fx, fy, cx, cy = checked_numbers(path, f"{where}intrinsics", intrinsics, (4,))
     coefficients = np.zeros(0)
     if distortion_model == "radtan":
         given = _value(path, where, values, "distortion_coeffs")
-        coefficients = numbers_of(path, f"{where}distortion_coeffs", given, (4,))
+        coefficients = checked_numbers(path, f"{where}distortion_coeffs", given, (4,))
     resolution = _value(path, where, values, "resolution")
     return CameraModel(
         np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]),
         five_coefficients(path, coefficients),
-        checked_size(path, numbers_of(path, f"{where}resolution", resolution, (2,)).tolist()),
+        checked_size(path, checked_numbers(path, f"{where}resolution", resolution, (2,)).tolist()),
     )
 
 
@@ -118,7 +118,9 @@ def ros_camera(path: Path, values: Mapping[str, Any]) -> CameraModel:
         five_coefficients(
             path, _ros_matrix(path, values, ("distortion_coefficients", "D", "d"), ())
         ),
-        checked_size(path, numbers_of(path, "image_width and image_height", size, (2,)).tolist()),
+        checked_size(
+            path, checked_numbers(path, "image_width and image_height", size, (2,)).tolist()
+        ),
     )
 
 
@@ -131,7 +133,7 @@ def _ros_matrix(
     value = values[name]
     if isinstance(value, Mapping):
         value = _value(path, f"{name}.", value, "data")
-    return numbers_of(path, name, value, count)
+    return checked_numbers(path, name, value, count)
 
 
 def ros_pair_settings(

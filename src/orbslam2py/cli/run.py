@@ -15,7 +15,7 @@ from rich.table import Table
 
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.interrupts import StopOnInterrupt
-from orbslam2py.datasets import open_source
+from orbslam2py.datasets import open_input
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.runs.outputs import OutputWriter, link_latest, prepare_output_folder
 from orbslam2py.runs.report import evaluate_run, make_report
@@ -129,7 +129,7 @@ def run(
 ) -> None:
     """Track a recorded sequence, a video or a camera; write trajectory, map and report."""
     log_to(Console(stderr=True), quiet=quiet)  # opening warns already
-    images = open_source(sequence, sensor, settings=settings, fps=fps, times=times, mask=mask)
+    images = open_input(sequence, sensor, settings=settings, fps=fps, times=times, mask=mask)
     options = RunOptions(
         *(sensor, deterministic, realtime, start, stride, max_frames, seed, localize),
         loop_closing=loop_closing,

@@ -3,13 +3,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import json
-import os
-import secrets
-import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from orbslam2py._files import atomic_folder
 from orbslam2py.datasets.base import Layout
 from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.settings import Sensor
@@ -74,10 +71,12 @@ def write_sequence(
         Layout.KITTI: _write_kitti,
         Layout.EUROC: _write_euroc,
     }
-    with _replaced_at_the_end(folder, force=force) as temporary:
+    _check_replaceable(folder, force=force)
+    with atomic_folder(folder) as temporary:
         writers[chosen](sequence, temporary, progress or (lambda done, total: None))
         about: dict[str, Any] = dataclasses.asdict(sequence.options) | {"layout": str(chosen)}
         _write_text(temporary / MARKER, [json.dumps(about, indent=2, default=str)])
+        _check_replaceable(folder, force=force)  # writing takes long: it may have been filled
     return folder
 
 
@@ -186,29 +185,6 @@ def _sensor_yaml(sequence: SyntheticSequence, number: int) -> list[str]:
 
 
 # ---- files ---------------------------------------------------------------------------------------
-
-
-@contextlib.contextmanager
-def _replaced_at_the_end(folder: Path, *, force: bool) -> Iterator[Path]:
-    """Yield a temporary folder that takes the place of `folder` if the block ends well."""
-    _check_replaceable(folder, force=force)
-    target = Path(os.path.realpath(folder))
-    token = secrets.token_hex(4)
-    temporary = target.with_name(f".{target.name}.{token}.tmp")
-    temporary.mkdir(parents=True)
-    try:
-        yield temporary
-        _check_replaceable(folder, force=force)
-        if target.exists() and any(target.iterdir()):
-            old = target.with_name(f".{target.name}.{token}.old")
-            target.replace(old)
-            temporary.replace(target)
-            shutil.rmtree(old)
-        else:
-            temporary.replace(target)
-    except BaseException:
-        shutil.rmtree(temporary, ignore_errors=True)
-        raise
 
 
 def _check_replaceable(folder: Path, *, force: bool) -> None:

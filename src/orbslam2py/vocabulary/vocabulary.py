@@ -18,10 +18,12 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 
 from orbslam2py import _core as core
+from orbslam2py._files import atomic_write
 from orbslam2py.errors import VocabularyError
 from orbslam2py.vocabulary import _textio
 from orbslam2py.vocabulary.files import Progress, VocabularyFormat, detect_format, read_nodes
@@ -160,9 +162,11 @@ def save_vocabulary(
     if target.suffix == ".bvoc":
         vocabulary.save(str(target), comment, core.VocabularySource())
     elif target.suffix == ".txt":
-        _write_text(vocabulary, target, Path.open, progress)
+        _write_text(vocabulary, target, contextlib.nullcontext, progress)
     elif target.name.endswith(".txt.gz"):
-        _write_text(vocabulary, target, gzip.GzipFile, progress)
+        _write_text(
+            vocabulary, target, lambda file: gzip.GzipFile(fileobj=file, mode="wb"), progress
+        )
     else:
         raise VocabularyError(f"{target}: the name must end with .bvoc, .txt or .txt.gz")
     if progress is not None:
@@ -172,7 +176,7 @@ def save_vocabulary(
 def _write_text(
     vocabulary: core.Vocabulary,
     target: Path,
-    opener: Callable[[Path, str], AbstractContextManager[_textio._Target]],
+    packed: Callable[[IO[bytes]], AbstractContextManager[_textio._Target]],
     progress: Progress | None,
 ) -> None:
     header = (
@@ -182,16 +186,12 @@ def _write_text(
         int(vocabulary.weighting),
     )
     report = None if progress is None else lambda n: progress(n / vocabulary.n_nodes)
-    part = target.with_name(f"{target.name}.part{os.getpid()}")
     try:
-        with opener(part, "wb") as file:
-            _textio.write_vocabulary_text(file, header, vocabulary.table(), report)
-        part.replace(target)
+        with atomic_write(target, binary=True) as file, packed(file) as text:
+            _textio.write_vocabulary_text(text, header, vocabulary.table(), report)
     except OSError as error:
-        raise VocabularyError(f"{target}: cannot be written: {error.strerror}") from error
-    finally:
-        with contextlib.suppress(OSError):
-            part.unlink()
+        reason = os.strerror(error.errno) if error.errno else str(error)
+        raise VocabularyError(f"{target}: cannot be written: {reason}") from error
 
 
 def convert_vocabulary(

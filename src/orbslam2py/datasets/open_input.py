@@ -16,7 +16,7 @@ from orbslam2py.errors import DatasetError
 from orbslam2py.settings import Sensor
 
 
-def open_source(
+def open_input(
     source: str | Path | int,
     sensor: Sensor | None = None,
     *,
