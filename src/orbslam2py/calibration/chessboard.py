@@ -12,9 +12,9 @@ import cv2
 import numpy as np
 
 from orbslam2py._arrays import ByteArray, FloatArray
+from orbslam2py.datasets import VideoReader
 from orbslam2py.datasets.image_folder import image_files
 from orbslam2py.datasets.images import read_image
-from orbslam2py.datasets.video import VideoReader
 from orbslam2py.errors import DatasetError, ImageError, SettingsError
 
 _log = logging.getLogger(__name__)

@@ -11,7 +11,7 @@ import typer
 from orbslam2py.cli.run import run_and_write
 from orbslam2py.runs.result import RunOptions
 from orbslam2py.settings import Sensor
-from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
 DEFAULT_OUTPUT = Path("runs/demo")
 

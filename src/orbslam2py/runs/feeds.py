@@ -12,7 +12,7 @@ from typing import TypeGuard
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
-from orbslam2py.datasets.base import Images, LiveSource, Sequence
+from orbslam2py.datasets import Images, LiveSource, Sequence
 from orbslam2py.runs.prefetch import Prefetcher
 
 #: Seconds between two looks at whether the run was stopped.
