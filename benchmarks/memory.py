@@ -21,7 +21,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from orbslam2py.settings.settings import OrbSettings
+from orbslam2py.settings import OrbSettings
 from orbslam2py.slam.system import System
 from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
 

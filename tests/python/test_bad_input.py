@@ -20,7 +20,7 @@ from command_line import CommandLine, Outcome, Results
 from orbslam2py import _core, _files
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
-from orbslam2py.trajectory.trajectory import read_tum
+from orbslam2py.trajectory import read_tum
 
 pytestmark = pytest.mark.watchdog(40)
 

@@ -16,8 +16,8 @@ from orbslam2py.calibration.camera_files import CameraFileFormat, read_camera_fi
 from orbslam2py.calibration.chessboard import Board, BoardViews, choose_views, find_views
 from orbslam2py.cli.app import app
 from orbslam2py.errors import DatasetError, ImageError, SettingsError
+from orbslam2py.settings import CameraSettings, Settings
 from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import CameraSettings, Settings
 
 BOARD = Board(chessboards.COLUMNS, chessboards.ROWS, chessboards.SQUARE)
 

@@ -20,7 +20,7 @@ from orbslam2py.datasets import (
     recognise,
 )
 from orbslam2py.errors import DatasetError, ImageError, SettingsError
-from orbslam2py.settings.builtin import builtin_settings
+from orbslam2py.settings import builtin_settings
 from orbslam2py.settings.sensor import Sensor
 
 SIZE = (48, 64)  # rows, columns

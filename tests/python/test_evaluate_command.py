@@ -17,7 +17,7 @@ from orbslam2py.cli import main
 from orbslam2py.cli.evaluate import evaluate
 from orbslam2py.errors import DatasetError
 from orbslam2py.evaluation.metrics import Alignment, evaluate_trajectory
-from orbslam2py.trajectory.trajectory import Trajectory, write_kitti, write_tum
+from orbslam2py.trajectory import Trajectory, write_kitti, write_tum
 
 
 def wander(n: int, seed: int = 0, rate: float = 10.0) -> Trajectory:

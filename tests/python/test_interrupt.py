@@ -16,7 +16,7 @@ import pytest
 
 from command_line import Results
 from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
-from orbslam2py.trajectory.trajectory import read_tum
+from orbslam2py.trajectory import read_tum
 from watchdog import watchdog
 
 N = 30

@@ -22,7 +22,7 @@ from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.records import Reason, TrackingRecord, TrackingState
 from orbslam2py.slam.system import System
 from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
-from orbslam2py.trajectory.trajectory import Trajectory, write_tum
+from orbslam2py.trajectory import Trajectory, write_tum
 from watchdog import watchdog
 
 OPTIONS = SyntheticOptions(world="corridor", sensor="mono", size=(320, 240), noise=1)

@@ -10,9 +10,9 @@ import pytest
 
 from orbslam2py.datasets import Layout, open_sequence
 from orbslam2py.errors import DatasetError
-from orbslam2py.settings.builtin import builtin_settings
+from orbslam2py.settings import builtin_settings
 from orbslam2py.settings.sensor import Sensor
-from orbslam2py.trajectory.trajectory import read_tum
+from orbslam2py.trajectory import read_tum
 
 pytestmark = pytest.mark.shared
 
@@ -68,7 +68,7 @@ def test_calibrated_and_builtin_kitti_agree(shared_data: Path) -> None:
     builtin = builtin_settings("kitti06", Sensor.STEREO)
     assert own.camera.matrix == pytest.approx(builtin.camera.matrix)
     assert own.camera.bf == builtin.camera.bf
-    assert own.max_frames == 10
+    assert own.max_keyframe_interval == 10
 
 
 def test_calibrated_and_builtin_euroc_nearly_agree(shared_data: Path) -> None:

@@ -19,7 +19,7 @@ from command_line import CommandLine, Results
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
 from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
-from orbslam2py.trajectory.trajectory import read_tum
+from orbslam2py.trajectory import read_tum
 
 pytestmark = pytest.mark.watchdog(40)
 

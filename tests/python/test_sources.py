@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from orbslam2py._timing import StageTimer
 from orbslam2py.cli.app import app
 from orbslam2py.datasets import (
     ImageFolder,
@@ -25,16 +26,15 @@ from orbslam2py.datasets import (
     VideoReader,
     VideoSequence,
     live,
-    open_source,
+    open_input,
 )
 from orbslam2py.datasets.image_folder import natural_key
 from orbslam2py.datasets.time_files import read_time_file
 from orbslam2py.errors import DatasetError, ImageError, OrbSlamError, SettingsError, StateError
-from orbslam2py.settings.builtin import builtin_settings
+from orbslam2py.settings import builtin_settings
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
 from orbslam2py.slam.front_end import FrontEnd
-from orbslam2py._timing import StageTimer
 
 MONO = Sensor.MONOCULAR
 SIZE = (96, 128)  # rows, columns
@@ -134,13 +134,13 @@ def test_bad_videos(tmp_path: Path, video: Path, folder: Path) -> None:
         VideoSequence(bad, settings="tum1")
     bad.write_bytes(b"")
     with pytest.raises(DatasetError, match=r"bad\.mp4 is no video"):
-        open_source(bad, MONO, settings="tum1")
+        open_input(bad, MONO, settings="tum1")
     with pytest.raises(DatasetError, match="is an image, no video; give the folder"):
-        open_source(folder / "1.png", MONO, settings="tum1")
+        open_input(folder / "1.png", MONO, settings="tum1")
     empty = tmp_path / "empty.avi"
     cv2.VideoWriter(str(empty), cv2.VideoWriter_fourcc(*"MJPG"), 25, SIZE[::-1]).release()
     with pytest.raises(DatasetError, match=r"empty\.avi .*(no frames|no video)"):
-        open_source(empty, MONO, settings="tum1")
+        open_input(empty, MONO, settings="tum1")
     with pytest.raises(SettingsError, match="orbslam2py calibrate"):
         VideoSequence(video)
     with pytest.raises(DatasetError, match="no stereo images; it can be used as: mono"):
@@ -172,7 +172,7 @@ def test_first_image_tells_that_the_settings_do_not_fit(
 
 
 def test_image_folder_sorts_naturally(folder: Path) -> None:
-    sequence: Sequence = open_source(folder, MONO, settings="tum1")  # type: ignore[assignment]
+    sequence: Sequence = open_input(folder, MONO, settings="tum1")  # type: ignore[assignment]
     assert isinstance(sequence, ImageFolder)
     assert (sequence.name, sequence.layout, len(sequence)) == ("walk", "images", 12)
     assert [path.name for path in sequence.paths] == [f"{k}.png" for k in range(1, 13)]
@@ -197,9 +197,9 @@ def test_bad_image_folders(folder: Path, tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match="no images in"):
         ImageFolder(tmp_path / "empty", settings="tum1")
     with pytest.raises(DatasetError, match=r"did you mean .*walk"):
-        open_source(tmp_path, MONO, settings="tum1")
+        open_input(tmp_path, MONO, settings="tum1")
     with pytest.raises(DatasetError, match="does not exist"):
-        open_source(tmp_path / "nowhere", MONO, settings="tum1")
+        open_input(tmp_path / "nowhere", MONO, settings="tum1")
     with pytest.raises(DatasetError, match="cannot list"):
         ImageFolder(tmp_path / "nowhere", settings="tum1")
     (folder / "3.png").write_bytes(b"")
@@ -212,11 +212,11 @@ def test_options_that_a_known_layout_does_not_take(tmp_path: Path) -> None:
     tum.mkdir()
     cv2.imwrite(str(tum / "a.png"), coloured(1))
     (tum / "rgb.txt").write_text("1.0 a.png\n")
-    assert isinstance(open_source(tum, MONO), TumSequence)
+    assert isinstance(open_input(tum, MONO), TumSequence)
     with pytest.raises(DatasetError, match=r"--fps is for .*is tum"):
-        open_source(tum, MONO, fps=20)
+        open_input(tum, MONO, fps=20)
     with pytest.raises(DatasetError, match=r"--times is for .*is tum"):
-        open_source(tum, MONO, times=tum / "rgb.txt")
+        open_input(tum, MONO, times=tum / "rgb.txt")
 
 
 # ---- time stamps ---------------------------------------------------------------------------------
@@ -274,7 +274,7 @@ def mask_image(value: int = 0, size: tuple[int, int] = SIZE) -> np.ndarray:
 
 def test_one_mask_for_all(folder: Path, tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "mask.png"), mask_image())
-    sequence: Sequence = open_source(  # type: ignore[assignment]
+    sequence: Sequence = open_input(  # type: ignore[assignment]
         folder, MONO, settings="tum1", mask=tmp_path / "mask.png"
     )
     assert isinstance(sequence, MaskedSequence)
@@ -493,12 +493,12 @@ def test_number_that_is_no_file_is_a_camera(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(DatasetError, match="camera 97 cannot be opened"):
-        open_source("97", MONO, settings="tum1")
+        open_input("97", MONO, settings="tum1")
     with pytest.raises(DatasetError, match="--times does not go with a camera"):
-        open_source(97, MONO, settings="tum1", times="t.txt")
+        open_input(97, MONO, settings="tum1", times="t.txt")
     (tmp_path / "97").mkdir()
     cv2.imwrite(str(tmp_path / "97" / "a.png"), coloured(1))
-    assert open_source("97", MONO, settings="tum1").layout == "images"
+    assert open_input("97", MONO, settings="tum1").layout == "images"
 
 
 def test_camera_with_a_mask(tmp_path: Path) -> None:

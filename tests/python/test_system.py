@@ -18,7 +18,7 @@ from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.records import Reason, TrackingState
 from orbslam2py.slam.system import System
 from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
-from orbslam2py.trajectory.trajectory import write_tum
+from orbslam2py.trajectory import write_tum
 from small_sequences import ate, images, new_system, play, track
 
 pytestmark = pytest.mark.watchdog(30)
@@ -105,7 +105,7 @@ import sys
 from pathlib import Path
 from small_sequences import new_system, play
 from orbslam2py.settings.sensor import Sensor
-from orbslam2py.trajectory.trajectory import write_tum
+from orbslam2py.trajectory import write_tum
 
 with new_system(Sensor(sys.argv[1]), deterministic=True) as system:
     play(system, 50)

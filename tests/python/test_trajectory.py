@@ -16,14 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from orbslam2py._files import atomic_write
 from orbslam2py.errors import DatasetError
-from orbslam2py.trajectory.rotations import (
-    inverse_poses,
-    nearest_rotations,
-    quaternions_from_rotations,
-    rotation_angles,
-    rotations_from_quaternions,
-)
-from orbslam2py.trajectory.trajectory import (
+from orbslam2py.trajectory import (
     Trajectory,
     TrajectoryFormat,
     read_euroc,
@@ -32,6 +25,13 @@ from orbslam2py.trajectory.trajectory import (
     read_tum,
     write_kitti,
     write_tum,
+)
+from orbslam2py.trajectory.rotations import (
+    inverse_poses,
+    nearest_rotations,
+    quaternions_from_rotations,
+    rotation_angles,
+    rotations_from_quaternions,
 )
 
 

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 
 from orbslam2py import _core as core
 from orbslam2py.errors import ImageError, SettingsError, VocabularyError
-from orbslam2py.vocabulary.vocabulary import (
+from orbslam2py.vocabulary import (
     ENVIRONMENT_VARIABLE,
     VocabularyFormat,
     convert_vocabulary,

@@ -1,16 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How far an estimate is from the truth: alignment, absolute and relative errors, laps."""
 
+from orbslam2py.evaluation.alignment import Alignment, Similarity, align, match_poses
 from orbslam2py.evaluation.laps import LapError, lap_error, scale_drift
 from orbslam2py.evaluation.metrics import (
     SEGMENT_LENGTHS,
-    Alignment,
     ErrorStatistics,
     Evaluation,
-    Similarity,
-    align,
     evaluate_trajectory,
-    match_poses,
     one_second_pairs,
     relative_errors,
     segment_errors,

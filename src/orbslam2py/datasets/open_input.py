@@ -13,10 +13,10 @@ from orbslam2py.datasets.masks import MaskedCamera, MaskedSequence
 from orbslam2py.datasets.recognise import has_layout, open_sequence
 from orbslam2py.datasets.video import VideoSequence
 from orbslam2py.errors import DatasetError
-from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings import Sensor
 
 
-def open_source(
+def open_input(
     source: str | Path | int,
     sensor: Sensor | None = None,
     *,
