@@ -162,7 +162,7 @@ class EventDispatcher:
     def post(self, event: Event) -> None:
         """Queue an event for the function that listens to its type; nothing if there is none."""
         listener = self._listeners[type(event)]
-        if listener is None or self.worker.ended:
+        if listener is None:
             return
 
         def deliver() -> None:
@@ -171,4 +171,4 @@ class EventDispatcher:
             except Exception:
                 _log.exception("a callback failed on %s", type(event).__name__)
 
-        self.worker.submit(deliver)
+        self.worker.offer(deliver)  # a shutdown ends the deliveries
