@@ -4,23 +4,17 @@
 from __future__ import annotations
 
 import gc
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from interleaving import LIMIT, Stage
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.system import System
-from small_sequences import new_system, play
-from watchdog import watchdog, worker_threads
-
-_CHECKOUT = Path(__file__).resolve().parents[2]
-
-
-def _shared_folder() -> Path:
-    return Path(os.environ.get("ORBSLAM2PY_SHARED", _CHECKOUT.parent / "shared"))
+from support.data import shared_folder
+from support.interleaving import LIMIT, Stage
+from support.small_sequences import new_system, play
+from support.watchdog import watchdog, worker_threads
 
 
 @pytest.fixture(autouse=True)
@@ -43,7 +37,7 @@ def shared_data() -> Path:
 
     Mark the test with ``@pytest.mark.shared`` as well, so that it can be left out by name.
     """
-    folder = _shared_folder() / "data"
+    folder = shared_folder()
     if not folder.is_dir():
         pytest.skip(f"no extra data in {folder}: set ORBSLAM2PY_SHARED to its folder")
     return folder
