@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the tests share."""
+"""For all tests: no hang, no thread left behind, the extra data."""
 
 from __future__ import annotations
 
@@ -9,11 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.system import System
 from support.data import shared_folder
-from support.interleaving import LIMIT, Stage
-from support.small_sequences import new_system, play
 from support.watchdog import watchdog, worker_threads
 
 
@@ -41,21 +37,3 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no extra data in {folder}: set ORBSLAM2PY_SHARED to its folder")
     return folder
-
-
-@pytest.fixture
-def slam() -> Iterator[System]:
-    """A system with a small map whose workers have nothing to do."""
-    system = new_system(Sensor.RGBD, wait_for_mapping=True)
-    play(system, 30)
-    assert system.wait_until_idle(LIMIT)
-    assert system.n_keyframes >= 3
-    yield system
-    system.shutdown(drain=False, timeout=LIMIT)
-
-
-@pytest.fixture
-def stage(monkeypatch: pytest.MonkeyPatch) -> Iterator[Stage]:
-    stage = Stage(monkeypatch)
-    yield stage
-    stage.open_all()

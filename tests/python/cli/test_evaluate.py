@@ -18,17 +18,7 @@ from orbslam2py.cli.evaluate import evaluate
 from orbslam2py.errors import DatasetError
 from orbslam2py.evaluation.metrics import Alignment, evaluate_trajectory
 from orbslam2py.trajectory.trajectory import Trajectory, write_kitti, write_tum
-
-
-def wander(n: int, seed: int = 0, rate: float = 10.0) -> Trajectory:
-    """A smooth walk with turning."""
-    generator = np.random.default_rng(seed)
-    T_wc = np.tile(np.eye(4), (n, 1, 1))
-    turns = np.cumsum(generator.normal(scale=0.02, size=(n, 3)), axis=0)
-    T_wc[:, :3, :3] = Rotation.from_rotvec(turns).as_matrix()
-    velocity = np.cumsum(generator.normal(scale=0.05, size=(n, 3)), axis=0) + np.array([0.5, 0, 0])
-    T_wc[:, :3, 3] = np.cumsum(velocity, axis=0) / rate
-    return Trajectory(100.0 + np.arange(n) / rate, T_wc)
+from support.made_up_paths import straight, wander
 
 
 def shrunk(truth: Trajectory) -> Trajectory:
@@ -37,12 +27,6 @@ def shrunk(truth: Trajectory) -> Trajectory:
     T_wc[:, :3, 3] += np.random.default_rng(1).normal(scale=0.05, size=(len(truth), 3))
     T_wc[:, :3, 3] *= 0.5
     return Trajectory(truth.timestamps, T_wc)
-
-
-def straight(n: int, step: float) -> Trajectory:
-    T_wc = np.tile(np.eye(4), (n, 1, 1))
-    T_wc[:, 2, 3] = np.arange(n) * step
-    return Trajectory(np.arange(n) * 0.1, T_wc)
 
 
 app = typer.Typer()

@@ -9,21 +9,17 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
 from orbslam2py.trajectory.trajectory import read_tum
-from support.command_line import Results
-from support.watchdog import watchdog
+from support.command_line import RUN_FILES, Results
+
+pytestmark = pytest.mark.watchdog(60)
 
 N = 30
-FILES = {
-    *("trajectory.txt", "trajectory_online.txt", "keyframes.txt", "trajectory_kitti.txt"),
-    *("frames.csv", "points.ply", "trajectory.png", "report.json", "settings.yaml"),
-}
 
 # Runs the command; sends Ctrl-C to itself when a function is called for the n-th time.
 _DRIVER = """
@@ -52,12 +48,6 @@ print("ready", flush=True)
 from orbslam2py.cli import main
 main()
 """
-
-
-@pytest.fixture(autouse=True)
-def _no_hang() -> Iterator[None]:
-    with watchdog(60):
-        yield
 
 
 @pytest.fixture(scope="module")
@@ -116,7 +106,7 @@ def test_once(lap: Path, module: str, name: str, n: int, options: tuple[str, ...
     code, err = finish(start(lap.parent, module, name, n, 1, *options))
     assert code == 130, err
     results = Results(lap.parent / "r")
-    assert {path.name for path in results.folder.iterdir()} == FILES
+    assert {path.name for path in results.folder.iterdir()} == RUN_FILES
     report = results.report
     rows = results.frames
     assert report["tracked"] == len(rows) == len(read_tum(results.folder / "trajectory.txt"))
@@ -156,7 +146,7 @@ def test_while_an_image_does_not_come(lap: Path) -> None:
     assert code == 130
     assert "an image is still being read" in err
     assert Results(lap.parent / "r").report["tracked"] == 12
-    assert {path.name for path in (lap.parent / "r").iterdir()} == FILES
+    assert {path.name for path in (lap.parent / "r").iterdir()} == RUN_FILES
 
 
 def test_twice_while_writing_gives_up(lap: Path) -> None:

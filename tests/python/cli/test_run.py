@@ -19,24 +19,13 @@ from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
 from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
 from orbslam2py.trajectory.trajectory import read_tum
-from support.command_line import CommandLine, Results
+from support.command_line import RUN_FILES, CommandLine, Results
 
 pytestmark = pytest.mark.watchdog(40)
 
 N = 24
 STAGES = ["extract", "stereo", "predict", "local_map", "keyframe", "track"]
 PARTS = ["insert", "cull_points", "new_points", "fuse", "cull_keyframes"]
-FILES = {
-    "trajectory.txt",
-    "trajectory_online.txt",
-    "keyframes.txt",
-    "trajectory_kitti.txt",
-    "frames.csv",
-    "points.ply",
-    "trajectory.png",
-    "report.json",
-    "settings.yaml",
-}
 
 
 @pytest.fixture(scope="module")
@@ -56,13 +45,6 @@ def rgbd(sequences: dict[Sensor, Path]) -> Path:
     return sequences[Sensor.RGBD]
 
 
-@pytest.fixture
-def command(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> CommandLine:
-    return CommandLine(monkeypatch, capsys, tmp_path)
-
-
 # ---- what a run leaves behind --------------------------------------------------------------------
 @pytest.mark.parametrize("sensor", [Sensor.STEREO, Sensor.RGBD])
 def test_results(command: CommandLine, sequences: dict[Sensor, Path], sensor: Sensor) -> None:
@@ -70,7 +52,7 @@ def test_results(command: CommandLine, sequences: dict[Sensor, Path], sensor: Se
     assert (done.code, done.err) == (0, "")
     assert "Results are in results" in done.out
     results = Results(Path("results"))
-    assert {path.name for path in results.folder.iterdir()} == FILES
+    assert {path.name for path in results.folder.iterdir()} == RUN_FILES
 
     report = results.report
     expected = {
@@ -177,7 +159,7 @@ def test_deterministic_runs_write_the_same_bytes(command: CommandLine, rgbd: Pat
     for name in ("a", "b"):
         arguments = ("--sensor", "rgbd", "--output", name, "--deterministic", "--quiet")
         assert command("run", rgbd, *arguments).code == 0
-    for file in FILES - {"report.json", "frames.csv", "trajectory.png"}:
+    for file in RUN_FILES - {"report.json", "frames.csv", "trajectory.png"}:
         assert Path("a", file).read_bytes() == Path("b", file).read_bytes(), file
     assert Results(Path("a")).report["deterministic"] is True
 
@@ -279,7 +261,7 @@ def test_a_folder_with_files_is_not_touched_without_force(command: CommandLine, 
     assert len(list(folder.iterdir())) == 2
     assert command("run", rgbd, "--sensor", "rgbd", "--output", folder, "--force").code == 0
     assert (folder / "thesis.txt").read_text() == "precious"
-    assert {path.name for path in folder.iterdir()} == FILES | {"thesis.txt"}
+    assert {path.name for path in folder.iterdir()} == RUN_FILES | {"thesis.txt"}
 
 
 def test_brackets_are_no_markup(command: CommandLine, rgbd: Path) -> None:
@@ -324,7 +306,7 @@ def test_nothing_to_see(command: CommandLine, rgbd: Path) -> None:
     assert len(results.frames) == N
     assert {row["reason"] for row in results.frames} == {"too few keypoints"}
     assert {row["state"] for row in results.frames} == {"NOT_INITIALIZED"}
-    assert {path.name for path in results.folder.iterdir()} == FILES - {"trajectory.png"}
+    assert {path.name for path in results.folder.iterdir()} == RUN_FILES - {"trajectory.png"}
 
 
 # ---- several maps --------------------------------------------------------------------------------

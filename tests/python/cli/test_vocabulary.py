@@ -3,30 +3,23 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
-from orbslam2py.cli import main
 from orbslam2py.vocabulary.vocabulary import load_vocabulary
-from support.data import GOLDEN
-
-TEXT = GOLDEN / "bow" / "voc_small_k10L3.txt"
+from support.vocabularies import TEXT
 
 
 @pytest.fixture
-def run(monkeypatch, capsys):
-    """Run the command line; gives the exit code, what was printed and what was complained."""
+def run(command):
+    """Run the subcommand; gives the exit code, what was printed and what was complained."""
 
     def call(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["orbslam2py", "vocabulary", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stopped:
-            main()
-        printed = capsys.readouterr()
-        return int(stopped.value.code or 0), printed.out, printed.err
+        done = command("vocabulary", *arguments)
+        return done.code, done.out, done.err
 
     return call
 
@@ -77,10 +70,7 @@ def test_convert_there_and_back(run, tmp_path):
         (["train", ".", "-o", "v.bvoc", "--seed", -1], "seed"),
     ],
 )
-def test_mistakes_give_a_message_and_exit_code_2(
-    run, images, tmp_path, monkeypatch, arguments, complaint
-):
-    monkeypatch.chdir(tmp_path)
+def test_mistakes_give_a_message_and_exit_code_2(run, images, arguments, complaint):
     code, _, err = run(*arguments)
     assert code == 2
     assert complaint in err

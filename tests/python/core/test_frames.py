@@ -11,32 +11,12 @@ import pytest
 
 from orbslam2py import _core as core
 from orbslam2py.errors import ImageError, SettingsError, StateError
-
-WIDTH, HEIGHT = 320, 240
-
-
-def texture(seed: int = 0, shift: int = 0) -> npt.NDArray[np.uint8]:
-    """Blocks of random grey values, moved to the left by `shift` pixels."""
-    blocks = np.random.default_rng(seed).integers(0, 256, (HEIGHT // 8, WIDTH // 4), dtype=np.uint8)
-    image = np.kron(blocks, np.ones((8, 8), dtype=np.uint8))
-    return np.ascontiguousarray(image[:, shift : shift + WIDTH])
+from support import block_wall
+from support.block_wall import HEIGHT, WIDTH, texture
 
 
 def context(**options: object) -> core.FrameContext:
-    camera_options = core.CameraOptions(
-        **{
-            "fx": 250.0,
-            "fy": 250.0,
-            "cx": 160.0,
-            "cy": 120.0,
-            "width": WIDTH,
-            "height": HEIGHT,
-            "bf": 25.0,
-            "depth_ratio": 30.0,
-            **options,
-        }
-    )
-    return core.FrameContext(core.Camera(camera_options), core.ScalePyramid(1.2, 8))
+    return block_wall.context(**{"depth_ratio": 30.0, **options})
 
 
 def extraction(image: npt.NDArray[np.uint8] | None = None) -> core.Extraction:
@@ -161,9 +141,12 @@ def test_stereo_frame_of_a_shifted_pair() -> None:
 
 def test_pair_extractor_equals_single_extractions() -> None:
     left, right = core.PairExtractor(core.OrbOptions(n_features=300)).extract(
-        texture(1), texture(2)
+        texture(seed=1), texture(seed=2)
     )
-    for together, alone in ((left, extraction(texture(1))), (right, extraction(texture(2)))):
+    for together, alone in (
+        (left, extraction(texture(seed=1))),
+        (right, extraction(texture(seed=2))),
+    ):
         np.testing.assert_array_equal(together.keypoints, alone.keypoints)
         np.testing.assert_array_equal(together.descriptors, alone.descriptors)
 

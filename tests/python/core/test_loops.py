@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from orbslam2py import _core as core
-from support.block_wall import HEIGHT, WIDTH, ten_words, texture
+from support.block_wall import DEPTH, HEIGHT, WIDTH, context, ten_words, texture
 
-DEPTH = 2.5  # metres: one pixel to the side is one centimetre
 SHIFT = 4  # centimetres between the two keyframes
 DRIFT = 0.03  # metres that the map puts the second one too far
 
@@ -17,16 +16,11 @@ DRIFT = 0.03  # metres that the map puts the second one too far
 @pytest.fixture(scope="module")
 def world() -> core.Map:
     """Two keyframes of one wall, each with points of its own: 0, and 1 which has drifted."""
-    options = core.CameraOptions(
-        fx=250.0, fy=250.0, cx=160.0, cy=120.0, width=WIDTH, height=HEIGHT, bf=25.0
-    )
-    options.depth_ratio = 40.0
-    context = core.FrameContext(core.Camera(options), core.ScalePyramid(1.2, 8))
     world, recent, words = core.Map(), core.RecentPoints(), ten_words()
     for shift, x in ((0, 0.0), (SHIFT, SHIFT / 100 + DRIFT)):
         extraction = core.OrbExtractor(core.OrbOptions(n_features=400)).extract(texture(shift))
         metres = np.full((HEIGHT, WIDTH), DEPTH, dtype=np.float32)
-        frame = core.build_rgbd_frame(context, shift, shift / 10.0, extraction, metres)
+        frame = core.build_rgbd_frame(context(), shift, shift / 10.0, extraction, metres)
         core.describe(frame, words)
         tracked = core.TrackedFrame(frame)
         tracked.T_cw = core.Pose(np.array([0, 0, 0, 1.0]), np.array([-x, 0, 0]))

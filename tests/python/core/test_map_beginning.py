@@ -8,9 +8,8 @@ import pytest
 
 from orbslam2py import _core as core
 from orbslam2py.errors import StateError
-from support.block_wall import HEIGHT, WIDTH, ten_words, texture
+from support.block_wall import DEPTH, HEIGHT, WIDTH, context, ten_words, texture
 
-DEPTH = 2.5  # metres: one pixel to the side is one centimetre
 SHIFT = 4  # pixels between the two views
 
 
@@ -21,23 +20,13 @@ def vocabulary() -> core.Vocabulary:
 
 def view(shift: int, *, depth: float | None = None) -> core.TrackedFrame:
     """A frame `shift` centimetres to the right, without a pose."""
-    options = core.CameraOptions(
-        fx=250.0,
-        fy=250.0,
-        cx=160.0,
-        cy=120.0,
-        width=WIDTH,
-        height=HEIGHT,
-        bf=0.0 if depth is None else 25.0,
-    )
-    options.depth_ratio = 40.0
-    context = core.FrameContext(core.Camera(options), core.ScalePyramid(1.2, 8))
+    camera = context(bf=0.0 if depth is None else 25.0)
     extraction = core.OrbExtractor(core.OrbOptions(n_features=600)).extract(texture(shift))
     if depth is None:
-        frame = core.build_monocular_frame(context, shift, shift / 10.0, extraction)
+        frame = core.build_monocular_frame(camera, shift, shift / 10.0, extraction)
     else:
         metres = np.full((HEIGHT, WIDTH), depth, dtype=np.float32)
-        frame = core.build_rgbd_frame(context, shift, shift / 10.0, extraction, metres)
+        frame = core.build_rgbd_frame(camera, shift, shift / 10.0, extraction, metres)
     return core.TrackedFrame(frame)
 
 

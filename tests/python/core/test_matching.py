@@ -9,20 +9,14 @@ import pytest
 
 from orbslam2py import _core as core
 from orbslam2py.errors import StateError
-from support.block_wall import HEIGHT, WIDTH, ten_words, texture
-
-DEPTH = 2.5  # metres: one pixel to the side is one centimetre
+from support.block_wall import DEPTH, HEIGHT, WIDTH, context, ten_words, texture
 
 
 class Scene:
     """Frames along a wall that is parallel to the image plane."""
 
     def __init__(self) -> None:
-        options = core.CameraOptions(
-            fx=250.0, fy=250.0, cx=160.0, cy=120.0, width=WIDTH, height=HEIGHT, bf=25.0
-        )
-        options.depth_ratio = 40.0
-        self.context = core.FrameContext(core.Camera(options), core.ScalePyramid(1.2, 8))
+        self.context = context()
         self.vocabulary = ten_words()
         self.map = core.Map()
         self.recent = core.RecentPoints()

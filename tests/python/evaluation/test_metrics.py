@@ -21,17 +21,7 @@ from orbslam2py.evaluation.metrics import (
     segment_errors,
 )
 from orbslam2py.trajectory.trajectory import Trajectory
-
-
-def wander(n: int, seed: int = 0, rate: float = 10.0) -> Trajectory:
-    """A smooth walk with turning."""
-    generator = np.random.default_rng(seed)
-    T_wc = np.tile(np.eye(4), (n, 1, 1))
-    turns = np.cumsum(generator.normal(scale=0.02, size=(n, 3)), axis=0)
-    T_wc[:, :3, :3] = Rotation.from_rotvec(turns).as_matrix()
-    velocity = np.cumsum(generator.normal(scale=0.05, size=(n, 3)), axis=0) + np.array([0.5, 0, 0])
-    T_wc[:, :3, 3] = np.cumsum(velocity, axis=0) / rate
-    return Trajectory(100.0 + np.arange(n) / rate, T_wc)
+from support.made_up_paths import straight, wander
 
 
 def disturbed(truth: Trajectory, scale: float = 1.0, seed: int = 1) -> Trajectory:
@@ -79,8 +69,6 @@ def evo_rpe(
 
 
 # ---- against evo ---------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("alignment", list(Alignment))
 @pytest.mark.parametrize("scale", [1.0, 0.2])
 def test_equals_evo(alignment: Alignment, scale: float) -> None:
@@ -142,8 +130,6 @@ def test_lost_poses_do_not_count() -> None:
 
 
 # ---- alignment -----------------------------------------------------------------------------------
-
-
 def test_alignment_finds_the_transform() -> None:
     points = np.random.default_rng(0).normal(size=(50, 3))
     known = Similarity(2.5, Rotation.from_rotvec([1, 2, 0.5]).as_matrix(), np.array([1.0, 2, 3]))
@@ -198,8 +184,6 @@ def test_paths_that_have_nothing_in_common_keep_their_scale() -> None:
 
 
 # ---- one second ----------------------------------------------------------------------------------
-
-
 def test_pairs_of_one_second() -> None:
     first, second = one_second_pairs(np.array([0.0, 0.5, 0.95, 1.04, 1.5, 2.2, 3.31]))
     pairs = list(zip(first.tolist(), second.tolist(), strict=True))
@@ -223,14 +207,6 @@ def test_single_pose() -> None:
 
 
 # ---- KITTI's segments by hand --------------------------------------------------------------------
-
-
-def straight(n: int, step: float) -> Trajectory:
-    T_wc = np.tile(np.eye(4), (n, 1, 1))
-    T_wc[:, 2, 3] = np.arange(n) * step
-    return Trajectory(np.arange(n) * 0.1, T_wc)
-
-
 def test_segments_of_a_line_that_is_too_long() -> None:
     """251 poses 1 m apart, the estimate 1 % too long.
 
@@ -302,8 +278,6 @@ def test_no_segments_on_short_paths() -> None:
 
 
 # ---- bad input -----------------------------------------------------------------------------------
-
-
 def test_no_common_time() -> None:
     truth = wander(10)
     later = Trajectory(truth.timestamps + 1000, truth.T_wc)

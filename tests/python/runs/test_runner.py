@@ -18,6 +18,8 @@ from orbslam2py.runs.runner import SequenceRunner
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
 
+pytestmark = pytest.mark.watchdog(60)
+
 
 def recorded(sensor: Sensor) -> SyntheticSequence:
     return SyntheticSequence(SyntheticOptions(sensor=sensor, world="room", frames=6))
@@ -127,3 +129,22 @@ def test_masks_reach_the_map(sensor: Sensor) -> None:
         shares.append(float((u < camera.cx - 5).mean()))
     assert shares[0] > 0.2
     assert shares[1] < 0.02
+
+
+@pytest.mark.parametrize("deterministic", [True, False])
+@pytest.mark.parametrize("sensor", [Sensor.STEREO, Sensor.RGBD])
+def test_run_that_switches(sensor: Sensor, deterministic: bool) -> None:
+    options = SyntheticOptions(world="corridor", sensor=sensor, frames=50, size=(320, 240))
+    sequence = SyntheticSequence(options)
+    hashes: list[int] = []
+    result = SequenceRunner(
+        sequence,
+        sequence.settings,
+        None,
+        RunOptions(sensor, deterministic=deterministic, localize_after=25),
+    ).run(lambda row, system: hashes.append(system.map_hash()))
+    assert result.error is None
+    assert result.n_tracked == 50
+    assert len(set(hashes[25:])) == 1
+    assert len(set(hashes[:25])) > 1
+    assert max(result.keyframes.timestamps) < sequence.timestamps[25]

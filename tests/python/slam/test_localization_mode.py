@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 
 from orbslam2py import _core as core
-from orbslam2py.runs.result import RunOptions
-from orbslam2py.runs.runner import SequenceRunner
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.local_mapping import LocalMapping
 from orbslam2py.slam.records import TrackingRecord, TrackingState
@@ -21,13 +19,6 @@ from support.mapped_world import MappedWorld, pose_error
 from support.small_sequences import black, images, new_system, play, track
 
 pytestmark = pytest.mark.watchdog(60)
-
-WITH_DEPTH = [Sensor.STEREO, Sensor.RGBD]
-
-
-@pytest.fixture(params=WITH_DEPTH)
-def sensor(request: pytest.FixtureRequest) -> Sensor:
-    return Sensor(request.param)
 
 
 # ---- out of the map and back ---------------------------------------------------------------------
@@ -285,25 +276,6 @@ def test_before_the_first_image(sensor: Sensor) -> None:
         assert track(system, 1).state is TrackingState.OK
         system.localization_mode = False
         assert track(system, 2).state is TrackingState.OK
-
-
-# ---- a run ---------------------------------------------------------------------------------------
-@pytest.mark.parametrize("deterministic", [True, False])
-def test_run_that_switches(sensor: Sensor, deterministic: bool) -> None:
-    options = SyntheticOptions(world="corridor", sensor=sensor, frames=50, size=(320, 240))
-    sequence = SyntheticSequence(options)
-    hashes: list[int] = []
-    result = SequenceRunner(
-        sequence,
-        sequence.settings,
-        None,
-        RunOptions(sensor, deterministic=deterministic, localize_after=25),
-    ).run(lambda row, system: hashes.append(system.map_hash()))
-    assert result.error is None
-    assert result.n_tracked == 50
-    assert len(set(hashes[25:])) == 1
-    assert len(set(hashes[:25])) > 1
-    assert max(result.keyframes.timestamps) < sequence.timestamps[25]
 
 
 def test_temporary_points_are_not_kept(sensor: Sensor) -> None:

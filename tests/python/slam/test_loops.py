@@ -17,6 +17,7 @@ from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
 from orbslam2py.slam.system import System
 from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
 from orbslam2py.trajectory.trajectory import Trajectory
+from support.feeding import feed
 
 pytestmark = pytest.mark.watchdog(300)
 
@@ -80,13 +81,7 @@ def run(world: str, sensor: Sensor, laps: float | None = 1.4, **options: object)
     )
     with system:
         for index, timestamp in enumerate(made.timestamps):
-            shown = images(world, sensor, laps, index)
-            if sensor is Sensor.STEREO:
-                system.track_stereo(shown.image, shown.right, float(timestamp))  # type: ignore[arg-type]
-            elif sensor is Sensor.RGBD:
-                system.track_rgbd(shown.image, shown.depth, float(timestamp))  # type: ignore[arg-type]
-            else:
-                system.track_monocular(shown.image, float(timestamp))
+            feed(system, images(world, sensor, laps, index), float(timestamp))
         system.wait_until_idle()
     problems += system.check_map()
     return Run(
@@ -181,8 +176,7 @@ def test_optimize_on_demand_lowers_the_cost() -> None:
     with System(settings, Sensor.RGBD, loop_closing=False, wait_for_mapping=True) as system:
         for index in range(120):
             shown = images("corridor", Sensor.RGBD, 1.4, index)
-            assert shown.depth is not None
-            system.track_rgbd(shown.image, shown.depth, float(made.timestamps[index]))
+            feed(system, shown, float(made.timestamps[index]))
         system.wait_until_idle()
         record = system.optimize()
         assert record.used

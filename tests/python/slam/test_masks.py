@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -13,8 +12,10 @@ from orbslam2py.errors import ImageError
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.records import TrackingRecord, TrackingState
 from orbslam2py.slam.system import System
-from support.small_sequences import images, sequence
-from support.watchdog import watchdog
+from support.feeding import feed
+from support.small_sequences import images, new_system
+
+pytestmark = pytest.mark.watchdog(30)
 
 HEIGHT, WIDTH = 240, 320
 EVERYTHING = np.full((HEIGHT, WIDTH), 255, np.uint8)
@@ -22,30 +23,13 @@ LEFT_HALF = EVERYTHING.copy()
 LEFT_HALF[:, : WIDTH // 2] = 0
 
 
-@pytest.fixture(autouse=True)
-def _no_hang() -> Iterator[None]:
-    with watchdog(30):
-        yield
-
-
 @pytest.fixture(params=list(Sensor))
 def sensor(request: pytest.FixtureRequest) -> Sensor:
     return Sensor(request.param)
 
 
-def new_system(sensor: Sensor) -> System:
-    return System(sequence(sensor).settings, sensor, deterministic=True)
-
-
 def track(system: System, index: int, mask: Any) -> TrackingRecord:
-    shown, seconds = images(system.sensor, index), index / 20
-    if system.sensor is Sensor.STEREO:
-        assert shown.right is not None
-        return system.track_stereo(shown.image, shown.right, seconds, mask=mask, details=True)
-    if system.sensor is Sensor.RGBD:
-        assert shown.depth is not None
-        return system.track_rgbd(shown.image, shown.depth, seconds, mask=mask, details=True)
-    return system.track_monocular(shown.image, seconds, mask=mask, details=True)
+    return feed(system, images(system.sensor, index), index / 20, mask=mask, details=True)
 
 
 def columns(record: TrackingRecord) -> np.ndarray:
@@ -54,7 +38,7 @@ def columns(record: TrackingRecord) -> np.ndarray:
 
 
 def test_no_keypoint_where_the_mask_is_zero(sensor: Sensor) -> None:
-    with new_system(sensor) as system:
+    with new_system(sensor, deterministic=True) as system:
         assert (columns(track(system, 0, LEFT_HALF)) > WIDTH // 2 - 1).all()
         assert (columns(track(system, 1, None)) < WIDTH // 2 - 1).any(), "of this image only"
 
@@ -62,13 +46,13 @@ def test_no_keypoint_where_the_mask_is_zero(sensor: Sensor) -> None:
 def test_a_mask_that_hides_nothing_changes_nothing(sensor: Sensor) -> None:
     found = []
     for mask in (None, EVERYTHING):
-        with new_system(sensor) as system:
+        with new_system(sensor, deterministic=True) as system:
             found.append(columns(track(system, 0, mask)))
     np.testing.assert_array_equal(*found)
 
 
 def test_everything_hidden(sensor: Sensor) -> None:
-    with new_system(sensor) as system:
+    with new_system(sensor, deterministic=True) as system:
         record = track(system, 0, 0 * EVERYTHING)
         assert record.state is TrackingState.NOT_INITIALIZED
         assert len(columns(record)) == 0
@@ -76,7 +60,7 @@ def test_everything_hidden(sensor: Sensor) -> None:
 
 @pytest.mark.parametrize("pair", [(LEFT_HALF, None), (None, LEFT_HALF), (None, None)])
 def test_masks_of_a_pair(pair: tuple[Any, Any]) -> None:
-    with new_system(Sensor.STEREO) as system:
+    with new_system(Sensor.STEREO, deterministic=True) as system:
         record = track(system, 0, pair)
         assert (columns(record) < WIDTH // 2 - 1).any() == (pair[0] is None)
         assert record.features is not None
@@ -102,7 +86,7 @@ def test_masks_of_a_pair(pair: tuple[Any, Any]) -> None:
     ],
 )
 def test_wrong_masks(sensor: Sensor, mask: Any, message: str) -> None:
-    with new_system(sensor) as system:
+    with new_system(sensor, deterministic=True) as system:
         with pytest.raises(ImageError, match=message):
             track(system, 0, mask)
         record = track(system, 0, LEFT_HALF)  # nothing has changed, not even the time
@@ -113,13 +97,19 @@ def test_wrong_masks(sensor: Sensor, mask: Any, message: str) -> None:
 def test_the_wrong_one_of_a_pair_is_named(side: str) -> None:
     wrong = EVERYTHING[:, :-1]
     pair = (wrong, None) if side == "left" else (EVERYTHING, wrong)
-    with new_system(Sensor.STEREO) as system, pytest.raises(ImageError, match=f"{side} mask"):
+    with (
+        new_system(Sensor.STEREO, deterministic=True) as system,
+        pytest.raises(ImageError, match=f"{side} mask"),
+    ):
         track(system, 0, pair)
 
 
 @pytest.mark.parametrize("masks", [(), (EVERYTHING,), (EVERYTHING,) * 3])
 def test_a_pair_has_two(masks: tuple[Any, ...]) -> None:
-    with new_system(Sensor.STEREO) as system, pytest.raises(ImageError, match="two"):
+    with (
+        new_system(Sensor.STEREO, deterministic=True) as system,
+        pytest.raises(ImageError, match="two"),
+    ):
         track(system, 0, masks)
 
 
@@ -128,6 +118,6 @@ def test_a_mask_that_is_not_contiguous(sensor: Sensor) -> None:
     wide[:, ::2] = LEFT_HALF
     found = []
     for mask in (wide[:, ::2], LEFT_HALF):
-        with new_system(sensor) as system:
+        with new_system(sensor, deterministic=True) as system:
             found.append(columns(track(system, 0, mask)))
     np.testing.assert_array_equal(*found)

@@ -3,9 +3,7 @@
 
 from __future__ import annotations
 
-import csv
-import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 
@@ -14,21 +12,19 @@ import numpy as np
 import pytest
 
 from orbslam2py.evaluation.metrics import Alignment, evaluate_trajectory
-from orbslam2py.runs.outputs import OutputWriter
-from orbslam2py.runs.report import make_report
-from orbslam2py.runs.result import RunOptions
-from orbslam2py.runs.runner import SequenceRunner
-from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.records import Reason, TrackingRecord, TrackingState
 from orbslam2py.slam.system import System
 from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
 from orbslam2py.trajectory.trajectory import Trajectory, write_tum
-from support.watchdog import watchdog
+
+pytestmark = pytest.mark.watchdog(60)
 
 OPTIONS = SyntheticOptions(world="corridor", sensor="mono", size=(320, 240), noise=1)
 SEQUENCE = SyntheticSequence(OPTIONS)
 BLACK = np.zeros((240, 320), np.uint8)
 WHITE = np.full((240, 320), 255, np.uint8)
+
+
 #: What may be said of two views between which nothing can be reconstructed.
 UNFIT = {
     Reason.FIRST_VIEW,
@@ -37,12 +33,6 @@ UNFIT = {
     Reason.AMBIGUOUS_MOTION,
     Reason.DEGENERATE_VIEWS,
 }
-
-
-@pytest.fixture(autouse=True)
-def _no_hang() -> Iterator[None]:
-    with watchdog(60):
-        yield
 
 
 @lru_cache
@@ -248,35 +238,3 @@ def test_a_hole_in_the_sequence() -> None:
     after = camera.play(range(72, 90))
     assert n_ok(after) > 10
     assert camera.ate() < 0.03
-
-
-# ---- what a run says -----------------------------------------------------------------------------
-class LateStart(SyntheticSequence):
-    """Stands still for ten frames, after two black ones."""
-
-    def load(self, index: int, /):  # type: ignore[no-untyped-def]
-        images = super().load(max(0, index - 12))
-        if index < 2:
-            images.image[:] = 0
-        return images
-
-
-def test_reasons_are_in_the_files(tmp_path: Path) -> None:
-    sequence = LateStart(
-        SyntheticOptions(world="corridor", sensor="mono", size=(320, 240), frames=50)
-    )
-    options = RunOptions(Sensor.MONOCULAR, deterministic=True)
-    result = SequenceRunner(sequence, sequence.settings, None, options).run()
-    report = make_report(result, None)
-    OutputWriter(tmp_path).write_all(result, report, None)
-    counts = json.loads((tmp_path / "report.json").read_text())["initialisation_reasons"]
-    with (tmp_path / "frames.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    waiting = [row for row in rows if row["state"] == "NOT_INITIALIZED"]
-    assert len(waiting) >= 12
-    assert counts["too few keypoints"] == 2
-    assert counts[str(Reason.FIRST_VIEW)] >= 1
-    assert sum(counts.values()) == len(waiting)
-    assert {row["reason"] for row in waiting} == set(counts)
-    assert list(counts.values()) == sorted(counts.values(), reverse=True)
-    assert result.n_tracked > 20

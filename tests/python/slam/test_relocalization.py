@@ -23,16 +23,11 @@ from orbslam2py.slam.relocalization import Relocalizer
 from orbslam2py.slam.timing import StageTimer
 from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
 from support.mapped_world import MappedWorld, beside
-from support.watchdog import watchdog
+
+pytestmark = pytest.mark.watchdog(60)
 
 SIZE = (480, 360)
 N_MAPPED = 110
-
-
-@pytest.fixture(autouse=True)
-def _no_hang() -> Iterator[None]:
-    with watchdog(60):
-        yield
 
 
 @lru_cache

@@ -18,13 +18,6 @@ from support.watchdog import worker_threads
 
 pytestmark = pytest.mark.watchdog(30)
 
-SENSORS = [Sensor.STEREO, Sensor.RGBD]
-
-
-@pytest.fixture(params=SENSORS)
-def sensor(request: pytest.FixtureRequest) -> Sensor:
-    return Sensor(request.param)
-
 
 # ---- shutdown ------------------------------------------------------------------------------------
 def test_shutdown_is_final_and_idempotent(sensor: Sensor) -> None:

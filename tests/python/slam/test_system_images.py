@@ -17,15 +17,7 @@ from support.small_sequences import images, new_system, play, sequence, track
 
 pytestmark = pytest.mark.watchdog(30)
 
-SENSORS = [Sensor.STEREO, Sensor.RGBD]
 
-
-@pytest.fixture(params=SENSORS)
-def sensor(request: pytest.FixtureRequest) -> Sensor:
-    return Sensor(request.param)
-
-
-# ---- bad images ----------------------------------------------------------------------------------
 def test_bad_time_stamps(sensor: Sensor) -> None:
     with new_system(sensor, deterministic=True) as system:
         track(system, 0, timestamp=1.0)

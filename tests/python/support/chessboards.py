@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -67,3 +68,15 @@ def render(T_cb: np.ndarray) -> np.ndarray:
     inside = (column >= -1) & (column < COLUMNS) & (row >= -1) & (row < ROWS)
     shade = np.where(inside & ((column + row) % 2 == 0), 30.0, 225.0)
     return shade.reshape(height, n, width, n).mean(axis=(1, 3)).astype(np.uint8)
+
+
+@cache
+def _views(n: int) -> list[np.ndarray]:
+    return [render(T_cb) for T_cb in poses(n)]
+
+
+def write_views(folder: Path, n: int = 16) -> Path:
+    """Images 0.png, 1.png... of the board from everywhere."""
+    for i, image in enumerate(_views(n)):
+        assert cv2.imwrite(str(folder / f"{i}.png"), image)
+    return folder

@@ -17,6 +17,21 @@ import pytest
 
 from orbslam2py.cli import main
 
+#: What a run leaves in its folder.
+RUN_FILES = frozenset(
+    [
+        "trajectory.txt",
+        "trajectory_online.txt",
+        "keyframes.txt",
+        "trajectory_kitti.txt",
+        "frames.csv",
+        "points.ply",
+        "trajectory.png",
+        "report.json",
+        "settings.yaml",
+    ]
+)
+
 
 @dataclass(frozen=True)
 class Outcome:

@@ -14,6 +14,7 @@ from orbslam2py.evaluation.metrics import align
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.records import TrackingRecord
 from orbslam2py.synthetic.sequence import SyntheticSequence
+from support.feeding import blackened, feed
 
 Array = np.ndarray
 
@@ -67,18 +68,11 @@ class MappedWorld:
         self._n_shown += 1
         if T_wc is not None:
             self._true[seconds] = T_wc
-        if self.sequence.sensor is Sensor.STEREO:
-            return self.system.track_stereo(shown.image, shown.right, seconds)
-        if self.sequence.sensor is Sensor.RGBD:
-            return self.system.track_rgbd(shown.image, shown.depth, seconds)
-        return self.system.track_monocular(shown.image, seconds)
+        return feed(self.system, shown, seconds)
 
     def black(self) -> Images:
         """Images in which nothing can be seen."""
-        shown = self.sequence.load(0)
-        right = None if shown.right is None else 0 * shown.right
-        depth = None if shown.depth is None else 0 * shown.depth
-        return Images(0 * shown.image, right, depth)
+        return blackened(self.sequence.load(0))
 
     def lose(self, n_frames: int = 1) -> TrackingRecord:
         """Show black images."""

@@ -11,6 +11,7 @@ from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.records import TrackingRecord
 from orbslam2py.slam.system import System
 from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
+from support.feeding import blackened, feed
 
 SIZE = (320, 240)
 
@@ -41,13 +42,8 @@ def track(
 ) -> TrackingRecord:
     """Track a frame, or other images in its place."""
     sensor = system.sensor
-    shown = shown or images(sensor, index)
     seconds = float(sequence(sensor).timestamps[index]) if timestamp is None else timestamp
-    if sensor is Sensor.STEREO:
-        assert shown.right is not None
-        return system.track_stereo(shown.image, shown.right, seconds, details=details)
-    assert shown.depth is not None
-    return system.track_rgbd(shown.image, shown.depth, seconds, details=details)
+    return feed(system, shown or images(sensor, index), seconds, details=details)
 
 
 def play(system: System, n_frames: int, first: int = 0) -> list[TrackingRecord]:
@@ -56,10 +52,7 @@ def play(system: System, n_frames: int, first: int = 0) -> list[TrackingRecord]:
 
 def black(sensor: Sensor) -> Images:
     """Images in which nothing can be seen."""
-    shown = images(sensor, 0)
-    right = None if shown.right is None else 0 * shown.right
-    depth = None if shown.depth is None else 0 * shown.depth  # type: ignore[operator]
-    return Images(0 * shown.image, right, depth)
+    return blackened(images(sensor, 0))
 
 
 def ate(system: System) -> float:

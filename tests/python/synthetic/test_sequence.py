@@ -4,18 +4,12 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
-import typer
-from hypothesis import given
-from hypothesis import strategies as st
-from typer.testing import CliRunner
 
 from orbslam2py import Sensor, open_sequence
-from orbslam2py.cli.synthesize import parse_size, synthesize
 from orbslam2py.datasets.base import Layout
 from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.synthetic.scenes import LAPS, ROOM_BESIDE
@@ -24,6 +18,7 @@ from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence, S
 SMALL = (160, 120)
 WORLDS = list(SyntheticWorld)
 STREETS = (SyntheticWorld.STREET, SyntheticWorld.STREET_LAP)
+
 LAYOUTS = [
     (Layout.TUM, Sensor.MONOCULAR),
     (Layout.TUM, Sensor.RGBD),
@@ -43,8 +38,6 @@ def corners(image: np.ndarray) -> int:
 
 
 # ---- images --------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("world", WORLDS)
 def test_views_are_rich_in_corners_and_neither_dark_nor_blown_out(world):
     sequence = SyntheticSequence(SyntheticOptions(world=world, sensor="mono"))
@@ -116,8 +109,6 @@ def test_depth_noise_grows_with_the_square_of_the_depth():
 
 
 # ---- ways ----------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("world", WORLDS)
 def test_motion_is_plausible(world):
     sequence = SyntheticSequence(SyntheticOptions(world=world))
@@ -189,8 +180,6 @@ def test_no_viewpoint_leaves_the_world(world):
 
 
 # ---- files ---------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("layout", "sensor"), LAYOUTS)
 def test_folders_are_read_back_by_the_loaders(tmp_path, layout, sensor):
     sequence = small(sensor=sensor, world="corridor", frames=5, noise=1.0)
@@ -268,8 +257,6 @@ def test_nothing_is_left_behind_when_writing_fails(tmp_path):
 
 
 # ---- options -------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     "options",
     [
@@ -307,46 +294,3 @@ def test_frames_out_of_range_raise():
     for index in (-1, 3):
         with pytest.raises(IndexError):
             small().load(index)
-
-
-@given(st.integers(1, 9999), st.integers(1, 9999))
-def test_sizes_are_read(width, height):
-    assert parse_size(f"{width}x{height}") == (width, height)
-
-
-@pytest.mark.parametrize("text", ["640", "640x", "x480", "640x480x3", "-640x480", "a x b", ""])
-def test_bad_sizes_are_refused(text):
-    with pytest.raises(SettingsError, match="--size"):
-        parse_size(text)
-
-
-# ---- command line --------------------------------------------------------------------------------
-
-
-def run_command(*arguments: str):
-    app = typer.Typer()
-    app.command()(synthesize)
-    return CliRunner().invoke(app, list(arguments))
-
-
-def test_the_command_writes_what_it_was_asked_for(tmp_path):
-    folder = tmp_path / "lap"
-    options = (
-        "--world corridor --sensor rgbd --layout tum --frames 4 --fps 15 --size 160x120 --seed 3 "
-        "--noise 1 --exposure 0.9 --depth-noise 0.001"
-    )
-    result = run_command(str(folder), *options.split())
-    assert result.exit_code == 0, result.output
-    about = json.loads((folder / "synthetic.json").read_text())
-    expected = {"world": "corridor", "frames": 4, "fps": 15, "size": [160, 120], "seed": 3}
-    assert expected.items() <= about.items()
-    image = cv2.imread(str(next(Path(folder / "rgb").iterdir())), cv2.IMREAD_UNCHANGED)
-    assert image.shape == (120, 160)
-    assert len(list((folder / "depth").iterdir())) == 4
-
-
-def test_the_command_refuses_bad_input(tmp_path):
-    assert run_command(str(tmp_path / "x"), "--world", "moon").exit_code == 2
-    result = run_command(str(tmp_path / "x"), "--size", "big")
-    assert isinstance(result.exception, SettingsError)  # main() makes it exit code 2
-    assert not list(tmp_path.iterdir())
