@@ -9,9 +9,15 @@ import cv2
 import numpy as np
 import pytest
 
-from orbslam2py.calibration.calibration import Calibration, calibrate
-from orbslam2py.calibration.chessboard import Board, BoardViews, choose_views, find_views
-from orbslam2py.errors import DatasetError, ImageError, SettingsError
+from orbslam2py import DatasetError, ImageError, SettingsError
+from orbslam2py.calibration import (
+    Board,
+    BoardViews,
+    Calibration,
+    calibrate,
+    choose_views,
+    find_views,
+)
 from support import chessboards
 
 BOARD = Board(chessboards.COLUMNS, chessboards.ROWS, chessboards.SQUARE)

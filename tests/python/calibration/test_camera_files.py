@@ -9,10 +9,9 @@ import cv2
 import numpy as np
 import pytest
 
-from orbslam2py.calibration.camera_files import CameraFileFormat, read_camera_file
-from orbslam2py.errors import SettingsError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import CameraSettings, Settings
+from orbslam2py import Sensor, Settings, SettingsError
+from orbslam2py.calibration import CameraFileFormat, read_camera_file
+from orbslam2py.settings import CameraSettings
 from support.camera_files import CX, CY, FX, FY, KALIBR, KALIBR_PAIR, OPENCV, ROS, D, written
 
 

@@ -8,10 +8,8 @@ from pathlib import Path
 import cv2
 from typer.testing import CliRunner
 
+from orbslam2py import Sensor, Settings, SettingsError
 from orbslam2py.cli.app import app
-from orbslam2py.errors import SettingsError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import Settings
 from support import chessboards
 from support.camera_files import FX, KALIBR, written
 

@@ -13,11 +13,11 @@ import typer
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
+from orbslam2py import DatasetError, Trajectory
 from orbslam2py.cli import main
 from orbslam2py.cli.evaluate import evaluate
-from orbslam2py.errors import DatasetError
-from orbslam2py.evaluation.metrics import Alignment, evaluate_trajectory
-from orbslam2py.trajectory.trajectory import Trajectory, write_kitti, write_tum
+from orbslam2py.evaluation import Alignment, evaluate_trajectory
+from orbslam2py.trajectory import write_kitti, write_tum
 from support.made_up_paths import straight, wander
 
 

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
-from orbslam2py.trajectory.trajectory import read_tum
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+from orbslam2py.trajectory import read_tum
 from support.command_line import RUN_FILES, Results
 
 pytestmark = pytest.mark.watchdog(60)
@@ -91,8 +91,8 @@ MOMENTS = [
     ("orbslam2py._core", "match_local_map", 10, ()),
     ("orbslam2py._core", "local_bundle_adjustment", 1, ()),
     ("orbslam2py._core", "process_new_keyframe", 2, ("--deterministic",)),
-    ("orbslam2py.slam.system", "System.wait_until_idle", 1, ()),
-    ("orbslam2py.slam.system", "System.shutdown", 1, ()),
+    ("orbslam2py", "System.wait_until_idle", 1, ()),
+    ("orbslam2py", "System.shutdown", 1, ()),
     ("orbslam2py.runs.report", "evaluate_trajectory", 1, ()),
     ("orbslam2py.runs.outputs", "draw_trajectory", 1, ()),
     ("orbslam2py.runs.outputs", "OutputWriter._remove_stale", 1, ()),

@@ -15,10 +15,9 @@ import numpy as np
 import pytest
 
 import orbslam2py
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import Settings
-from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
-from orbslam2py.trajectory.trajectory import read_tum
+from orbslam2py import Sensor, Settings
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+from orbslam2py.trajectory import read_tum
 from support.command_line import RUN_FILES, CommandLine, Results
 
 pytestmark = pytest.mark.watchdog(40)

@@ -9,10 +9,9 @@ from typing import cast
 import pytest
 from rich.progress import Progress, TextColumn
 
+from orbslam2py import Reason, System, TrackingRecord, TrackingState
 from orbslam2py.cli.run import _Display
-from orbslam2py.runs.result import FrameRow
-from orbslam2py.slam.records import Reason, TrackingRecord, TrackingState
-from orbslam2py.slam.system import System
+from orbslam2py.runs import FrameRow
 
 pytestmark = pytest.mark.watchdog(20)
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from orbslam2py import DatasetError, OrbSlamError, SettingsError
 from orbslam2py.cli.app import app
-from orbslam2py.errors import DatasetError, OrbSlamError, SettingsError
 from support.numbered_images import write_video
 
 

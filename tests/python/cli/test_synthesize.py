@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
+from orbslam2py import SettingsError
 from orbslam2py.cli.synthesize import parse_size, synthesize
-from orbslam2py.errors import SettingsError
 
 
 @given(st.integers(1, 9999), st.integers(1, 9999))

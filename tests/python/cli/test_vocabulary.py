@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from orbslam2py.vocabulary.vocabulary import load_vocabulary
+from orbslam2py import load_vocabulary
 from support.vocabularies import TEXT
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from orbslam2py import _core, errors
+from orbslam2py import ImageError, SettingsError, StateError, _core
 
 
 def noise(height: int, width: int, seed: int = 0) -> NDArray[np.generic]:
@@ -74,7 +74,7 @@ def test_one_extractor_refuses_a_second_thread() -> None:
         while not refused.is_set():
             try:
                 extractor.extract(large)
-            except errors.StateError:
+            except StateError:
                 refused.set()
 
     thread = threading.Thread(target=work)
@@ -84,7 +84,7 @@ def test_one_extractor_refuses_a_second_thread() -> None:
             break
         try:
             extractor.extract(small)
-        except errors.StateError:
+        except StateError:
             refused.set()
     found = refused.is_set()
     refused.set()
@@ -117,24 +117,24 @@ def test_mask() -> None:
     ],
 )
 def test_bad_images(image: NDArray[np.generic]) -> None:
-    with pytest.raises(errors.ImageError, match="image"):
+    with pytest.raises(ImageError, match="image"):
         _core.OrbExtractor().extract(image)
 
 
 @pytest.mark.parametrize("mask", [np.zeros((50, 49), np.uint8), np.zeros((50, 50), bool)])
 def test_bad_masks(mask: NDArray[np.generic]) -> None:
-    with pytest.raises(errors.ImageError, match="mask"):
+    with pytest.raises(ImageError, match="mask"):
         _core.OrbExtractor().extract(noise(50, 50), mask=mask)
 
 
 def test_options_out_of_range_are_settings_errors() -> None:
-    with pytest.raises(errors.SettingsError, match="n_features"):
+    with pytest.raises(SettingsError, match="n_features"):
         _core.OrbOptions(n_features=0)
-    with pytest.raises(errors.SettingsError, match="scale factor"):
+    with pytest.raises(SettingsError, match="scale factor"):
         _core.ScalePyramid(0.5, 8)
-    with pytest.raises(errors.SettingsError, match="kernels"):
+    with pytest.raises(SettingsError, match="kernels"):
         _core.OrbExtractor(kernels="fast")
-    assert _core.SettingsError is errors.SettingsError
+    assert _core.SettingsError is SettingsError
 
 
 def test_extractors_in_threads_agree_with_one_alone() -> None:

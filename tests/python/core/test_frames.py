@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from orbslam2py import ImageError, SettingsError, StateError
 from orbslam2py import _core as core
-from orbslam2py.errors import ImageError, SettingsError, StateError
 from support import block_wall
 from support.block_wall import HEIGHT, WIDTH, texture
 

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from orbslam2py import StateError
 from orbslam2py import _core as core
-from orbslam2py.errors import StateError
 from support.block_wall import DEPTH, HEIGHT, WIDTH, context, ten_words, texture
 
 SHIFT = 4  # pixels between the two views

@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from orbslam2py import StateError
 from orbslam2py import _core as core
-from orbslam2py.errors import StateError
 from support.block_wall import DEPTH, HEIGHT, WIDTH, context, ten_words, texture
 
 

@@ -6,11 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from orbslam2py import VocabularyError, load_vocabulary
 from orbslam2py import _core as core
-from orbslam2py.errors import VocabularyError
-from orbslam2py.vocabulary.vocabulary import (
-    load_vocabulary,
-)
 from support.vocabularies import TEXT, golden
 
 

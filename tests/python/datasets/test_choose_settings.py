@@ -7,12 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from orbslam2py.datasets import (
-    open_sequence,
-)
-from orbslam2py.errors import DatasetError, SettingsError
-from orbslam2py.settings.builtin import builtin_settings
-from orbslam2py.settings.sensor import Sensor
+from orbslam2py import DatasetError, Sensor, SettingsError
+from orbslam2py.datasets import open_sequence
+from orbslam2py.settings import builtin_settings
 
 
 def test_settings_file_in_the_folder_wins(tum: Path) -> None:

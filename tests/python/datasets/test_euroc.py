@@ -9,15 +9,9 @@ import cv2
 import numpy as np
 import pytest
 
-from orbslam2py.datasets import (
-    EurocSequence,
-    Layout,
-    Sequence,
-    open_sequence,
-)
-from orbslam2py.errors import DatasetError, ImageError, SettingsError
-from orbslam2py.settings.builtin import builtin_settings
-from orbslam2py.settings.sensor import Sensor
+from orbslam2py import DatasetError, ImageError, Sensor, SettingsError
+from orbslam2py.datasets import EurocSequence, Layout, Sequence, open_sequence
+from orbslam2py.settings import builtin_settings
 from support.small_folders import SIZE, STAMPS, image, save
 
 

@@ -9,15 +9,10 @@ import cv2
 import numpy as np
 import pytest
 
-from orbslam2py.datasets import (
-    ImageFolder,
-    Sequence,
-    TumSequence,
-    open_source,
-)
+from orbslam2py import DatasetError, ImageError, SettingsError
+from orbslam2py.datasets import ImageFolder, Sequence, TumSequence, open_source
 from orbslam2py.datasets.image_folder import natural_key
-from orbslam2py.errors import DatasetError, ImageError, SettingsError
-from orbslam2py.settings.builtin import builtin_settings
+from orbslam2py.settings import builtin_settings
 from support.numbered_images import MONO, coloured
 
 

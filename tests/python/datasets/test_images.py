@@ -9,11 +9,8 @@ import cv2
 import numpy as np
 import pytest
 
-from orbslam2py.datasets import (
-    open_sequence,
-)
-from orbslam2py.errors import DatasetError, ImageError
-from orbslam2py.settings.sensor import Sensor
+from orbslam2py import DatasetError, ImageError, Sensor
+from orbslam2py.datasets import open_sequence
 from support.small_folders import SIZE, image, save
 
 

@@ -11,13 +11,8 @@ import cv2
 import numpy as np
 import pytest
 
-from orbslam2py.datasets import (
-    LiveCamera,
-    MaskedCamera,
-    live,
-    open_source,
-)
-from orbslam2py.errors import DatasetError, SettingsError, StateError
+from orbslam2py import DatasetError, SettingsError, StateError
+from orbslam2py.datasets import LiveCamera, MaskedCamera, live, open_source
 from support.numbered_images import MONO, coloured, mask_image, number_of, with_size
 
 

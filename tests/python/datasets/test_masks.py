@@ -9,15 +9,9 @@ import cv2
 import numpy as np
 import pytest
 
-from orbslam2py.datasets import (
-    ImageFolder,
-    MaskedSequence,
-    Sequence,
-    VideoSequence,
-    open_source,
-)
-from orbslam2py.errors import DatasetError, ImageError
-from orbslam2py.settings.builtin import builtin_settings
+from orbslam2py import DatasetError, ImageError
+from orbslam2py.datasets import ImageFolder, MaskedSequence, Sequence, VideoSequence, open_source
+from orbslam2py.settings import builtin_settings
 from support.numbered_images import MONO, SIZE, coloured, mask_image
 
 

@@ -7,14 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from orbslam2py.datasets import (
-    EurocSequence,
-    KittiSequence,
-    Layout,
-    open_sequence,
-    recognise,
-)
-from orbslam2py.errors import DatasetError
+from orbslam2py import DatasetError
+from orbslam2py.datasets import EurocSequence, KittiSequence, Layout, open_sequence, recognise
 
 
 def test_recognise(tum: Path, kitti: Path, euroc: Path) -> None:

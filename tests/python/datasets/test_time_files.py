@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from orbslam2py import DatasetError
 from orbslam2py.datasets.time_files import read_time_file
-from orbslam2py.errors import DatasetError
 
 
 def times_file(tmp_path: Path, *lines: str) -> Path:

@@ -8,14 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orbslam2py.datasets import (
-    Sequence,
-    TumSequence,
-    open_sequence,
-)
-from orbslam2py.errors import DatasetError
-from orbslam2py.settings.builtin import builtin_settings
-from orbslam2py.settings.sensor import Sensor
+from orbslam2py import DatasetError, Sensor
+from orbslam2py.datasets import Sequence, TumSequence, open_sequence
+from orbslam2py.settings import builtin_settings
 from support.small_folders import SIZE, image, save
 
 

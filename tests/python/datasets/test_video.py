@@ -10,14 +10,8 @@ import cv2
 import numpy as np
 import pytest
 
-from orbslam2py.datasets import (
-    Sequence,
-    VideoReader,
-    VideoSequence,
-    open_source,
-)
-from orbslam2py.errors import DatasetError, ImageError, SettingsError
-from orbslam2py.settings.sensor import Sensor
+from orbslam2py import DatasetError, ImageError, Sensor, SettingsError
+from orbslam2py.datasets import Sequence, VideoReader, VideoSequence, open_source
 from support.numbered_images import MONO, SIZE, number_of, with_size
 
 

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from orbslam2py.errors import DatasetError
-from orbslam2py.evaluation.laps import lap_error, scale_drift
-from orbslam2py.trajectory.trajectory import Trajectory
+from orbslam2py import DatasetError, Trajectory
+from orbslam2py.evaluation import lap_error, scale_drift
 
 
 def circle(n: int, radius: float = 10.0, turns: float = 1.2) -> Trajectory:

@@ -11,8 +11,8 @@ from evo.core import metrics, sync
 from evo.core.trajectory import PoseTrajectory3D
 from scipy.spatial.transform import Rotation
 
-from orbslam2py.errors import DatasetError
-from orbslam2py.evaluation.metrics import (
+from orbslam2py import DatasetError, Trajectory
+from orbslam2py.evaluation import (
     Alignment,
     Similarity,
     align,
@@ -20,7 +20,6 @@ from orbslam2py.evaluation.metrics import (
     one_second_pairs,
     segment_errors,
 )
-from orbslam2py.trajectory.trajectory import Trajectory
 from support.made_up_paths import straight, wander
 
 

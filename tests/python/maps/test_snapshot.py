@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from orbslam2py.settings.sensor import Sensor
+from orbslam2py import Sensor
 from support.small_sequences import new_system, play
 
 pytestmark = pytest.mark.watchdog(30)

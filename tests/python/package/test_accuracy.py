@@ -7,11 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from orbslam2py.datasets import open_sequence
+from orbslam2py import Sensor, open_sequence
+from orbslam2py.runs import RunOptions, SequenceRunner
 from orbslam2py.runs.report import evaluate_run, make_report
-from orbslam2py.runs.result import RunOptions
-from orbslam2py.runs.runner import SequenceRunner
-from orbslam2py.settings.sensor import Sensor
 
 pytestmark = [pytest.mark.shared, pytest.mark.slow]
 

@@ -8,11 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orbslam2py.datasets import Layout, open_sequence
-from orbslam2py.errors import DatasetError
-from orbslam2py.settings.builtin import builtin_settings
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.trajectory.trajectory import read_tum
+from orbslam2py import DatasetError, Sensor, open_sequence
+from orbslam2py.datasets import Layout
+from orbslam2py.settings import builtin_settings
+from orbslam2py.trajectory import read_tum
 
 pytestmark = pytest.mark.shared
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 
 import pytest
 
-from orbslam2py.errors import DatasetError
-from orbslam2py.runs.result import RunOptions
-from orbslam2py.settings.sensor import Sensor
+from orbslam2py import DatasetError, Sensor
+from orbslam2py.runs import RunOptions
 
 pytestmark = pytest.mark.watchdog(20)
 

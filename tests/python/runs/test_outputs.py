@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orbslam2py.errors import DatasetError
+from orbslam2py import DatasetError
 from orbslam2py.runs.outputs import link_latest, prepare_output_folder, write_ply
 from support.files import names_in
 

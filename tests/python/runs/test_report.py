@@ -7,13 +7,11 @@ import csv
 import json
 from pathlib import Path
 
+from orbslam2py import Reason, Sensor
+from orbslam2py.runs import RunOptions, SequenceRunner
 from orbslam2py.runs.outputs import OutputWriter
 from orbslam2py.runs.report import make_report, peak_memory_mb
-from orbslam2py.runs.result import RunOptions
-from orbslam2py.runs.runner import SequenceRunner
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.records import Reason
-from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
 
 def test_peak_memory_is_in_megabytes() -> None:

@@ -10,13 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orbslam2py.datasets.base import Images, LiveFrame
-from orbslam2py.errors import DatasetError
+from orbslam2py import DatasetError, Sensor
+from orbslam2py.datasets import Images, LiveFrame
+from orbslam2py.runs import RunOptions, SequenceRunner
 from orbslam2py.runs.report import make_report
-from orbslam2py.runs.result import RunOptions
-from orbslam2py.runs.runner import SequenceRunner
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
 pytestmark = pytest.mark.watchdog(60)
 

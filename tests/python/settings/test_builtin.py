@@ -8,14 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orbslam2py.errors import SettingsError
-from orbslam2py.settings.builtin import BUILTIN_NAMES, builtin_settings, resolve_settings
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import (
+from orbslam2py import SettingsError
+from orbslam2py.settings import (
+    BUILTIN_NAMES,
     DepthSettings,
     OrbSettings,
+    Sensor,
     Settings,
     ViewerSettings,
+    builtin_settings,
+    resolve_settings,
 )
 
 VARIANTS = [

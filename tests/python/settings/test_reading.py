@@ -10,12 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import (
-    CameraSettings,
-    OrbSettings,
-    Settings,
-)
+from orbslam2py.settings import CameraSettings, OrbSettings, Sensor, Settings
 from support.settings_files import DEPTH, MATRIX, MONO, write
 
 

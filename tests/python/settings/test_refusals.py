@@ -9,10 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import (
-    Settings,
-)
+from orbslam2py.settings import Sensor, Settings
 from support.settings_files import DEPTH, MATRIX, MONO, refusal, write
 
 

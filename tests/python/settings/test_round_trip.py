@@ -13,13 +13,13 @@ from hypothesis import HealthCheck, given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from orbslam2py.errors import SettingsError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import (
+from orbslam2py import SettingsError
+from orbslam2py.settings import (
     CameraRectification,
     CameraSettings,
     DepthSettings,
     OrbSettings,
+    Sensor,
     Settings,
     StereoRectification,
     ViewerSettings,

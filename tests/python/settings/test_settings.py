@@ -9,14 +9,14 @@ import math
 import numpy as np
 import pytest
 
-from orbslam2py.errors import SettingsError
-from orbslam2py.settings.builtin import builtin_settings
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import (
+from orbslam2py import SettingsError
+from orbslam2py.settings import (
     CameraSettings,
     DepthSettings,
     OrbSettings,
+    Sensor,
     Settings,
+    builtin_settings,
 )
 
 

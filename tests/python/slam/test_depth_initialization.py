@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orbslam2py import _core
+from orbslam2py import Reason, _core
 from orbslam2py.slam import initialization
-from orbslam2py.slam.records import Reason
 from support.tracking_scene import (
     FakeCore,
     FakeFrame,

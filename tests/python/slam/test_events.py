@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.events import (
+from orbslam2py import (
     Callbacks,
     KeyframeAdded,
     MapChangeCause,
     MapChanged,
     Relocalized,
+    Sensor,
+    System,
     TrackingLost,
+    TrackingState,
 )
-from orbslam2py.slam.records import TrackingState
-from orbslam2py.slam.system import System
 from support.small_sequences import black, new_system, play, track
 
 pytestmark = pytest.mark.watchdog(60)

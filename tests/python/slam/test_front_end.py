@@ -7,9 +7,8 @@ import cv2
 import numpy as np
 import pytest
 
-from orbslam2py.errors import ImageError
-from orbslam2py.settings.builtin import builtin_settings
-from orbslam2py.settings.sensor import Sensor
+from orbslam2py import ImageError, Sensor
+from orbslam2py.settings import builtin_settings
 from orbslam2py.slam.front_end import FrontEnd
 from orbslam2py.slam.timing import StageTimer
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import pytest
 
+from orbslam2py import TrackingState
 from orbslam2py.slam import tracking
-from orbslam2py.slam.records import TrackingState
 from support.tracking_scene import (
     MAX_FRAMES,
     Scene,

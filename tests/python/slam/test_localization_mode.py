@@ -9,12 +9,10 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
+from orbslam2py import Sensor, System, TrackingRecord, TrackingState
 from orbslam2py import _core as core
-from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.local_mapping import LocalMapping
-from orbslam2py.slam.records import TrackingRecord, TrackingState
-from orbslam2py.slam.system import System
-from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.mapped_world import MappedWorld, pose_error
 from support.small_sequences import black, images, new_system, play, track
 

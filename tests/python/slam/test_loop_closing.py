@@ -13,11 +13,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from orbslam2py import _core
-from orbslam2py.errors import StateError
-from orbslam2py.settings.sensor import Sensor
+from orbslam2py import LoopClosed, Sensor, StateError, _core
 from orbslam2py.slam import loop_closing
-from orbslam2py.slam.events import LoopClosed
 from orbslam2py.slam.loop_closing import LoopClosing
 from orbslam2py.slam.worker import Worker
 

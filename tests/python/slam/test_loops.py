@@ -9,14 +9,18 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from orbslam2py.datasets.base import Images
-from orbslam2py.evaluation.laps import lap_error, scale_drift
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.events import Callbacks, LoopClosed, MapChanged
-from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
-from orbslam2py.slam.system import System
-from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
-from orbslam2py.trajectory.trajectory import Trajectory
+from orbslam2py import (
+    Callbacks,
+    FullAdjustmentRecord,
+    LoopClosed,
+    MapChanged,
+    Sensor,
+    System,
+    Trajectory,
+)
+from orbslam2py.datasets import Images
+from orbslam2py.evaluation import lap_error, scale_drift
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.feeding import feed
 
 pytestmark = pytest.mark.watchdog(300)

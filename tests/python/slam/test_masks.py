@@ -8,10 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orbslam2py.errors import ImageError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.records import TrackingRecord, TrackingState
-from orbslam2py.slam.system import System
+from orbslam2py import ImageError, Sensor, System, TrackingRecord, TrackingState
 from support.feeding import feed
 from support.small_sequences import images, new_system
 

@@ -11,11 +11,10 @@ import cv2
 import numpy as np
 import pytest
 
-from orbslam2py.evaluation.metrics import Alignment, evaluate_trajectory
-from orbslam2py.slam.records import Reason, TrackingRecord, TrackingState
-from orbslam2py.slam.system import System
-from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
-from orbslam2py.trajectory.trajectory import Trajectory, write_tum
+from orbslam2py import Reason, System, TrackingRecord, TrackingState, Trajectory
+from orbslam2py.evaluation import Alignment, evaluate_trajectory
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+from orbslam2py.trajectory import write_tum
 
 pytestmark = pytest.mark.watchdog(60)
 

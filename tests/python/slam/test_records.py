@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from orbslam2py.slam.records import Reason, TrackingRecord, TrackingState
+from orbslam2py import Reason, TrackingRecord, TrackingState
 
 pytestmark = pytest.mark.watchdog(20)
 

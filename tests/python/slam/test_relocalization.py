@@ -15,13 +15,12 @@ import cv2
 import numpy as np
 import pytest
 
+from orbslam2py import Reason, Sensor, TrackingState
 from orbslam2py import _core as core
-from orbslam2py.datasets.base import Images
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.records import Reason, TrackingState
+from orbslam2py.datasets import Images
 from orbslam2py.slam.relocalization import Relocalizer
 from orbslam2py.slam.timing import StageTimer
-from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.mapped_world import MappedWorld, beside
 
 pytestmark = pytest.mark.watchdog(60)

@@ -18,13 +18,9 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import lru_cache
 
-from orbslam2py.datasets.base import Images
-from orbslam2py.errors import StateError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.events import Callbacks
-from orbslam2py.slam.system import System
-from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
-from orbslam2py.vocabulary.vocabulary import load_vocabulary
+from orbslam2py import Callbacks, Sensor, StateError, System, load_vocabulary
+from orbslam2py.datasets import Images
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.watchdog import watchdog, worker_threads
 
 SECONDS = float(os.environ.get("ORBSLAM2PY_STRESS_SECONDS", "15"))

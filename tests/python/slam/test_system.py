@@ -9,14 +9,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orbslam2py import _core
-from orbslam2py.datasets.base import Images
-from orbslam2py.errors import SettingsError, StateError, VocabularyError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.records import Reason, TrackingState
-from orbslam2py.slam.system import System
-from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
-from orbslam2py.trajectory.trajectory import write_tum
+from orbslam2py import (
+    Reason,
+    Sensor,
+    SettingsError,
+    StateError,
+    System,
+    TrackingState,
+    VocabularyError,
+    _core,
+)
+from orbslam2py.datasets import Images
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+from orbslam2py.trajectory import write_tum
 from support.scripts import run_script
 from support.small_sequences import ate, images, new_system, play, track
 
@@ -95,9 +100,9 @@ def test_waiting_for_an_idle_mapper_is_the_deterministic_mode_of_a_single_camera
 _RUN = """
 import sys
 from pathlib import Path
+from orbslam2py import Sensor
+from orbslam2py.trajectory import write_tum
 from support.small_sequences import new_system, play
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.trajectory.trajectory import write_tum
 
 with new_system(Sensor(sys.argv[1]), deterministic=True) as system:
     play(system, 50)

@@ -8,10 +8,7 @@ import gc
 import numpy as np
 import pytest
 
-from orbslam2py import _core
-from orbslam2py.errors import StateError, WorkerError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.records import Reason, TrackingState
+from orbslam2py import Reason, Sensor, StateError, TrackingState, WorkerError, _core
 from support.scripts import run_to_the_end
 from support.small_sequences import ate, black, new_system, play, sequence, track
 from support.watchdog import worker_threads
@@ -86,7 +83,7 @@ def test_error_of_the_caller_passes_through() -> None:
 def test_interpreter_ends_without_shutdown() -> None:
     code = (
         "from support.small_sequences import new_system, play\n"
-        "from orbslam2py.settings.sensor import Sensor\n"
+        "from orbslam2py import Sensor\n"
         "system = new_system(Sensor.STEREO)\n"
         "play(system, 12)\n"
         "print('end')\n"

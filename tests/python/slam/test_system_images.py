@@ -8,11 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orbslam2py.datasets.base import Images
-from orbslam2py.errors import ImageError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.records import Reason, TrackingState
-from orbslam2py.slam.system import System
+from orbslam2py import ImageError, Reason, Sensor, System, TrackingState
+from orbslam2py.datasets import Images
 from support.small_sequences import images, new_system, play, sequence, track
 
 pytestmark = pytest.mark.watchdog(30)

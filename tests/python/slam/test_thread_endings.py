@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Systems and workers that end while others are at work.
-
-D14 and D17 with a number are defects of the original in spec 14, section 8, and 17, section 4.
-"""
+"""Systems and workers that end while others are at work."""
 
 from __future__ import annotations
 
@@ -10,11 +7,7 @@ import threading
 
 import pytest
 
-from orbslam2py import _core
-from orbslam2py.errors import StateError, WorkerError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.events import Callbacks, KeyframeAdded
-from orbslam2py.slam.system import System
+from orbslam2py import Callbacks, KeyframeAdded, Sensor, StateError, System, WorkerError, _core
 from orbslam2py.slam.worker import WorkerState
 from support.interleaving import LIMIT, Call, Stage, last_keyframe, refine
 from support.scripts import run_to_the_end
@@ -30,7 +23,7 @@ pytestmark = pytest.mark.watchdog(60)
     "verb", ["plan_loop_correction", "optimize_essential_graph", "apply_loop_correction"]
 )
 def test_shutdown_during_a_correction(slam: System, stage: Stage, verb: str, drain: bool) -> None:
-    """D14-4: the original's correction waits without looking at the end."""
+    """The original's correction waits for the mapper without looking whether all is to end."""
     close = stage.loops(slam)
     gate = stage.gate(verb)
     apply = stage.gate("apply_loop_correction", opened=True) if "apply" not in verb else gate
@@ -67,7 +60,7 @@ def test_shutdown_while_a_correction_waits_for_the_mapper(slam: System, stage: S
 
 
 def test_shutdown_gives_up_an_adjustment(slam: System, stage: Stage) -> None:
-    """D14-17: the original waits for its end."""
+    """The original waits until it has been solved."""
     stage.waitable_cancel(slam._back_end.adjustment.worker)
     solve = stage.endless_solve()
     refine(slam)
@@ -174,7 +167,7 @@ def test_the_interpreter_ends_while_an_adjustment_is_solved() -> None:
         "import threading\n"
         "from orbslam2py import _core\n"
         "from support.small_sequences import new_system, play\n"
-        "from orbslam2py.settings.sensor import Sensor\n"
+        "from orbslam2py import Sensor\n"
         "entered, real = threading.Event(), _core.solve_global_bundle\n"
         "def solve(bundle, options, cancelled, n_threads):\n"
         "    entered.set()\n"

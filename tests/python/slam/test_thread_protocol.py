@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Requests between threads, each in the interleaving in which the original hangs or goes wrong.
-
-D14 and D17 with a number are defects of the original in spec 14, section 8, and 17, section 4.
-"""
+"""Requests between threads, each in the interleaving in which the original hangs or goes wrong."""
 
 from __future__ import annotations
 
@@ -10,11 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from orbslam2py import _core
-from orbslam2py.errors import StateError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.records import TrackingState
-from orbslam2py.slam.system import System
+from orbslam2py import Sensor, StateError, System, TrackingState, _core
 from support.interleaving import LIMIT, Call, Stage, last_keyframe, refine, settle
 from support.small_sequences import new_system, play, track
 
@@ -42,7 +35,7 @@ def busy_mapping(stage: Stage) -> tuple[System, Callable[[], None], int]:
 
 
 def test_waiting_keyframes_outlive_localization_mode(stage: Stage) -> None:
-    """D17-6: the original's release of the mapper deletes the keyframes in its queue."""
+    """In the original the mapper's release deletes the keyframes that wait for it."""
     system, go_on, frame = busy_mapping(stage)
     with system:
         inserted = len(system._map.keyframe_ids())
@@ -62,7 +55,7 @@ def test_waiting_keyframes_outlive_localization_mode(stage: Stage) -> None:
 def test_a_new_keyframe_interrupts_local_bundle_adjustment(
     slam: System, stage: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The flag that the original writes from three threads without a lock (D17-7)."""
+    """By a flag that the original writes from three threads without a lock."""
     mapping = slam._mapping.worker
     gate = stage.gate("local_bundle_adjustment")
     monkeypatch.setattr(_core, "process_new_keyframe", lambda *_: None)
@@ -76,7 +69,7 @@ def test_a_new_keyframe_interrupts_local_bundle_adjustment(
 
 
 def test_an_idle_mapper_says_so_at_once(slam: System) -> None:
-    """D17-10: the original's is "not idle" for a part of every three milliseconds."""
+    """The original's looks busy for a part of every three milliseconds."""
     mapping = slam._mapping.worker
     assert all(mapping.idle for _ in range(10000))
 
@@ -91,7 +84,7 @@ def test_no_keyframe_is_made_while_the_mapper_is_to_stand_still(slam: System) ->
 
 
 def test_keyframes_have_their_words_before_others_see_them(stage: Stage) -> None:
-    """D17-8: the original's tracker reads words while the mapper computes them."""
+    """The original's tracker reads words while the mapper computes them."""
     real, described = _core.insert_keyframe, []
 
     def insert(world: _core.Map, frame: _core.TrackedFrame, **options: bool) -> int:
@@ -109,7 +102,7 @@ def test_keyframes_have_their_words_before_others_see_them(stage: Stage) -> None
 
 # ---- localization mode ---------------------------------------------------------------------------
 def test_a_reset_is_served_while_localization_mode_holds_the_workers(slam: System) -> None:
-    """D17-1: the original's mapper does not look at reset requests while it is stopped."""
+    """The original's mapper does not look at reset requests while it stands: all wait for ever."""
     slam.localization_mode = True
     assert track(slam, 30).state is TrackingState.OK
     assert slam._mapping.worker.held
@@ -148,7 +141,7 @@ def test_localization_mode_waits_for_no_adjustment_that_is_being_solved(
 def test_a_loop_closed_at_the_switch_does_not_end_localization_mode(
     slam: System, stage: Stage, verb: str
 ) -> None:
-    """D17-9, D14-7: in the original any release of the mapper cancels the mode."""
+    """In the original any release of the mapper cancels the mode."""
     close = stage.loops(slam)
     gate = stage.gate(verb)
     close(last_keyframe(slam))
@@ -233,7 +226,7 @@ def test_who_waits_for_the_workers_is_told_when_localization_mode_comes_on(
 
 # ---- loops and full adjustments ------------------------------------------------------------------
 def test_a_second_loop_gives_up_the_running_adjustment(slam: System, stage: Stage) -> None:
-    """D14-1, D14-2: the original's adjustments share a flag and a truth value as a counter."""
+    """In the original it clears the flag that stops the first, whose stale result is written."""
     close = stage.loops(slam)
     solve = stage.gate("solve_global_bundle")
     close(last_keyframe(slam) - 1)
@@ -247,7 +240,7 @@ def test_a_second_loop_gives_up_the_running_adjustment(slam: System, stage: Stag
 
 
 def test_a_loop_begins_while_an_adjustment_is_written(slam: System, stage: Stage) -> None:
-    """D17-2, D14-5, D14-6: the original loses the stop request, and waits for ever."""
+    """The original's adjustment lets the mapper go, whom the loop then waits for for ever."""
     close = stage.loops(slam)
     commit, plan = stage.gate("commit_global_bundle"), stage.gate("plan_loop_correction")
     plan.open()

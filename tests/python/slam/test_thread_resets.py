@@ -1,29 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Maps and keyframes that end while others are at work.
-
-D14 and D17 with a number are defects of the original in spec 14, section 8, and 17, section 4.
-"""
+"""Maps and keyframes that end while others are at work."""
 
 from __future__ import annotations
 
 import pytest
 
-from orbslam2py import _core
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.records import TrackingState
-from orbslam2py.slam.system import System
+from orbslam2py import Sensor, System, TrackingState, _core
 from support.interleaving import LIMIT, Call, Stage, last_keyframe, refine, settle
 from support.small_sequences import black, new_system, play, track
 
 pytestmark = pytest.mark.watchdog(60)
-N_FRAMES = 30
 
 
 # ---- reset ---------------------------------------------------------------------------------------
 def test_a_reset_gives_up_an_adjustment_without_waiting_for_its_solver(
     slam: System, stage: Stage
 ) -> None:
-    """D14-8, D17-6: the original's goes on in the destroyed map."""
+    """The original's goes on in the destroyed map."""
     solve, commit = stage.gate("solve_global_bundle"), stage.gate("commit_global_bundle")
     refine(slam)
     solve.wait_entered()
@@ -56,7 +49,7 @@ def test_a_reset_gives_up_an_adjustment_that_localization_mode_holds(
     "verb", ["plan_loop_correction", "optimize_essential_graph", "apply_loop_correction"]
 )
 def test_a_reset_during_a_correction(slam: System, stage: Stage, verb: str) -> None:
-    """D14-8: the original's loop closer keeps keyframes of the old map."""
+    """The original's loop closer keeps keyframes of the old map."""
     close = stage.loops(slam)
     closing = slam._back_end.loop_closing
     gate = stage.gate(verb)
@@ -77,7 +70,7 @@ def test_a_reset_during_a_correction(slam: System, stage: Stage, verb: str) -> N
 
 
 def test_a_reset_of_a_spoilt_beginning_while_an_adjustment_is_written(stage: Stage) -> None:
-    """D17-3: the original resets inside a frame, with the lock that the adjustment waits for."""
+    """The original resets inside a frame, holding the lock that the adjustment waits for."""
     with new_system(Sensor.RGBD) as system:
         play(system, 5)
         assert system.wait_until_idle(LIMIT)
@@ -120,7 +113,7 @@ def test_optimize_ends_when_a_reset_drops_it(slam: System) -> None:
 
 
 def test_nobody_waits_for_those_who_look(slam: System, stage: Stage) -> None:
-    """D17-5: the original's reset waits for a viewer that may have ended; and the other way."""
+    """The original's reset waits for its viewer, for ever if that has ended."""
     close = stage.loops(slam)
     plan = stage.gate("plan_loop_correction")
     close(last_keyframe(slam))
@@ -136,7 +129,7 @@ def test_nobody_waits_for_those_who_look(slam: System, stage: Stage) -> None:
 
 
 def test_every_system_counts_its_own_changes(slam: System) -> None:
-    """D17-13: the original counts in a variable of the process."""
+    """The original counts in one variable for all systems of a process."""
     with new_system(Sensor.RGBD) as other:
         play(other, 5)
         assert slam.optimize().used
@@ -149,7 +142,7 @@ def test_every_system_counts_its_own_changes(slam: System) -> None:
 
 # ---- keyframes that die --------------------------------------------------------------------------
 def test_a_keyframe_that_dies_in_the_loop_closers_queue_is_passed_over(slam: System) -> None:
-    """D14-14: the original does not look."""
+    """The original does not look whether it is still alive."""
     closing = slam._back_end.loop_closing
     dies = last_keyframe(slam)
     slam._back_end.index.erase(dies)
@@ -180,7 +173,7 @@ def test_a_keyframe_culled_while_the_loop_closer_looks_at_it_dies_afterwards(
 
 
 def test_related_keyframes_die_in_two_threads_at_once(slam: System) -> None:
-    """D17-4: the original takes their two locks in opposite order."""
+    """The original takes their two locks in opposite order."""
     keyframes = slam._map.keyframe_ids()[1:].tolist()
 
     def erase(order: list[int]) -> None:

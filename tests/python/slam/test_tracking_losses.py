@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from orbslam2py.slam.records import Reason, TrackingState
+from orbslam2py import Reason, TrackingState
 from support.tracking_scene import (
     MAX_FRAMES,
     Scene,

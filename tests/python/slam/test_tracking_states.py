@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.records import Reason, TrackingState
+from orbslam2py import Reason, Sensor, TrackingState
 from support.tracking_scene import (
     MAX_FRAMES,
     OUTLIERS,

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from orbslam2py.errors import WorkerError
+from orbslam2py import WorkerError
 from orbslam2py.slam.worker import Worker, WorkerState
 from support.worker_steps import NAME, eventually, failing
 

@@ -7,7 +7,7 @@ import threading
 
 import pytest
 
-from orbslam2py.errors import OrbSlamError, StateError, WorkerError
+from orbslam2py import OrbSlamError, StateError, WorkerError
 from orbslam2py.slam.worker import CallGuard, Worker, WorkerState
 from support.worker_steps import NAME, Gate, eventually
 

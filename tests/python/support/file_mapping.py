@@ -6,7 +6,7 @@ from __future__ import annotations
 from multiprocessing import Queue
 from pathlib import Path
 
-from orbslam2py.vocabulary import load_vocabulary
+from orbslam2py import load_vocabulary
 
 
 def tell_permissions(path: str, queue: Queue[str]) -> None:

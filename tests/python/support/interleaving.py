@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orbslam2py import _core
-from orbslam2py.slam.system import System
+from orbslam2py import System, _core
 from orbslam2py.slam.worker import Worker
 
 #: Seconds after which something that should happen is held to have hung.

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from orbslam2py.trajectory.trajectory import Trajectory
+from orbslam2py import Trajectory
 
 
 def made_up(n: int, seed: int = 0) -> Trajectory:

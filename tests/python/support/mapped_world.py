@@ -8,12 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orbslam2py import System, TrackingState
-from orbslam2py.datasets.base import Images
-from orbslam2py.evaluation.metrics import align
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.records import TrackingRecord
-from orbslam2py.synthetic.sequence import SyntheticSequence
+from orbslam2py import Sensor, System, TrackingRecord, TrackingState
+from orbslam2py.datasets import Images
+from orbslam2py.evaluation import align
+from orbslam2py.synthetic import SyntheticSequence
 from support.feeding import blackened, feed
 
 Array = np.ndarray

@@ -10,9 +10,8 @@ import cv2
 import numpy as np
 import pytest
 
-from orbslam2py.settings.builtin import builtin_settings
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import Settings
+from orbslam2py import Sensor, Settings
+from orbslam2py.settings import builtin_settings
 
 MONO = Sensor.MONOCULAR
 SIZE = (96, 128)  # rows, columns

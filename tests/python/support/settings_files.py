@@ -7,11 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from orbslam2py.errors import SettingsError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import (
-    Settings,
-)
+from orbslam2py import Sensor, Settings, SettingsError
 
 MONO = {
     "Camera.fx": "517.3",

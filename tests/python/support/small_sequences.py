@@ -5,12 +5,10 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from orbslam2py.datasets.base import Images
-from orbslam2py.evaluation.metrics import evaluate_trajectory
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.records import TrackingRecord
-from orbslam2py.slam.system import System
-from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
+from orbslam2py import Sensor, System, TrackingRecord
+from orbslam2py.datasets import Images
+from orbslam2py.evaluation import evaluate_trajectory
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.feeding import blackened, feed
 
 SIZE = (320, 240)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from orbslam2py.trajectory.trajectory import read_tum
+from orbslam2py.trajectory import read_tum
 from support.command_line import CommandLine, Outcome, Results
 
 N = 14

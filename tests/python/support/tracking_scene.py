@@ -10,9 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from orbslam2py import _core
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.records import Reason, TrackingState
+from orbslam2py import Reason, Sensor, TrackingState, _core
 from orbslam2py.slam.timing import StageTimer
 from orbslam2py.slam.tracking import Tracking, TrackingOutcome
 

@@ -11,11 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from orbslam2py import VocabularyError, load_vocabulary
 from orbslam2py import _core as core
-from orbslam2py.errors import VocabularyError
-from orbslam2py.vocabulary.vocabulary import (
-    load_vocabulary,
-)
 from support.data import GOLDEN
 
 BOW = GOLDEN / "bow"

@@ -9,11 +9,10 @@ import cv2
 import numpy as np
 import pytest
 
-from orbslam2py import Sensor, open_sequence
-from orbslam2py.datasets.base import Layout
-from orbslam2py.errors import DatasetError, SettingsError
+from orbslam2py import DatasetError, Sensor, SettingsError, open_sequence
+from orbslam2py.datasets import Layout
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence, SyntheticWorld
 from orbslam2py.synthetic.scenes import LAPS, ROOM_BESIDE
-from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence, SyntheticWorld
 
 SMALL = (160, 120)
 WORLDS = list(SyntheticWorld)

@@ -10,7 +10,7 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from orbslam2py.trajectory.association import associate
+from orbslam2py.trajectory import associate
 
 
 def plain_greedy(first: list[float], second: list[float], limit: float) -> list[tuple[int, int]]:

@@ -11,8 +11,8 @@ from hypothesis import HealthCheck, given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from orbslam2py.errors import DatasetError
-from orbslam2py.trajectory.trajectory import (
+from orbslam2py import DatasetError
+from orbslam2py.trajectory import (
     Trajectory,
     TrajectoryFormat,
     read_euroc,

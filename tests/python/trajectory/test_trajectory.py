@@ -6,9 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from orbslam2py.trajectory.trajectory import (
-    Trajectory,
-)
+from orbslam2py.trajectory import Trajectory
 from support.made_up_paths import made_up
 
 

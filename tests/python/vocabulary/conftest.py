@@ -7,10 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from orbslam2py.vocabulary.vocabulary import (
-    ENVIRONMENT_VARIABLE,
-    load_vocabulary,
-)
+from orbslam2py.vocabulary import ENVIRONMENT_VARIABLE, load_vocabulary
 from support.vocabularies import TEXT
 
 

@@ -10,16 +10,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from orbslam2py.errors import VocabularyError
-from orbslam2py.vocabulary.vocabulary import (
-    load_vocabulary,
-)
+from orbslam2py import VocabularyError
+from orbslam2py.vocabulary import load_vocabulary
 from support.vocabularies import BYTES, TEXT, error_of, golden, packed, to_yaml, with_line
 
 
 # ---- broken text ---------------------------------------------------------------------------------
 @pytest.mark.parametrize("header", ["1 3 0 0", "0 3 0 0", "21 3 0 0", "10 0 0 0", "10 11 0 0"])
-def test_header_out_of_range(text, header):  # D11-10
+def test_header_out_of_range(text, header):
+    """With less than two branches the original divides by zero."""
     assert "line 1: not a vocabulary file" in error_of(with_line(text, 1, header))
 
 
@@ -88,7 +87,8 @@ def test_other_files_are_refused(tmp_path, content):
     error_of(path)
 
 
-def test_missing_file_and_folder_are_named(tmp_path):  # D11-3
+def test_missing_file_and_folder_are_named(tmp_path):
+    """The original reads on in a file that it could not open."""
     assert "No such file" in error_of(tmp_path / "nothing.txt")
     error_of(tmp_path)
 

@@ -9,8 +9,8 @@ import sys
 
 import pytest
 
-from orbslam2py.errors import VocabularyError
-from orbslam2py.vocabulary.vocabulary import (
+from orbslam2py import VocabularyError
+from orbslam2py.vocabulary import (
     ENVIRONMENT_VARIABLE,
     default_vocabulary_path,
     load_vocabulary,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from orbslam2py import _core as core
-from orbslam2py.vocabulary.vocabulary import (
+from orbslam2py.vocabulary import (
     VocabularyFormat,
     convert_vocabulary,
     load_vocabulary,
@@ -19,7 +19,8 @@ from orbslam2py.vocabulary.vocabulary import (
 from support.vocabularies import TEXT, packed, to_yaml
 
 
-def test_trailing_newline_makes_no_extra_word(vocabulary, text):  # D11-1
+def test_trailing_newline_makes_no_extra_word(vocabulary, text):
+    """The original reads one line too many, and makes a word of it."""
     assert (vocabulary.n_words, vocabulary.n_nodes) == (1000, 1111)
     text.write_bytes(text.read_bytes().rstrip(b"\n"))
     assert load_vocabulary(text, cache=False).hash == vocabulary.hash

@@ -9,13 +9,9 @@ import cv2
 import numpy as np
 import pytest
 
+from orbslam2py import ImageError, SettingsError, VocabularyError
 from orbslam2py import _core as core
-from orbslam2py.errors import ImageError, SettingsError, VocabularyError
-from orbslam2py.vocabulary.vocabulary import (
-    read_training_images,
-    save_vocabulary,
-    train_vocabulary,
-)
+from orbslam2py.vocabulary import read_training_images, save_vocabulary, train_vocabulary
 
 
 @pytest.fixture

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
+from orbslam2py import Sensor
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.spoilt_runs import N
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from orbslam2py import _core
-from orbslam2py.trajectory.trajectory import read_tum
+from orbslam2py.trajectory import read_tum
 from support.command_line import RUN_FILES, CommandLine, Results
 from support.spoilt_runs import run
 
