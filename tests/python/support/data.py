@@ -10,15 +10,15 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-_CHECKOUT = Path(__file__).resolve().parents[3]
+CHECKOUT = Path(__file__).resolve().parents[3]
 
 #: Arrays of the reference that are part of the project.
-GOLDEN = _CHECKOUT / "tests" / "data" / "golden"
+GOLDEN = CHECKOUT / "tests" / "data" / "golden"
 
 
 def shared_folder() -> Path:
     """Folder of the extra data (photographs, real sequences), whether it exists or not."""
-    return Path(os.environ.get("ORBSLAM2PY_SHARED", _CHECKOUT.parent / "shared")) / "data"
+    return Path(os.environ.get("ORBSLAM2PY_SHARED", CHECKOUT.parent / "shared")) / "data"
 
 
 def shared_arrays(name: str) -> dict[str, npt.NDArray[np.generic]]:
