@@ -19,7 +19,7 @@ from orbslam2py.slam.initialization import Initializer
 from orbslam2py.slam.keyframe_decision import KeyframeClock, KeyframeDecision
 from orbslam2py.slam.local_mapping import LocalMapping
 from orbslam2py.slam.localization_mode import FirstEstimateInFixedMap
-from orbslam2py.slam.pose_search import PoseSearch
+from orbslam2py.slam.pose_search import MotionModel, PoseSearch
 from orbslam2py.slam.records import PoseEstimate, Reason, TrackingOutcome, TrackingState
 
 _log = logging.getLogger(__name__)
@@ -137,6 +137,11 @@ class Tracking:
     def initializing(self) -> bool:
         """Whether the next image may begin a map."""
         return self.state in (TrackingState.NO_IMAGES_YET, TrackingState.NOT_INITIALIZED)
+
+    @property
+    def motion(self) -> MotionModel:
+        """The last frame that had a pose, and the speed."""
+        return self._search.motion
 
     @property
     def reference_keyframe(self) -> int:

@@ -185,7 +185,7 @@ def test_tracked_frame() -> None:
     depth = np.full((HEIGHT, WIDTH), 2.0, dtype=np.float32)
     frame = core.build_rgbd_frame(context(), 3, 1.5, extraction(), depth)
     tracked = core.TrackedFrame(frame)
-    assert tracked.frame is frame
+    assert tracked.features is frame
     assert (tracked.id, tracked.timestamp) == (3, 1.5)
     assert tracked.T_cw is None
     assert tracked.reference_keyframe == -1

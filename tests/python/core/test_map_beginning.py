@@ -36,10 +36,10 @@ class TwoViews:
     def __init__(self, vocabulary: core.Vocabulary) -> None:
         self.initial, self.current = view(0), view(SHIFT)
         for tracked in (self.initial, self.current):
-            core.describe(tracked.frame, vocabulary)
-        pixels = self.initial.frame.keypoints
+            core.describe(tracked.features, vocabulary)
+        pixels = self.initial.features.keypoints
         self.matches, _ = core.match_for_initialization(
-            self.initial.frame, self.current.frame, pixels, 20
+            self.initial.features, self.current.features, pixels, 20
         )
         z = 100.0 * DEPTH / SHIFT
         rays = np.column_stack([(pixels - (160.0, 120.0)) / 250.0, np.ones(len(pixels))])
@@ -160,7 +160,7 @@ def test_temporary_points() -> None:
     current.T_cw = core.Pose(np.array([0, 0, 0, 1.0]), np.array([-SHIFT / 100.0, 0, 0]))
     points = core.gather_points(world, last.map_points)
     n = core.add_temporary_points(last, points)
-    assert n == len(points) == last.frame.size > 100
+    assert n == len(points) == last.features.size > 100
     assert (points.ids >= core.FIRST_TEMPORARY_POINT).all()
     np.testing.assert_allclose(points.positions[:, 2], DEPTH, rtol=1e-6)
     matched = core.match_last_frame(current, last, points, 15.0, True)
@@ -178,7 +178,7 @@ def test_temporary_points() -> None:
 
 def test_scene_depth_of_a_keyframe_without_points() -> None:
     world = core.Map()
-    keyframe = world.add_keyframe(view(0).frame, core.Pose())
+    keyframe = world.add_keyframe(view(0).features, core.Pose())
     assert core.median_scene_depth(world, keyframe) is None
     with pytest.raises(KeyError, match="not in the map"):
         core.median_scene_depth(world, 7)

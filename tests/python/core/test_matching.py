@@ -41,7 +41,7 @@ class Scene:
         held = frame.map_points >= 0
         p = frame.positions[held] + np.array([-frame.id / 100.0, 0, 0])
         uv = 250.0 * p[:, :2] / p[:, 2:] + np.array([160.0, 120.0])
-        return np.linalg.norm(uv - frame.frame.keypoints[held], axis=1)
+        return np.linalg.norm(uv - frame.features.keypoints[held], axis=1)
 
 
 @pytest.fixture
@@ -106,7 +106,7 @@ def test_by_words(scene: Scene) -> None:
 
 
 def test_for_initialization(scene: Scene) -> None:
-    first, second = scene.frame(0).frame, scene.frame(6).frame
+    first, second = scene.frame(0).features, scene.frame(6).features
     matches, previous = core.match_for_initialization(first, second, first.keypoints, 50.0, 0.9)
     found = matches >= 0
     assert matches.shape == (len(first),)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from orbslam2py import DatasetError, ImageError, SettingsError
-from orbslam2py.datasets import ImageFolder, Sequence, TumSequence, open_source
+from orbslam2py.datasets import ImageFolder, Sequence, TumSequence, open_input
 from orbslam2py.datasets.image_folder import natural_key
 from orbslam2py.settings import builtin_settings
 from support.numbered_images import MONO, coloured
@@ -28,7 +28,7 @@ def test_colour_order_follows_camera_rgb(folder: Path, tmp_path: Path) -> None:
 
 
 def test_image_folder_sorts_naturally(folder: Path) -> None:
-    sequence: Sequence = open_source(folder, MONO, settings="tum1")  # type: ignore[assignment]
+    sequence: Sequence = open_input(folder, MONO, settings="tum1")  # type: ignore[assignment]
     assert isinstance(sequence, ImageFolder)
     assert (sequence.name, sequence.layout, len(sequence)) == ("walk", "images", 12)
     assert [path.name for path in sequence.paths] == [f"{k}.png" for k in range(1, 13)]
@@ -53,9 +53,9 @@ def test_bad_image_folders(folder: Path, tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match="no images in"):
         ImageFolder(tmp_path / "empty", settings="tum1")
     with pytest.raises(DatasetError, match=r"did you mean .*walk"):
-        open_source(tmp_path, MONO, settings="tum1")
+        open_input(tmp_path, MONO, settings="tum1")
     with pytest.raises(DatasetError, match="does not exist"):
-        open_source(tmp_path / "nowhere", MONO, settings="tum1")
+        open_input(tmp_path / "nowhere", MONO, settings="tum1")
     with pytest.raises(DatasetError, match="cannot list"):
         ImageFolder(tmp_path / "nowhere", settings="tum1")
     (folder / "3.png").write_bytes(b"")
@@ -68,8 +68,8 @@ def test_options_that_a_known_layout_does_not_take(tmp_path: Path) -> None:
     tum.mkdir()
     cv2.imwrite(str(tum / "a.png"), coloured(1))
     (tum / "rgb.txt").write_text("1.0 a.png\n")
-    assert isinstance(open_source(tum, MONO), TumSequence)
+    assert isinstance(open_input(tum, MONO), TumSequence)
     with pytest.raises(DatasetError, match=r"--fps is for .*is tum"):
-        open_source(tum, MONO, fps=20)
+        open_input(tum, MONO, fps=20)
     with pytest.raises(DatasetError, match=r"--times is for .*is tum"):
-        open_source(tum, MONO, times=tum / "rgb.txt")
+        open_input(tum, MONO, times=tum / "rgb.txt")

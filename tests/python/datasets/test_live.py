@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from orbslam2py import DatasetError, SettingsError, StateError
-from orbslam2py.datasets import LiveCamera, MaskedCamera, live, open_source
+from orbslam2py.datasets import LiveCamera, MaskedCamera, live, open_input
 from support.numbered_images import MONO, coloured, mask_image, number_of, with_size
 
 
@@ -148,12 +148,12 @@ def test_number_that_is_no_file_is_a_camera(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(DatasetError, match="camera 97 cannot be opened"):
-        open_source("97", MONO, settings="tum1")
+        open_input("97", MONO, settings="tum1")
     with pytest.raises(DatasetError, match="--times does not go with a camera"):
-        open_source(97, MONO, settings="tum1", times="t.txt")
+        open_input(97, MONO, settings="tum1", times="t.txt")
     (tmp_path / "97").mkdir()
     cv2.imwrite(str(tmp_path / "97" / "a.png"), coloured(1))
-    assert open_source("97", MONO, settings="tum1").layout == "images"
+    assert open_input("97", MONO, settings="tum1").layout == "images"
 
 
 def test_camera_with_a_mask(tmp_path: Path) -> None:

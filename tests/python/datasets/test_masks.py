@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from orbslam2py import DatasetError, ImageError
-from orbslam2py.datasets import ImageFolder, MaskedSequence, Sequence, VideoSequence, open_source
+from orbslam2py.datasets import ImageFolder, MaskedSequence, Sequence, VideoSequence, open_input
 from orbslam2py.settings import builtin_settings
 from support.numbered_images import MONO, SIZE, coloured, mask_image
 
 
 def test_one_mask_for_all(folder: Path, tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "mask.png"), mask_image())
-    sequence: Sequence = open_source(  # type: ignore[assignment]
+    sequence: Sequence = open_input(  # type: ignore[assignment]
         folder, MONO, settings="tum1", mask=tmp_path / "mask.png"
     )
     assert isinstance(sequence, MaskedSequence)

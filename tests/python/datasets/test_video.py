@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from orbslam2py import DatasetError, ImageError, Sensor, SettingsError
-from orbslam2py.datasets import Sequence, VideoReader, VideoSequence, open_source
+from orbslam2py.datasets import Sequence, VideoReader, VideoSequence, open_input
 from support.numbered_images import MONO, SIZE, number_of, with_size
 
 
@@ -54,13 +54,13 @@ def test_bad_videos(tmp_path: Path, video: Path, folder: Path) -> None:
         VideoSequence(bad, settings="tum1")
     bad.write_bytes(b"")
     with pytest.raises(DatasetError, match=r"bad\.mp4 is no video"):
-        open_source(bad, MONO, settings="tum1")
+        open_input(bad, MONO, settings="tum1")
     with pytest.raises(DatasetError, match="is an image, no video; give the folder"):
-        open_source(folder / "1.png", MONO, settings="tum1")
+        open_input(folder / "1.png", MONO, settings="tum1")
     empty = tmp_path / "empty.avi"
     cv2.VideoWriter(str(empty), cv2.VideoWriter_fourcc(*"MJPG"), 25, SIZE[::-1]).release()
     with pytest.raises(DatasetError, match=r"empty\.avi .*(no frames|no video)"):
-        open_source(empty, MONO, settings="tum1")
+        open_input(empty, MONO, settings="tum1")
     with pytest.raises(SettingsError, match="orbslam2py calibrate"):
         VideoSequence(video)
     with pytest.raises(DatasetError, match="no stereo images; it can be used as: mono"):

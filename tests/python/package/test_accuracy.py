@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from orbslam2py import Sensor, open_sequence
-from orbslam2py.runs import RunOptions, SequenceRunner
+from orbslam2py.runs import RunOptions, SequenceRunner, SystemOptions
 from orbslam2py.runs.report import evaluate_run, make_report
 
 pytestmark = [pytest.mark.shared, pytest.mark.slow]
@@ -30,7 +30,7 @@ def test_absolute_trajectory_error(
         pytest.skip(f"no sequence {folder}")
     sequence = open_sequence(folder, sensor)
     runner = SequenceRunner(
-        sequence, sequence.settings, None, RunOptions(sensor, deterministic=True)
+        sequence, sequence.settings, None, RunOptions(sensor, SystemOptions(deterministic=True))
     )
     result = runner.run()
     assert result.error is None

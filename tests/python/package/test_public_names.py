@@ -45,15 +45,16 @@ NAMES = {
     "__version__",
     "load_vocabulary",
     "open_sequence",
+    "run_sequence",
 }
 
 #: Names that users import from rooms, as the examples do; a room may offer more.
 ROOMS = {
     "calibration": ["Board", "Calibration", "calibrate", "find_views", "read_camera_file"],
-    "datasets": ["ImageFolder", "Images", "LiveCamera", "Sequence", "VideoSequence", "open_source"],
+    "datasets": ["ImageFolder", "Images", "LiveCamera", "Sequence", "VideoSequence", "open_input"],
     "evaluation": ["Alignment", "align", "evaluate_trajectory", "lap_error"],
     "maps": ["MapSnapshot"],
-    "runs": ["RunOptions", "RunResult", "SequenceRunner"],
+    "runs": ["RunOptions", "RunResult", "SequenceRunner", "SystemOptions", "run_sequence"],
     "settings": ["CameraSettings", "DepthSettings", "OrbSettings", "Settings", "builtin_settings"],
     "synthetic": ["SyntheticOptions", "SyntheticSequence"],
     "trajectory": [

@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from orbslam2py import DatasetError, Sensor
-from orbslam2py.runs import RunOptions
+from orbslam2py.runs import RunOptions, SystemOptions
 
 pytestmark = pytest.mark.watchdog(20)
 
@@ -32,9 +34,9 @@ def test_indices(options: dict[str, int], indices: list[int]) -> None:
         {"start": -1},
         {"stride": 0},
         {"max_frames": 0},
-        {"deterministic": True, "realtime": True},
+        {"system": SystemOptions(deterministic=True), "realtime": True},
     ],
 )
-def test_options_that_make_no_sense(options: dict[str, int]) -> None:
+def test_options_that_make_no_sense(options: dict[str, Any]) -> None:
     with pytest.raises(DatasetError, match="--"):
-        RunOptions(Sensor.RGBD, **options).indices(5)  # type: ignore[arg-type]
+        RunOptions(Sensor.RGBD, **options).indices(5)

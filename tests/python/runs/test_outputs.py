@@ -16,14 +16,14 @@ pytestmark = pytest.mark.watchdog(20)
 
 
 def test_output_folder_is_made_with_its_parents(tmp_path: Path) -> None:
-    folder = prepare_output_folder(tmp_path / "a" / "b", "name", force=False)
+    folder = prepare_output_folder(tmp_path / "a" / "b", force=False)
     assert folder.is_dir()
     assert list(folder.iterdir()) == []
-    assert prepare_output_folder(folder, "name", force=False) == folder, "empty: taken"
+    assert prepare_output_folder(folder, force=False) == folder, "empty: taken"
     (folder / "x").touch()
     with pytest.raises(DatasetError, match="not empty"):
-        prepare_output_folder(folder, "name", force=False)
-    assert prepare_output_folder(folder, "name", force=True) == folder
+        prepare_output_folder(folder, force=False)
+    assert prepare_output_folder(folder, force=True) == folder
 
 
 def test_link_to_the_latest_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

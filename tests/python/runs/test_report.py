@@ -8,7 +8,7 @@ import json
 from pathlib import Path
 
 from orbslam2py import Reason, Sensor
-from orbslam2py.runs import RunOptions, SequenceRunner
+from orbslam2py.runs import RunOptions, SequenceRunner, SystemOptions
 from orbslam2py.runs.outputs import OutputWriter
 from orbslam2py.runs.report import make_report, peak_memory_mb
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
@@ -32,7 +32,7 @@ def test_reasons_are_in_the_files(tmp_path: Path) -> None:
     sequence = LateStart(
         SyntheticOptions(world="corridor", sensor="mono", size=(320, 240), frames=50)
     )
-    options = RunOptions(Sensor.MONOCULAR, deterministic=True)
+    options = RunOptions(Sensor.MONOCULAR, SystemOptions(deterministic=True))
     result = SequenceRunner(sequence, sequence.settings, None, options).run()
     report = make_report(result, None)
     OutputWriter(tmp_path).write_all(result, report, None)

@@ -12,7 +12,7 @@ import pytest
 
 from orbslam2py import DatasetError, Sensor
 from orbslam2py.datasets import Images, LiveFrame
-from orbslam2py.runs import RunOptions, SequenceRunner
+from orbslam2py.runs import RunOptions, SequenceRunner, SystemOptions
 from orbslam2py.runs.report import make_report
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
@@ -93,12 +93,18 @@ def test_camera_that_fails_keeps_what_was_done() -> None:
 
 @pytest.mark.parametrize(
     "options",
-    [{"deterministic": True}, {"realtime": True}, {"start": 1}, {"stride": 2}],
+    [
+        {"system": SystemOptions(deterministic=True)},
+        {"realtime": True},
+        {"start": 1},
+        {"stride": 2},
+    ],
     ids=lambda options: next(iter(options)),
 )
 def test_options_for_recordings_only(options: dict[str, Any]) -> None:
     camera = Camera(recorded(Sensor.RGBD))
-    with pytest.raises(DatasetError, match=f"--{next(iter(options))} is for recorded images"):
+    name = next(iter(options)).replace("system", "deterministic")
+    with pytest.raises(DatasetError, match=f"--{name} is for recorded images"):
         SequenceRunner(camera, camera.settings, None, RunOptions(Sensor.RGBD, **options))
 
 
@@ -139,7 +145,7 @@ def test_run_that_switches(sensor: Sensor, deterministic: bool) -> None:
         sequence,
         sequence.settings,
         None,
-        RunOptions(sensor, deterministic=deterministic, localize_after=25),
+        RunOptions(sensor, SystemOptions(deterministic=deterministic), localize_after=25),
     ).run(lambda row, system: hashes.append(system.map_hash()))
     assert result.error is None
     assert result.n_tracked == 50

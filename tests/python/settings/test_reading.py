@@ -31,7 +31,7 @@ def test_derived_quantities(tmp_path: Path) -> None:
     settings = Settings.load(write(tmp_path / "a.yaml", values), Sensor.RGBD)
     assert settings.baseline == pytest.approx(40 / 517.3)
     assert settings.close_depth == pytest.approx(40 * 40 / 517.3)
-    assert settings.max_frames == 29
+    assert settings.max_keyframe_interval == 29
     assert settings.depth_factor == 5000
 
 
@@ -43,7 +43,7 @@ def test_depth_factor_of_zero_means_metres(tmp_path: Path, factor: str, expected
 
 def test_rates_below_one_still_allow_a_frame(tmp_path: Path) -> None:
     path = write(tmp_path / "a.yaml", {**MONO, "Camera.fps": "0.5"})
-    assert Settings.load(path, Sensor.MONOCULAR).max_frames == 1
+    assert Settings.load(path, Sensor.MONOCULAR).max_keyframe_interval == 1
 
 
 def test_rate_of_zero_is_unknown(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from orbslam2py import Sensor, System
-from orbslam2py.slam import keyframe_decision, tracking
+from orbslam2py.slam import keyframe_decision, localization_mode, pose_search, tracking
 from orbslam2py.slam.worker import Worker
 from support.interleaving import LIMIT, Stage
 from support.small_sequences import new_system, play
@@ -46,8 +46,8 @@ def stage(monkeypatch: pytest.MonkeyPatch) -> Iterator[Stage]:
 def core(monkeypatch: pytest.MonkeyPatch) -> FakeCore:
     """Stands in for the verbs that tracking calls."""
     core = FakeCore()
-    monkeypatch.setattr(tracking, "core", core)
-    monkeypatch.setattr(keyframe_decision, "core", core)
+    for module in (tracking, pose_search, localization_mode, keyframe_decision):
+        monkeypatch.setattr(module, "core", core)
     return core
 
 

@@ -33,7 +33,7 @@ def test_depth_initializer(
     inserted: list[dict[str, Any]] = []
 
     def insert(_map: FakeMap, frame: FakeFrame, **options: Any) -> int:
-        assert frame.frame.described
+        assert frame.features.described
         frame.reference_keyframe = 0
         inserted.append(options)
         return 0
@@ -44,7 +44,7 @@ def test_depth_initializer(
     frame = FakeFrame(0)
     depth = np.full(size, -1, np.float32)
     depth[:n_depths] = 2.0
-    frame.frame = SimpleNamespace(size=size, depth=depth, described=False)
+    frame.features = SimpleNamespace(size=size, depth=depth, described=False)
     initializer = initialization.DepthInitializer(
         FakeMap(),  # type: ignore[arg-type]
         "vocabulary",  # type: ignore[arg-type]

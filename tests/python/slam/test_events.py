@@ -119,7 +119,7 @@ def test_callbacks_may_use_the_system() -> None:
     with new_system(Sensor.RGBD, callbacks=Callbacks(on_keyframe=looks)) as system:
         systems.append(system)
         track(system, 0)
-        system._back_end.events.worker.wait_until_idle(20)
+        system.pipeline.back_end.events.worker.wait_until_idle(20)
     systems.clear()
     assert seen == [1]
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from orbslam2py import ImageError, Sensor
+from orbslam2py._timing import StageTimer
 from orbslam2py.settings import builtin_settings
 from orbslam2py.slam.front_end import FrontEnd
-from orbslam2py.slam.timing import StageTimer
 
 
 @pytest.mark.parametrize("sensor", [Sensor.STEREO, Sensor.RGBD])

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import pytest
 
-from orbslam2py import TrackingState
-from orbslam2py.slam import tracking
+from orbslam2py import Sensor, TrackingState
+from orbslam2py.slam.thresholds import TrackingThresholds
 from support.tracking_scene import (
     MAX_FRAMES,
+    FakeCore,
     Scene,
     lose,
 )
@@ -61,7 +62,12 @@ TABLE = [
 
 
 @pytest.mark.parametrize("case", TABLE, ids=lambda case: case.why)
-def test_keyframe_decision(scene: Scene, case: Case) -> None:
+def test_keyframe_decision(sensor: Sensor, core: FakeCore, case: Case) -> None:
+    # Too few inliers to go on tracking are enough for a decision.
+    limits = TrackingThresholds(
+        local_map_inliers=1, local_map_inliers_after_relocalization=1, map_matches=1
+    )
+    scene = Scene(sensor, core, limits)
     scene.run(1)
     scene.core.inliers.extend([100, 100])
     scene.core.n_reference = 10_000
@@ -69,9 +75,6 @@ def test_keyframe_decision(scene: Scene, case: Case) -> None:
     assert scene.track(frame_id=first).is_keyframe  # the last one before the frame in question
     inserted = list(scene.mapping.inserted)
 
-    # Too few inliers to go on tracking are enough for a decision.
-    limits = tracking.TrackingThresholds(local_map_inliers=1, map_matches=1)
-    scene.tracking._limits = scene.tracking._keyframe_decision.limits = limits
     scene.map.n_keyframes = case.n_keyframes
     scene.core.n_reference = case.n_reference
     worker = scene.mapping.worker
@@ -88,7 +91,7 @@ def test_keyframe_decision(scene: Scene, case: Case) -> None:
     if case.keyframe:
         keyframe = scene.mapping.inserted[-1]
         assert scene.tracking.reference_keyframe == scene.last.reference_keyframe == keyframe
-        assert scene.last.frame.described
+        assert scene.last.features.described
 
 
 @pytest.mark.parametrize(

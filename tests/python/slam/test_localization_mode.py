@@ -80,15 +80,15 @@ def test_the_end_of_odometry_is_no_motion(sensor: Sensor) -> None:
     world = MappedWorld(turning(sensor), _MAPPED)
     world.system.localization_mode = True
     turn(world, range(_MAPPED[-1], _FAR))
-    tracking, n_ends = world.system._tracking, 0
+    tracking, n_ends = world.system.pipeline.tracking, 0
     before: TrackingRecord | None = None
     for i in range(_FAR - 1, _MAPPED[-1] - 1, -1):
         [record] = turn(world, range(i, i + 1))
         if before is not None and before.visual_odometry and not record.visual_odometry:
             n_ends += 1
-            assert tracking._velocity is not None
+            assert tracking.motion.velocity is not None
             T_ab = np.linalg.inv(world.sequence.T_wc(i)) @ world.sequence.T_wc(i + 1)
-            error = pose_error(tracking._velocity.matrix, T_ab)
+            error = pose_error(tracking.motion.velocity.matrix, T_ab)
             assert error.metres < 0.02
             assert error.degrees < 0.5
         before = record
@@ -160,7 +160,7 @@ def test_switching_at_any_time(sensor: Sensor, deterministic: bool) -> None:
             if not system.localization_mode:
                 fixed = None
             records.append(track(system, i))
-            if system._tracking.localization_only:
+            if system.pipeline.localization.on:
                 assert not records[-1].is_keyframe
                 assert fixed in (None, system.map_hash())
                 fixed = system.map_hash()
@@ -180,15 +180,15 @@ def test_last_assignment_counts(sensor: Sensor) -> None:
         system.localization_mode = True
         system.localization_mode = False
         assert track(system, 3).state is TrackingState.OK
-        assert not system._mapping.worker.pausing
+        assert not system.pipeline.back_end.mapping.worker.pausing
         system.localization_mode = True
         assert system.localization_mode
         track(system, 4)
         track(system, 5)
-        assert system._mapping.worker.pausing
+        assert system.pipeline.back_end.mapping.worker.pausing
         system.localization_mode = False
         track(system, 6)
-        assert not system._mapping.worker.pausing
+        assert not system.pipeline.back_end.mapping.worker.pausing
 
 
 @pytest.fixture
@@ -210,18 +210,20 @@ def test_waiting_keyframes_are_processed_afterwards(
 ) -> None:
     with new_system(sensor) as system:
         play(system, 1)
-        assert system._mapping.worker.wait_until(lambda: system._mapping.worker._busy, 10)
+        assert system.pipeline.back_end.mapping.worker.wait_until(
+            lambda: system.pipeline.back_end.mapping.worker._busy, 10
+        )
         n = 1
-        while system._mapping.worker.n_waiting == 0:
+        while system.pipeline.back_end.mapping.worker.n_waiting == 0:
             track(system, n)
             n += 1
             assert n < 80
-        n_waiting = system._mapping.worker.n_waiting
+        n_waiting = system.pipeline.back_end.mapping.worker.n_waiting
         system.localization_mode = True
         threading.Timer(0.1, slow_mapping.set).start()  # the switch waits for the step
         fixed = play(system, 5, first=n)
         before = system.map_hash()
-        assert system._mapping.worker.n_waiting == n_waiting
+        assert system.pipeline.back_end.mapping.worker.n_waiting == n_waiting
         assert not system.wait_until_idle(10), "they wait for the end of the mode"
         fixed += play(system, 5, first=n + 5)
         assert system.map_hash() == before
@@ -229,8 +231,8 @@ def test_waiting_keyframes_are_processed_afterwards(
         system.localization_mode = False
         track(system, n + 10)
         assert system.wait_until_idle(20)
-        assert system._mapping.worker.n_waiting == 0
-        assert system._back_end.loop_closing.last_keyframe >= n_waiting
+        assert system.pipeline.back_end.mapping.worker.n_waiting == 0
+        assert system.pipeline.back_end.loop_closing.last_keyframe >= n_waiting
         assert system.check_map() == []
 
 
@@ -254,7 +256,7 @@ def test_reset_in_localization_mode(sensor: Sensor, deterministic: bool) -> None
         assert system.localization_mode, "it is the user's choice"
         assert [r.map_index for r in records] == [1] * 5
         assert [r.state for r in records] == [TrackingState.OK] * 5
-        assert system._mapping.worker.pausing
+        assert system.pipeline.back_end.mapping.worker.pausing
         n_keyframes = system.n_keyframes
         assert n_keyframes >= 1
         play(system, 1, first=27)
@@ -282,8 +284,7 @@ def test_temporary_points_are_not_kept(sensor: Sensor) -> None:
         system.localization_mode = True
         for i in range(10, 20):
             track(system, i)
-            last = system._tracking._last
-            assert last is not None
+            last = system.pipeline.tracking.motion.last
             assert (last.map_points < core.FIRST_TEMPORARY_POINT).all()
         record = track(system, 20, shown=images(sensor, 20), details=True)
         assert record.features is not None

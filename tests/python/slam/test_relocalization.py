@@ -17,9 +17,9 @@ import pytest
 
 from orbslam2py import Reason, Sensor, TrackingState
 from orbslam2py import _core as core
+from orbslam2py._timing import StageTimer
 from orbslam2py.datasets import Images
 from orbslam2py.slam.relocalization import Relocalizer
-from orbslam2py.slam.timing import StageTimer
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.mapped_world import MappedWorld, beside
 
@@ -134,7 +134,7 @@ def test_photographs_are_never_found(world: MappedWorld, shared_data: Path) -> N
 
 # ---- the verb ------------------------------------------------------------------------------------
 def described(world: MappedWorld, shown: Images) -> core.TrackedFrame:
-    front_end = world.system._front_end
+    front_end = world.system.pipeline.front_end
     timer = StageTimer()
     if world.sequence.sensor is Sensor.STEREO:
         assert shown.right is not None
@@ -149,7 +149,9 @@ def described(world: MappedWorld, shown: Images) -> core.TrackedFrame:
 
 
 def relocalizer(world: MappedWorld, seed: int = 0) -> Relocalizer:
-    return Relocalizer(world.system._map, world.system._back_end.index, seed)
+    return Relocalizer(
+        world.system.pipeline.back_end.map, world.system.pipeline.back_end.keyframe_index, seed
+    )
 
 
 def test_found_frame_has_pose_and_matches(world: MappedWorld) -> None:

@@ -51,7 +51,7 @@ def test_interrupted_shutdown_can_be_repeated(monkeypatch: pytest.MonkeyPatch) -
     play(system, 3)
     with monkeypatch.context() as patch:
         patch.setattr(
-            type(system._mapping.worker),
+            type(system.pipeline.back_end.mapping.worker),
             "finish",
             lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt),
         )
@@ -215,7 +215,7 @@ def test_failed_loop_closing_reaches_the_caller(
     monkeypatch: pytest.MonkeyPatch, deterministic: bool
 ) -> None:
     system = new_system(Sensor.RGBD, deterministic=deterministic)
-    monkeypatch.setattr(system._back_end.loop_closing.worker, "_step", breaks)
+    monkeypatch.setattr(system.pipeline.back_end.loop_closing.worker, "_step", breaks)
     with pytest.raises(WorkerError, match="loop closing stopped: out of order") as caught:
         play(system, 80)
         system.wait_until_idle(20)

@@ -29,9 +29,9 @@ def test_keyframes_that_wait_in_localization_mode_are_processed_at_shutdown() ->
         play(system, 1, first=3)
         # As if mapping had been paused before its turn came.
         processed: list[int] = []
-        system._mapping.worker._step = processed.append
-        system._mapping.worker.submit(7)
-        assert system._mapping.worker.n_waiting == 1
+        system.pipeline.back_end.mapping.worker._step = processed.append
+        system.pipeline.back_end.mapping.worker.submit(7)
+        assert system.pipeline.back_end.mapping.worker.n_waiting == 1
     assert processed == [7]
 
 

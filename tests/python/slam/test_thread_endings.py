@@ -29,7 +29,7 @@ def test_shutdown_during_a_correction(slam: System, stage: Stage, verb: str, dra
     apply = stage.gate("apply_loop_correction", opened=True) if "apply" not in verb else gate
     close(last_keyframe(slam))
     gate.wait_entered()
-    finishing = stage.entering(slam._back_end.loop_closing.worker, "finish")
+    finishing = stage.entering(slam.pipeline.back_end.loop_closing.worker, "finish")
     call = Call(slam.shutdown, drain=drain)
     assert finishing.wait(LIMIT)
     gate.open()
@@ -46,12 +46,12 @@ def test_shutdown_while_a_correction_waits_for_the_mapper(slam: System, stage: S
     close = stage.loops(slam)
     points = stage.gate("create_new_points")
     stage._patch.setattr(_core, "process_new_keyframe", lambda *_: None)
-    slam._mapping.worker.submit(last_keyframe(slam))
+    slam.pipeline.back_end.mapping.worker.submit(last_keyframe(slam))
     points.wait_entered()
-    waiting = stage.entering(slam._mapping.worker, "wait_until")
+    waiting = stage.entering(slam.pipeline.back_end.mapping.worker, "wait_until")
     close(last_keyframe(slam))
     assert waiting.wait(LIMIT)
-    finishing = stage.entering(slam._mapping.worker, "finish")
+    finishing = stage.entering(slam.pipeline.back_end.mapping.worker, "finish")
     call = Call(slam.shutdown, drain=False)
     assert finishing.wait(LIMIT)
     points.open()
@@ -61,7 +61,7 @@ def test_shutdown_while_a_correction_waits_for_the_mapper(slam: System, stage: S
 
 def test_shutdown_gives_up_an_adjustment(slam: System, stage: Stage) -> None:
     """The original waits until it has been solved."""
-    stage.waitable_cancel(slam._back_end.adjustment.worker)
+    stage.waitable_cancel(slam.pipeline.back_end.adjustment.worker)
     solve = stage.endless_solve()
     refine(slam)
     solve.wait_entered()
@@ -72,10 +72,10 @@ def test_shutdown_gives_up_an_adjustment(slam: System, stage: Stage) -> None:
 
 
 def test_shutdown_waits_for_an_adjustment_when_asked_to(slam: System, stage: Stage) -> None:
-    solve = stage.gate("solve_global_bundle")
+    solve = stage.gate("solve_full_bundle")
     refine(slam)
     solve.wait_entered()
-    finishing = stage.entering(slam._back_end.adjustment.worker, "finish")
+    finishing = stage.entering(slam.pipeline.back_end.adjustment.worker, "finish")
     call = Call(slam.shutdown, wait_for_adjustment=True)
     assert finishing.wait(LIMIT)
     solve.open()
@@ -99,10 +99,10 @@ def test_shutdown_while_a_reset_waits(slam: System, stage: Stage) -> None:
     close(last_keyframe(slam))
     plan.wait_entered()
     slam.reset()
-    waiting = stage.entering(slam._back_end.loop_closing.worker, "wait_until")
+    waiting = stage.entering(slam.pipeline.back_end.loop_closing.worker, "wait_until")
     tracking = Call(track, slam, 30)
     assert waiting.wait(LIMIT)
-    finishing = stage.entering(slam._back_end.loop_closing.worker, "finish")
+    finishing = stage.entering(slam.pipeline.back_end.loop_closing.worker, "finish")
     ending = Call(slam.shutdown, drain=False)
     assert finishing.wait(LIMIT)
     plan.open()
@@ -122,7 +122,7 @@ def test_shutdown_in_two_threads_at_once(slam: System, stage: Stage, drain: bool
     plan.wait_entered()
     calls = []
     for _ in range(2):
-        finishing = stage.entering(slam._back_end.loop_closing.worker, "finish")
+        finishing = stage.entering(slam.pipeline.back_end.loop_closing.worker, "finish")
         calls.append(Call(slam.shutdown, drain=drain))
         assert finishing.wait(LIMIT)
     plan.open()
@@ -154,7 +154,7 @@ def test_shutdown_by_a_callback(drain: bool) -> None:
 
 
 def test_optimize_ends_with_the_shutdown(slam: System, stage: Stage) -> None:
-    stage.waitable_cancel(slam._back_end.adjustment.worker)
+    stage.waitable_cancel(slam.pipeline.back_end.adjustment.worker)
     solve = stage.endless_solve()
     call = Call(slam.optimize)
     solve.wait_entered()
@@ -168,16 +168,16 @@ def test_the_interpreter_ends_while_an_adjustment_is_solved() -> None:
         "from orbslam2py import _core\n"
         "from support.small_sequences import new_system, play\n"
         "from orbslam2py import Sensor\n"
-        "entered, real = threading.Event(), _core.solve_global_bundle\n"
+        "entered, real = threading.Event(), _core.solve_full_bundle\n"
         "def solve(bundle, options, cancelled, n_threads):\n"
         "    entered.set()\n"
         "    while not cancelled.is_set():\n"
         "        summary = real(bundle, options, cancelled, n_threads)\n"
         "    return summary\n"
-        "_core.solve_global_bundle = solve\n"
+        "_core.solve_full_bundle = solve\n"
         "system = new_system(Sensor.RGBD)\n"
         "play(system, 20)\n"
-        "system._back_end.adjustment.start()\n"
+        "system.pipeline.back_end.adjustment.start()\n"
         "assert entered.wait(15)\n"
         "print('end')\n"
     )
@@ -199,14 +199,14 @@ def test_a_mapper_that_fails_lets_the_loop_closer_go_on(stage: Stage) -> None:
     close = stage.loops(system)
     points = stage.gate("create_new_points")
     stage._patch.setattr(_core, "process_new_keyframe", lambda *_: None)
-    system._mapping.worker.submit(last_keyframe(system))
+    system.pipeline.back_end.mapping.worker.submit(last_keyframe(system))
     points.wait_entered()
-    waiting = stage.entering(system._mapping.worker, "wait_until")
+    waiting = stage.entering(system.pipeline.back_end.mapping.worker, "wait_until")
     close(last_keyframe(system))
     assert waiting.wait(LIMIT)
     points.error = RuntimeError("out of order")
     points.open()
-    assert system._back_end.loop_closing.worker.wait_until_idle(LIMIT)
+    assert system.pipeline.back_end.loop_closing.worker.wait_until_idle(LIMIT)
     with pytest.raises(WorkerError, match="local mapping stopped: out of order"):
         track(system, 10)
     failing_end(system)
@@ -221,16 +221,16 @@ def test_a_loop_closer_that_fails_holds_nobody(stage: Stage) -> None:
     apply.error = RuntimeError("out of order")
     close(last_keyframe(system))
     with pytest.raises(WorkerError, match="loop closing stopped: out of order"):
-        system._back_end.loop_closing.worker.wait_until_idle(LIMIT)
-    assert system._back_end.loop_closing.worker.state is WorkerState.FAILED
-    assert not system._mapping.worker.pausing
-    assert not system._back_end.adjustment.worker.pausing
+        system.pipeline.back_end.loop_closing.worker.wait_until_idle(LIMIT)
+    assert system.pipeline.back_end.loop_closing.worker.state is WorkerState.FAILED
+    assert not system.pipeline.back_end.mapping.worker.pausing
+    assert not system.pipeline.back_end.adjustment.worker.pausing
     with pytest.raises(WorkerError, match="out of order"):
         track(system, 10)
     failing_end(system)
 
 
-@pytest.mark.parametrize("verb", ["solve_global_bundle", "commit_global_bundle"])
+@pytest.mark.parametrize("verb", ["solve_full_bundle", "commit_full_bundle"])
 def test_an_adjustment_that_fails_reaches_those_who_wait(stage: Stage, verb: str) -> None:
     system = new_system(Sensor.RGBD)
     play(system, 10)
@@ -238,7 +238,7 @@ def test_an_adjustment_that_fails_reaches_those_who_wait(stage: Stage, verb: str
     gate.error = RuntimeError("out of order")
     with pytest.raises(WorkerError, match="full bundle adjustment stopped: out of order"):
         Call(system.optimize).result()
-    assert not system._mapping.worker.pausing
+    assert not system.pipeline.back_end.mapping.worker.pausing
     with pytest.raises(WorkerError, match="out of order"):
         track(system, 10)
     failing_end(system)
@@ -248,13 +248,13 @@ def test_tickets_of_a_failed_worker_do_not_wait(stage: Stage) -> None:
     """Nor does localization mode, which asks all of them."""
     system = new_system(Sensor.RGBD)
     play(system, 10)
-    gate = stage.gate("solve_global_bundle", opened=True)
+    gate = stage.gate("solve_full_bundle", opened=True)
     gate.error = RuntimeError("out of order")
     refine(system)
     with pytest.raises(WorkerError):
-        system._back_end.adjustment.worker.wait_until_idle(LIMIT)
+        system.pipeline.back_end.adjustment.worker.wait_until_idle(LIMIT)
     released = threading.Event()
-    with system._back_end.adjustment.worker.pause() as ticket:
+    with system.pipeline.back_end.adjustment.worker.pause() as ticket:
         assert ticket.wait(LIMIT)
         released.set()
     assert released.is_set()

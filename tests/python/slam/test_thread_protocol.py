@@ -27,7 +27,7 @@ def busy_mapping(stage: Stage) -> tuple[System, Callable[[], None], int]:
     track(system, 0)
     gate.wait_entered()
     frame = 1
-    while system._mapping.worker.n_waiting == 0:
+    while system.pipeline.back_end.mapping.worker.n_waiting == 0:
         assert frame < 60, "the tracker inserts keyframes while the mapper is busy"
         track(system, frame)
         frame += 1
@@ -38,14 +38,14 @@ def test_waiting_keyframes_outlive_localization_mode(stage: Stage) -> None:
     """In the original the mapper's release deletes the keyframes that wait for it."""
     system, go_on, frame = busy_mapping(stage)
     with system:
-        inserted = len(system._map.keyframe_ids())
+        inserted = len(system.pipeline.back_end.map.keyframe_ids())
         system.localization_mode = True
-        waiting = stage.entering(system._mapping.worker, "wait_until")
+        waiting = stage.entering(system.pipeline.back_end.mapping.worker, "wait_until")
         call = Call(track, system, frame)
         assert waiting.wait(LIMIT)
         go_on()
         call.result()
-        assert system._mapping.worker.n_waiting >= 1
+        assert system.pipeline.back_end.mapping.worker.n_waiting >= 1
         system.localization_mode = False
         track(system, frame + 1)
         settle(system)
@@ -56,7 +56,7 @@ def test_a_new_keyframe_interrupts_local_bundle_adjustment(
     slam: System, stage: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """By a flag that the original writes from three threads without a lock."""
-    mapping = slam._mapping.worker
+    mapping = slam.pipeline.back_end.mapping.worker
     gate = stage.gate("local_bundle_adjustment")
     monkeypatch.setattr(_core, "process_new_keyframe", lambda *_: None)
     mapping.submit(1)
@@ -70,17 +70,17 @@ def test_a_new_keyframe_interrupts_local_bundle_adjustment(
 
 def test_an_idle_mapper_says_so_at_once(slam: System) -> None:
     """The original's looks busy for a part of every three milliseconds."""
-    mapping = slam._mapping.worker
+    mapping = slam.pipeline.back_end.mapping.worker
     assert all(mapping.idle for _ in range(10000))
 
 
 def test_no_keyframe_is_made_while_the_mapper_is_to_stand_still(slam: System) -> None:
-    before = slam._map.keyframe_ids().tolist()
-    with slam._mapping.worker.pause() as ticket:
+    before = slam.pipeline.back_end.map.keyframe_ids().tolist()
+    with slam.pipeline.back_end.mapping.worker.pause() as ticket:
         assert ticket.wait(LIMIT)
         records = play(slam, 40, first=N_FRAMES)
     assert not any(record.is_keyframe for record in records)
-    assert slam._map.keyframe_ids().tolist() == before
+    assert slam.pipeline.back_end.map.keyframe_ids().tolist() == before
 
 
 def test_keyframes_have_their_words_before_others_see_them(stage: Stage) -> None:
@@ -88,7 +88,7 @@ def test_keyframes_have_their_words_before_others_see_them(stage: Stage) -> None
     real, described = _core.insert_keyframe, []
 
     def insert(world: _core.Map, frame: _core.TrackedFrame, **options: bool) -> int:
-        described.append(frame.frame.described)
+        described.append(frame.features.described)
         return int(real(world, frame, **options))
 
     stage._patch.setattr(_core, "insert_keyframe", insert)
@@ -105,13 +105,13 @@ def test_a_reset_is_served_while_localization_mode_holds_the_workers(slam: Syste
     """The original's mapper does not look at reset requests while it stands: all wait for ever."""
     slam.localization_mode = True
     assert track(slam, 30).state is TrackingState.OK
-    assert slam._mapping.worker.held
+    assert slam.pipeline.back_end.mapping.worker.held
     slam.reset()
     record = Call(track, slam, 31).result()
     assert (record.map_index, record.state) == (1, TrackingState.OK)
     assert slam.localization_mode, "the mode stays"
     play(slam, 3, first=32)
-    assert slam._mapping.worker.held, "and is in force again with the new map"
+    assert slam.pipeline.back_end.mapping.worker.held, "and is in force again with the new map"
 
 
 def test_localization_mode_waits_for_no_adjustment_that_is_being_solved(
@@ -147,13 +147,13 @@ def test_a_loop_closed_at_the_switch_does_not_end_localization_mode(
     close(last_keyframe(slam))
     gate.wait_entered()
     slam.localization_mode = True
-    waiting = stage.entering(slam._back_end.loop_closing.worker, "wait_until")
+    waiting = stage.entering(slam.pipeline.back_end.loop_closing.worker, "wait_until")
     call = Call(track, slam, 30)
     assert waiting.wait(LIMIT)
     gate.open()
     assert call.result().state is TrackingState.OK
     assert slam.n_loops_closed == 1
-    assert slam._mapping.worker.held
+    assert slam.pipeline.back_end.mapping.worker.held
     before = slam.map_hash()
     records = play(slam, 20, first=31)
     assert not any(record.is_keyframe for record in records)
@@ -167,13 +167,13 @@ def test_an_adjustment_written_at_the_switch_does_not_end_localization_mode(
     refine(slam)
     commit.wait_entered()
     slam.localization_mode = True
-    waiting = stage.entering(slam._back_end.adjustment.worker, "wait_until")
+    waiting = stage.entering(slam.pipeline.back_end.adjustment.worker, "wait_until")
     call = Call(track, slam, 30)
     assert waiting.wait(LIMIT)
     commit.open()
     assert call.result().state is TrackingState.OK
     assert slam.full_adjustments[-1].used
-    assert slam._mapping.worker.held
+    assert slam.pipeline.back_end.mapping.worker.held
     before = slam.map_hash()
     play(slam, 5, first=31)
     assert slam.map_hash() == before
@@ -196,7 +196,7 @@ def test_a_keyframe_that_waits_for_the_loop_closer_outlives_localization_mode(
 
 def test_optimize_ends_when_localization_mode_comes_on(slam: System, stage: Stage) -> None:
     """It would wait for the end of the mode otherwise."""
-    stage.waitable_cancel(slam._back_end.adjustment.worker)
+    stage.waitable_cancel(slam.pipeline.back_end.adjustment.worker)
     solve = stage.endless_solve()
     call = Call(slam.optimize)
     solve.wait_entered()
@@ -232,7 +232,9 @@ def test_a_second_loop_gives_up_the_running_adjustment(slam: System, stage: Stag
     close(last_keyframe(slam) - 1)
     solve.wait_entered()
     close(last_keyframe(slam))
-    assert slam._back_end.loop_closing.worker.wait_until_idle(LIMIT), "nobody waits for the first"
+    assert slam.pipeline.back_end.loop_closing.worker.wait_until_idle(LIMIT), (
+        "nobody waits for the first"
+    )
     assert slam.n_loops_closed == 2
     solve.open()
     settle(slam)
@@ -246,17 +248,17 @@ def test_a_loop_begins_while_an_adjustment_is_written(slam: System, stage: Stage
     plan.open()
     refine(slam)
     commit.wait_entered()
-    waiting = stage.entering(slam._back_end.adjustment.worker, "reset")
+    waiting = stage.entering(slam.pipeline.back_end.adjustment.worker, "reset")
     close(last_keyframe(slam))
     assert waiting.wait(LIMIT)
-    assert slam._mapping.worker.pausing
+    assert slam.pipeline.back_end.mapping.worker.pausing
     commit.open()
     settle(slam)
     assert slam.n_loops_closed == 1
     assert stage.journal.index("commit_full_bundle ends") < stage.journal.index(
         "plan_loop_correction begins"
     )
-    assert not slam._mapping.worker.pausing
+    assert not slam.pipeline.back_end.mapping.worker.pausing
 
 
 def test_no_adjustment_is_written_in_the_middle_of_a_correction(slam: System, stage: Stage) -> None:
@@ -285,7 +287,7 @@ def test_an_adjustment_that_a_loop_overtook_is_not_written(
     solve = stage.gate("solve_full_bundle")
     refine(slam)
     solve.wait_entered()
-    slam._map.count_big_change()
+    slam.pipeline.back_end.map.count_big_change()
     before = slam.map_hash()
     solve.open()
     settle(slam)
@@ -297,14 +299,14 @@ def test_corrections_do_not_disturb_each_other(slam: System, stage: Stage) -> No
     """A loop's adjustment, another loop and requests of the user, all at once."""
     close = stage.loops(slam)
     calls = [Call(slam.optimize) for _ in range(3)]
-    for keyframe in slam._map.keyframe_ids()[1:].tolist():
+    for keyframe in slam.pipeline.back_end.map.keyframe_ids()[1:].tolist():
         close(keyframe)
     records = [call.result() for call in calls]
     settle(slam)
     assert len({id(record) for record in records}) == 3, "each call has its own"
-    assert slam.n_loops_closed == len(slam._map.keyframe_ids()) - 1
+    assert slam.n_loops_closed == len(slam.pipeline.back_end.map.keyframe_ids()) - 1
     assert slam.full_adjustments[-1].used
-    assert not slam._mapping.worker.pausing
+    assert not slam.pipeline.back_end.mapping.worker.pausing
 
 
 def test_tracking_goes_on_while_an_adjustment_is_solved(slam: System, stage: Stage) -> None:
@@ -314,7 +316,7 @@ def test_tracking_goes_on_while_an_adjustment_is_solved(slam: System, stage: Sta
     records = Call(play, slam, 40, N_FRAMES).result()
     assert all(record.state is TrackingState.OK for record in records)
     assert any(record.is_keyframe for record in records), "and mapping"
-    assert slam._mapping.worker.wait_until_idle(LIMIT)
+    assert slam.pipeline.back_end.mapping.worker.wait_until_idle(LIMIT)
     solve.open()
     settle(slam)
     assert slam.full_adjustments[-1].used, "what was made meanwhile follows"

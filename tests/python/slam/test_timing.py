@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from orbslam2py.slam.timing import StageStatistics, StageTimer
+from orbslam2py._timing import StageStatistics, StageTimer
 
 pytestmark = pytest.mark.watchdog(20)
 

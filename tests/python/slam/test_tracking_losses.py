@@ -17,7 +17,7 @@ def test_lost(scene: Scene) -> None:
     scene.run(3)
     outcome = lose(scene)
     assert outcome.state is scene.tracking.state is TrackingState.LOST
-    assert outcome.reason is Reason.FEW_MATCHES_REFERENCE
+    assert outcome.estimate.reason is Reason.FEW_MATCHES_REFERENCE
     assert scene.last.T_cw is None, "a lost frame has no pose"
     assert scene.last.n_cleared > 0
     assert not outcome.reset_needed
@@ -41,10 +41,10 @@ def test_a_small_map_is_given_up(scene: Scene, n_keyframes: int, reset: bool) ->
 def test_a_small_map_that_was_used_for_localization_is_kept(scene: Scene) -> None:
     scene.run(3)
     scene.map.n_keyframes = 3
-    scene.tracking.localization_only = True
+    scene.localize = True
     scene.core.motion.extend([0, 0])
     assert not scene.track().reset_needed
-    scene.tracking.localization_only = False
+    scene.localize = False
     assert not lose(scene).reset_needed, "the map is the user's, also after the mode"
 
 

@@ -30,15 +30,15 @@ def test_waits_for_a_frame_that_can_begin_a_map(scene: Scene) -> None:
     for _ in range(2):
         outcome = scene.track()
         assert outcome.state is scene.tracking.state is TrackingState.NOT_INITIALIZED
-        assert outcome.reason is Reason.TOO_FEW_KEYPOINTS
+        assert outcome.estimate.reason is Reason.TOO_FEW_KEYPOINTS
         assert not outcome.is_keyframe
         assert not outcome.reset_needed
     outcome = scene.track()
     assert outcome.state is scene.tracking.state is TrackingState.OK
     assert outcome.is_keyframe
-    assert outcome.n_inliers == outcome.n_matches == 321
+    assert outcome.estimate.n_inliers == outcome.estimate.n_matches == 321
     assert scene.tracking.reference_keyframe == 0
-    np.testing.assert_array_equal(outcome.covariance, np.zeros((6, 6)))
+    np.testing.assert_array_equal(outcome.estimate.covariance, np.zeros((6, 6)))
 
 
 def test_second_frame_has_no_velocity(scene: Scene) -> None:
@@ -188,7 +188,7 @@ def test_limits_of_the_reference_keyframe(
     scene.core.words.append(words)
     scene.core.inliers.extend(inliers)
     outcome = scene.track()
-    assert outcome.reason is reason
+    assert outcome.estimate.reason is reason
     assert (outcome.state is TrackingState.OK) == (reason is Reason.NONE)
 
 
@@ -205,9 +205,9 @@ def test_limits_of_the_local_map(scene: Scene, frame_id: int, inliers: int, ok: 
     scene.run(frame_id)
     scene.core.inliers.extend([100, inliers])
     outcome = scene.track()
-    assert outcome.n_inliers == inliers
+    assert outcome.estimate.n_inliers == inliers
     assert outcome.state is (TrackingState.OK if ok else TrackingState.LOST)
-    assert outcome.reason is (Reason.NONE if ok else Reason.FEW_INLIERS_LOCAL_MAP)
+    assert outcome.estimate.reason is (Reason.NONE if ok else Reason.FEW_INLIERS_LOCAL_MAP)
 
 
 def test_search_radius_in_the_local_map(scene: Scene, sensor: Sensor) -> None:

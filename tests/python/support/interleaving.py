@@ -127,7 +127,7 @@ class Stage:
     def loops(self, system: System, *, far: int = 0) -> Callable[[int], None]:
         """Make loops to keyframe `far` on demand: the function returned queues a keyframe that
         closes one. The steps of the correction are stand-ins that count a big change."""
-        closing = system._back_end.loop_closing
+        closing = system.pipeline.back_end.loop_closing
         wanted: set[int] = set()
 
         def find(keyframe: int, _timer: object) -> object:
@@ -164,14 +164,14 @@ class Stage:
 
 
 def last_keyframe(slam: System) -> int:
-    return int(slam._map.keyframe_ids()[-1])
+    return int(slam.pipeline.back_end.map.keyframe_ids()[-1])
 
 
 def refine(slam: System) -> None:
     """Ask for a full adjustment, as a loop does."""
-    slam._back_end.adjustment.start()
+    slam.pipeline.back_end.adjustment.start()
 
 
 def settle(slam: System) -> None:
-    assert slam._back_end.wait_until_idle(LIMIT)
+    assert slam.pipeline.back_end.wait_until_idle(LIMIT)
     assert slam.check_map() == []

@@ -11,8 +11,12 @@ from typing import Any
 import numpy as np
 
 from orbslam2py import Reason, Sensor, TrackingState, _core
-from orbslam2py.slam.timing import StageTimer
-from orbslam2py.slam.tracking import Tracking, TrackingOutcome
+from orbslam2py._timing import StageTimer
+from orbslam2py.slam.keyframe_decision import KeyframeDecision
+from orbslam2py.slam.pose_search import PoseSearch
+from orbslam2py.slam.records import TrackingOutcome
+from orbslam2py.slam.thresholds import TrackingThresholds
+from orbslam2py.slam.tracking import Tracking
 
 MAX_FRAMES = 30
 OUTLIERS = np.array([7, 9])
@@ -28,7 +32,7 @@ class FakeFrame:
     def __init__(self, frame_id: int) -> None:
         self.id = frame_id
         self.timestamp = frame_id / 30
-        self.frame = SimpleNamespace(size=1000, depth=np.ones(1000, np.float32), described=False)
+        self.features = SimpleNamespace(size=1000, depth=np.ones(1000, np.float32), described=False)
         self.T_cw: _core.Pose | None = None
         self.reference_keyframe = -1
         self.map_points = np.arange(100)
@@ -139,7 +143,7 @@ class FakeCore:
     def match_keyframe_by_words(
         self, world: FakeMap, keyframe: int, frame: FakeFrame, ratio: float
     ) -> int:
-        assert frame.frame.described
+        assert frame.features.described
         assert ratio == 0.7
         assert frame.T_cw is not None
         self.calls.append("words")
@@ -180,7 +184,7 @@ class FakeCore:
         return self.n_reference
 
     def insert_keyframe(self, world: FakeMap, frame: FakeFrame, create_points: bool) -> int:
-        assert frame.frame.described
+        assert frame.features.described
         assert create_points
         self.n_inserted += 1
         frame.reference_keyframe = 100 + self.n_inserted
@@ -208,19 +212,33 @@ class FakeInitializer:
 class Scene:
     """A tracker among fakes."""
 
-    def __init__(self, sensor: Sensor, core: FakeCore) -> None:
+    def __init__(
+        self, sensor: Sensor, core: FakeCore, thresholds: TrackingThresholds | None = None
+    ) -> None:
         self.core = core
         self.map = FakeMap()
         self.mapping = FakeMapping()
-        self.tracking = Tracking(
-            self.map,  # type: ignore[arg-type]
-            "vocabulary",  # type: ignore[arg-type]
-            self.mapping,  # type: ignore[arg-type]
-            sensor,
-            MAX_FRAMES,
-        )
         self.initializer = FakeInitializer()
-        self.tracking._initializer = self.initializer  # type: ignore[assignment]
+        #: Track in localization mode.
+        self.localize = False
+        fakes: Any = self
+        vocabulary: Any = "vocabulary"
+        self.tracking = Tracking(
+            fakes.map,
+            vocabulary,
+            fakes.mapping,
+            initializer=fakes.initializer,
+            search=PoseSearch(
+                fakes.map,
+                vocabulary,
+                sensor,
+                MAX_FRAMES,
+                relocalizer=None,
+                thresholds=thresholds or TrackingThresholds(),
+            ),
+            keyframe_decision=KeyframeDecision(fakes.map, fakes.mapping.worker, sensor, MAX_FRAMES),
+            has_depth=sensor.has_depth,
+        )
         self.frames: list[FakeFrame] = []
 
     def track(self, frame_id: int | None = None, **attributes: Any) -> TrackingOutcome:
@@ -228,7 +246,8 @@ class Scene:
         for name, value in attributes.items():
             setattr(frame, name, value)
         self.frames.append(frame)
-        return self.tracking.track(frame, StageTimer())  # type: ignore[arg-type]
+        image: Any = frame
+        return self.tracking.track(image, StageTimer(), localize=self.localize)
 
     def run(self, n: int) -> None:
         """So many frames that make no keyframe."""
