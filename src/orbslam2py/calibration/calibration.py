@@ -40,7 +40,7 @@ _GRID = (8, 6)
 
 @dataclass(frozen=True, eq=False)
 class CalibratedView:
-    """A view that was used.
+    """A view of the board from which the camera was calibrated.
 
     Attributes
     ----------
@@ -85,9 +85,9 @@ class Calibration:
     rms
         Reprojection error over all corners: root mean square of the distances [pixels].
     board
-        What was looked at.
+        The chessboard.
     views
-        What was used.
+        The views from which the camera was calibrated.
     left_out
         Names of views that did not fit the others.
     n_searched, n_found
@@ -161,29 +161,52 @@ class Calibration:
         n_features
             Features per image; by default 1000, or 2000 for images above 0.6 megapixels.
         rgb
-            Colour order of the images that will be tracked.
+            Whether the images that will be tracked are RGB (True) or BGR.
+
+        Raises
+        ------
+        SettingsError
+            If a number is out of range.
         """
         width, height = self.size
         k1, k2, p1, p2, k3 = self.distortion.tolist()
         if n_features is None:
             n_features = 1000 if width * height <= 600_000 else 2000
         camera = CameraSettings(
-            *(self.K[0, 0], self.K[1, 1], self.K[0, 2], self.K[1, 2]),
-            *(k1, k2, p1, p2, k3),
+            fx=self.K[0, 0],
+            fy=self.K[1, 1],
+            cx=self.K[0, 2],
+            cy=self.K[1, 2],
+            k1=k1,
+            k2=k2,
+            p1=p1,
+            p2=p2,
+            k3=k3,
             width=width,
             height=height,
             fps=fps,
             rgb=rgb,
         )
-        return Settings(Sensor.MONOCULAR, camera, OrbSettings(n_features=n_features))
+        return Settings(
+            sensor=Sensor.MONOCULAR, camera=camera, orb=OrbSettings(n_features=n_features)
+        )
 
     def save(
         self, path: str | PathLike[str], *, fps: float = 30.0, n_features: int | None = None
     ) -> None:
         """Write a settings file that says where it comes from.
 
+        Parameters
+        ----------
+        path
+            The file; replaced only when everything was written.
+        fps, n_features
+            As for `settings`.
+
         Raises
         ------
+        SettingsError
+            If a number is out of range.
         OSError
             If the file cannot be written; an existing file is kept then.
         """

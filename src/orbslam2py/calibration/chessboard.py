@@ -55,6 +55,13 @@ class Board:
     def parse(cls, text: str, square: float) -> Board:
         """Make a board of a text such as ``9x6``.
 
+        Parameters
+        ----------
+        text
+            Inner corners, columns x rows.
+        square
+            Side of a square [m].
+
         Raises
         ------
         SettingsError
@@ -96,7 +103,7 @@ class BoardView:
 
 @dataclass
 class BoardViews:
-    """What a search found.
+    """What a search for the board in a folder or a video found.
 
     Attributes
     ----------
@@ -123,7 +130,7 @@ def find_board(image: ByteArray, board: Board) -> FloatArray | None:
     Parameters
     ----------
     image
-        (h, w) or (h, w, 3 or 4).
+        uint8 (h, w), or (h, w, 3 or 4) in the order BGR.
     board
         What to look for.
 

@@ -34,7 +34,13 @@ from orbslam2py.settings import (
 
 
 def parse_yaml(path: Path, text: str) -> Mapping[str, Any]:
-    """Parse a file that holds named values."""
+    """Parse the text of a file that holds named values.
+
+    Raises
+    ------
+    SettingsError
+        Naming the file, if it is no YAML or holds something else.
+    """
     # OpenCV's head line, which some write, is no YAML.
     text = re.sub(r"\A%YAML:1\.0\s*(?:\n---)?", "", text)
     try:
@@ -56,7 +62,22 @@ def _value(path: Path, where: str, values: Mapping[str, Any], key: str) -> Any:
 def kalibr_settings(
     path: Path, document: Mapping[str, Any], number: int | None, fps: float, n_features: int
 ) -> Settings:
-    """Make settings of a camchain: of one camera, or of the pair of the first two."""
+    """Make settings of Kalibr's camchain: of one camera, or of the pair of the first two.
+
+    Parameters
+    ----------
+    path, document
+        The file, for messages, and its values.
+    number
+        Which camera; None for the only one or the pair.
+    fps, n_features
+        Frames per second and ORB features per image, which the file does not tell.
+
+    Raises
+    ------
+    SettingsError
+        If values are missing or wrong, or a model is not supported.
+    """
     names = sorted(
         (key for key in document if re.fullmatch(r"cam\d+", str(key))), key=lambda key: int(key[3:])
     )
@@ -108,7 +129,13 @@ _ROS_MODELS = ("plumb_bob", "rational_polynomial", "radtan")
 
 
 def ros_camera(path: Path, values: Mapping[str, Any]) -> CameraModel:
-    """Read the raw camera of a camera_info."""
+    """Read the raw camera of ROS's camera_info.
+
+    Raises
+    ------
+    SettingsError
+        If values are missing or wrong, or the model is not supported.
+    """
     model = values.get("distortion_model", "plumb_bob") or "plumb_bob"
     require_supported(path, "distortion_model", model, _ROS_MODELS)
     size = [_value(path, "", values, key) for key in ("image_width", "image_height")]
@@ -142,14 +169,30 @@ def ros_pair_settings(
     fps: float,
     n_features: int,
 ) -> Settings:
-    """Make settings of the files (path, values) of a rectified pair."""
+    """Make settings of the camera_info files of a rectified pair.
+
+    Parameters
+    ----------
+    left, right
+        Path, for messages, and values of either file.
+    fps, n_features
+        Frames per second and ORB features per image, which the files do not tell.
+
+    Raises
+    ------
+    SettingsError
+        If values are missing or wrong, or the cameras are no rectified pair.
+    """
     cameras = []
     for path, values in (left, right):
         raw = ros_camera(path, values)
         assert raw.size is not None
         R = _ros_matrix(path, values, ("rectification_matrix", "R", "r"), (9,)).reshape(3, 3)
         P = _ros_matrix(path, values, ("projection_matrix", "P", "p"), (12,)).reshape(3, 4)
-        cameras.append(CameraRectification(raw.K, raw.distortion, R, P, *raw.size))
+        width, height = raw.size
+        cameras.append(
+            CameraRectification(K=raw.K, D=raw.distortion, R=R, P=P, width=width, height=height)
+        )
     if (cameras[0].width, cameras[0].height) != (cameras[1].width, cameras[1].height):
         raise SettingsError(f"{left[0]} and {right[0]} have different image sizes")
     P_left, P_right = cameras[0].P, cameras[1].P
@@ -158,7 +201,8 @@ def ros_pair_settings(
             f"{left[0]} and {right[0]} are no rectified pair: their projection_matrix must be "
             "equal but for the last column, which is 0 for the left camera"
         )
-    return _pair_settings(right[0], StereoRectification(*cameras), fps, n_features)
+    rectification = StereoRectification(left=cameras[0], right=cameras[1])
+    return _pair_settings(right[0], rectification, fps, n_features)
 
 
 def _pair_settings(

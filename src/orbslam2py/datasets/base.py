@@ -103,9 +103,9 @@ class LiveFrame:
     timestamp
         Seconds since 1970 when it came; grows from image to image whatever the system's clock does.
     text
-        The same as text.
+        The time stamp in decimal seconds.
     images
-        The image.
+        The image, with its mask if there is one.
     """
 
     timestamp: float
@@ -162,6 +162,8 @@ class LiveSource(Source, Protocol):
 class Sequence(Source, Protocol):
     """A sequence of known length, recorded or made up; see `Source`.
 
+    The ``index`` of a frame is its place in the sequence, from 0, whichever frames a run takes.
+
     Attributes
     ----------
     timestamps
@@ -176,7 +178,13 @@ class Sequence(Source, Protocol):
         ...
 
     def timestamp_text(self, index: int, /) -> str:
-        """Return the time of a frame in seconds, with all digits of the source."""
+        """Return the time of a frame in seconds, with all digits of the source.
+
+        Parameters
+        ----------
+        index
+            Place of the frame in the sequence, from 0.
+        """
         ...
 
     def default_settings(self) -> Settings:
@@ -193,6 +201,11 @@ class Sequence(Source, Protocol):
 
     def load(self, index: int, /) -> Images:
         """Read (and rectify) the images of a frame.
+
+        Parameters
+        ----------
+        index
+            Place of the frame in the sequence, from 0.
 
         Raises
         ------
@@ -236,6 +249,15 @@ class Stamps:
 
 def choose_sensor(folder: Path, wanted: Sensor | None, available: tuple[Sensor, ...]) -> Sensor:
     """Return the wanted sensor, or the richest available one.
+
+    Parameters
+    ----------
+    folder
+        Where the images are, for the message.
+    wanted
+        None for the richest.
+    available
+        Sensors there are images for, the richest first.
 
     Raises
     ------

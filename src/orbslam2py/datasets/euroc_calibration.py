@@ -56,6 +56,16 @@ class SensorCalibration:
 def read_sensor_yaml(path: Path) -> SensorCalibration:
     """Read the calibration of a pinhole camera.
 
+    Parameters
+    ----------
+    path
+        EuRoC's ``sensor.yaml`` of a camera.
+
+    Returns
+    -------
+    SensorCalibration
+        With 20 images per second if the file does not tell its rate.
+
     Raises
     ------
     DatasetError
@@ -97,8 +107,14 @@ def monocular_settings(camera: SensorCalibration) -> Settings:
     return Settings(
         sensor=Sensor.MONOCULAR,
         camera=CameraSettings(
-            *(fx, fy, cx, cy),
-            *(k1, k2, p1, p2),
+            fx=fx,
+            fy=fy,
+            cx=cx,
+            cy=cy,
+            k1=k1,
+            k2=k2,
+            p1=p1,
+            p2=p2,
             width=camera.size[0],
             height=camera.size[1],
             fps=camera.rate,
@@ -121,7 +137,10 @@ def stereo_settings(left: SensorCalibration, right: SensorCalibration) -> Settin
     return Settings(
         sensor=Sensor.STEREO,
         camera=CameraSettings(
-            *(float(P[0, 0]), float(P[1, 1]), float(P[0, 2]), float(P[1, 2])),
+            fx=float(P[0, 0]),
+            fy=float(P[1, 1]),
+            cx=float(P[0, 2]),
+            cy=float(P[1, 2]),
             width=left.size[0],
             height=left.size[1],
             fps=left.rate,

@@ -40,6 +40,18 @@ class StaticMask:
     def mask(self, index: int, image: ByteArray) -> ByteArray:
         """Return the mask of an image.
 
+        Parameters
+        ----------
+        index
+            Not looked at: the mask is the same for all.
+        image
+            The image the mask is for, uint8 (h, w) or (h, w, channels).
+
+        Returns
+        -------
+        ByteArray
+            (h, w), 0 where no keypoint may lie.
+
         Raises
         ------
         ImageError
@@ -89,6 +101,18 @@ class MaskFolder:
 
     def mask(self, index: int, image: ByteArray) -> ByteArray:
         """Read the mask of an image.
+
+        Parameters
+        ----------
+        index
+            Place of the frame in the sequence, from 0.
+        image
+            The image the mask is for, uint8 (h, w) or (h, w, channels).
+
+        Returns
+        -------
+        ByteArray
+            (h, w), 0 where no keypoint may lie.
 
         Raises
         ------
@@ -204,7 +228,7 @@ class MaskedSequence(_Masked):
         return self._sequence.timestamp_text(index)
 
     def default_settings(self) -> Settings:
-        """Choose settings by what comes with the images."""
+        """Choose settings by what comes with the images; see `datasets.base.Sequence`."""
         return self._sequence.default_settings()
 
     def load(self, index: int, /) -> Images:
@@ -243,7 +267,7 @@ class MaskedCamera(_Masked):
         return self._camera.n_dropped
 
     def open(self) -> None:
-        """Open the camera."""
+        """Open the camera; see `datasets.base.LiveSource.open`."""
         self._camera.open()
 
     def __enter__(self) -> MaskedCamera:
@@ -254,6 +278,6 @@ class MaskedCamera(_Masked):
         self._camera.__exit__(*details)
 
     def take(self, timeout: float, /) -> LiveFrame | None:
-        """Take the newest image, with the mask."""
+        """Take the newest image, with the mask; see `datasets.base.LiveSource.take`."""
         frame = self._camera.take(timeout)
         return frame and replace(frame, images=self._with_mask(0, frame.images))

@@ -25,7 +25,7 @@ def open_input(
     times: str | Path | None = None,
     mask: str | Path | None = None,
 ) -> Sequence | LiveSource:
-    """Open images of any kind.
+    """Open a recorded sequence, a folder of images, a video or a camera.
 
     Parameters
     ----------
@@ -44,6 +44,11 @@ def open_input(
     mask
         An image file, 0 where no keypoint may lie, or a folder with one per image.
 
+    Returns
+    -------
+    Sequence or LiveSource
+        A `LiveSource`, opened already, for a camera.
+
     Raises
     ------
     DatasetError
@@ -55,10 +60,10 @@ def open_input(
     """
     named = Path(str(source))
     if isinstance(source, int) or (str(source).isdecimal() and not named.exists()):
-        index = int(str(source))
+        number = int(str(source))
         if times is not None:
             raise DatasetError("--times does not go with a camera: its images get their own times")
-        camera = LiveCamera(index, sensor, settings=settings, fps=fps)
+        camera = LiveCamera(number, sensor, settings=settings, fps=fps)
         live: LiveSource = camera if mask is None else MaskedCamera(camera, mask)
         live.open()
         return live

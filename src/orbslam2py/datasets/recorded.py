@@ -61,7 +61,7 @@ class RecordedSequence(ABC):
 
     @cached_property
     def settings(self) -> Settings:
-        """What the caller chose, or `default_settings`."""
+        """The settings the caller chose, or `default_settings`."""
         return self.default_settings() if self._chosen is None else self._chosen
 
     def default_settings(self) -> Settings:

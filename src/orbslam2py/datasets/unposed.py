@@ -22,7 +22,7 @@ _log = logging.getLogger(__name__)
 
 
 class UnposedSource:
-    """Images of a single camera, of which nothing else is known.
+    """Images of a single camera without true poses and without calibration.
 
     Parameters
     ----------
@@ -88,7 +88,9 @@ class UnposedSource:
             _log.warning(
                 "%s has images of %d x %d pixels, but the settings are for %d x %d: "
                 "focal lengths and distortion do not fit",
-                *(self._what, *found, *given),
+                self._what,
+                *found,
+                *given,
             )
 
 
@@ -102,7 +104,7 @@ def _with_rate(camera: CameraSettings, fps: float) -> CameraSettings:
 def chosen_stamps(
     n: int, fps: float | None, times: str | Path | None, otherwise: Stamps | float
 ) -> Stamps:
-    """Take the time stamps that were asked for.
+    """Choose the time stamps of images: from a rate, from a file, or else their own.
 
     Parameters
     ----------

@@ -72,6 +72,11 @@ class VideoReader:
     def read(self, index: int) -> ByteArray:
         """Decode a frame.
 
+        Parameters
+        ----------
+        index
+            Number of the frame in the video, from 0.
+
         Returns
         -------
         ByteArray
@@ -98,6 +103,16 @@ class VideoReader:
     def frames(self, step: int = 1) -> Iterator[ByteArray | ImageError]:
         """Yield every so many frames from the beginning; an error in the place of a bad one.
 
+        Parameters
+        ----------
+        step
+            1 for all frames, 2 for every second one.
+
+        Yields
+        ------
+        ByteArray or ImageError
+            (h, w, 3) in the order BGR, or (h, w).
+
         Raises
         ------
         DatasetError
@@ -117,7 +132,7 @@ class VideoReader:
             raise self._no_frames()
 
     def close(self) -> None:
-        """Give the file free."""
+        """Close the file."""
         self._capture.release()
 
     def _no_frames(self) -> DatasetError:
@@ -219,6 +234,7 @@ class VideoSequence(UnposedSource):
             )
         _log.warning(
             "the time stamps of %s do not grow; taking a constant %g frames per second",
-            *(self.path, self._reader.fps),
+            self.path,
+            self._reader.fps,
         )
         return stamps_of_rate(len(seconds), self._reader.fps)

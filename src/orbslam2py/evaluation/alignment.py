@@ -17,8 +17,11 @@ class Alignment(str, Enum):
     """How the estimate is moved onto the truth before the absolute error is taken."""
 
     SE3 = "se3"
+    """Turned and shifted."""
     SIM3 = "sim3"
+    """Turned, shifted and scaled: for one camera, which cannot see metres."""
     NONE = "none"
+    """Left as it is: both are in one world."""
 
     def __str__(self) -> str:
         return self.value
@@ -52,12 +55,12 @@ class Similarity:
         return Similarity(1 / self.scale, self.R.T, -(self.R.T @ self.t) / self.scale)
 
     def apply(self, points: FloatArray) -> FloatArray:
-        """Transform points (n, 3)."""
+        """Transform points (n, 3); returns float64 (n, 3)."""
         moved: FloatArray = self.scale * points @ self.R.T + self.t
         return moved
 
     def apply_to_poses(self, T_wc: FloatArray) -> FloatArray:
-        """Transform camera poses (n, 4, 4): positions as points, orientations turned."""
+        """Transform poses (n, 4, 4), camera to world: positions as points, orientations turned."""
         moved: FloatArray = T_wc.copy()
         moved[:, :3, :3] = self.R @ T_wc[:, :3, :3]
         moved[:, :3, 3] = self.apply(T_wc[:, :3, 3])
@@ -97,6 +100,13 @@ def match_poses(
     estimate: Trajectory, truth: Trajectory, max_difference: float = MAX_DIFFERENCE
 ) -> tuple[IntArray, IntArray]:
     """Find which poses belong together by their time stamps.
+
+    Parameters
+    ----------
+    estimate, truth
+        Both on one clock.
+    max_difference
+        Poses belong together if their time stamps differ by less [s].
 
     Returns
     -------

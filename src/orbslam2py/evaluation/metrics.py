@@ -25,7 +25,15 @@ _SECOND_TOLERANCE = 0.1  # how far "one second later" may be off [s]
 
 @dataclass(frozen=True)
 class ErrorStatistics:
-    """Figures over many errors of one kind, in their unit."""
+    """Figures over many errors of one kind, in the unit of the errors.
+
+    Attributes
+    ----------
+    rmse
+        Root of the mean square.
+    mean, median, max
+        Of the errors.
+    """
 
     rmse: float
     mean: float
@@ -34,7 +42,7 @@ class ErrorStatistics:
 
     @classmethod
     def of(cls, errors: FloatArray) -> ErrorStatistics:
-        """Take the figures of at least one error (n,)."""
+        """Take the figures of errors, float64 (n,), n > 0."""
         return cls(
             rmse=float(np.sqrt(np.mean(errors**2))),
             mean=float(np.mean(errors)),
@@ -119,6 +127,11 @@ def evaluate_trajectory(
     timed
         False if the time stamps are only frame numbers: no figures over one second then.
 
+    Returns
+    -------
+    Evaluation
+        Positions in metres if the truth is.
+
     Raises
     ------
     DatasetError
@@ -186,6 +199,11 @@ def one_second_pairs(times: FloatArray) -> tuple[IntArray, IntArray]:
     ----------
     times
         Seconds in increasing order, (n,).
+
+    Returns
+    -------
+    first, second
+        Indices into `times`, int64 (k,) each.
     """
     if not len(times):
         return np.zeros(0, np.int64), np.zeros(0, np.int64)

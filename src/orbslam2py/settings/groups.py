@@ -134,7 +134,19 @@ class DepthSettings:
 
 @dataclass(frozen=True)
 class ViewerSettings:
-    """Sizes (world units) and line widths (pixels) of the map view, and where its eye stands."""
+    """Sizes of things in the map view, and where its eye stands.
+
+    Attributes
+    ----------
+    keyframe_size, camera_size
+        Length of the drawn cameras in units of the world [m].
+    keyframe_line_width, graph_line_width, camera_line_width, point_size
+        Widths of lines and points in pixels.
+    viewpoint_x, viewpoint_y, viewpoint_z
+        Where the eye stands, seen from the present camera (x right, y down, z forward) [m].
+    viewpoint_f
+        Focal length of the view in pixels.
+    """
 
     keyframe_size: float = 0.05
     keyframe_line_width: float = 1.0

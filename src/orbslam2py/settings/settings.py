@@ -125,6 +125,11 @@ class Settings:
     def save(self, path: str | PathLike[str]) -> None:
         """Write an ORB-SLAM settings file that `load` turns into equal settings.
 
+        Parameters
+        ----------
+        path
+            The file; replaced only when everything was written.
+
         Raises
         ------
         OSError

@@ -64,7 +64,7 @@ class WritableSequence(Sequence, Protocol):
 
 
 def choose_layout(layout: Layout | str | None, sensor: Sensor) -> Layout:
-    """Return the layout, or the usual one of the sensor.
+    """Return the layout, or the usual one of the sensor if it is None.
 
     Raises
     ------

@@ -14,7 +14,7 @@ from orbslam2py.synthetic.scenes import LAPS, ROOM_BESIDE, SyntheticWorld
 
 @dataclass(frozen=True)
 class SyntheticOptions:
-    """What to make. None stands for the world's own value.
+    """What a synthetic sequence shall be. None stands for the world's own value.
 
     Attributes
     ----------

@@ -39,7 +39,7 @@ class SyntheticSequence:
     Parameters
     ----------
     options
-        What to make.
+        World, sensor, length and disturbances.
     threads
         Rendering threads; the images do not depend on it.
     """
@@ -75,21 +75,21 @@ class SyntheticSequence:
 
     @property
     def layout(self) -> str:
-        """There are no files."""
+        """Always ``synthetic``: there are no files."""
         return "synthetic"
 
     @property
     def sensor(self) -> Sensor:
-        """What the images come from."""
+        """The kind of camera that delivers the images."""
         return Sensor(self.options.sensor)
 
     @cached_property
     def timestamps(self) -> FloatArray:
-        """Seconds from the start, (n,)."""
+        """Time of every frame in seconds from the start, float64 (n,)."""
         return np.asarray(self.nanoseconds / 1e9)
 
     def timestamp_text(self, index: int, /) -> str:
-        """Seconds with nine decimals."""
+        """Return the time of a frame in seconds, with nine decimals."""
         nanoseconds = int(self.nanoseconds[index])
         return f"{nanoseconds // 10**9}.{nanoseconds % 10**9:09d}"
 
@@ -131,7 +131,7 @@ class SyntheticSequence:
 
     @cached_property
     def settings(self) -> Settings:
-        """The default settings."""
+        """The same as `default_settings`."""
         return self.default_settings()
 
     def ground_truth(self) -> Trajectory:
@@ -163,7 +163,13 @@ class SyntheticSequence:
         return way.length() if way is not None and self._world in LAPS else None
 
     def T_wc(self, index: int) -> FloatArray:
-        """Exact pose of the (left) camera, camera to world, (4, 4)."""
+        """Return the exact pose of the (left) camera, camera to world, float64 (4, 4) [m].
+
+        Raises
+        ------
+        IndexError
+            If there is no such frame.
+        """
         if not 0 <= index < len(self):
             raise IndexError(f"frame {index} of {len(self)}")
         seconds = float(self.timestamps[index])

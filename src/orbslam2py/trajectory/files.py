@@ -24,12 +24,16 @@ from orbslam2py.trajectory.trajectory import Trajectory
 
 
 class TrajectoryFormat(str, Enum):
-    """File formats; ``auto`` decides by the content."""
+    """Formats of trajectory files."""
 
     AUTO = "auto"
+    """Whichever the content of the file shows."""
     TUM = "tum"
+    """``time tx ty tz qx qy qz qw``, camera to world."""
     KITTI = "kitti"
+    """The upper three rows of a pose, camera to world, per frame; no time stamps."""
     EUROC = "euroc"
+    """``ns, px, py, pz, qw, qx, qy, qz``, body to world."""
 
     def __str__(self) -> str:
         return self.value
@@ -117,6 +121,11 @@ def _decimals(values: Any) -> str:
 def read_tum(path: str | Path) -> Trajectory:
     """Read ``time tx ty tz qx qy qz qw`` lines; ``#`` starts a comment.
 
+    Returns
+    -------
+    Trajectory
+        Poses ``T_wc``; quaternions need not have unit length.
+
     Raises
     ------
     DatasetError
@@ -183,6 +192,13 @@ def read_trajectory(
     path: str | Path, file_format: TrajectoryFormat = TrajectoryFormat.AUTO
 ) -> tuple[Trajectory, TrajectoryFormat]:
     """Read a trajectory in any of the formats.
+
+    Parameters
+    ----------
+    path
+        The file.
+    file_format
+        What it is; by default told by its content.
 
     Returns
     -------

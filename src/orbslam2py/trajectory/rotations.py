@@ -52,7 +52,10 @@ def rotations_from_quaternions(q: FloatArray) -> FloatArray:
 
 
 def nearest_rotations(M: FloatArray) -> FloatArray:
-    """Find the rotations (n, 3, 3) nearest to matrices read from rounded text."""
+    """Find the rotations nearest to matrices (..., 3, 3), such as those read from rounded text.
+
+    Nearest in the Frobenius norm, by the singular value decomposition.
+    """
     U, _, Vt = np.linalg.svd(M)
     U[..., :, 2] *= np.sign(np.linalg.det(U @ Vt))[..., None]
     return np.asarray(U @ Vt)
@@ -82,7 +85,7 @@ def poses_from(R: FloatArray, t: FloatArray) -> FloatArray:
 
 
 def inverse_poses(T: FloatArray) -> FloatArray:
-    """Invert rigid transforms (..., 4, 4)."""
+    """Invert rigid transforms (..., 4, 4); exact for the rotation, which is transposed."""
     inverse = np.zeros_like(T)
     Rt = np.swapaxes(T[..., :3, :3], -1, -2)
     inverse[..., :3, :3] = Rt

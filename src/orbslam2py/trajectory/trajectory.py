@@ -25,7 +25,8 @@ class Trajectory:
     lost
         Which poses only repeat an earlier one because tracking was lost, bool (n,).
     indices
-        Number of the input frame of each pose, int64 (n,).
+        Frame that each pose belongs to, int64 (n,): its place, from 0, among the frames that were
+        fed; 0, 1, ... if nothing else is said.
     """
 
     timestamps: FloatArray
@@ -53,7 +54,7 @@ class Trajectory:
 
     @property
     def positions(self) -> FloatArray:
-        """Camera centres in the world, (n, 3)."""
+        """Camera centres in the world, float64 (n, 3), in the unit of `T_wc`."""
         return self.T_wc[:, :3, 3]
 
     def select(self, which: NDArray[Any]) -> Trajectory:

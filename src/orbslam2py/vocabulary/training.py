@@ -19,7 +19,12 @@ from orbslam2py.errors import ImageError, VocabularyError
 
 
 def read_training_images(folder: str | os.PathLike[str]) -> list[Path]:
-    """All images below a folder, sorted by name.
+    """Find all images below a folder, sorted by path.
+
+    Parameters
+    ----------
+    folder : path
+        Searched with its subfolders.
 
     Raises
     ------
@@ -50,7 +55,7 @@ def train_vocabulary(
     features : OrbOptions, optional
         How features are found; default: 2000 per image.
     progress : callable, optional
-        Called with the name of the step and the fraction done; returning False cancels.
+        Called with the name of the step and the fraction done, 0 to 1; returning False cancels.
 
     Returns
     -------

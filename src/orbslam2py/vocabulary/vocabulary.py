@@ -35,7 +35,7 @@ _log = logging.getLogger(__name__)
 
 # ---- load ----------------------------------------------------------------------------------------
 def default_vocabulary_path() -> Path:
-    """Path of the vocabulary that comes with the package."""
+    """Return the path of the vocabulary that comes with the package."""
     return Path(__file__).parent.parent / "data" / "default.bvoc"
 
 
@@ -200,7 +200,21 @@ def convert_vocabulary(
     *,
     progress: Progress | None = None,
 ) -> core.Vocabulary:
-    """Read any format, write another, see :func:`save_vocabulary`; returns what was read.
+    """Read a vocabulary in any format and write it in another.
+
+    Parameters
+    ----------
+    source : path
+        As for :func:`load_vocabulary`.
+    target : path
+        As for :func:`save_vocabulary`: the name decides the format.
+    progress : callable, optional
+        Called with the fraction done, 0 to 1.
+
+    Returns
+    -------
+    Vocabulary
+        What was read.
 
     Raises
     ------
@@ -241,6 +255,11 @@ class VocabularyInfo:
 
 def vocabulary_info(path: str | os.PathLike[str] | None = None) -> VocabularyInfo:
     """Read a vocabulary as a whole, check all of it, and say what it is.
+
+    Parameters
+    ----------
+    path : path, optional
+        Default: as for :func:`load_vocabulary`.
 
     Raises
     ------
