@@ -5,7 +5,7 @@ A short path through the synthetic room is rendered once at 160x120 and then fed
 RGB-D images, for as many frames as wanted. Once the place is mapped only the trajectory should
 grow. Resident memory is read after ``malloc_trim``, so that freed blocks do not count.
 
-    python benchmarks/memory.py --frames 100000
+    python -m benchmarks.memory --frames 100000
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@
 Recall at precision 1 is the share of the right pairs whose score is above that of every wrong pair;
 average precision is the area under the precision-recall curve over all pairs.
 
-    python benchmarks/place_recognition.py src/orbslam2py/data/default.bvoc deeper.bvoc
+    python -m benchmarks.accuracy.place_recognition src/orbslam2py/data/default.bvoc deeper.bvoc
 """
 
 from __future__ import annotations

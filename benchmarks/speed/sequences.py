@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import reference
-import runs
-from reference import SequenceFigure
 from rich.table import Table
-from steps import Row
-from tables import new_table, verdict
-from yardstick import Measurement, Times, Yardstick, shared_folder
+
+from benchmarks.harness import reference, runs
+from benchmarks.harness.reference import SequenceFigure
+from benchmarks.harness.tables import new_table, verdict
+from benchmarks.harness.yardstick import Measurement, Times, Yardstick, shared_folder
+from benchmarks.speed.single_steps import Row
 
 _MISSING = "left out: the sequences are not there (ORBSLAM2PY_SHARED names their folder)"
 
@@ -187,7 +187,7 @@ def _add_realtime(table: Table, figure: SequenceFigure, folder: Path, n_runs: in
 
 def program_rows(yardstick: Yardstick, build: Path) -> Iterator[Row]:
     """Fusing in a dense made-up map where everything is covisible: the worst case, from C++."""
-    program = build / "benchmarks" / "matching_bench"
+    program = build / "benchmarks" / "cpp" / "matching_bench"
     if not program.is_file():
         return
     command = [str(program), "--benchmark_format=json", "--benchmark_filter=fuse"]
@@ -235,12 +235,11 @@ def python_table() -> Iterator[object]:
     )
     table.caption = (
         "Every function, method and property of the extension is wrapped to\n"
-        "note its time, the rest of the track call is Python (benchmarks/python_share.py).\n"
+        "note its time, the rest of the track call is Python (benchmarks/speed/python_share.py).\n"
         "Mapping inline: no other thread uses the interpreter. Freeing C++ objects counts on "
         "neither side."
     )
     table.caption_justify = "left"
-    script = Path(__file__).with_name("python_share.py")
     for figure in reference.SEQUENCES:
         folder = _folder(figure)
         if folder is None:
@@ -250,7 +249,14 @@ def python_table() -> Iterator[object]:
             ("all, with mapping: mean", []),
             ("not keyframes: median", ["--tracking-only"]),
         ):
-            command = [sys.executable, str(script), str(folder), figure.sensor, *option]
+            command = [
+                sys.executable,
+                "-m",
+                "benchmarks.speed.python_share",
+                str(folder),
+                figure.sensor,
+            ]
+            command += option
             done = subprocess.run(command, capture_output=True, text=True, check=True)
             share = json.loads(done.stdout)
             table.add_row(

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How long vocabularies take to be ready, and with how much memory: in processes of their own.
 
-    python benchmarks/vocabularies.py FILE
+    python -m benchmarks.speed.vocabularies FILE
 
 opens FILE once and prints milliseconds and megabytes as JSON.
 """
@@ -18,10 +18,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import reference
-from steps import Row
-from yardstick import Yardstick
 
+from benchmarks.harness import reference
+from benchmarks.harness.yardstick import Yardstick
+from benchmarks.speed.single_steps import Row
 from orbslam2py import _core as core
 from orbslam2py.vocabulary.vocabulary import load_vocabulary, save_vocabulary
 
@@ -69,7 +69,7 @@ class VocabularyFiles:
 
 def open_in_new_process(path: Path) -> dict[str, float]:
     """Milliseconds until the first image can be described, and the process's memory [MB]."""
-    command = [sys.executable, __file__, str(path)]
+    command = [sys.executable, "-m", "benchmarks.speed.vocabularies", str(path)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     return json.loads(done.stdout)
 

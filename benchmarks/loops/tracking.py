@@ -6,7 +6,7 @@ made-up ring of keyframes already, under which the live ones hang. In every seco
 `System.optimize` refines everything without a pause; before each adjustment the ring drifts anew.
 Both kinds of runs see the same images, in turns.
 
-    python benchmarks/loop_tracking.py --passes 3
+    python -m benchmarks.loops.tracking --passes 3
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ import time
 from dataclasses import asdict, dataclass, field
 
 import numpy as np
-from made_up_map import MadeUpMap, MapSize
 
+from benchmarks.loops.made_up_map import MadeUpMap, MapSize
 from orbslam2py.datasets import Images
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord

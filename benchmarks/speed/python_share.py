@@ -9,7 +9,7 @@ that does nothing, and by how much that makes the frame's Python longer is taken
 C++ objects are kept alive until the call is over, so that freeing their memory, which is no work of
 Python's, counts on neither side.
 
-    python benchmarks/python_share.py FOLDER rgbd
+    python -m benchmarks.speed.python_share FOLDER rgbd
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ Threaded runs with stereo or RGB-D differ from each other and are repeated; dete
 not, so they start at different frames instead. With a single camera the seed decides which two
 views begin the map: every run has its own, and the median over them is judged.
 
-    python benchmarks/accuracy.py --runs 5 --starts 5
+    python -m benchmarks.accuracy.accuracy --runs 5 --starts 5
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import reference
-import runs
-from reference import MonocularFigure, SequenceFigure
 from rich.console import Console
 from rich.table import Table
-from tables import new_table, verdict
-from yardstick import shared_folder
+
+from benchmarks.harness import reference, runs
+from benchmarks.harness.reference import MonocularFigure, SequenceFigure
+from benchmarks.harness.tables import new_table, verdict
+from benchmarks.harness.yardstick import shared_folder
 
 
 def _spread(values: Sequence[float], digits: int = 4) -> str:

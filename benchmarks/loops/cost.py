@@ -17,11 +17,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-import reference
 from matplotlib.figure import Figure
-from steps import Row
-from tables import new_table, verdict
-from yardstick import Times, Yardstick
+
+from benchmarks.harness import reference
+from benchmarks.harness.tables import new_table, verdict
+from benchmarks.harness.yardstick import Times, Yardstick
+from benchmarks.speed.single_steps import Row
 
 SIZES = (250, 500, 1000, 2000, 4000)
 LIMIT_SIZE = 1000
@@ -62,7 +63,7 @@ class Program:
     """A Google Benchmark program."""
 
     def __init__(self, build: Path, name: str, *options: str) -> None:
-        self.path = build / "benchmarks" / name
+        self.path = build / "benchmarks" / "cpp" / name
         self._options = options
 
     def records(self, pattern: str) -> dict[str, Record]:
@@ -185,7 +186,7 @@ def measure(yardstick: Yardstick, build: Path) -> list[Step]:
 
 def missing_programs(build: Path) -> list[str]:
     """Programs that are not built."""
-    return [name for name in _PROGRAMS if not (build / "benchmarks" / name).is_file()]
+    return [name for name in _PROGRAMS if not (build / "benchmarks" / "cpp" / name).is_file()]
 
 
 # ---- what is shown -------------------------------------------------------------------------------
@@ -237,8 +238,7 @@ def rows(steps: list[Step]) -> Iterator[Row]:
 # ---- tracking meanwhile --------------------------------------------------------------------------
 def tracking_table() -> object:
     """Tracking's times with and without full adjustments beside it, and theirs beside tracking."""
-    script = Path(__file__).with_name("loop_tracking.py")
-    command = [sys.executable, str(script), "--json"]
+    command = [sys.executable, "-m", "benchmarks.loops.tracking", "--json"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         raise RuntimeError(f"{' '.join(command)}: {done.stderr}")

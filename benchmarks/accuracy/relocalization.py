@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How well lost frames are found again, and that foreign ones are not.
 
-    python benchmarks/relocalization.py kidnap          to another place, black images between
-    python benchmarks/relocalization.py recall          viewpoints beside the path, other exposure
-    python benchmarks/relocalization.py foreign         worlds and photographs never mapped
-    python benchmarks/relocalization.py localization    out of the map and back, ten times
-    python benchmarks/relocalization.py speed           single attempts, query of a large map
+    python -m benchmarks.accuracy.relocalization PART
+
+    kidnap          to another place, black images between
+    recall          viewpoints beside the path, other exposure
+    foreign         worlds and photographs never mapped
+    localization    out of the map and back, ten times
+    speed           single attempts, query of a large map
 
 Errors are taken through the nearest mapped keyframe, so that the drift of the map does not count;
 with a single camera lengths are those of the mapped path aligned by Sim(3).
@@ -37,7 +39,7 @@ from orbslam2py.slam.timing import StageTimer
 from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence, SyntheticWorld
 from orbslam2py.vocabulary.vocabulary import load_vocabulary
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "python"))
+sys.path.append(str(Path(__file__).resolve().parents[2] / "tests" / "python"))
 from mapped_world import MappedWorld, PoseError, beside
 
 #: Both views had enough matches, and a reconstruction was tried.
@@ -139,7 +141,7 @@ def foreign_views(arguments: argparse.Namespace, sensor: str):  # type: ignore[n
         )  # fmt: skip
         for index in rng.integers(len(sequence), size=20):
             yield "worlds", sequence.load(int(index))
-    beside_checkout = Path(__file__).resolve().parents[2] / "shared"
+    beside_checkout = Path(__file__).resolve().parents[3] / "shared"
     shared = Path(os.environ.get("ORBSLAM2PY_SHARED", beside_checkout))
     for file in sorted((shared / "data" / "vocabulary_images").glob("*")):
         image = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)

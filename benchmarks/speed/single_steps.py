@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-import reference
-from reference import Figure
-from yardstick import GOLDEN, Measurement, Yardstick, shared_folder
 
+from benchmarks.harness import reference
+from benchmarks.harness.reference import Figure
+from benchmarks.harness.yardstick import GOLDEN, Measurement, Yardstick, shared_folder
 from orbslam2py import _core as core
 from orbslam2py.vocabulary.vocabulary import load_vocabulary
 

@@ -12,14 +12,15 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from reference import YARDSTICK
 
-GOLDEN = Path(__file__).parent.parent / "tests" / "data" / "golden"
+from benchmarks.harness.reference import YARDSTICK
+
+GOLDEN = Path(__file__).parents[2] / "tests" / "data" / "golden"
 
 
 def shared_folder() -> Path | None:
     """Folder of photographs and recorded sequences, None without it."""
-    default = Path(__file__).parent.parent.parent / "shared"
+    default = Path(__file__).parents[3] / "shared"
     folder = Path(os.environ.get("ORBSLAM2PY_SHARED", default)) / "data"
     return folder if folder.is_dir() else None
 

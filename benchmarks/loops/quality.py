@@ -5,9 +5,9 @@ Every case runs with several seeds; the seed chooses wallpaper, noise and all ra
 are judged against the exact poses, and the map by the motion from the start of the lap to its end.
 Without loop closing a few of the seeds run again, to show the drift there is.
 
-    python benchmarks/loops.py                                     all cases, ten seeds
-    python benchmarks/loops.py --cases corridor --sensors rgbd --seeds 3
-    python benchmarks/loops.py --list
+    python -m benchmarks.loops.quality                                     all cases, ten seeds
+    python -m benchmarks.loops.quality --cases corridor --sensors rgbd --seeds 3
+    python -m benchmarks.loops.quality --list
 
 Exits with 1 if a row misses its limits.
 """
@@ -25,18 +25,18 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
-from loop_cases import CASES, Case
-from loop_judgement import (
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.harness.tables import new_table, verdict
+from benchmarks.loops.cases import CASES, Case
+from benchmarks.loops.judgement import (
     Judgement,
     closed_revisits,
     judge_loop,
     metres_per_unit_at,
     revisits,
 )
-from rich.console import Console
-from rich.table import Table
-from tables import new_table, verdict
-
 from orbslam2py.errors import DatasetError
 from orbslam2py.evaluation.laps import lap_error, scale_drift
 from orbslam2py.evaluation.metrics import Alignment, evaluate_trajectory

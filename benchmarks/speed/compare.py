@@ -4,9 +4,8 @@
 The yardstick is OpenCV's own ORB in one thread. It is measured in turns with each step, so that
 both see the same state of the machine; "there" means the machine of the reference's figures.
 
-    python benchmarks/compare.py                 everything that this checkout allows
-    python benchmarks/compare.py --only steps    steps, vocabularies, sequences, python, locks,
-                                                 loops
+    python -m benchmarks.speed.compare                 everything that this checkout allows
+    python -m benchmarks.speed.compare --only steps    only a part
 
 The curve of the costs of loops goes to build/bench/loop_cost.png.
 """
@@ -22,15 +21,16 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import cv2
-import loop_cost
-import reference
-import steps
-import vocabularies
 from rich.console import Console
-from sequences import lock_tables, program_rows, python_table, sequence_tables
-from steps import Row
-from tables import new_table, verdict
-from yardstick import Yardstick
+
+from benchmarks.harness import reference
+from benchmarks.harness.tables import new_table, verdict
+from benchmarks.harness.yardstick import Yardstick
+from benchmarks.loops import cost as loop_cost
+from benchmarks.speed import single_steps as steps
+from benchmarks.speed import vocabularies
+from benchmarks.speed.sequences import lock_tables, program_rows, python_table, sequence_tables
+from benchmarks.speed.single_steps import Row
 
 PARTS = ("steps", "vocabularies", "sequences", "python", "locks", "loops")
 
@@ -172,7 +172,7 @@ def main() -> None:
             files = vocabularies.VocabularyFiles.write(large, Path(folder))
             rows = list(vocabularies.vocabulary_rows(yardstick, files))
             console.print(steps_table("Vocabulary until the first image is described", rows))
-    library = arguments.build / "benchmarks" / "liblock_times.so"
+    library = arguments.build / "benchmarks" / "cpp" / "liblock_times.so"
     for part, tables in (
         ("sequences", lambda: sequence_tables(yardstick, arguments.runs)),
         ("python", python_table),
@@ -183,8 +183,9 @@ def main() -> None:
             for table in tables():
                 console.print(table)
     console.print(
-        "Not here, because they take minutes: benchmarks/memory.py (memory over 100 000 frames), "
-        "benchmarks/accuracy.py (errors of all sequences), benchmarks/place_recognition.py"
+        "Not here, because they take minutes: benchmarks.memory (memory over 100 000 frames), "
+        "benchmarks.accuracy.accuracy (errors of all sequences), "
+        "benchmarks.accuracy.place_recognition"
     )
 
 

@@ -7,13 +7,13 @@
 #include <memory>
 #include <vector>
 
-#include "../tests/cpp/support/synthetic_frames.hpp"
 #include "map/map.hpp"
 #include "matching/by_projection.hpp"
 #include "matching/by_words.hpp"
 #include "matching/for_initialization.hpp"
 #include "matching/for_triangulation.hpp"
 #include "matching/fuse.hpp"
+#include "support/synthetic_frames.hpp"
 
 namespace {
 

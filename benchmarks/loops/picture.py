@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Draw the same run without and with loop closing: the picture of the README.
 
-    python scripts/draw_loop_picture.py --case corridor --sensor rgbd --seed 1
+    python -m benchmarks.loops.picture --case corridor --sensor rgbd --seed 1
 
-The settings are those of benchmarks/loops.py. Both paths are laid onto the truth at their start, so
-that what is gathered on the way shows at the end.
+The settings are those of benchmarks.loops.quality. Both paths are laid onto the truth at their
+start, so that what is gathered on the way shows at the end.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from benchmarks.loops.cases import CASES, Case
 from orbslam2py.evaluation.laps import lap_error
 from orbslam2py.evaluation.metrics import Similarity, align
 from orbslam2py.runs.result import RunOptions, RunResult
@@ -27,9 +28,7 @@ from orbslam2py.settings.sensor import Sensor
 from orbslam2py.trajectory.trajectory import Trajectory
 from orbslam2py.vocabulary.vocabulary import load_vocabulary
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.append(str(ROOT / "benchmarks"))
-from loop_cases import CASES, Case  # noqa: E402  # benchmarks are no package
+ROOT = Path(__file__).resolve().parents[2]
 
 Array = npt.NDArray[np.float64]
 
