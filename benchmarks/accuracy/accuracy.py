@@ -10,20 +10,19 @@ views begin the map: every run has its own, and the median over them is judged.
 
 from __future__ import annotations
 
-import argparse
 import statistics
-import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
 from rich.table import Table
 
-from benchmarks.harness import reference, runs
+from benchmarks.harness import reference
+from benchmarks.harness.arguments import add_counts, add_width, console_of, new_parser
+from benchmarks.harness.folders import sequence_folder
 from benchmarks.harness.reference import MonocularFigure, SequenceFigure
+from benchmarks.harness.runs import run_sequence
 from benchmarks.harness.tables import new_table, verdict
-from benchmarks.harness.yardstick import shared_folder
 
 
 def _spread(values: Sequence[float], digits: int = 4) -> str:
@@ -42,7 +41,7 @@ def accuracy_rows(
         ],
     }
     for mode, options in modes.items():
-        reports = [runs.run(folder, figure.sensor, *words) for words in options]
+        reports = [run_sequence(folder, figure.sensor, *words) for words in options]
         errors = [float(report["ate_rmse_m"]) for report in reports]
         keyframes = [int(report["keyframes"]) for report in reports]
         tracked = min(float(report["tracked_fraction"]) for report in reports)
@@ -64,7 +63,7 @@ def monocular_rows(figure: MonocularFigure, folder: Path, n_runs: int) -> Iterat
     """One row per mode."""
     for mode, options in {"threads": [], "deterministic": ["--deterministic"]}.items():
         reports = [
-            runs.run(folder, "mono", *options, "--seed", str(seed)) for seed in range(n_runs)
+            run_sequence(folder, "mono", *options, "--seed", str(seed)) for seed in range(n_runs)
         ]
         keyframes_errors = [float(report["ate_keyframes_rmse_m"]) for report in reports]
         frames_errors = [float(report["ate_rmse_m"]) for report in reports]
@@ -91,7 +90,7 @@ def monocular_rows(figure: MonocularFigure, folder: Path, n_runs: int) -> Iterat
         )
 
 
-def _depth_table(shared: Path, n_runs: int, n_starts: int) -> Table:
+def _depth_table(n_runs: int, n_starts: int) -> Table:
     table = new_table(
         "Accuracy: RMSE in metres of all frames after rigid alignment, median (least..most)",
         ["sequence", "mode"],
@@ -106,7 +105,7 @@ def _depth_table(shared: Path, n_runs: int, n_starts: int) -> Table:
         ],
     )
     for figure in [*reference.SEQUENCES, reference.STILL]:
-        folder = shared / "sequences" / figure.folder
+        folder = sequence_folder(figure.folder)
         # 8 frames only: starting later leaves too little.
         own_starts = 1 if figure is reference.STILL else n_starts
         for row in accuracy_rows(figure, folder, n_runs, own_starts):
@@ -114,7 +113,7 @@ def _depth_table(shared: Path, n_runs: int, n_starts: int) -> Table:
     return table
 
 
-def _monocular_table(shared: Path, n_runs: int) -> Table:
+def _monocular_table(n_runs: int) -> Table:
     table = new_table(
         "A single camera: RMSE in metres after similarity alignment, median (least..most)",
         ["sequence", "mode"],
@@ -131,26 +130,28 @@ def _monocular_table(shared: Path, n_runs: int) -> Table:
         ],
     )
     for figure in reference.MONOCULAR:
-        for row in monocular_rows(figure, shared / "sequences" / figure.folder, n_runs):
+        for row in monocular_rows(figure, sequence_folder(figure.folder), n_runs):
             table.add_row(*row)
     return table
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=5, help="threaded runs; seeds of one camera")
-    parser.add_argument("--starts", type=int, default=5, help="first frames of deterministic runs")
+    parser = new_parser(__doc__)
+    add_counts(
+        parser,
+        [
+            ("runs", 5, "threaded runs; seeds of one camera"),
+            ("starts", 5, "first frames of deterministic runs"),
+        ],
+    )
     parser.add_argument("--only", choices=("mono", "depth"), help="one of the two tables")
-    parser.add_argument("--width", type=int, default=150, help="columns of the output")
+    add_width(parser)
     arguments = parser.parse_args()
-    shared = shared_folder()
-    if shared is None:
-        sys.exit("the sequences are not there: set ORBSLAM2PY_SHARED to their folder")
-    console = Console(width=arguments.width)
+    console = console_of(arguments)
     if arguments.only != "mono":
-        console.print(_depth_table(shared, arguments.runs, arguments.starts))
+        console.print(_depth_table(arguments.runs, arguments.starts))
     if arguments.only != "depth":
-        console.print(_monocular_table(shared, arguments.runs))
+        console.print(_monocular_table(arguments.runs))
 
 
 if __name__ == "__main__":

@@ -9,19 +9,18 @@ average precision is the area under the precision-recall curve over all pairs.
 
 from __future__ import annotations
 
-import argparse
 import csv
-import os
 from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
+from benchmarks.harness.arguments import add_counts, add_width, console_of, new_parser
+from benchmarks.harness.folders import sequence_folder
+from benchmarks.harness.tables import new_table
 from orbslam2py import _core as core
-from orbslam2py.vocabulary.vocabulary import default_vocabulary_path, load_vocabulary
+from orbslam2py.vocabulary import default_vocabulary_path, load_vocabulary
 
 
 @dataclass
@@ -97,18 +96,26 @@ def best_match_is_right(scores: np.ndarray, places: Places) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("vocabulary", nargs="*", type=Path, default=[default_vocabulary_path()])
-    parser.add_argument("--features", type=int, default=1000, help="features per image")
+    parser = new_parser(__doc__)
+    parser.add_argument(
+        "vocabulary",
+        nargs="*",
+        type=Path,
+        default=[default_vocabulary_path()],
+        help="files to compare [the package's]",
+    )
+    add_counts(parser, [("features", 1000, "features per image")])
+    add_width(parser, 160)
     arguments = parser.parse_args()
-    shared = Path(os.environ.get("ORBSLAM2PY_SHARED", "../shared")) / "data" / "sequences"
     sets = [
-        euroc_places(shared / "euroc_V1_01_keyframes"),
-        corridor_places(shared / "rtabmap_samples_loop"),
+        euroc_places(sequence_folder("euroc_V1_01_keyframes")),
+        corridor_places(sequence_folder("rtabmap_samples_loop")),
     ]
-    table = Table("images", "right pairs", "vocabulary", "words")
-    for name in ("recall at precision 1", "average precision", "best match right"):
-        table.add_column(name, justify="right")
+    table = new_table(
+        "Places told apart",
+        ["images", "right pairs", "vocabulary", "words"],
+        ["recall at precision 1", "average precision", "best match right"],
+    )
     for places in sets:
         descriptors = describe_all(places.images, arguments.features)
         for path in arguments.vocabulary:
@@ -123,7 +130,7 @@ def main() -> None:
                 f"{average_precision(scores, places):.3f}",
                 f"{best_match_is_right(scores, places):.3f}",
             )
-    Console(width=160).print(table)
+    console_of(arguments).print(table)
 
 
 if __name__ == "__main__":

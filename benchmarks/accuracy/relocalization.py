@@ -16,31 +16,28 @@ with a single camera lengths are those of the mapped path aligned by Sim(3).
 from __future__ import annotations
 
 import argparse
-import os
-import sys
 import time
 from collections import Counter
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 
 import cv2
 import numpy as np
 
-from orbslam2py import System, TrackingState
+from benchmarks.accuracy.mapped_world import MappedWorld, beside
+from benchmarks.harness.arguments import add_counts, add_sensors, new_parser
+from benchmarks.harness.folders import shared_folder
+from benchmarks.harness.process_memory import peak_mb, resident_mb
+from benchmarks.harness.tables import in_words
+from benchmarks.harness.yardstick import milliseconds_of
+from orbslam2py import Reason, Sensor, System, TrackingState, load_vocabulary
 from orbslam2py import _core as core
-from orbslam2py.datasets.base import Images
-from orbslam2py.runs.report import peak_memory_mb
-from orbslam2py.settings.sensor import Sensor
+from orbslam2py.datasets import Images
+from orbslam2py.evaluation import PoseError
 from orbslam2py.slam.front_end import FrontEnd
-from orbslam2py.slam.records import Reason
 from orbslam2py.slam.relocalization import RelocalizationThresholds, Relocalizer
 from orbslam2py.slam.timing import StageTimer
-from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence, SyntheticWorld
-from orbslam2py.vocabulary.vocabulary import load_vocabulary
-
-sys.path.append(str(Path(__file__).resolve().parents[2] / "tests" / "python"))
-from mapped_world import MappedWorld, PoseError, beside
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence, SyntheticWorld
 
 #: Both views had enough matches, and a reconstruction was tried.
 ATTEMPTED = {Reason.LOW_PARALLAX, Reason.AMBIGUOUS_MOTION, Reason.DEGENERATE_VIEWS}
@@ -54,10 +51,10 @@ def sequence_of(arguments: argparse.Namespace, sensor: str, **options: object) -
 def mapped(arguments: argparse.Namespace, sensor: str) -> MappedWorld:
     sequence = sequence_of(arguments, sensor)
     n_frames = min(arguments.frames or len(sequence), len(sequence) - 1)
-    world = MappedWorld(sequence, range(n_frames), arguments.seed)
+    world = MappedWorld(sequence, n_frames, arguments.seed)
     print(
         f"{sensor}, {arguments.world}: {world.n_tracked} of {n_frames} frames tracked, "
-        f"{world.system.n_keyframes} keyframes, scale {world.scale:.3f}",
+        f"{world.system.n_keyframes} keyframes, {world.metres_per_unit:.3f} m a unit",
         flush=True,
     )
     return world
@@ -66,13 +63,13 @@ def mapped(arguments: argparse.Namespace, sensor: str) -> MappedWorld:
 def summary(errors: list[PoseError]) -> str:
     if not errors:
         return "no poses"
-    metres = np.array([e.metres for e in errors])
-    degrees = np.array([e.degrees for e in errors])
+    metres = np.array([e.translation_m for e in errors])
+    degrees = np.array([e.rotation_deg for e in errors])
     return (
         f"{metres.mean() * 100:.2f} cm {degrees.mean():.2f} deg (mean), "
         f"{np.median(metres) * 100:.2f} cm {np.median(degrees):.2f} deg (median), "
         f"{metres.max() * 100:.2f} cm {degrees.max():.2f} deg (most); "
-        f"{sum(e.small for e in errors)} of {len(errors)} within 2 cm and 0.5 deg"
+        f"{sum(e.is_within(0.02, 0.5) for e in errors)} of {len(errors)} within 2 cm and 0.5 deg"
     )
 
 
@@ -85,12 +82,12 @@ def kidnap(arguments: argparse.Namespace, sensor: str) -> None:
     waits: Counter[object] = Counter()
     first_errors, all_errors = [], []
     for _ in range(arguments.count):
-        assert world.lose(8).state is TrackingState.LOST
+        world.lose(8)
         start = int(rng.integers(5, world.n_frames - 15))
         found = None
         for k in range(15):
             T_wc = beside_path.T_wc(start + k)
-            record = world.show(beside_path.load(start + k), T_wc)
+            record = world.show(beside_path.load(start + k))
             if record.state is TrackingState.OK:
                 error = world.error(record, T_wc)
                 if found is None:
@@ -111,7 +108,7 @@ def recall(arguments: argparse.Namespace, sensor: str) -> None:
     rng = np.random.default_rng(arguments.seed)
     found, errors, times = 0, [], []
     for number in range(arguments.count):
-        assert world.lose().state is TrackingState.LOST
+        world.lose()
         T_wc = world.sequence.T_wc(int(rng.integers(world.n_frames)))
         T_wc = beside(T_wc, rng, 0.5, 20.0)
         exposure = float(np.exp(rng.uniform(np.log(0.6), np.log(1.6))))
@@ -129,7 +126,7 @@ def recall(arguments: argparse.Namespace, sensor: str) -> None:
 
 
 # ---- foreign -------------------------------------------------------------------------------------
-def foreign_views(arguments: argparse.Namespace, sensor: str):  # type: ignore[no-untyped-def]
+def foreign_views(arguments: argparse.Namespace, sensor: str) -> Iterator[tuple[str, Images]]:
     """Images of other worlds, then the photographs (as both images of a pair, or at 2 m)."""
     rng = np.random.default_rng(arguments.seed)
     worlds = list(SyntheticWorld)
@@ -141,9 +138,9 @@ def foreign_views(arguments: argparse.Namespace, sensor: str):  # type: ignore[n
         )  # fmt: skip
         for index in rng.integers(len(sequence), size=20):
             yield "worlds", sequence.load(int(index))
-    beside_checkout = Path(__file__).resolve().parents[3] / "shared"
-    shared = Path(os.environ.get("ORBSLAM2PY_SHARED", beside_checkout))
-    for file in sorted((shared / "data" / "vocabulary_images").glob("*")):
+    shared = shared_folder()
+    files = [] if shared is None else sorted((shared / "vocabulary_images").glob("*"))
+    for file in files:
         image = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
         if image is not None:
             image = cv2.resize(image, size[::-1])
@@ -158,7 +155,7 @@ def foreign_views(arguments: argparse.Namespace, sensor: str):  # type: ignore[n
 def foreign(arguments: argparse.Namespace, sensor: str) -> None:
     """With mapping on: a lost frame may also be found by the reference keyframe."""
     world = mapped(arguments, sensor)
-    assert world.lose().state is TrackingState.LOST
+    world.lose()
     shown, found, times = Counter(), Counter(), []
     for kind, images in foreign_views(arguments, sensor):
         record = world.show(images)
@@ -166,7 +163,7 @@ def foreign(arguments: argparse.Namespace, sensor: str) -> None:
         times.append(record.milliseconds["predict"])
         if record.state is TrackingState.OK:
             found[kind] += 1
-            assert world.lose().state is TrackingState.LOST
+            world.lose()
     print(
         f"  shown {dict(shown)}, found {dict(found)}; attempt {np.median(times):.1f} ms (median), "
         f"{np.percentile(times, 99):.1f} ms (p99)",
@@ -175,14 +172,6 @@ def foreign(arguments: argparse.Namespace, sensor: str) -> None:
 
 
 # ---- localization mode ---------------------------------------------------------------------------
-def resident_mb() -> float:
-    """Resident memory now."""
-    for line in Path("/proc/self/status").read_text().splitlines():
-        if line.startswith("VmRSS:"):
-            return int(line.split()[1]) / 1e3
-    return float("nan")
-
-
 def localization(arguments: argparse.Namespace, sensor: str) -> None:
     """Walk on past the end of the map and back, and again."""
     world = mapped(arguments, sensor)
@@ -204,9 +193,9 @@ def localization(arguments: argparse.Namespace, sensor: str) -> None:
         last = errors[-1]
         print(
             f"  turn {turn + 1}: {dict(states)}, at the turn "
-            f"{max(e.metres for e in errors) * 100:.1f} cm, back {last.metres * 100:.2f} cm "
-            f"{last.degrees:.2f} deg, map {same}, {resident_mb():.1f} MB "
-            f"(peak {peak_memory_mb():.1f})",
+            f"{max(e.translation_m for e in errors) * 100:.1f} cm, "
+            f"back {last.translation_m * 100:.2f} cm {last.rotation_deg:.2f} deg, "
+            f"map {same}, {resident_mb():.1f} MB (peak {peak_mb():.1f})",
             flush=True,
         )
     print(f"  {time.perf_counter() - begin:.1f} s")
@@ -214,12 +203,7 @@ def localization(arguments: argparse.Namespace, sensor: str) -> None:
 
 # ---- speed ---------------------------------------------------------------------------------------
 def times_of(name: str, function: Callable[[], object], repeat: int, limit: float) -> None:
-    milliseconds = []
-    for _ in range(repeat):
-        begin = time.perf_counter()
-        function()
-        milliseconds.append(1e3 * (time.perf_counter() - begin))
-    report(name, milliseconds, limit)
+    report(name, [milliseconds_of(function) for _ in range(repeat)], limit)
 
 
 def report(name: str, milliseconds: list[float], limit: float) -> None:
@@ -227,7 +211,7 @@ def report(name: str, milliseconds: list[float], limit: float) -> None:
     print(
         f"{name}: {median:.2f} ms (median), {np.percentile(milliseconds, 99):.2f} ms (p99), "
         f"{min(milliseconds):.2f} ms (least); limit {limit:g} ms "
-        f"{'met' if median < limit else 'NOT met'}",
+        f"{in_words(median < limit)}",
         flush=True,
     )
 
@@ -263,7 +247,7 @@ def _relocalization_speed(arguments: argparse.Namespace, sensor: str) -> None:
     T_wk = world.system.keyframe_trajectory().T_wc
     middle = int(
         np.argmin(
-            np.linalg.norm(world._true_T_wk[:, :3, 3] - world.sequence.T_wc(150)[:3, 3], axis=1)
+            np.linalg.norm(world.true_T_wk[:, :3, 3] - world.sequence.T_wc(150)[:3, 3], axis=1)
         )
     )
     first = min(max(middle - n_candidates // 2, 0), len(T_wk) - n_candidates)
@@ -314,22 +298,23 @@ def _query_speed(sequence: SyntheticSequence) -> None:
 
 def main() -> None:
     parts = {f.__name__: f for f in (kidnap, recall, foreign, localization, speed)}
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("part", choices=parts)
-    parser.add_argument("--sensor", choices=[str(s) for s in Sensor], action="append")
-    parser.add_argument("--world", choices=[str(w) for w in SyntheticWorld], default="corridor")
+    parser = new_parser(__doc__)
+    parser.add_argument("part", choices=parts, help="see above")
+    add_sensors(parser)
+    worlds = [str(world) for world in SyntheticWorld]
+    parser.add_argument("--world", choices=worlds, default="corridor", help="[corridor]")
     parser.add_argument("--frames", type=int, help="mapped frames [all, localization: 200]")
     parser.add_argument("--count", type=int, help="tries, or foreign images")
-    parser.add_argument("--beyond", type=int, default=60, help="frames past the end of the map")
-    parser.add_argument("--seed", type=int, default=0)
+    add_counts(
+        parser,
+        [("beyond", 60, "frames past the end of the map"), ("seed", 0, "of all random draws")],
+    )
     arguments = parser.parse_args()
     counts = {"kidnap": 20, "recall": 300, "foreign": 1000}
     arguments.count = arguments.count or counts.get(arguments.part, 0)
     if arguments.part == "localization":
         arguments.frames = arguments.frames or 200
-    for sensor in arguments.sensor or [str(s) for s in Sensor]:
+    for sensor in arguments.sensors:
         parts[arguments.part](arguments, sensor)
 
 

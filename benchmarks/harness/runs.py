@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Runs of the command-line program over whole sequences, each in a process of its own."""
+"""What runs in a process of its own: whole sequences, programs of this package, C++ programs."""
 
 from __future__ import annotations
 
@@ -8,14 +8,19 @@ import os
 import subprocess
 import sys
 import tempfile
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+from benchmarks.harness.folders import built
+
+Record = dict[str, float]
+"""Counters of one C++ benchmark."""
 
 
-def run(folder: Path, sensor: str, *options: str, preload: Path | None = None) -> dict[str, Any]:
+def run_sequence(
+    folder: Path, sensor: str, *options: str, environment: dict[str, str] | None = None
+) -> dict[str, Any]:
     """``orbslam2py run`` with these options; returns report.json.
 
     Raises
@@ -25,36 +30,53 @@ def run(folder: Path, sensor: str, *options: str, preload: Path | None = None) -
     """
     with tempfile.TemporaryDirectory() as output:
         command = [sys.executable, "-m", "orbslam2py", "run", str(folder), "--sensor", sensor]
-        command += [*options, "--output", output, "--force", "--quiet"]
-        environment = dict(os.environ)
-        if preload is not None:
-            environment["LD_PRELOAD"] = str(preload)
-        done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
-        if done.returncode:
-            raise RuntimeError(f"{' '.join(command)}: {done.stderr}")
+        _output_of([*command, *options, "--output", output, "--force", "--quiet"], environment)
         report: dict[str, Any] = json.loads((Path(output) / "report.json").read_text())
         return report
 
 
-@dataclass(frozen=True)
-class LockTimes:
-    """Sections under the map's lock, microseconds."""
+def run_module(name: str, *options: str) -> dict[str, Any]:
+    """A program of this package that prints JSON; returns what it printed.
 
-    written: np.ndarray
-    """(n, 3): waited, held, processor time used while held."""
-    read: np.ndarray
+    Raises
+    ------
+    RuntimeError
+        With the program's words, if it fails.
+    """
+    printed: dict[str, Any] = json.loads(_output_of([sys.executable, "-m", name, *options]))
+    return printed
 
-    @staticmethod
-    def measure(folder: Path, sensor: str, library: Path, *options: str) -> LockTimes:
-        """Run the sequence with the measuring library in front of the C library."""
-        with tempfile.TemporaryDirectory() as temporary:
-            log = Path(temporary) / "locks.txt"
-            os.environ["ORBSLAM2PY_LOCK_TIMES"] = str(log)
-            try:
-                run(folder, sensor, *options, preload=library.resolve())
-            finally:
-                del os.environ["ORBSLAM2PY_LOCK_TIMES"]
-            rows = [line.split() for line in log.read_text().splitlines()]
-        kinds = np.array([row[0] for row in rows])
-        times = np.array([row[1:] for row in rows], np.float64).reshape(-1, 3)
-        return LockTimes(times[kinds == "w"], times[kinds == "r"])
+
+def benchmark_records(build: Path, program: str, pattern: str, *options: str) -> dict[str, Record]:
+    """Run benchmarks of a Google Benchmark program.
+
+    Returns
+    -------
+    dict
+        Counters by the benchmark's name without the numbers of iterations.
+
+    Raises
+    ------
+    RuntimeError
+        With the program's words, if it fails.
+    """
+    command = [str(built(build, program)), "--benchmark_format=json"]
+    command += [f"--benchmark_filter={pattern}", *options]
+    rows = json.loads(_output_of(command))["benchmarks"]
+    failed = [row for row in rows if row.get("error_occurred")]
+    if failed or not rows:
+        raise RuntimeError(f"{' '.join(command)}: {failed or 'nothing was measured'}")
+    return {row["name"].split("/iterations:")[0].split("/manual")[0]: row for row in rows}
+
+
+def _output_of(command: Sequence[str], environment: dict[str, str] | None = None) -> str:
+    done = subprocess.run(
+        command,
+        capture_output=True,
+        text=True,
+        env={**os.environ, **(environment or {})},
+        check=False,
+    )
+    if done.returncode:
+        raise RuntimeError(f"{' '.join(command)}: {done.stderr}")
+    return done.stdout

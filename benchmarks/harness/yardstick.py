@@ -3,26 +3,16 @@
 
 from __future__ import annotations
 
-import os
 import statistics
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import cv2
 import numpy as np
 
+from benchmarks.harness.folders import GOLDEN, shared_folder
 from benchmarks.harness.reference import YARDSTICK
-
-GOLDEN = Path(__file__).parents[2] / "tests" / "data" / "golden"
-
-
-def shared_folder() -> Path | None:
-    """Folder of photographs and recorded sequences, None without it."""
-    default = Path(__file__).parents[3] / "shared"
-    folder = Path(os.environ.get("ORBSLAM2PY_SHARED", default)) / "data"
-    return folder if folder.is_dir() else None
 
 
 @dataclass(frozen=True)
@@ -55,11 +45,6 @@ class Measurement:
     def carried(self) -> float:
         """Our median carried to the reference's machine [ms]."""
         return self.ours.median / self.slower
-
-    @property
-    def least_carried(self) -> float:
-        """The same of the least times of both."""
-        return self.ours.least * self.yardstick_there / self.yardstick.least
 
 
 class Yardstick:

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import Settings
-from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence, SyntheticWorld
+from orbslam2py import Sensor, Settings, load_vocabulary
+from orbslam2py.runs import RunOptions, RunResult, SequenceRunner
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence, SyntheticWorld
 
 
 @dataclass(frozen=True)
@@ -72,6 +72,16 @@ class Case:
         """Exact calibration, and the number of features."""
         settings = sequence.settings
         return replace(settings, orb=replace(settings.orb, n_features=self.features))
+
+    def run(
+        self, sequence: SyntheticSequence, seed: int, *, loop_closing: bool, deterministic: bool
+    ) -> RunResult:
+        """Run over the images of the seed, which also chooses all random draws."""
+        options = RunOptions(
+            self.sensor, deterministic=deterministic, seed=seed, loop_closing=loop_closing
+        )
+        settings = self.settings(sequence)
+        return SequenceRunner(sequence, settings, load_vocabulary(), options).run()
 
     def describe(self) -> str:
         """Settings in words."""

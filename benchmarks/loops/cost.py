@@ -1,35 +1,35 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What closing a loop costs, by size of the map: programs of this folder, a table and a curve.
+"""What closing a loop costs, by size of the map, and what a full adjustment does to tracking.
 
-Every step runs in made-up maps of 250 to 4000 keyframes; the limits are for 1000.
+Every step runs in made-up maps of 250 to 4000 keyframes; the limits are for 1000. The curve goes to
+build/bench/loop_cost.png.
+
+    python -m benchmarks.loops.cost
 """
 
 from __future__ import annotations
 
 import itertools
-import json
 import math
-import statistics
-import subprocess
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from benchmarks.harness import reference
-from benchmarks.harness.tables import new_table, verdict
+from benchmarks.harness.arguments import add_build, add_width, console_of, new_parser
+from benchmarks.harness.folders import how_to_build
+from benchmarks.harness.machine import print_machine
+from benchmarks.harness.runs import benchmark_records, run_module
+from benchmarks.harness.steps import Row, steps_table
+from benchmarks.harness.tables import new_table
 from benchmarks.harness.yardstick import Times, Yardstick
-from benchmarks.speed.single_steps import Row
+from benchmarks.loops.tracking import Measured, tracking_table
 
 SIZES = (250, 500, 1000, 2000, 4000)
 LIMIT_SIZE = 1000
 """Keyframes at which the limits hold."""
-
-Record = dict[str, float]
-"""Counters of one benchmark."""
 
 
 @dataclass
@@ -40,7 +40,8 @@ class Step:
     """In `reference.LOOPS`."""
     note: str
     by_size: dict[int, Times] = field(default_factory=dict)
-    unit: Row | None = None
+    row: Row | None = None
+    """At the size of the limits."""
 
     @property
     def name(self) -> str:
@@ -59,37 +60,9 @@ class Step:
         ]
 
 
-class Program:
-    """A Google Benchmark program."""
-
-    def __init__(self, build: Path, name: str, *options: str) -> None:
-        self.path = build / "benchmarks" / "cpp" / name
-        self._options = options
-
-    def records(self, pattern: str) -> dict[str, Record]:
-        """Counters by name without the numbers of iterations.
-
-        Raises
-        ------
-        RuntimeError
-            With the program's words, if it fails.
-        """
-        command = [str(self.path), "--benchmark_format=json", f"--benchmark_filter={pattern}"]
-        done = subprocess.run(
-            [*command, *self._options], capture_output=True, text=True, check=False
-        )
-        if done.returncode:
-            raise RuntimeError(f"{' '.join(command)}: {done.stderr}")
-        rows = json.loads(done.stdout)["benchmarks"]
-        failed = [row for row in rows if row.get("error_occurred")]
-        if failed or not rows:
-            raise RuntimeError(f"{' '.join(command)}: {failed or 'nothing was measured'}")
-        return {row["name"].split("/iterations:")[0].split("/manual")[0]: row for row in rows}
-
-
 # ---- the steps -----------------------------------------------------------------------------------
 def _detection(build: Path) -> list[Step]:
-    found = Program(build, "loop_detection_bench").records("BM_DetectLoop")
+    found = benchmark_records(build, "loop_detection_bench", "BM_DetectLoop")
     step = Step("detection", "at a place seen before; in a new one about half")
     for n in SIZES:
         record = found[f"BM_DetectLoop/keyframes:{n}/known:1"]
@@ -99,8 +72,8 @@ def _detection(build: Path) -> list[Step]:
 
 def _verification(build: Path) -> list[Step]:
     """The slowest of several shares of wrong matches, and the choice among eight loops."""
-    program = Program(build, "loops_bench", "--benchmark_min_time=0.2")
-    found = program.records("BM_VerifyLoopCandidate|BM_ChooseLoopOfEight")
+    pattern = "BM_VerifyLoopCandidate|BM_ChooseLoopOfEight"
+    found = benchmark_records(build, "loops_bench", pattern, "--benchmark_min_time=0.2")
     verified = [r for name, r in found.items() if name.startswith("BM_VerifyLoopCandidate")]
     slowest = max(verified, key=lambda record: record["min_ms"])
     step = Step(
@@ -116,7 +89,7 @@ def _verification(build: Path) -> list[Step]:
 
 
 def _correction(build: Path) -> list[Step]:
-    found = Program(build, "loop_correction_bench").records("BM_CorrectLoop/.*monocular:0")
+    found = benchmark_records(build, "loop_correction_bench", "BM_CorrectLoop/.*monocular:0")
     whole = Step("correction", "processor time; plan, prepare under the read lock, write")
     lock = Step("correction_lock", "processor time; nobody reads the map meanwhile")
     for n in SIZES:
@@ -132,8 +105,8 @@ def _correction(build: Path) -> list[Step]:
 
 
 def _essential_graph(build: Path) -> list[Step]:
-    program = Program(build, "pose_graph_bench", "--benchmark_min_time=1.5")
-    found = program.records("BM_OptimizePoseGraph/.*fix_scale:0/eigen:0")
+    pattern = "BM_OptimizePoseGraph/.*fix_scale:0/eigen:0"
+    found = benchmark_records(build, "pose_graph_bench", pattern, "--benchmark_min_time=1.5")
     step = Step("essential_graph", "with scales (one camera); four and a half edges a keyframe")
     for n in SIZES:
         record = found[f"BM_OptimizePoseGraph/keyframes:{n}/fix_scale:0/eigen:0"]
@@ -142,7 +115,7 @@ def _essential_graph(build: Path) -> list[Step]:
 
 
 def _full_adjustment(build: Path) -> list[Step]:
-    found = Program(build, "global_bundle_bench").records("BM_GlobalBundle/stereo/")
+    found = benchmark_records(build, "global_bundle_bench", "BM_GlobalBundle/stereo/")
     record = found[f"BM_GlobalBundle/stereo/{LIMIT_SIZE}"]
     step = Step(
         "full_adjustment",
@@ -179,14 +152,9 @@ def measure(yardstick: Yardstick, build: Path) -> list[Step]:
         around = yardstick.around([work])
         for step in found:
             measured = replace(around, ours=step.by_size[LIMIT_SIZE])
-            step.unit = Row(step.name, reference.LOOPS[step.key], measured, step.note)
+            step.row = Row(step.name, reference.LOOPS[step.key], measured, step.note)
         steps += found
     return steps
-
-
-def missing_programs(build: Path) -> list[str]:
-    """Programs that are not built."""
-    return [name for name in _PROGRAMS if not (build / "benchmarks" / "cpp" / name).is_file()]
 
 
 # ---- what is shown -------------------------------------------------------------------------------
@@ -196,12 +164,11 @@ def sizes_table(steps: list[Step]) -> object:
         "The same by size of the map: ms here, and the exponent of the growth (1: linear)",
         ["step"],
         [f"{n}\nkeyframes" for n in SIZES] + [f"{a}\nto {b}" for a, b in itertools.pairwise(SIZES)],
+        "Exponents of the least times (full adjustment: of processor time).",
     )
     for step in steps:
         cells = [f"{step.by_size[n].median:.3g}" for n in SIZES]
         table.add_row(step.name, *cells, *(f"{exponent:.2f}" for exponent in step.growth))
-    table.caption = "Exponents of the least times (full adjustment: of processor time)."
-    table.caption_justify = "left"
     return table
 
 
@@ -230,48 +197,33 @@ def draw(steps: list[Step], path: Path) -> None:
     figure.savefig(path, dpi=110)
 
 
-def rows(steps: list[Step]) -> Iterator[Row]:
-    """Steps at the size of the limits."""
-    return (step.unit for step in steps if step.unit is not None)
+def loop_tables(yardstick: Yardstick, build: Path, pictures: Path) -> Iterator[object]:
+    """Steps of closing a loop, by size of the map; draws the curve."""
+    missing = how_to_build(build, *_PROGRAMS)
+    if missing is not None:
+        yield f"[yellow]Loops: left out, {missing}"
+        return
+    steps = measure(yardstick, build)
+    rows = [step.row for step in steps if step.row is not None]
+    yield steps_table(f"Closing a loop in a map of {LIMIT_SIZE} keyframes", rows)
+    yield sizes_table(steps)
+    picture = pictures / "loop_cost.png"
+    draw(steps, picture)
+    yield f"Curve: {picture}"
+    yield tracking_table(Measured(**run_module("benchmarks.loops.tracking", "--json")))
 
 
-# ---- tracking meanwhile --------------------------------------------------------------------------
-def tracking_table() -> object:
-    """Tracking's times with and without full adjustments beside it, and theirs beside tracking."""
-    command = [sys.executable, "-m", "benchmarks.loops.tracking", "--json"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise RuntimeError(f"{' '.join(command)}: {done.stderr}")
-    found = json.loads(done.stdout)
-    table = new_table(
-        f"Tracking in real time (every {found['period_ms']:.0f} ms) while the map of "
-        f"{found['keyframes']} keyframes and {found['points']} points is adjusted",
-        [""],
-        ["measured", "limit", "met"],
-    )
-    p99 = []
-    for name, key in (("without", "without_ms"), ("meanwhile", "during_ms")):
-        values = np.percentile(found[key], (50, 95, 99))
-        p99.append(float(values[2]))
-        shown = " / ".join(f"{value:.1f}" for value in values)
-        table.add_row(f"track ms {name}: median / p95 / p99", shown, "", "")
-    ratio, most = p99[1] / p99[0], reference.ADJUSTMENT_TRACKING_RATIO
-    table.add_row("p99 meanwhile / without", f"{ratio:.2f}", f"{most:g}", verdict(ratio <= most))
-    seconds = found["adjustment_s"]
-    limit = (reference.LOOPS["full_adjustment"].limit or 0) / 1e3
-    if seconds:
-        shown = f"{statistics.median(seconds):.1f} ({max(seconds):.1f})"
-        table.add_row(
-            "full adjustment s: median (longest)",
-            shown,
-            f"{limit:g}",
-            verdict(max(seconds) < limit),
-        )
-    table.caption = (
-        f"{len(found['without_ms'])} and {len(found['during_ms'])} frames of the same images; "
-        f"{found['tracked']} of {found['frames']} tracked\n{len(seconds)} adjustments to their "
-        f"end, {found['used']} used; accepted steps: {found['iterations']}\n"
-        "Other programs disturb the ratio: it means something on an otherwise idle computer only."
-    )
-    table.caption_justify = "left"
-    return table
+# ---- command line --------------------------------------------------------------------------------
+def main() -> None:
+    parser = new_parser(__doc__)
+    add_build(parser)
+    add_width(parser)
+    arguments = parser.parse_args()
+    console, yardstick = console_of(arguments), Yardstick()
+    print_machine(console, yardstick)
+    for table in loop_tables(yardstick, arguments.build, arguments.pictures):
+        console.print(table)
+
+
+if __name__ == "__main__":
+    main()

@@ -9,7 +9,6 @@ start, so that what is gathered on the way shows at the end.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from pathlib import Path
 
@@ -19,16 +18,12 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from benchmarks.harness.arguments import SENSORS, add_counts, new_parser
+from benchmarks.harness.folders import CHECKOUT
 from benchmarks.loops.cases import CASES, Case
-from orbslam2py.evaluation.laps import lap_error
-from orbslam2py.evaluation.metrics import Similarity, align
-from orbslam2py.runs.result import RunOptions, RunResult
-from orbslam2py.runs.runner import SequenceRunner
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.trajectory.trajectory import Trajectory
-from orbslam2py.vocabulary.vocabulary import load_vocabulary
-
-ROOT = Path(__file__).resolve().parents[2]
+from orbslam2py import Sensor, Trajectory
+from orbslam2py.evaluation import Similarity, align, lap_error
+from orbslam2py.runs import RunResult
 
 Array = npt.NDArray[np.float64]
 
@@ -37,9 +32,7 @@ TRUTH, ESTIMATE, LOOP = "#9a9a9a", "#1f5fa8", "#c8452d"
 
 def run(case: Case, seed: int, *, loop_closing: bool) -> RunResult:
     """Run the case; the same images whether loops are closed or not."""
-    sequence = case.sequence(seed)
-    options = RunOptions(case.sensor, deterministic=True, seed=seed, loop_closing=loop_closing)
-    result = SequenceRunner(sequence, case.settings(sequence), load_vocabulary(), options).run()
+    result = case.run(case.sequence(seed), seed, loop_closing=loop_closing, deterministic=True)
     if result.error is not None:
         sys.exit(f"the run failed: {result.error}")
     return result
@@ -127,11 +120,13 @@ def draw(case: Case, seed: int, path: Path) -> None:
 def main() -> None:
     """Command line."""
     cases = [case for case in CASES if case.n_revisits]
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--case", choices=sorted({c.name for c in cases}), default="corridor")
-    parser.add_argument("--sensor", choices=[str(s) for s in Sensor], default="rgbd")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--output", type=Path, default=ROOT / "docs/images/loop_closing.png")
+    parser = new_parser(__doc__)
+    names = sorted({case.name for case in cases})
+    parser.add_argument("--case", choices=names, default="corridor", help="[corridor]")
+    parser.add_argument("--sensor", choices=SENSORS, default="rgbd", help="[rgbd]")
+    add_counts(parser, [("seed", 1, "of the case")])
+    output = CHECKOUT / "docs" / "images" / "loop_closing.png"
+    parser.add_argument("--output", type=Path, default=output, help="[the picture of the README]")
     arguments = parser.parse_args()
     chosen = [c for c in cases if (c.name, str(c.sensor)) == (arguments.case, arguments.sensor)]
     if not chosen:

@@ -25,26 +25,31 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
-from rich.console import Console
+import numpy as np
 from rich.table import Table
 
+from benchmarks.harness.arguments import (
+    add_counts,
+    add_sensors,
+    add_width,
+    console_of,
+    new_parser,
+)
 from benchmarks.harness.tables import new_table, verdict
 from benchmarks.loops.cases import CASES, Case
-from benchmarks.loops.judgement import (
-    Judgement,
+from orbslam2py import DatasetError, Sensor, Trajectory
+from orbslam2py.evaluation import (
+    Alignment,
+    LoopError,
     closed_revisits,
-    judge_loop,
+    evaluate_trajectory,
+    find_revisits,
+    lap_error,
+    loop_error,
     metres_per_unit_at,
-    revisits,
+    scale_drift,
 )
-from orbslam2py.errors import DatasetError
-from orbslam2py.evaluation.laps import lap_error, scale_drift
-from orbslam2py.evaluation.metrics import Alignment, evaluate_trajectory
-from orbslam2py.runs.result import RunOptions, RunResult
-from orbslam2py.runs.runner import SequenceRunner
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.trajectory.trajectory import Trajectory
-from orbslam2py.vocabulary.vocabulary import load_vocabulary
+from orbslam2py.runs import RunResult
 
 #: A revisit has to be closed in so many of the runs.
 LEAST_CLOSED = 0.9
@@ -63,14 +68,23 @@ class Task:
     deterministic: bool
 
 
+@dataclass(frozen=True)
+class JudgedLoop:
+    """A closed loop, and how far it is from the truth."""
+
+    timestamp: float
+    """Of the present keyframe [s]."""
+    error: LoopError
+
+
 @dataclass
 class Outcome:
     """What one run gave."""
 
     closed: list[bool] = field(default_factory=list)
     """For every place seen again."""
-    true: list[Judgement] = field(default_factory=list)
-    false: list[Judgement] = field(default_factory=list)
+    true: list[JudgedLoop] = field(default_factory=list)
+    false: list[JudgedLoop] = field(default_factory=list)
     lap_percent: float | None = None
     """None where there is no lap, or tracking did not last for one."""
     scale_percent: float | None = None
@@ -91,14 +105,10 @@ def carry_out(task: Task) -> Outcome:
     """Run and judge."""
     case = task.case
     sequence = case.sequence(task.seed)
-    options = RunOptions(
-        case.sensor,
-        deterministic=task.deterministic,
-        seed=task.seed,
-        loop_closing=task.loop_closing,
-    )
     begin = time.perf_counter()
-    result = SequenceRunner(sequence, case.settings(sequence), load_vocabulary(), options).run()
+    result = case.run(
+        sequence, task.seed, loop_closing=task.loop_closing, deterministic=task.deterministic
+    )
     truth = sequence.ground_truth()
     outcome = Outcome(seconds=time.perf_counter() - begin, n_maps=len(result.trajectories))
     outcome.tracked = result.n_tracked / len(truth)
@@ -110,18 +120,25 @@ def carry_out(task: Task) -> Outcome:
 
 
 def _judge_loops(outcome: Outcome, case: Case, result: RunResult, truth: Trajectory) -> None:
-    places = revisits(truth, near=case.near, apart=case.apart)
+    places = find_revisits(truth, near=case.near, apart=case.apart)
     if len(places) != case.n_revisits:
         raise ValueError(f"{case}: {len(places)} places are seen again, not {case.n_revisits}")
     for loop in result.loops:
         unit = 1.0
         if case.sensor is Sensor.MONOCULAR:
             estimate = result.trajectories[loop.map_index]
-            estimate = estimate.select(~estimate.lost)
             unit = metres_per_unit_at(loop.matched_timestamp, estimate, truth, 2 * case.near)
-        judgement = judge_loop(loop, truth, unit)
-        (outcome.true if judgement.is_true else outcome.false).append(judgement)
-    outcome.closed = closed_revisits(places, outcome.true)
+        true_T_wc = _pose_at(truth, loop.current_timestamp)
+        true_T_wm = _pose_at(truth, loop.matched_timestamp)
+        error = loop_error(loop.S_cm, true_T_wc, true_T_wm, metres_per_unit=unit)
+        judged = outcome.true if error.is_true else outcome.false
+        judged.append(JudgedLoop(loop.current_timestamp, error))
+    closing_times = np.array([loop.timestamp for loop in outcome.true])
+    outcome.closed = closed_revisits(places, closing_times).tolist()
+
+
+def _pose_at(truth: Trajectory, timestamp: float) -> np.ndarray:
+    return truth.T_wc[int(np.argmin(np.abs(truth.timestamps - timestamp)))]
 
 
 def _judge_lap(
@@ -236,7 +253,8 @@ def line_of(task: Task, outcome: Outcome) -> str:
     }
     words = ", ".join(f"{name} {value}" for name, value in figures.items())
     far = "".join(
-        f"; FALSE at {loop.timestamp:.2f} s: {loop.metres:.2f} m, {loop.degrees:.1f} deg off"
+        f"; FALSE at {loop.timestamp:.2f} s: {loop.error.translation_m:.2f} m, "
+        f"{loop.error.rotation_deg:.1f} deg off"
         for loop in outcome.false
     )
     return f"{task.case}, seed {task.seed}, {mode}: {words}{far} {outcome.failure}".rstrip()
@@ -245,18 +263,24 @@ def line_of(task: Task, outcome: Outcome) -> str:
 # ---- command line --------------------------------------------------------------------------------
 def parse() -> argparse.Namespace:
     """Read the options."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = new_parser(__doc__)
     names = sorted({case.name for case in CASES})
-    sensors = [str(sensor) for sensor in Sensor]
-    parser.add_argument("--cases", nargs="+", choices=names, default=names, metavar="CASE")
-    parser.add_argument("--sensors", nargs="+", choices=sensors, default=sensors)
-    parser.add_argument("--seeds", type=int, default=10, help="runs of every case")
-    parser.add_argument("--first-seed", type=int, default=0)
-    parser.add_argument("--without", type=int, default=1, help="of these, again without loops")
-    parser.add_argument("--jobs", type=int, default=1, help="runs at the same time")
+    parser.add_argument(
+        "--cases", nargs="+", choices=names, default=names, metavar="CASE", help="see --list"
+    )
+    add_sensors(parser)
+    add_counts(
+        parser,
+        [
+            ("seeds", 10, "runs of every case"),
+            ("first-seed", 0, "seed of the first of them"),
+            ("without", 1, "of these, again without loops"),
+            ("jobs", 1, "runs at the same time"),
+        ],
+    )
     parser.add_argument("--deterministic", action="store_true", help="mapping and loops inline")
     parser.add_argument("--list", action="store_true", help="only show the cases")
-    parser.add_argument("--width", type=int, default=200, help="columns of the table")
+    add_width(parser, 200)
     arguments = parser.parse_args()
     if arguments.seeds < 1:
         parser.error("--seeds must be 1 or more")
@@ -278,7 +302,7 @@ def main() -> None:
         for case in CASES
         if case.name in arguments.cases and str(case.sensor) in arguments.sensors
     ]
-    console = Console(width=arguments.width)
+    console = console_of(arguments)
     if arguments.list:
         for case in chosen:
             console.print(f"{case}: {case.describe()}", highlight=False)

@@ -11,21 +11,22 @@ Both kinds of runs see the same images, in turns.
 
 from __future__ import annotations
 
-import argparse
 import json
+import statistics
 import threading
 import time
 from dataclasses import asdict, dataclass, field
 
 import numpy as np
+from rich.table import Table
 
+from benchmarks.harness import reference
+from benchmarks.harness.arguments import add_counts, add_width, console_of, new_parser
+from benchmarks.harness.tables import new_table, verdict
 from benchmarks.loops.made_up_map import MadeUpMap, MapSize
+from orbslam2py import FullAdjustmentRecord, Sensor, System, TrackingState
 from orbslam2py.datasets import Images
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
-from orbslam2py.slam.records import TrackingState
-from orbslam2py.slam.system import System
-from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence, SyntheticWorld
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence, SyntheticWorld
 
 #: Frames after the start of a run that do not count: the map begins.
 _WARM_UP = 20
@@ -150,31 +151,61 @@ def measure(size: MapSize, n_frames: int, passes: int) -> Measured:
     return result
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--passes", type=int, default=2, help="runs of each kind")
-    parser.add_argument("--frames", type=int, default=300)
-    parser.add_argument("--keyframes", type=int, default=1000)
-    parser.add_argument("--json", action="store_true", help="print everything as JSON")
-    arguments = parser.parse_args()
-    result = measure(MapSize(arguments.keyframes), arguments.frames, arguments.passes)
-    if arguments.json:
-        print(json.dumps(asdict(result)))
-        return
-    for name, times in (("without", result.without_ms), ("during", result.during_ms)):
-        median, p95, p99 = np.percentile(times, (50, 95, 99))
-        print(
-            f"{name}: {len(times)} frames, median {median:.2f} ms, p95 {p95:.2f}, p99 {p99:.2f}, "
-            f"max {max(times):.2f}"
-        )
-    ratio = np.percentile(result.during_ms, 99) / np.percentile(result.without_ms, 99)
-    print(f"ratio of p99: {ratio:.2f}; {result.tracked} of {result.frames} frames tracked")
-    seconds = ", ".join(f"{s:.2f}" for s in result.adjustment_s)
-    print(
-        f"adjustments of {result.keyframes} keyframes and {result.points} points: {seconds} s, "
-        f"steps {result.iterations}, {result.used} used"
+# ---- what is shown -------------------------------------------------------------------------------
+def tracking_table(found: Measured) -> Table:
+    """Tracking's times with and without full adjustments beside it, and theirs beside tracking."""
+    seconds = found.adjustment_s
+    table = new_table(
+        f"Tracking in real time (every {found.period_ms:.0f} ms) while the map of "
+        f"{found.keyframes} keyframes and {found.points} points is adjusted",
+        [""],
+        ["measured", "limit", "met"],
+        f"{len(found.without_ms)} and {len(found.during_ms)} frames of the same images; "
+        f"{found.tracked} of {found.frames} tracked\n{len(seconds)} adjustments to their "
+        f"end, {found.used} used; accepted steps: {found.iterations}\n"
+        "Other programs disturb the ratio: it means something on an otherwise idle computer only.",
     )
-    print({step: [round(ms, 1) for ms in times] for step, times in result.steps_ms.items()})
+    p99 = []
+    for name, times in (("without", found.without_ms), ("meanwhile", found.during_ms)):
+        values = np.percentile(times, (50, 95, 99))
+        p99.append(float(values[2]))
+        shown = " / ".join(f"{value:.1f}" for value in values)
+        table.add_row(f"track ms {name}: median / p95 / p99", shown, "", "")
+        table.add_row(f"track ms {name}: longest", f"{max(times):.1f}", "", "")
+    ratio, most = p99[1] / p99[0], reference.ADJUSTMENT_TRACKING_RATIO
+    table.add_row("p99 meanwhile / without", f"{ratio:.2f}", f"{most:g}", verdict(ratio <= most))
+    limit = (reference.LOOPS["full_adjustment"].limit or 0) / 1e3
+    if seconds:
+        shown = f"{statistics.median(seconds):.1f} ({max(seconds):.1f})"
+        met = verdict(max(seconds) < limit)
+        table.add_row("full adjustment s: median (longest)", shown, f"{limit:g}", met)
+    for step, times in found.steps_ms.items():
+        shown = f"{statistics.median(times):.1f} ({max(times):.1f})"
+        table.add_row(f"of it {step} ms: median (longest)", shown, "", "")
+    return table
+
+
+# ---- command line --------------------------------------------------------------------------------
+def main() -> None:
+    parser = new_parser(__doc__)
+    add_counts(
+        parser,
+        [
+            ("passes", 2, "runs of each kind"),
+            ("frames", 300, "frames of a run"),
+            ("keyframes", 1000, "keyframes of the made-up map"),
+        ],
+    )
+    parser.add_argument("--json", action="store_true", help="print everything as JSON")
+    add_width(parser)
+    arguments = parser.parse_args()
+    if arguments.frames <= _WARM_UP:
+        parser.error(f"--frames must be more than {_WARM_UP}")
+    found = measure(MapSize(arguments.keyframes), arguments.frames, arguments.passes)
+    if arguments.json:
+        print(json.dumps(asdict(found)))
+    else:
+        console_of(arguments).print(tracking_table(found))
 
 
 if __name__ == "__main__":

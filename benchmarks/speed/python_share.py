@@ -14,21 +14,26 @@ Python's, counts on neither side.
 
 from __future__ import annotations
 
-import argparse
 import inspect
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from benchmarks.harness import reference
+from benchmarks.harness.arguments import new_parser
+from benchmarks.harness.folders import MISSING, sequence_folder, shared_folder
+from benchmarks.harness.runs import run_module
+from benchmarks.harness.tables import new_table, verdict
+from orbslam2py import Sensor, System, open_sequence
 from orbslam2py import _core as core
-from orbslam2py.datasets import open_sequence
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.system import System
+
+#: A single camera has no second image.
+WITH_DEPTH = (Sensor.STEREO, Sensor.RGBD)
 
 _CLASSES = (
     core.Map,
@@ -149,10 +154,46 @@ def measure(folder: Path, sensor: Sensor, *, tracking_only: bool) -> PythonShare
     )
 
 
+# ---- table ---------------------------------------------------------------------------------------
+def python_tables() -> Iterator[object]:
+    """The share in every sequence, each measured in a process of its own."""
+    if shared_folder() is None:
+        yield f"[yellow]Python's share: left out, {MISSING}"
+        return
+    table = new_table(
+        "Python's share of a frame: between the C++ steps",
+        ["sequence", "frames"],
+        ["ms a frame", "Python ms", "calls of C++", "share", "limit", "met"],
+        "Every function, method and property of the extension is wrapped to\n"
+        "note its time, the rest of the track call is Python (benchmarks/speed/python_share.py).\n"
+        "Mapping inline: no other thread uses the interpreter. Freeing C++ objects counts on "
+        "neither side.",
+    )
+    for figure in reference.SEQUENCES:
+        for label, options in (
+            ("all, with mapping: mean", []),
+            ("not keyframes: median", ["--tracking-only"]),
+        ):
+            folder = str(sequence_folder(figure.folder))
+            share = run_module("benchmarks.speed.python_share", folder, figure.sensor, *options)
+            table.add_row(
+                figure.name,
+                label,
+                f"{share['milliseconds']:.2f}",
+                f"{share['python_milliseconds']:.3f}",
+                f"{share['calls']:.0f}",
+                f"{100 * share['share']:.1f} %",
+                f"{100 * reference.PYTHON_SHARE:g} %",
+                verdict(share["share"] < reference.PYTHON_SHARE),
+            )
+    yield table
+
+
+# ---- command line --------------------------------------------------------------------------------
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("sensor", type=Sensor)
+    parser = new_parser(__doc__)
+    parser.add_argument("folder", type=Path, help="a sequence")
+    parser.add_argument("sensor", type=Sensor, choices=WITH_DEPTH, help="of the sequence")
     parser.add_argument("--tracking-only", action="store_true", help="leave out new keyframes")
     arguments = parser.parse_args()
     share = measure(arguments.folder, arguments.sensor, tracking_only=arguments.tracking_only)

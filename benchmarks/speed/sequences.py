@@ -1,32 +1,22 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whole sequences beside the reference: speed, real time, Python's share, locks."""
+"""Whole sequences beside the reference: speed, real time, and fusing as it happens in them."""
 
 from __future__ import annotations
 
-import json
 import statistics
-import subprocess
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.table import Table
 
-from benchmarks.harness import reference, runs
+from benchmarks.harness import reference
+from benchmarks.harness.folders import MISSING, sequence_folder, shared_folder
 from benchmarks.harness.reference import SequenceFigure
+from benchmarks.harness.runs import run_sequence
 from benchmarks.harness.tables import new_table, verdict
-from benchmarks.harness.yardstick import Measurement, Times, Yardstick, shared_folder
-from benchmarks.speed.single_steps import Row
-
-_MISSING = "left out: the sequences are not there (ORBSLAM2PY_SHARED names their folder)"
-
-
-def _folder(figure: SequenceFigure) -> Path | None:
-    shared = shared_folder()
-    return None if shared is None else shared / "sequences" / figure.folder
+from benchmarks.harness.yardstick import Measurement, Times, Yardstick
 
 
 def _median(reports: list[dict[str, Any]], *keys: str) -> float:
@@ -39,9 +29,11 @@ def _median(reports: list[dict[str, Any]], *keys: str) -> float:
     return statistics.median(values)
 
 
-# ---- speed ---------------------------------------------------------------------------------------
 def sequence_tables(yardstick: Yardstick, n_runs: int) -> Iterator[object]:
-    """Offline speed, real time, and fusing as it happens in the sequences."""
+    """All of them."""
+    if shared_folder() is None:
+        yield f"[yellow]Sequences: left out, {MISSING}"
+        return
     offline = new_table(
         f"Whole sequences, offline, threads ({n_runs} runs each, median)",
         ["sequence"],
@@ -83,17 +75,12 @@ def sequence_tables(yardstick: Yardstick, n_runs: int) -> Iterator[object]:
         ["ms here\nmedian", "p99", "ms there\nmedian", "reference", "limit", "met"],
     )
     for figure in reference.SEQUENCES:
-        folder = _folder(figure)
-        if folder is None:
-            yield f"[yellow]{figure.name}: {_MISSING}"
-            continue
+        folder = sequence_folder(figure.folder)
         reports, measured = _add_offline(offline, yardstick, figure, folder, n_runs)
         _add_summed(summed, yardstick, figure, folder, reports, measured)
         _add_realtime(realtime, figure, folder, n_runs)
         _add_fusing(fusing, yardstick, figure, folder)
-    for table in (offline, summed, realtime, fusing):
-        if table.row_count:
-            yield table
+    yield from (offline, summed, realtime, fusing)
 
 
 def _add_offline(
@@ -102,7 +89,7 @@ def _add_offline(
     reports: list[dict[str, Any]] = []
 
     def work() -> float:
-        reports.append(runs.run(folder, figure.sensor))
+        reports.append(run_sequence(folder, figure.sensor))
         return 1e3 / float(reports[-1]["slam_frames_per_second"])
 
     measured = yardstick.around([work] * n_runs)
@@ -146,7 +133,7 @@ def _add_summed(
     inline: list[dict[str, Any]] = []
 
     def work() -> float:
-        inline.append(runs.run(folder, figure.sensor, "--deterministic"))
+        inline.append(run_sequence(folder, figure.sensor, "--deterministic"))
         return _summed_milliseconds(inline[-1])
 
     inline_times = yardstick.around([work] * 3)
@@ -172,7 +159,7 @@ def _add_summed(
 
 
 def _add_realtime(table: Table, figure: SequenceFigure, folder: Path, n_runs: int) -> None:
-    reports = [runs.run(folder, figure.sensor, "--realtime") for _ in range(min(n_runs, 3))]
+    reports = [run_sequence(folder, figure.sensor, "--realtime") for _ in range(min(n_runs, 3))]
     p99 = _median(reports, "milliseconds", "track", "p99")
     table.add_row(
         figure.name,
@@ -185,31 +172,11 @@ def _add_realtime(table: Table, figure: SequenceFigure, folder: Path, n_runs: in
     )
 
 
-def program_rows(yardstick: Yardstick, build: Path) -> Iterator[Row]:
-    """Fusing in a dense made-up map where everything is covisible: the worst case, from C++."""
-    program = build / "benchmarks" / "cpp" / "matching_bench"
-    if not program.is_file():
-        return
-    command = [str(program), "--benchmark_format=json", "--benchmark_filter=fuse"]
-    found: dict[str, float] = {}
-
-    def work() -> float:
-        done = subprocess.run(command, capture_output=True, text=True, check=True)
-        for one in json.loads(done.stdout)["benchmarks"]:
-            found[one["name"].split("/")[1]] = one["median_ms"]
-        return max(found.values())
-
-    unit = yardstick.around([work])
-    for name, value in found.items():
-        measured = replace(unit, ours=Times(value, value))
-        yield Row(f"fuse, dense made-up map ({name})", reference.FUSE, measured)
-
-
 def _add_fusing(table: Table, yardstick: Yardstick, figure: SequenceFigure, folder: Path) -> None:
     stages: dict[str, float] = {}
 
     def work() -> float:
-        report = runs.run(folder, figure.sensor, "--deterministic")
+        report = run_sequence(folder, figure.sensor, "--deterministic")
         stages.update(report["milliseconds"]["mapping.fuse"])
         return stages["median"]
 
@@ -224,106 +191,3 @@ def _add_fusing(table: Table, yardstick: Yardstick, figure: SequenceFigure, fold
         f"{limit:g}",
         verdict(measured.carried < limit),
     )
-
-
-# ---- Python's share ------------------------------------------------------------------------------
-def python_table() -> Iterator[object]:
-    table = new_table(
-        "Python's share of a frame: between the C++ steps",
-        ["sequence", "frames"],
-        ["ms a frame", "Python ms", "calls of C++", "share", "limit", "met"],
-    )
-    table.caption = (
-        "Every function, method and property of the extension is wrapped to\n"
-        "note its time, the rest of the track call is Python (benchmarks/speed/python_share.py).\n"
-        "Mapping inline: no other thread uses the interpreter. Freeing C++ objects counts on "
-        "neither side."
-    )
-    table.caption_justify = "left"
-    for figure in reference.SEQUENCES:
-        folder = _folder(figure)
-        if folder is None:
-            yield f"[yellow]Python's share, {figure.name}: {_MISSING}"
-            continue
-        for label, option in (
-            ("all, with mapping: mean", []),
-            ("not keyframes: median", ["--tracking-only"]),
-        ):
-            command = [
-                sys.executable,
-                "-m",
-                "benchmarks.speed.python_share",
-                str(folder),
-                figure.sensor,
-            ]
-            command += option
-            done = subprocess.run(command, capture_output=True, text=True, check=True)
-            share = json.loads(done.stdout)
-            table.add_row(
-                figure.name,
-                label,
-                f"{share['milliseconds']:.2f}",
-                f"{share['python_milliseconds']:.3f}",
-                f"{share['calls']:.0f}",
-                f"{100 * share['share']:.1f} %",
-                f"{100 * reference.PYTHON_SHARE:g} %",
-                verdict(share["share"] < reference.PYTHON_SHARE),
-            )
-    if table.row_count:
-        yield table
-
-
-# ---- locks ---------------------------------------------------------------------------------------
-_EDGES_MS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 20.0)
-
-
-def lock_tables(library: Path) -> Iterator[object]:
-    if not library.is_file():
-        yield (
-            f"[yellow]Locks: left out, {library} is not built "
-            "(cmake --preset release, then cmake --build build/release --target lock_times)"
-        )
-        return
-    local, whole = reference.LOCK_HOLD_MS
-    table = new_table(
-        f"Sections under the map's lock, by milliseconds held (aim: writing {local:g}, a whole map "
-        f"{whole:g})",
-        ["sequence", ""],
-        [
-            "n",
-            *(f"<{edge:g}" for edge in _EDGES_MS),
-            "more",
-            "p99",
-            "max",
-            "max\nused",
-            "max\nwait",
-        ],
-    )
-    for figure in reference.SEQUENCES:
-        folder = _folder(figure)
-        if folder is None:
-            yield f"[yellow]Locks, {figure.name}: {_MISSING}"
-            continue
-        times = runs.LockTimes.measure(folder, figure.sensor, library)
-        for kind, sections in (("writing", times.written), ("reading", times.read)):
-            if not len(sections):
-                continue
-            waited, held, used = (sections / 1e3).T
-            counts = np.bincount(np.searchsorted(_EDGES_MS, held, side="right"), minlength=11)
-            table.add_row(
-                figure.name,
-                kind,
-                str(len(held)),
-                *(str(count) for count in counts),
-                f"{np.percentile(held, 99):.2f}",
-                f"{held.max():.2f}",
-                f"{used.max():.2f}",
-                f"{waited.max():.2f}",
-            )
-    table.caption = (
-        "Held is wall-clock time: a thread that loses the processor goes on holding the lock. "
-        "Used: processor time\nwhile the lock was held."
-    )
-    table.caption_justify = "left"
-    if table.row_count:
-        yield table

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Single steps of the reference and ours: extraction, stereo, pose, local bundle adjustment, words.
+"""Single steps of the reference and ours: extraction, stereo, pose, bundle adjustment, words, fuse.
 
 The C++ verbs are called through the bindings, whose cost (conversion of the arguments, tens of
 microseconds) is part of our time.
@@ -7,31 +7,24 @@ microseconds) is part of our time.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from functools import cache
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from pathlib import Path
 
 import numpy as np
 
 from benchmarks.harness import reference
+from benchmarks.harness.folders import GOLDEN, how_to_build, shared_folder
 from benchmarks.harness.reference import Figure
-from benchmarks.harness.yardstick import GOLDEN, Measurement, Yardstick, shared_folder
+from benchmarks.harness.runs import benchmark_records
+from benchmarks.harness.steps import Row
+from benchmarks.harness.tables import in_words
+from benchmarks.harness.yardstick import Times, Yardstick
 from orbslam2py import _core as core
-from orbslam2py.vocabulary.vocabulary import load_vocabulary
+from orbslam2py.vocabulary import load_vocabulary
 
 SCALE_FACTOR, N_LEVELS = 1.2, 8
-
-
-@dataclass(frozen=True)
-class Row:
-    """A step, measured."""
-
-    name: str
-    figure: Figure
-    measured: Measurement
-    note: str = ""
-    stand_in: bool = False
-    """Measured on other images than the reference's figure: no verdict."""
 
 
 @cache
@@ -52,7 +45,7 @@ def extraction_rows(yardstick: Yardstick) -> Iterator[Row]:
         options = core.OrbOptions(n_features=n_features)
         for kernels in ("automatic", "portable"):
             extractor = core.OrbExtractor(options, kernels)
-            measured = yardstick.compare(_call(extractor.extract, yardstick.images[image]), image)
+            measured = yardstick.compare(partial(extractor.extract, yardstick.images[image]), image)
             stretch = reference.EXTRACTION_STRETCH * (figure.milliseconds or 0)
             reached = "stretch goal reached" if measured.carried <= stretch else ""
             if kernels == "automatic":
@@ -66,10 +59,6 @@ def extraction_rows(yardstick: Yardstick) -> Iterator[Row]:
             elif extractor.kernel_name != core.OrbExtractor(options).kernel_name:
                 untargeted = Figure(figure.name, figure.milliseconds, yardstick=image)
                 yield Row(f"{figure.name} (portable)", untargeted, measured)
-
-
-def _call(function: Callable[..., object], *arguments: object) -> Callable[[], object]:
-    return lambda: function(*arguments)
 
 
 def stereo_rows(yardstick: Yardstick) -> Iterator[Row]:
@@ -89,7 +78,7 @@ def stereo_rows(yardstick: Yardstick) -> Iterator[Row]:
         first, second = (core.OrbExtractor(options).extract(image) for image in (left, right))
         scales = core.ScalePyramid(SCALE_FACTOR, N_LEVELS)
         measured = yardstick.compare(
-            _call(core.match_stereo, first, second, scales, float(bf), float(fx))
+            partial(core.match_stereo, first, second, scales, float(bf), float(fx))
         )
         matched = int(np.count_nonzero(core.match_stereo(first, second, scales, bf, fx)[1] > 0))
         note = note or f"{len(first)} keypoints, {matched} with depth"
@@ -113,7 +102,7 @@ def pose_rows(yardstick: Yardstick) -> Iterator[Row]:
             _pixels(arrays["uv"], arrays["ur"]),
             inverse_sigma2(arrays["octave"]),
         )
-        measured = yardstick.compare(_call(core.optimize_pose, *arguments), repeat=60)
+        measured = yardstick.compare(partial(core.optimize_pose, *arguments), repeat=60)
         estimate = core.optimize_pose(*arguments)
         same = np.array_equal(estimate.outlier != 0, arrays["out_outlier"] != 0)
         note = "" if same else "outliers differ from the reference's"
@@ -163,25 +152,41 @@ class GoldenBundle:
 def bundle_rows(yardstick: Yardstick) -> Iterator[Row]:
     for name, figure in reference.BUNDLE.items():
         bundle = GoldenBundle.load(name)
-        measured = yardstick.compare(_call(core.solve_bundle, *bundle.arguments), repeat=20)
+        measured = yardstick.compare(partial(core.solve_bundle, *bundle.arguments), repeat=20)
         ratio = bundle.cost() / reference.BUNDLE_COST[name]
-        met = "met" if ratio <= reference.BUNDLE_COST_RATIO else "NOT met"
         limit = reference.BUNDLE_COST_RATIO
+        met = in_words(ratio <= limit)
         yield Row(
             figure.name, figure, measured, f"cost {ratio:.5f} of the reference's, {limit}: {met}"
         )
 
 
 # ---- words ---------------------------------------------------------------------------------------
-def words_rows(yardstick: Yardstick, large: core.Vocabulary | None) -> Iterator[Row]:
+def words_rows(yardstick: Yardstick, large: core.Vocabulary) -> Iterator[Row]:
     """With the package's vocabulary, and with one as large as the reference's."""
-    vocabularies = {"package's vocabulary": load_vocabulary()}
-    if large is not None:
-        vocabularies["10^6 made-up words"] = large
+    vocabularies = {"package's vocabulary": load_vocabulary(), "10^6 made-up words": large}
     for n_features, figure in reference.WORDS.items():
         image = yardstick.images["tum_a" if n_features == 1000 else "kitti_a"]
         extractor = core.OrbExtractor(core.OrbOptions(n_features=n_features))
         descriptors = extractor.extract(image).descriptors
         for label, vocabulary in vocabularies.items():
-            measured = yardstick.compare(_call(vocabulary.transform, descriptors))
+            measured = yardstick.compare(partial(vocabulary.transform, descriptors))
             yield Row(f"{figure.name} ({label})", figure, measured)
+
+
+# ---- fusing --------------------------------------------------------------------------------------
+def fuse_rows(yardstick: Yardstick, build: Path) -> Iterator[Row]:
+    """Fusing in a dense made-up map where everything is covisible: the worst case, from C++."""
+    if how_to_build(build, "matching_bench") is not None:
+        return
+    found: dict[str, float] = {}
+
+    def work() -> float:
+        for name, record in benchmark_records(build, "matching_bench", "fuse").items():
+            found[name.split("/")[1]] = record["median_ms"]
+        return max(found.values())
+
+    unit = yardstick.around([work])
+    for name, value in found.items():
+        measured = replace(unit, ours=Times(value, value))
+        yield Row(f"fuse, dense made-up map ({name})", reference.FUSE, measured)

@@ -8,10 +8,7 @@ opens FILE once and prints milliseconds and megabytes as JSON.
 
 from __future__ import annotations
 
-import argparse
 import json
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -20,10 +17,14 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.harness import reference
+from benchmarks.harness.arguments import new_parser
+from benchmarks.harness.process_memory import peak_mb
+from benchmarks.harness.runs import run_module
+from benchmarks.harness.steps import Row
+from benchmarks.harness.tables import in_words
 from benchmarks.harness.yardstick import Yardstick
-from benchmarks.speed.single_steps import Row
 from orbslam2py import _core as core
-from orbslam2py.vocabulary.vocabulary import load_vocabulary, save_vocabulary
+from orbslam2py.vocabulary import load_vocabulary, save_vocabulary
 
 BRANCHING, DEPTH = 10, 6
 
@@ -67,19 +68,12 @@ class VocabularyFiles:
         return files
 
 
-def open_in_new_process(path: Path) -> dict[str, float]:
-    """Milliseconds until the first image can be described, and the process's memory [MB]."""
-    command = [sys.executable, "-m", "benchmarks.speed.vocabularies", str(path)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    return json.loads(done.stdout)
-
-
 def vocabulary_rows(yardstick: Yardstick, files: VocabularyFiles) -> Iterator[Row]:
     opened: list[dict[str, float]] = []
 
     def open_once(path: Path) -> Callable[[], float]:
         def work() -> float:
-            opened.append(open_in_new_process(path))
+            opened.append(run_module("benchmarks.speed.vocabularies", str(path)))
             return opened[-1]["ms"]
 
         return work
@@ -93,26 +87,17 @@ def vocabulary_rows(yardstick: Yardstick, files: VocabularyFiles) -> Iterator[Ro
     peak = max(one["peak_mb"] for one in opened)
     before = max(one["before_mb"] for one in opened)
     theirs, limit = reference.VOCABULARY_TEXT_PEAK_MB
-    met = "met" if peak <= limit else "NOT met"
     size = files.text.stat().st_size / 1e6
     note = (
         f"{size:.0f} MB of text; peak of the process {peak:.0f} MB ({before:.0f} before), "
-        f"reference {theirs:.0f}, target {limit:.0f}: {met}"
+        f"reference {theirs:.0f}, target {limit:.0f}: {in_words(peak <= limit)}"
     )
     yield Row(reference.VOCABULARY_TEXT.name, reference.VOCABULARY_TEXT, text, note)
 
 
-def peak_mb() -> float:
-    """Largest resident memory of this program; unlike getrusage not that of the one before exec."""
-    for line in Path("/proc/self/status").read_text().splitlines():
-        if line.startswith("VmHWM"):
-            return float(line.split()[1]) * 1.024e-3
-    raise OSError("/proc/self/status has no VmHWM")
-
-
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("file", type=Path)
+    parser = new_parser(__doc__)
+    parser.add_argument("file", type=Path, help="a vocabulary, text or binary")
     arguments = parser.parse_args()
     before = peak_mb()
     descriptors = np.random.default_rng(1).integers(0, 256, (1000, 32), dtype=np.uint8)
