@@ -21,7 +21,7 @@ from benchmarks.harness import reference
 from benchmarks.harness.arguments import add_counts, add_width, console_of, new_parser
 from benchmarks.harness.folders import sequence_folder
 from benchmarks.harness.reference import MonocularFigure, SequenceFigure
-from benchmarks.harness.runs import run_sequence
+from benchmarks.harness.runs import run_report
 from benchmarks.harness.tables import new_table, verdict
 
 
@@ -41,7 +41,7 @@ def accuracy_rows(
         ],
     }
     for mode, options in modes.items():
-        reports = [run_sequence(folder, figure.sensor, *words) for words in options]
+        reports = [run_report(folder, figure.sensor, *words) for words in options]
         errors = [float(report["ate_rmse_m"]) for report in reports]
         keyframes = [int(report["keyframes"]) for report in reports]
         tracked = min(float(report["tracked_fraction"]) for report in reports)
@@ -63,7 +63,7 @@ def monocular_rows(figure: MonocularFigure, folder: Path, n_runs: int) -> Iterat
     """One row per mode."""
     for mode, options in {"threads": [], "deterministic": ["--deterministic"]}.items():
         reports = [
-            run_sequence(folder, "mono", *options, "--seed", str(seed)) for seed in range(n_runs)
+            run_report(folder, "mono", *options, "--seed", str(seed)) for seed in range(n_runs)
         ]
         keyframes_errors = [float(report["ate_keyframes_rmse_m"]) for report in reports]
         frames_errors = [float(report["ate_rmse_m"]) for report in reports]

@@ -32,11 +32,12 @@ from benchmarks.harness.tables import in_words
 from benchmarks.harness.yardstick import milliseconds_of
 from orbslam2py import Reason, Sensor, System, TrackingState, load_vocabulary
 from orbslam2py import _core as core
+from orbslam2py._timing import StageTimer
 from orbslam2py.datasets import Images
 from orbslam2py.evaluation import PoseError
 from orbslam2py.slam.front_end import FrontEnd
-from orbslam2py.slam.relocalization import RelocalizationThresholds, Relocalizer
-from orbslam2py.slam.timing import StageTimer
+from orbslam2py.slam.relocalization import Relocalizer
+from orbslam2py.slam.thresholds import RelocalizationThresholds
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence, SyntheticWorld
 
 #: Both views had enough matches, and a reconstruction was tried.
@@ -240,26 +241,22 @@ def speed(arguments: argparse.Namespace, sensor: str) -> None:
 def _relocalization_speed(arguments: argparse.Namespace, sensor: str) -> None:
     """Twenty candidates around the place, none of which is ever good enough: the worst case."""
     world = mapped(argparse.Namespace(**{**vars(arguments), "frames": 260}), sensor)
-    system, n_candidates = world.system, 20
-    frame = system._front_end.monocular(world.sequence.load(150).image, 9999, 0.0, StageTimer())
-    core.describe(frame, system.vocabulary)
-    ids = core.snapshot_keyframes(system._map).ids
-    T_wk = world.system.keyframe_trajectory().T_wc
-    middle = int(
-        np.argmin(
-            np.linalg.norm(world.true_T_wk[:, :3, 3] - world.sequence.T_wc(150)[:3, 3], axis=1)
-        )
-    )
-    first = min(max(middle - n_candidates // 2, 0), len(T_wk) - n_candidates)
+    pipeline, n_candidates = world.system.pipeline, 20
+    image, T_wc = world.sequence.load(150).image, world.sequence.T_wc(150)
+    frame = pipeline.front_end.monocular(image, 9999, 0.0, StageTimer())
+    core.describe(frame, world.system.vocabulary)
+    slam_map, index = pipeline.back_end.map, pipeline.back_end.keyframe_index
+    ids = core.snapshot_keyframes(slam_map).ids
+    distances = np.linalg.norm(world.true_T_wk[:, :3, 3] - T_wc[:3, 3], axis=1)
+    first = min(max(int(distances.argmin()) - n_candidates // 2, 0), len(ids) - n_candidates)
     chosen = [SimpleNamespace(keyframe=int(i)) for i in ids[first : first + n_candidates]]
     query = core.find_relocalization_candidates
     limits = {"never good enough": 10**6, "as it is": 50}
     try:
         core.find_relocalization_candidates = lambda *_: chosen
         for name, enough in limits.items():
-            relocalizer = Relocalizer(
-                system._map, system._back_end.index, 0, RelocalizationThresholds(enough=enough)
-            )
+            thresholds = RelocalizationThresholds(enough=enough)
+            relocalizer = Relocalizer(slam_map, index, 0, thresholds)
             candidates = relocalizer._candidates(core.TrackedFrame(frame))
             times_of(
                 f"relocalization, 20 keyframes, {len(candidates)} with enough matches, {name}",
@@ -273,7 +270,7 @@ def _relocalization_speed(arguments: argparse.Namespace, sensor: str) -> None:
 
 def _query_speed(sequence: SyntheticSequence) -> None:
     """Every third of 750 images, twenty times over, makes an index of 5000 keyframes."""
-    world, index, vocabulary = core.Map(), core.KeyFrameIndex(), load_vocabulary()
+    slam_map, index, vocabulary = core.Map(), core.KeyFrameIndex(), load_vocabulary()
     front_end, recent = FrontEnd(sequence.settings, Sensor.MONOCULAR), core.RecentPoints()
     frames = []
     for number in range(0, 750, 3):
@@ -284,13 +281,13 @@ def _query_speed(sequence: SyntheticSequence) -> None:
         for frame in frames:
             tracked = core.TrackedFrame(frame)
             tracked.T_cw = core.Pose()
-            keyframe = core.insert_keyframe(world, tracked, create_points=False)
-            core.process_new_keyframe(world, keyframe, recent)
-            core.index_keyframe(index, world, keyframe)
+            keyframe = core.insert_keyframe(slam_map, tracked, create_points=False)
+            core.process_new_keyframe(slam_map, keyframe, recent)
+            core.index_keyframe(index, slam_map, keyframe)
     asked = iter(frames)
     times_of(
         f"candidates among {len(index)} keyframes ({len(frames)} views)",
-        lambda: core.find_relocalization_candidates(index, world, next(asked)),
+        lambda: core.find_relocalization_candidates(index, slam_map, next(asked)),
         len(frames),
         5,
     )

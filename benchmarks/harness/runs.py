@@ -18,7 +18,7 @@ Record = dict[str, float]
 """Counters of one C++ benchmark."""
 
 
-def run_sequence(
+def run_report(
     folder: Path, sensor: str, *options: str, environment: dict[str, str] | None = None
 ) -> dict[str, Any]:
     """``orbslam2py run`` with these options; returns report.json.

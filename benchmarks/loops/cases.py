@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from orbslam2py import Sensor, Settings, load_vocabulary
-from orbslam2py.runs import RunOptions, RunResult, SequenceRunner
+from orbslam2py.runs import RunOptions, RunResult, SequenceRunner, SystemOptions
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence, SyntheticWorld
 
 
@@ -77,11 +77,11 @@ class Case:
         self, sequence: SyntheticSequence, seed: int, *, loop_closing: bool, deterministic: bool
     ) -> RunResult:
         """Run over the images of the seed, which also chooses all random draws."""
-        options = RunOptions(
-            self.sensor, deterministic=deterministic, seed=seed, loop_closing=loop_closing
+        system = SystemOptions(deterministic=deterministic, seed=seed, loop_closing=loop_closing)
+        runner = SequenceRunner(
+            sequence, self.settings(sequence), load_vocabulary(), RunOptions(self.sensor, system)
         )
-        settings = self.settings(sequence)
-        return SequenceRunner(sequence, settings, load_vocabulary(), options).run()
+        return runner.run()
 
     def describe(self) -> str:
         """Settings in words."""

@@ -115,15 +115,15 @@ def _essential_graph(build: Path) -> list[Step]:
 
 
 def _full_adjustment(build: Path) -> list[Step]:
-    found = benchmark_records(build, "global_bundle_bench", "BM_GlobalBundle/stereo/")
-    record = found[f"BM_GlobalBundle/stereo/{LIMIT_SIZE}"]
+    found = benchmark_records(build, "full_bundle_bench", "BM_FullBundle/stereo/")
+    record = found[f"BM_FullBundle/stereo/{LIMIT_SIZE}"]
     step = Step(
         "full_adjustment",
         f"one thread; {record['points']:.0f} points, {record['observations']:.0f} observations, "
         f"{record['steps']:.0f} steps; in brackets processor time",
     )
     for n in SIZES:
-        record = found[f"BM_GlobalBundle/stereo/{n}"]
+        record = found[f"BM_FullBundle/stereo/{n}"]
         around = record["gather_ms"] + record["commit_ms"]
         step.add(n, around + 1e3 * record["solve_wall_s"], around + 1e3 * record["solve_s"])
     return [step]
@@ -135,7 +135,7 @@ _PROGRAMS = (
     "loops_bench",
     "loop_correction_bench",
     "pose_graph_bench",
-    "global_bundle_bench",
+    "full_bundle_bench",
 )
 
 

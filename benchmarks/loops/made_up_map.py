@@ -63,11 +63,12 @@ class MadeUpMap:
         made._photograph(observers, np.random.default_rng(size.seed + 1))
         return made
 
-    def fill(self, world: core.Map, rng: np.random.Generator) -> list[int]:
+    def fill(self, slam_map: core.Map, rng: np.random.Generator) -> list[int]:
         """Enter all into an empty map, with drift. Returns the ids of the keyframes."""
         poses = self.drifted(rng)
         keyframes = [
-            world.add_keyframe(frame, pose) for frame, pose in zip(self.frames, poses, strict=True)
+            slam_map.add_keyframe(frame, pose)
+            for frame, pose in zip(self.frames, poses, strict=True)
         ]
         matrices = np.stack([pose.matrix for pose in poses])
         # Every point is where the first keyframe that sees it puts it.
@@ -77,20 +78,20 @@ class MadeUpMap:
         positions = np.einsum("nji,nj->ni", R, before - t)
         n_seen = np.bincount(np.concatenate([p for p, _ in self.seen]), minlength=len(positions))
         ids = [
-            world.add_point(position, keyframes[creator], 0) if n > 1 else -1
+            slam_map.add_point(position, keyframes[creator], 0) if n > 1 else -1
             for position, creator, n in zip(positions, self.creator, n_seen, strict=True)
         ]
         for keyframe, (points, slots) in zip(keyframes, self.seen, strict=True):
             for point, slot in zip(points.tolist(), slots.tolist(), strict=True):
                 if ids[point] >= 0:
-                    world.add_observation(ids[point], keyframe, slot)
+                    slam_map.add_observation(ids[point], keyframe, slot)
         for keyframe in keyframes:
-            world.publish(keyframe)
+            slam_map.publish(keyframe)
         for keyframe in keyframes:
-            world.update_connections(keyframe)
+            slam_map.update_connections(keyframe)
         for point in ids:
             if point >= 0:
-                world.update_point(point)
+                slam_map.update_point(point)
         return keyframes
 
     def drifted(self, rng: np.random.Generator) -> list[core.Pose]:

@@ -81,7 +81,7 @@ class Adjuster:
         """Let the ring drift, and begin one."""
         poses = self._made.drifted(self._rng)
         for keyframe, pose in zip(self._ring, poses, strict=True):
-            self._system._map.set_pose(keyframe, pose)
+            self._system.pipeline.back_end.map.set_pose(keyframe, pose)
         self._thread = threading.Thread(target=self._run)
         self._thread.start()
 
@@ -136,7 +136,7 @@ def measure(size: MapSize, n_frames: int, passes: int) -> Measured:
     for number in range(2 * passes):
         rng = np.random.default_rng(number)
         with System(sequence.settings, Sensor.STEREO, loop_closing=False) as system:
-            ring = made.fill(system._map, rng)
+            ring = made.fill(system.pipeline.back_end.map, rng)
             adjuster = Adjuster(system, made, ring, rng) if number % 2 else None
             times, tracked = track_all(system, images, period, adjuster)
             result.tracked += tracked

@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks.harness import reference
 from benchmarks.harness.folders import MISSING, built, how_to_build, sequence_folder, shared_folder
-from benchmarks.harness.runs import run_sequence
+from benchmarks.harness.runs import run_report
 from benchmarks.harness.tables import new_table
 
 _LIBRARY = "liblock_times.so"
@@ -33,7 +33,7 @@ class LockTimes:
         with tempfile.TemporaryDirectory() as temporary:
             log = Path(temporary) / "locks.txt"
             noting = {"LD_PRELOAD": str(library.resolve()), "ORBSLAM2PY_LOCK_TIMES": str(log)}
-            run_sequence(folder, sensor, environment=noting)
+            run_report(folder, sensor, environment=noting)
             rows = [line.split() for line in log.read_text().splitlines()]
         kinds = np.array([row[0] for row in rows])
         times = np.array([row[1:] for row in rows], np.float64).reshape(-1, 3)

@@ -14,7 +14,7 @@ from rich.table import Table
 from benchmarks.harness import reference
 from benchmarks.harness.folders import MISSING, sequence_folder, shared_folder
 from benchmarks.harness.reference import SequenceFigure
-from benchmarks.harness.runs import run_sequence
+from benchmarks.harness.runs import run_report
 from benchmarks.harness.tables import new_table, verdict
 from benchmarks.harness.yardstick import Measurement, Times, Yardstick
 
@@ -89,7 +89,7 @@ def _add_offline(
     reports: list[dict[str, Any]] = []
 
     def work() -> float:
-        reports.append(run_sequence(folder, figure.sensor))
+        reports.append(run_report(folder, figure.sensor))
         return 1e3 / float(reports[-1]["slam_frames_per_second"])
 
     measured = yardstick.around([work] * n_runs)
@@ -133,7 +133,7 @@ def _add_summed(
     inline: list[dict[str, Any]] = []
 
     def work() -> float:
-        inline.append(run_sequence(folder, figure.sensor, "--deterministic"))
+        inline.append(run_report(folder, figure.sensor, "--deterministic"))
         return _summed_milliseconds(inline[-1])
 
     inline_times = yardstick.around([work] * 3)
@@ -159,7 +159,7 @@ def _add_summed(
 
 
 def _add_realtime(table: Table, figure: SequenceFigure, folder: Path, n_runs: int) -> None:
-    reports = [run_sequence(folder, figure.sensor, "--realtime") for _ in range(min(n_runs, 3))]
+    reports = [run_report(folder, figure.sensor, "--realtime") for _ in range(min(n_runs, 3))]
     p99 = _median(reports, "milliseconds", "track", "p99")
     table.add_row(
         figure.name,
@@ -176,7 +176,7 @@ def _add_fusing(table: Table, yardstick: Yardstick, figure: SequenceFigure, fold
     stages: dict[str, float] = {}
 
     def work() -> float:
-        report = run_sequence(folder, figure.sensor, "--deterministic")
+        report = run_report(folder, figure.sensor, "--deterministic")
         stages.update(report["milliseconds"]["mapping.fuse"])
         return stages["median"]
 

@@ -125,8 +125,8 @@ class Stage:
             assert flag.wait(2 * LIMIT), "nobody cancelled"
             return SimpleNamespace(aborted=True, iterations=0, initial_cost=1.0, final_cost=1.0)
 
-        self._patch.setattr(_core, "solve_global_bundle", solve)
-        return self.gate("solve_global_bundle", opened=True)
+        self._patch.setattr(_core, "solve_full_bundle", solve)
+        return self.gate("solve_full_bundle", opened=True)
 
     def loops(self, system: System, *, far: int = 0) -> Callable[[int], None]:
         """Make loops to keyframe `far` on demand: the function returned queues a keyframe that

@@ -116,7 +116,7 @@ def test_full_bundle_adjustment(views: TwoViews) -> None:
     before = world.content_hash()
     flag = core.StopFlag()
     flag.set()
-    aborted = core.global_bundle_adjustment(world, abort=flag)
+    aborted = core.full_bundle_adjustment(world, abort=flag)
     assert aborted.summary.aborted and not aborted.committed
     assert world.content_hash() == before
 
@@ -124,8 +124,8 @@ def test_full_bundle_adjustment(views: TwoViews) -> None:
     points = world.point_ids()
     for point in points:
         world.set_position(point, world.point_position(point) + rng.uniform(-0.01, 0.01, 3))
-    options = core.GlobalBundleOptions(iterations=15, robust=False)
-    result = core.global_bundle_adjustment(world, options)
+    options = core.FullBundleOptions(iterations=15, robust=False)
+    result = core.full_bundle_adjustment(world, options)
     assert result.committed
     assert (result.n_keyframes, result.n_points) == (2, len(points))
     assert result.n_observations == 2 * len(points)
@@ -142,27 +142,27 @@ def test_full_bundle_adjustment_in_steps(views: TwoViews) -> None:
         world.set_position(point, world.point_position(point) + rng.uniform(-0.01, 0.01, 3))
     before = world.content_hash()
 
-    bundle = core.gather_global_bundle(world)
+    bundle = core.gather_full_bundle(world)
     assert (bundle.n_keyframes, bundle.n_points) == (2, world.n_points)
     assert bundle.n_observations == 2 * world.n_points
     assert not bundle.solved
-    assert not core.commit_global_bundle(world, bundle).committed
-    late = core.GlobalBundleOptions(max_seconds=1e-9)
-    summary = core.solve_global_bundle(bundle, late)
+    assert not core.commit_full_bundle(world, bundle).committed
+    late = core.FullBundleOptions(max_seconds=1e-9)
+    summary = core.solve_full_bundle(bundle, late)
     assert summary.timed_out and not bundle.solved
     assert world.content_hash() == before
 
-    summary = core.solve_global_bundle(bundle, core.GlobalBundleOptions(iterations=15))
+    summary = core.solve_full_bundle(bundle, core.FullBundleOptions(iterations=15))
     assert bundle.solved and not summary.timed_out
     assert summary.final_cost < 0.1 * summary.initial_cost
     assert world.content_hash() == before
     world.erase_point(world.point_ids()[0])
-    commit = core.commit_global_bundle(world, bundle)
+    commit = core.commit_full_bundle(world, bundle)
     assert commit.committed
     assert (commit.n_followed_keyframes, commit.n_followed_points) == (0, 0)
     assert world.big_change_index == 1
     assert core.check_invariants(world, require_words=True) == []
-    assert not core.commit_global_bundle(world, bundle).committed  # once
+    assert not core.commit_full_bundle(world, bundle).committed  # once
 
 
 def test_temporary_points() -> None:

@@ -21,7 +21,7 @@ from orbslam2py.datasets.base import Images
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.records import Reason, TrackingState
 from orbslam2py.slam.relocalization import Relocalizer
-from orbslam2py.slam.timing import StageTimer
+from orbslam2py._timing import StageTimer
 from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
 from watchdog import watchdog
 

@@ -34,7 +34,7 @@ from orbslam2py.settings.builtin import builtin_settings
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
 from orbslam2py.slam.front_end import FrontEnd
-from orbslam2py.slam.timing import StageTimer
+from orbslam2py._timing import StageTimer
 
 MONO = Sensor.MONOCULAR
 SIZE = (96, 128)  # rows, columns

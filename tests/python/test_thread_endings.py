@@ -31,7 +31,7 @@ def test_a_reset_gives_up_an_adjustment_without_waiting_for_its_solver(
     slam: System, stage: Stage
 ) -> None:
     """D14-8, D17-6: the original's goes on in the destroyed map."""
-    solve, commit = stage.gate("solve_global_bundle"), stage.gate("commit_global_bundle")
+    solve, commit = stage.gate("solve_full_bundle"), stage.gate("commit_full_bundle")
     refine(slam)
     solve.wait_entered()
     slam.reset()
@@ -45,7 +45,7 @@ def test_a_reset_gives_up_an_adjustment_without_waiting_for_its_solver(
 def test_a_reset_gives_up_an_adjustment_that_localization_mode_holds(
     slam: System, stage: Stage
 ) -> None:
-    solve, commit = stage.gate("solve_global_bundle"), stage.gate("commit_global_bundle")
+    solve, commit = stage.gate("solve_full_bundle"), stage.gate("commit_full_bundle")
     refine(slam)
     solve.wait_entered()
     slam.localization_mode = True
@@ -88,10 +88,10 @@ def test_a_reset_of_a_spoilt_beginning_while_an_adjustment_is_written(stage: Sta
     with new_system(Sensor.RGBD) as system:
         play(system, 5)
         assert system.wait_until_idle(LIMIT)
-        commit = stage.gate("commit_global_bundle")
+        commit = stage.gate("commit_full_bundle")
         stage._patch.setattr(
             _core,
-            "solve_global_bundle",
+            "solve_full_bundle",
             lambda *_: SimpleSummary(),
         )
         refine(system)
@@ -256,7 +256,7 @@ def test_shutdown_gives_up_an_adjustment(slam: System, stage: Stage) -> None:
 
 
 def test_shutdown_waits_for_an_adjustment_when_asked_to(slam: System, stage: Stage) -> None:
-    solve = stage.gate("solve_global_bundle")
+    solve = stage.gate("solve_full_bundle")
     refine(slam)
     solve.wait_entered()
     finishing = stage.entering(slam._back_end.adjustment.worker, "finish")
@@ -352,13 +352,13 @@ def test_the_interpreter_ends_while_an_adjustment_is_solved() -> None:
         "from orbslam2py import _core\n"
         "from small_sequences import new_system, play\n"
         "from orbslam2py.settings.sensor import Sensor\n"
-        "entered, real = threading.Event(), _core.solve_global_bundle\n"
+        "entered, real = threading.Event(), _core.solve_full_bundle\n"
         "def solve(bundle, options, cancelled, n_threads):\n"
         "    entered.set()\n"
         "    while not cancelled.is_set():\n"
         "        summary = real(bundle, options, cancelled, n_threads)\n"
         "    return summary\n"
-        "_core.solve_global_bundle = solve\n"
+        "_core.solve_full_bundle = solve\n"
         "system = new_system(Sensor.RGBD)\n"
         "play(system, 20)\n"
         "system._back_end.adjustment.start()\n"
@@ -414,7 +414,7 @@ def test_a_loop_closer_that_fails_holds_nobody(stage: Stage) -> None:
     failing_end(system)
 
 
-@pytest.mark.parametrize("verb", ["solve_global_bundle", "commit_global_bundle"])
+@pytest.mark.parametrize("verb", ["solve_full_bundle", "commit_full_bundle"])
 def test_an_adjustment_that_fails_reaches_those_who_wait(stage: Stage, verb: str) -> None:
     system = new_system(Sensor.RGBD)
     play(system, 10)
@@ -432,7 +432,7 @@ def test_tickets_of_a_failed_worker_do_not_wait(stage: Stage) -> None:
     """Nor does localization mode, which asks all of them."""
     system = new_system(Sensor.RGBD)
     play(system, 10)
-    gate = stage.gate("solve_global_bundle", opened=True)
+    gate = stage.gate("solve_full_bundle", opened=True)
     gate.error = RuntimeError("out of order")
     refine(system)
     with pytest.raises(WorkerError):

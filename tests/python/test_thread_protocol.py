@@ -125,7 +125,7 @@ def test_localization_mode_waits_for_no_adjustment_that_is_being_solved(
     slam: System, stage: Stage
 ) -> None:
     """The map stays as it is until the mode ends; the adjustment is not lost."""
-    solve, commit = stage.gate("solve_global_bundle"), stage.gate("commit_global_bundle")
+    solve, commit = stage.gate("solve_full_bundle"), stage.gate("commit_full_bundle")
     refine(slam)
     solve.wait_entered()
     slam.localization_mode = True
@@ -170,7 +170,7 @@ def test_a_loop_closed_at_the_switch_does_not_end_localization_mode(
 def test_an_adjustment_written_at_the_switch_does_not_end_localization_mode(
     slam: System, stage: Stage
 ) -> None:
-    commit = stage.gate("commit_global_bundle")
+    commit = stage.gate("commit_full_bundle")
     refine(slam)
     commit.wait_entered()
     slam.localization_mode = True
@@ -218,7 +218,7 @@ def test_who_waits_for_the_workers_is_told_when_localization_mode_comes_on(
     slam: System, stage: Stage
 ) -> None:
     """What has not been done by then may wait for long."""
-    solve = stage.gate("solve_global_bundle")
+    solve = stage.gate("solve_full_bundle")
     refine(slam)
     solve.wait_entered()
     call = Call(slam.wait_until_idle)
@@ -235,7 +235,7 @@ def test_who_waits_for_the_workers_is_told_when_localization_mode_comes_on(
 def test_a_second_loop_gives_up_the_running_adjustment(slam: System, stage: Stage) -> None:
     """D14-1, D14-2: the original's adjustments share a flag and a truth value as a counter."""
     close = stage.loops(slam)
-    solve = stage.gate("solve_global_bundle")
+    solve = stage.gate("solve_full_bundle")
     close(last_keyframe(slam) - 1)
     solve.wait_entered()
     close(last_keyframe(slam))
@@ -249,7 +249,7 @@ def test_a_second_loop_gives_up_the_running_adjustment(slam: System, stage: Stag
 def test_a_loop_begins_while_an_adjustment_is_written(slam: System, stage: Stage) -> None:
     """D17-2, D14-5, D14-6: the original loses the stop request, and waits for ever."""
     close = stage.loops(slam)
-    commit, plan = stage.gate("commit_global_bundle"), stage.gate("plan_loop_correction")
+    commit, plan = stage.gate("commit_full_bundle"), stage.gate("plan_loop_correction")
     plan.open()
     refine(slam)
     commit.wait_entered()
@@ -260,7 +260,7 @@ def test_a_loop_begins_while_an_adjustment_is_written(slam: System, stage: Stage
     commit.open()
     settle(slam)
     assert slam.n_loops_closed == 1
-    assert stage.journal.index("commit_global_bundle ends") < stage.journal.index(
+    assert stage.journal.index("commit_full_bundle ends") < stage.journal.index(
         "plan_loop_correction begins"
     )
     assert not slam._mapping.worker.pausing
@@ -269,7 +269,7 @@ def test_a_loop_begins_while_an_adjustment_is_written(slam: System, stage: Stage
 def test_no_adjustment_is_written_in_the_middle_of_a_correction(slam: System, stage: Stage) -> None:
     """The correction would undo it, and leave points behind."""
     close = stage.loops(slam)
-    graph, commit = stage.gate("optimize_essential_graph"), stage.gate("commit_global_bundle")
+    graph, commit = stage.gate("optimize_essential_graph"), stage.gate("commit_full_bundle")
     apply = stage.gate("apply_loop_correction", opened=True)
     close(last_keyframe(slam))
     graph.wait_entered()
@@ -281,7 +281,7 @@ def test_no_adjustment_is_written_in_the_middle_of_a_correction(slam: System, st
     call.result()
     settle(slam)
     assert stage.journal.index("apply_loop_correction ends") < stage.journal.index(
-        "commit_global_bundle begins"
+        "commit_full_bundle begins"
     )
 
 
@@ -289,7 +289,7 @@ def test_an_adjustment_that_a_loop_overtook_is_not_written(
     slam: System, stage: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Even if nobody told it: the map has moved as a whole since."""
-    solve = stage.gate("solve_global_bundle")
+    solve = stage.gate("solve_full_bundle")
     refine(slam)
     solve.wait_entered()
     slam._map.count_big_change()
@@ -315,7 +315,7 @@ def test_corrections_do_not_disturb_each_other(slam: System, stage: Stage) -> No
 
 
 def test_tracking_goes_on_while_an_adjustment_is_solved(slam: System, stage: Stage) -> None:
-    solve = stage.gate("solve_global_bundle")
+    solve = stage.gate("solve_full_bundle")
     refine(slam)
     solve.wait_entered()
     records = Call(play, slam, 40, N_FRAMES).result()

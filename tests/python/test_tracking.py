@@ -15,7 +15,7 @@ from orbslam2py import _core
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam import initialization, keyframe_decision, tracking
 from orbslam2py.slam.records import Reason, TrackingState
-from orbslam2py.slam.timing import StageTimer
+from orbslam2py._timing import StageTimer
 from orbslam2py.slam.tracking import Tracking, TrackingOutcome
 
 MAX_FRAMES = 30

@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
-from orbslam2py.slam.records import FrameFeatures
 from orbslam2py.trajectory.trajectory import Trajectory
 
 
@@ -31,9 +30,9 @@ class MapSnapshot:
     """(l, 2) ids of the keyframes that a closed loop connects."""
 
 
-def take_snapshot(world: core.Map) -> MapSnapshot:
+def take_snapshot(slam_map: core.Map) -> MapSnapshot:
     """Copy keyframe poses, points and loop edges in one consistent view."""
-    snapshot = core.snapshot_map(world)
+    snapshot = core.snapshot_map(slam_map)
     keyframes, points = snapshot.keyframes, snapshot.points
     return MapSnapshot(
         keyframe_ids=keyframes.ids,
@@ -45,30 +44,10 @@ def take_snapshot(world: core.Map) -> MapSnapshot:
     )
 
 
-def keyframe_trajectory(world: core.Map) -> Trajectory:
+def keyframe_trajectory(slam_map: core.Map) -> Trajectory:
     """Poses of the keyframes, relative to keyframe 0."""
-    keyframes = core.snapshot_keyframes(world)
+    keyframes = core.snapshot_keyframes(slam_map)
     T_wc = keyframes.T_wc
     if len(T_wc):
         T_wc = np.linalg.inv(T_wc[0]) @ T_wc
     return Trajectory(timestamps=keyframes.timestamps, T_wc=T_wc)
-
-
-def frame_trajectory(recorder: core.TrajectoryRecorder, world: core.Map) -> Trajectory:
-    """Poses of all recorded frames, relative to keyframe 0, after the latest optimisation."""
-    poses = recorder.rebuild(world)
-    return Trajectory(
-        timestamps=poses.timestamps, T_wc=poses.T_wc, lost=poses.lost, indices=poses.frames
-    )
-
-
-def frame_features(frame: core.TrackedFrame) -> FrameFeatures:
-    """Copy the keypoints of a frame and what they were matched to."""
-    ids = frame.map_points
-    return FrameFeatures(
-        keypoints=frame.frame.keypoints,
-        levels=frame.frame.levels,
-        depths=frame.frame.depth,
-        map_point_ids=ids,
-        inliers=(ids >= 0) & (frame.outlier == 0),
-    )

@@ -32,15 +32,24 @@ _log = logging.getLogger(__name__)
 STAGES = ("wait", "extract", "stereo", "predict", "local_map", "keyframe", "track")
 
 
-def prepare_output_folder(folder: Path | None, name: str, *, force: bool) -> Path:
+def new_output_folder(name: str) -> Path:
+    """A folder that does not exist yet: ``runs/<name>-<time>``, below the working folder."""
+    stem = Path("runs") / f"{name}-{time.strftime('%Y%m%d-%H%M%S')}"
+    folder = stem
+    for number in range(2, 100):
+        if not folder.exists():
+            break
+        folder = stem.with_name(f"{stem.name}-{number}")
+    return folder
+
+
+def prepare_output_folder(folder: Path, *, force: bool) -> Path:
     """Make the folder that takes the results, and see that it can be written.
 
     Parameters
     ----------
-    folder : Path, optional
-        The folder; ``runs/<name>-<time>`` if None.
-    name : str
-        Name of the sequence.
+    folder : Path
+        The folder.
     force : bool
         Accept a folder that holds files.
 
@@ -49,13 +58,6 @@ def prepare_output_folder(folder: Path | None, name: str, *, force: bool) -> Pat
     DatasetError
         If it is not empty (without `force`), not a folder, or not writable.
     """
-    if folder is None:
-        stem = Path("runs") / f"{name}-{time.strftime('%Y%m%d-%H%M%S')}"
-        folder = stem
-        for number in range(2, 100):
-            if not folder.exists():
-                break
-            folder = stem.with_name(f"{stem.name}-{number}")
     if folder.exists() and not folder.is_dir():
         raise DatasetError(f"{folder} is not a folder; give another one with --output")
     if folder.exists() and any(folder.iterdir()) and not force:

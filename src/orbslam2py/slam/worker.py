@@ -4,10 +4,10 @@
 With counted pauses, a reset that is served in every state, bounded waits, and errors that reach
 the caller.
 
-The protocol follows section 6 of the thread specification: nobody waits for somebody who waits
-for him, because pauses are counted tickets, a reset is acknowledged while paused as well, and no
-lock of the map is held while waiting. A worker can also run inline (``threaded=False``): the same
-steps in the caller's thread, which makes two runs equal.
+Nobody waits for somebody who waits for him, because pauses are counted tickets, a reset is
+acknowledged while paused as well, and no lock of the map is held while waiting. A worker can also
+run inline (``threaded=False``): the same steps in the caller's thread, which makes two runs equal.
+The whole protocol: ``docs/method/threads.md#workers``.
 """
 
 from __future__ import annotations
@@ -395,21 +395,3 @@ class Worker(Generic[Job]):
             with self._condition:
                 self._busy = False
                 self._condition.notify_all()
-
-
-class CallGuard:
-    """Allows one call at a time; a second one raises instead of waiting."""
-
-    def __init__(self, what: str) -> None:
-        self._what = what
-        self._lock = threading.Lock()
-
-    @contextlib.contextmanager
-    def __call__(self) -> Iterator[None]:
-        """Enter the guarded call."""
-        if not self._lock.acquire(blocking=False):
-            raise StateError(f"{self._what} is already running in another thread")
-        try:
-            yield
-        finally:
-            self._lock.release()

@@ -8,8 +8,7 @@
 namespace orbslam::testing {
 namespace {
 
-// ---- recent points (spec 13, section 4)
-// ----------------------------------------------------------
+// ---- recent points -----------------------------------------------------------------------------
 
 struct RecentCase {
   int age;          ///< of the current keyframe against the point's first one
@@ -62,8 +61,7 @@ TEST(RecentPoints, DeadOnesAreDroppedAndTheOrderStays) {
   EXPECT_EQ(recent, (std::vector<MapPointId>{points[0], points[2], points[3]}));
 }
 
-// ---- keyframes (spec 13, section 7)
-// --------------------------------------------------------------
+// ---- keyframes ---------------------------------------------------------------------------------
 
 constexpr int kPoints = 100;
 

@@ -46,7 +46,7 @@ struct OracleResidual {
   }
 };
 
-/// Spec 16, section 3, with Ceres instead of our own solver.
+/// The rounds of optimize_pose() with Ceres instead of our own solver.
 PoseEstimate solve_with_ceres(const PoseProblem& problem) {
   PoseEstimate estimate;
   estimate.outlier.assign(problem.observations.size(), 0);

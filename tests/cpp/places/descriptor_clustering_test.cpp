@@ -84,7 +84,8 @@ TEST(ClusterDescriptors, FewDescriptorsAreAClusterEach) {
 }
 
 TEST(ClusterDescriptors, NoClusterIsEverEmpty) {
-  // Majority centres can drift away from all members (D11-4); many small random problems meet it.
+  // Majority centres can drift away from all members; the original then goes on with an empty
+  // centre and crashes. Many small random problems meet it.
   std::mt19937_64 random(11);
   for (int round = 0; round < 300; ++round) {
     Problem problem;

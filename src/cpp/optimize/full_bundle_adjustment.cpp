@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "optimize/global_bundle_adjustment.hpp"
+#include "optimize/full_bundle_adjustment.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -25,8 +25,8 @@ bool is_finite(const BundleProblem& problem) {
 
 }  // namespace
 
-BundleSummary solve_global_bundle(GatheredBundle& bundle, const GlobalBundleOptions& options,
-                                  const std::atomic<bool>* abort, int n_threads) {
+BundleSummary solve_full_bundle(GatheredBundle& bundle, const FullBundleOptions& options,
+                                const std::atomic<bool>* abort, int n_threads) {
   BundleOptions solver;
   solver.robust_iterations = options.iterations;
   solver.final_iterations = 0;
@@ -41,15 +41,15 @@ BundleSummary solve_global_bundle(GatheredBundle& bundle, const GlobalBundleOpti
   return summary;
 }
 
-GlobalBundleResult global_bundle_adjustment(Map& map, const GlobalBundleOptions& options,
-                                            const std::atomic<bool>* abort, int n_threads) {
-  GlobalBundleResult result;
-  GatheredBundle bundle = gather_global_bundle(map);
+FullBundleResult full_bundle_adjustment(Map& map, const FullBundleOptions& options,
+                                        const std::atomic<bool>* abort, int n_threads) {
+  FullBundleResult result;
+  GatheredBundle bundle = gather_full_bundle(map);
   result.n_keyframes = static_cast<int>(bundle.keyframes.size());
   result.n_points = static_cast<int>(bundle.points.size());
   result.n_observations = static_cast<int>(bundle.problem.observations.size());
-  result.summary = solve_global_bundle(bundle, options, abort, n_threads);
-  result.committed = commit_global_bundle(map, bundle).committed;
+  result.summary = solve_full_bundle(bundle, options, abort, n_threads);
+  result.committed = commit_full_bundle(map, bundle).committed;
   return result;
 }
 

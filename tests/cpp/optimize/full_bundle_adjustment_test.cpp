@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "optimize/global_bundle_adjustment.hpp"
+#include "optimize/full_bundle_adjustment.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -65,12 +65,12 @@ class Row {
   }
 };
 
-TEST(GlobalBundleAdjustment, RefinesAllKeyframesAndPoints) {
+TEST(FullBundleAdjustment, RefinesAllKeyframesAndPoints) {
   Row row(6);
   ASSERT_EQ(row.map.n_keyframes(), 5U);
   const auto big_changes = row.map.big_change_index();
   const std::size_t n_points = row.map.n_points();
-  const GlobalBundleResult result = global_bundle_adjustment(row.map, {}, nullptr);
+  const FullBundleResult result = full_bundle_adjustment(row.map, {}, nullptr);
   EXPECT_TRUE(result.committed);
   EXPECT_EQ(result.n_keyframes, 6);
   EXPECT_EQ(result.n_points, static_cast<int>(n_points));
@@ -92,15 +92,15 @@ TEST(GlobalBundleAdjustment, RefinesAllKeyframesAndPoints) {
   }
 }
 
-TEST(GlobalBundleAdjustment, ManyKeyframesTakeTheSparseSolver) {
+TEST(FullBundleAdjustment, ManyKeyframesTakeTheSparseSolver) {
   Row row(40, 0.05, 150);
-  const GlobalBundleResult result = global_bundle_adjustment(row.map, {10, false}, nullptr);
+  const FullBundleResult result = full_bundle_adjustment(row.map, {10, false}, nullptr);
   EXPECT_TRUE(result.committed);
   EXPECT_EQ(result.n_keyframes, 40);
   EXPECT_LT(row.largest_error(), 1e-3);
 }
 
-TEST(GlobalBundleAdjustment, KernelLimitsTheInfluenceOfAWrongObservation) {
+TEST(FullBundleAdjustment, KernelLimitsTheInfluenceOfAWrongObservation) {
   double errors[2];
   for (const bool robust : {false, true}) {
     Row row(4);
@@ -112,23 +112,23 @@ TEST(GlobalBundleAdjustment, KernelLimitsTheInfluenceOfAWrongObservation) {
     row.map.add_observation(a, KeyFrameId(2), 50);
     row.map.add_observation(b, KeyFrameId(2), 10);
     const std::size_t n_before = row.map.find(a)->observations.size();
-    ASSERT_TRUE(global_bundle_adjustment(row.map, {20, robust}, nullptr).committed);
+    ASSERT_TRUE(full_bundle_adjustment(row.map, {20, robust}, nullptr).committed);
     errors[robust ? 1 : 0] = row.largest_error();
     EXPECT_EQ(row.map.find(a)->observations.size(), n_before);  // nothing is erased
   }
   EXPECT_LT(errors[1], 0.2 * errors[0]);
 }
 
-TEST(GlobalBundleAdjustment, StopsAfterTheGivenIterations) {
+TEST(FullBundleAdjustment, StopsAfterTheGivenIterations) {
   Row row(6);
-  EXPECT_EQ(global_bundle_adjustment(row.map, {1, true}, nullptr).summary.iterations, 1);
+  EXPECT_EQ(full_bundle_adjustment(row.map, {1, true}, nullptr).summary.iterations, 1);
 }
 
-TEST(GlobalBundleAdjustment, AbortKeepsTheMapAsItWas) {
+TEST(FullBundleAdjustment, AbortKeepsTheMapAsItWas) {
   Row raised(5);
   const std::uint64_t before = content_hash(raised.map);
   const std::atomic<bool> abort{true};
-  const GlobalBundleResult result = global_bundle_adjustment(raised.map, {}, &abort);
+  const FullBundleResult result = full_bundle_adjustment(raised.map, {}, &abort);
   EXPECT_TRUE(result.summary.aborted);
   EXPECT_FALSE(result.committed);
   EXPECT_EQ(content_hash(raised.map), before);
@@ -141,14 +141,14 @@ TEST(GlobalBundleAdjustment, AbortKeepsTheMapAsItWas) {
       later = true;
     });
     const std::uint64_t hash = content_hash(row.map);
-    const GlobalBundleResult interrupted = global_bundle_adjustment(row.map, {}, &later);
+    const FullBundleResult interrupted = full_bundle_adjustment(row.map, {}, &later);
     other.join();
     EXPECT_EQ(interrupted.committed, !interrupted.summary.aborted);
     EXPECT_EQ(interrupted.committed, content_hash(row.map) != hash);
   }
 }
 
-TEST(GlobalBundleAdjustment, ResetDuringTheWorkDropsTheResult) {
+TEST(FullBundleAdjustment, ResetDuringTheWorkDropsTheResult) {
   for (int delay = 0; delay < 10; ++delay) {
     Row row(8);
     std::thread other([&] {
@@ -158,13 +158,13 @@ TEST(GlobalBundleAdjustment, ResetDuringTheWorkDropsTheResult) {
       row.map.add_keyframe(make_raster_frame(0, 10), Pose());
       row.map.add_keyframe(make_raster_frame(1, 10), Pose());
     });
-    global_bundle_adjustment(row.map, {}, nullptr);
+    full_bundle_adjustment(row.map, {}, nullptr);
     other.join();
     EXPECT_EQ(row.map.find(KeyFrameId(1))->T_cw.matrix(), Pose().matrix());
   }
 }
 
-TEST(GlobalBundleAdjustment, KeyframesThatNoPointTiesToTheOthersFollow) {
+TEST(FullBundleAdjustment, KeyframesThatNoPointTiesToTheOthersFollow) {
   Row row(4);
   const KeyFrameId blind =
       row.map.add_keyframe(make_raster_frame(9, 10), Pose::exp(Vector6d::Constant(0.3)));
@@ -176,12 +176,12 @@ TEST(GlobalBundleAdjustment, KeyframesThatNoPointTiesToTheOthersFollow) {
   const Pose T_own = row.map.find(own)->T_cw * row.map.find(blind)->T_cw.inverse();
   const Eigen::Vector3d p_own = row.map.find(own)->T_cw * row.map.find(point)->position;
 
-  const GatheredBundle bundle = gather_global_bundle(row.map);
+  const GatheredBundle bundle = gather_full_bundle(row.map);
   EXPECT_EQ(bundle.n_fixed(), 1);
   EXPECT_EQ(bundle.keyframes.size(), 4U);
   EXPECT_EQ(bundle.camera_of.count(blind) + bundle.camera_of.count(own), 0U);
   EXPECT_EQ(bundle.points.back().value + 1, point.value);
-  ASSERT_TRUE(global_bundle_adjustment(row.map, {}, nullptr).committed);
+  ASSERT_TRUE(full_bundle_adjustment(row.map, {}, nullptr).committed);
   const auto& map = row.map;
   EXPECT_TRUE((T_blind * before.T_cw).matrix().isApprox(map.find(blind)->T_cw.matrix(), 1e-12));
   EXPECT_TRUE(
@@ -189,18 +189,18 @@ TEST(GlobalBundleAdjustment, KeyframesThatNoPointTiesToTheOthersFollow) {
   EXPECT_TRUE((map.find(own)->T_cw * map.find(point)->position).isApprox(p_own, 1e-12));
 }
 
-TEST(GlobalBundleAdjustment, EmptyMapIsLeftAlone) {
+TEST(FullBundleAdjustment, EmptyMapIsLeftAlone) {
   Map map;
-  const GlobalBundleResult result = global_bundle_adjustment(map, {}, nullptr);
+  const FullBundleResult result = full_bundle_adjustment(map, {}, nullptr);
   EXPECT_FALSE(result.committed);
   EXPECT_EQ(result.n_keyframes, 0);
   EXPECT_EQ(result.n_points, 0);
 }
 
-TEST(GlobalBundleAdjustment, RepeatsBitByBit) {
+TEST(FullBundleAdjustment, RepeatsBitByBit) {
   Row a(6), b(6);
-  global_bundle_adjustment(a.map, {}, nullptr);
-  global_bundle_adjustment(b.map, {}, nullptr);
+  full_bundle_adjustment(a.map, {}, nullptr);
+  full_bundle_adjustment(b.map, {}, nullptr);
   EXPECT_EQ(content_hash(a.map), content_hash(b.map));
 }
 

@@ -8,7 +8,7 @@
 
 #include "map/content_hash.hpp"
 #include "map/invariants.hpp"
-#include "optimize/global_bundle_adjustment.hpp"
+#include "optimize/full_bundle_adjustment.hpp"
 #include "optimize/local_bundle_adjustment.hpp"
 #include "support/loop_map.hpp"
 
@@ -28,22 +28,22 @@ LoopMapOptions small_loop() {
 
 /// Robustified cost of a map, as full bundle adjustment sees it.
 double cost_of(const Map& map) {
-  GatheredBundle bundle = gather_global_bundle(map);
+  GatheredBundle bundle = gather_full_bundle(map);
   const std::atomic<bool> abort{true};
-  return solve_global_bundle(bundle, {}, &abort, 1).initial_cost;
+  return solve_full_bundle(bundle, {}, &abort, 1).initial_cost;
 }
 
 KeyFrameId kf(std::int64_t value) { return KeyFrameId(value); }
 
-class GlobalBundleCommitting : public ::testing::Test {
+class FullBundleCommitting : public ::testing::Test {
  protected:
   LoopMap loop{small_loop()};
   Map& map = loop.map;
-  GatheredBundle bundle = gather_global_bundle(map);
+  GatheredBundle bundle = gather_full_bundle(map);
   const double cost_before = cost_of(map);
 
   void SetUp() override {
-    const BundleSummary summary = solve_global_bundle(bundle, {}, nullptr, 1);
+    const BundleSummary summary = solve_full_bundle(bundle, {}, nullptr, 1);
     ASSERT_TRUE(bundle.solved);
     ASSERT_LT(summary.final_cost, 0.95 * summary.initial_cost);
   }
@@ -85,7 +85,7 @@ class GlobalBundleCommitting : public ::testing::Test {
   void expect_not_committed() {
     const std::uint64_t before = content_hash(map);
     const std::uint64_t big_changes = map.big_change_index();
-    EXPECT_FALSE(commit_global_bundle(map, bundle).committed);
+    EXPECT_FALSE(commit_full_bundle(map, bundle).committed);
     EXPECT_EQ(content_hash(map), before);
     EXPECT_EQ(map.big_change_index(), big_changes);
   }
@@ -106,9 +106,9 @@ class GlobalBundleCommitting : public ::testing::Test {
   }
 };
 
-TEST_F(GlobalBundleCommitting, MovesTheMapInOneBigChange) {
+TEST_F(FullBundleCommitting, MovesTheMapInOneBigChange) {
   const std::uint64_t big_changes = map.big_change_index();
-  const GlobalBundleCommit commit = commit_global_bundle(map, bundle);
+  const FullBundleCommit commit = commit_full_bundle(map, bundle);
   EXPECT_TRUE(commit.committed);
   EXPECT_EQ(commit.n_followed_keyframes, 0);
   EXPECT_EQ(commit.n_followed_points, 0);
@@ -117,12 +117,12 @@ TEST_F(GlobalBundleCommitting, MovesTheMapInOneBigChange) {
   EXPECT_LT(cost_of(map), cost_before);
 }
 
-TEST_F(GlobalBundleCommitting, ResultIsUsedOnce) {
-  ASSERT_TRUE(commit_global_bundle(map, bundle).committed);
+TEST_F(FullBundleCommitting, ResultIsUsedOnce) {
+  ASSERT_TRUE(commit_full_bundle(map, bundle).committed);
   expect_not_committed();
 }
 
-TEST_F(GlobalBundleCommitting, KeyframesAndPointsMadeMeanwhileFollow) {
+TEST_F(FullBundleCommitting, KeyframesAndPointsMadeMeanwhileFollow) {
   const KeyFrameId added = add_keyframe(true);
   const KeyFrameId parent = map.find(added)->parent;
   ASSERT_TRUE(parent.valid());
@@ -136,7 +136,7 @@ TEST_F(GlobalBundleCommitting, KeyframesAndPointsMadeMeanwhileFollow) {
   const Pose T_added = relative(added, parent), T_below = relative(below, added);
   const Eigen::Vector3d p_added = map.find(added)->T_cw * map.find(point)->position;
 
-  const GlobalBundleCommit commit = commit_global_bundle(map, bundle);
+  const FullBundleCommit commit = commit_full_bundle(map, bundle);
   EXPECT_TRUE(commit.committed);
   EXPECT_EQ(commit.n_followed_keyframes, 2);
   EXPECT_EQ(commit.n_followed_points, 1);
@@ -147,22 +147,22 @@ TEST_F(GlobalBundleCommitting, KeyframesAndPointsMadeMeanwhileFollow) {
   EXPECT_TRUE((map.find(added)->T_cw * map.find(point)->position).isApprox(p_added, 1e-12));
 }
 
-TEST_F(GlobalBundleCommitting, WhatIsNotPublishedFollowsTheKeyframeBeforeIt) {
+TEST_F(FullBundleCommitting, WhatIsNotPublishedFollowsTheKeyframeBeforeIt) {
   const KeyFrameId first = add_keyframe(false), second = add_keyframe(false);
   const Pose T_first = relative(first, kf(59)), T_second = relative(second, first);
-  EXPECT_EQ(commit_global_bundle(map, bundle).n_followed_keyframes, 2);
+  EXPECT_EQ(commit_full_bundle(map, bundle).n_followed_keyframes, 2);
   expect_committed();
   expect_equal(relative(first, kf(59)), T_first);
   expect_equal(relative(second, first), T_second);
 }
 
-TEST_F(GlobalBundleCommitting, TheDeadStayDead) {
+TEST_F(FullBundleCommitting, TheDeadStayDead) {
   ASSERT_TRUE(map.erase_keyframe(kf(30)));
   const MapPointId erased = bundle.points[200];
   map.erase_point(erased);
   const KeyFrameId heir = map.living(kf(30));
   const Pose T_dead = map.T_cw(kf(30)) * map.find(heir)->T_cw.inverse();
-  EXPECT_TRUE(commit_global_bundle(map, bundle).committed);
+  EXPECT_TRUE(commit_full_bundle(map, bundle).committed);
   expect_committed(1);
   EXPECT_EQ(map.find(kf(30)), nullptr);
   EXPECT_EQ(map.find(erased), nullptr);
@@ -170,26 +170,26 @@ TEST_F(GlobalBundleCommitting, TheDeadStayDead) {
   EXPECT_LT(cost_of(map), cost_before);
 }
 
-TEST_F(GlobalBundleCommitting, ADeadParentDoesNotLoseTheKeyframeMadeMeanwhile) {
+TEST_F(FullBundleCommitting, ADeadParentDoesNotLoseTheKeyframeMadeMeanwhile) {
   const KeyFrameId added = add_keyframe(true);
   const KeyFrameId dying = map.find(added)->parent;
   ASSERT_TRUE(map.erase_keyframe(dying));
   const KeyFrameId parent = map.find(added)->parent;
   const Pose T_added = relative(added, parent);
-  EXPECT_EQ(commit_global_bundle(map, bundle).n_followed_keyframes, 1);
+  EXPECT_EQ(commit_full_bundle(map, bundle).n_followed_keyframes, 1);
   expect_committed(1);
   expect_equal(relative(added, parent), T_added);
 }
 
-TEST_F(GlobalBundleCommitting, WinsOverLocalBundleAdjustment) {
+TEST_F(FullBundleCommitting, WinsOverLocalBundleAdjustment) {
   ASSERT_TRUE(local_bundle_adjustment(map, kf(40), nullptr).committed);
   ASSERT_NE(map.find(kf(40))->T_cw.matrix(), solved(kf(40)).matrix());
-  EXPECT_TRUE(commit_global_bundle(map, bundle).committed);
+  EXPECT_TRUE(commit_full_bundle(map, bundle).committed);
   expect_committed();
   EXPECT_LT(cost_of(map), cost_before);
 }
 
-TEST_F(GlobalBundleCommitting, PointsMadeMeanwhileStayBeforeTheirReferenceKeyframe) {
+TEST_F(FullBundleCommitting, PointsMadeMeanwhileStayBeforeTheirReferenceKeyframe) {
   const MapPointId gone = map.find(kf(50))->map_points[3];
   const Eigen::Vector3d place = map.find(gone)->position;
   map.erase_point(gone);
@@ -197,60 +197,60 @@ TEST_F(GlobalBundleCommitting, PointsMadeMeanwhileStayBeforeTheirReferenceKeyfra
   map.add_observation(point, kf(50), 3);
   map.update_point(point);
   const Eigen::Vector3d p_c = map.find(kf(50))->T_cw * place;
-  const GlobalBundleCommit commit = commit_global_bundle(map, bundle);
+  const FullBundleCommit commit = commit_full_bundle(map, bundle);
   EXPECT_EQ(commit.n_followed_points, 1);
   expect_committed();
   EXPECT_GT((map.find(point)->position - place).norm(), 1e-6);
   EXPECT_TRUE((map.find(kf(50))->T_cw * map.find(point)->position).isApprox(p_c, 1e-12));
 }
 
-TEST_F(GlobalBundleCommitting, AClearedMapStaysAsItIs) {
+TEST_F(FullBundleCommitting, AClearedMapStaysAsItIs) {
   map.clear();
   map.add_keyframe(make_raster_frame(0, 10), Pose());
   expect_not_committed();
 }
 
-TEST_F(GlobalBundleCommitting, ALoopClosedMeanwhileIsNotTornOpen) {
+TEST_F(FullBundleCommitting, ALoopClosedMeanwhileIsNotTornOpen) {
   map.count_big_change();
   expect_not_committed();
 }
 
-TEST_F(GlobalBundleCommitting, UnsolvedBundlesAreNotCommitted) {
-  bundle = gather_global_bundle(map);
+TEST_F(FullBundleCommitting, UnsolvedBundlesAreNotCommitted) {
+  bundle = gather_full_bundle(map);
   expect_not_committed();
   const std::atomic<bool> abort{true};
-  solve_global_bundle(bundle, {}, &abort, 1);
+  solve_full_bundle(bundle, {}, &abort, 1);
   expect_not_committed();
-  GlobalBundleOptions none;
+  FullBundleOptions none;
   none.iterations = 0;
-  solve_global_bundle(bundle, none, nullptr, 1);
+  solve_full_bundle(bundle, none, nullptr, 1);
   expect_not_committed();
 }
 
-TEST_F(GlobalBundleCommitting, ResultsThatAreNotFiniteAreNotCommitted) {
-  bundle = gather_global_bundle(map);
+TEST_F(FullBundleCommitting, ResultsThatAreNotFiniteAreNotCommitted) {
+  bundle = gather_full_bundle(map);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   bundle.problem.cameras[7].T_cw = Pose(Eigen::Quaterniond::Identity(), {nan, 0, 0});
-  solve_global_bundle(bundle, {}, nullptr, 1);
+  solve_full_bundle(bundle, {}, nullptr, 1);
   EXPECT_FALSE(bundle.solved);
   expect_not_committed();
 }
 
-TEST_F(GlobalBundleCommitting, IsTheSameForTheSameChanges) {
+TEST_F(FullBundleCommitting, IsTheSameForTheSameChanges) {
   LoopMap other(small_loop());
-  GatheredBundle again = gather_global_bundle(other.map);
-  solve_global_bundle(again, {}, nullptr, 1);
+  GatheredBundle again = gather_full_bundle(other.map);
+  solve_full_bundle(again, {}, nullptr, 1);
   for (Map* changed : {&map, &other.map}) {
     changed->erase_keyframe(kf(20));
     changed->publish(
         changed->add_keyframe(make_raster_frame(100, 10, 3), changed->find(kf(59))->T_cw));
   }
-  ASSERT_TRUE(commit_global_bundle(map, bundle).committed);
-  ASSERT_TRUE(commit_global_bundle(other.map, again).committed);
+  ASSERT_TRUE(commit_full_bundle(map, bundle).committed);
+  ASSERT_TRUE(commit_full_bundle(other.map, again).committed);
   EXPECT_EQ(content_hash(map), content_hash(other.map));
 }
 
-TEST_F(GlobalBundleCommitting, TakesInWhatChangesWhileItIsPrepared) {
+TEST_F(FullBundleCommitting, TakesInWhatChangesWhileItIsPrepared) {
   std::atomic<bool> stop{false};
   std::vector<KeyFrameId> added;
   std::thread tracker([&] {
@@ -266,7 +266,7 @@ TEST_F(GlobalBundleCommitting, TakesInWhatChangesWhileItIsPrepared) {
       added.push_back(id);
     }
   });
-  const bool committed = commit_global_bundle(map, bundle).committed;
+  const bool committed = commit_full_bundle(map, bundle).committed;
   stop = true;
   tracker.join();
   ASSERT_TRUE(committed);
@@ -280,12 +280,12 @@ TEST_F(GlobalBundleCommitting, TakesInWhatChangesWhileItIsPrepared) {
   }
 }
 
-TEST(GlobalBundleTimeLimit, NoTimeNoChange) {
+TEST(FullBundleTimeLimit, NoTimeNoChange) {
   LoopMap loop(small_loop());
   const std::uint64_t before = content_hash(loop.map);
-  GlobalBundleOptions options;
+  FullBundleOptions options;
   options.max_seconds = 1e-9;
-  const GlobalBundleResult result = global_bundle_adjustment(loop.map, options, nullptr);
+  const FullBundleResult result = full_bundle_adjustment(loop.map, options, nullptr);
   EXPECT_TRUE(result.summary.timed_out);
   EXPECT_FALSE(result.summary.aborted);
   EXPECT_EQ(result.summary.iterations, 0);
@@ -293,22 +293,22 @@ TEST(GlobalBundleTimeLimit, NoTimeNoChange) {
   EXPECT_EQ(content_hash(loop.map), before);
 }
 
-TEST(GlobalBundleTimeLimit, EnoughTimeChangesNothing) {
+TEST(FullBundleTimeLimit, EnoughTimeChangesNothing) {
   LoopMap a(small_loop()), b(small_loop());
-  GlobalBundleOptions options;
-  global_bundle_adjustment(a.map, options, nullptr);
+  FullBundleOptions options;
+  full_bundle_adjustment(a.map, options, nullptr);
   options.max_seconds = 1e4;
-  EXPECT_FALSE(global_bundle_adjustment(b.map, options, nullptr).summary.timed_out);
+  EXPECT_FALSE(full_bundle_adjustment(b.map, options, nullptr).summary.timed_out);
   EXPECT_EQ(content_hash(a.map), content_hash(b.map));
 }
 
-TEST(GlobalBundleTimeLimit, WhatWasReachedIsUsed) {
+TEST(FullBundleTimeLimit, WhatWasReachedIsUsed) {
   for (double seconds = 0.002; seconds < 20; seconds *= 1.3) {
     LoopMap loop(small_loop());
     const double before = cost_of(loop.map);
-    GlobalBundleOptions options;
+    FullBundleOptions options;
     options.max_seconds = seconds;
-    const GlobalBundleResult result = global_bundle_adjustment(loop.map, options, nullptr);
+    const FullBundleResult result = full_bundle_adjustment(loop.map, options, nullptr);
     ASSERT_EQ(result.committed, result.summary.iterations > 0);
     if (!result.summary.timed_out) break;  // from here on there is always enough time
     if (result.summary.iterations == 0) continue;
@@ -319,7 +319,7 @@ TEST(GlobalBundleTimeLimit, WhatWasReachedIsUsed) {
   GTEST_SKIP() << "no limit fell between the first step and the last";
 }
 
-TEST(GlobalBundleLoop, SpreadsWhatTheLoopHasLeft) {
+TEST(FullBundleLoop, SpreadsWhatTheLoopHasLeft) {
   for (const double depth_limit : {8.0, 0.0}) {
     LoopMapOptions options = small_loop();
     options.n_keyframes = 120;
@@ -328,7 +328,7 @@ TEST(GlobalBundleLoop, SpreadsWhatTheLoopHasLeft) {
     options.depth_limit = depth_limit;
     LoopMap loop(options);
     const double cost = cost_of(loop.map), error = loop.point_error();
-    const GlobalBundleResult result = global_bundle_adjustment(loop.map, {}, nullptr);
+    const FullBundleResult result = full_bundle_adjustment(loop.map, {}, nullptr);
     ASSERT_TRUE(result.committed);
     EXPECT_LT(result.summary.final_cost, 0.5 * cost);
     EXPECT_NEAR(cost_of(loop.map), result.summary.final_cost, 1e-6 * cost);

@@ -9,7 +9,7 @@
 
 namespace orbslam {
 
-struct GlobalBundleOptions {
+struct FullBundleOptions {
   int iterations = 10;  ///< accepted steps at most
   bool robust = true;   ///< Huber kernel on all observations
   /// No iteration is begun that would probably end later; 0: no limit, and the result does not
@@ -17,20 +17,23 @@ struct GlobalBundleOptions {
   double max_seconds = 0;
 };
 
-struct GlobalBundleResult {
+struct FullBundleResult {
   int n_keyframes = 0;  ///< cameras, fixed ones included
   int n_points = 0, n_observations = 0;
   bool committed = false;  ///< the map was changed
   BundleSummary summary;
 };
 
-/// Spec 16, section 4: refines all keyframes, unpublished ones included, and all points; the first
-/// keyframe is fixed and no observation is erased. One after the other the three steps below.
-/// After an abort, or when the map was cleared meanwhile, the map stays as it was.
-GlobalBundleResult global_bundle_adjustment(Map& map, const GlobalBundleOptions& options,
-                                            const std::atomic<bool>* abort, int n_threads = 1);
+/// Full bundle adjustment: refines all keyframes, unpublished ones included, and all points; the
+/// first keyframe is fixed and no observation is erased. One after the other the three steps below.
+/// `abort` is polled once per iteration; nullptr: never. After an abort, or when the map was
+/// cleared meanwhile, the map stays as it was. See
+/// docs/method/adjustment.md#full-bundle-adjustment.
+FullBundleResult full_bundle_adjustment(Map& map, const FullBundleOptions& options,
+                                        const std::atomic<bool>* abort, int n_threads = 1);
 
-// Its steps, for those that let the map change between them (spec 14, section 5).
+// Its steps, for those that let the map change between them: after a loop, tracking and mapping go
+// on while it is solved. See docs/method/loops.md#after-a-loop.
 
 /// All keyframes that are tied to each other by points, and these points. Others (a keyframe that
 /// was just inserted and has not been processed) are left out: nothing says where they are relative
@@ -38,14 +41,14 @@ GlobalBundleResult global_bundle_adjustment(Map& map, const GlobalBundleOptions&
 /// of the bundle is fixed: it is keyframe 0 unless that one has lost its points. Takes the read
 /// lock in short sections, so that tracking does not wait for a large map; what changes between
 /// them is taken as it is found.
-GatheredBundle gather_global_bundle(const Map& map);
+GatheredBundle gather_full_bundle(const Map& map);
 
 /// Solves a gathered bundle in place, without a lock. It counts as solved, and may be committed,
 /// unless there was no step that lowered the cost, the result is not finite or `abort` was raised.
-BundleSummary solve_global_bundle(GatheredBundle& bundle, const GlobalBundleOptions& options,
-                                  const std::atomic<bool>* abort, int n_threads);
+BundleSummary solve_full_bundle(GatheredBundle& bundle, const FullBundleOptions& options,
+                                const std::atomic<bool>* abort, int n_threads);
 
-struct GlobalBundleCommit {
+struct FullBundleCommit {
   bool committed = false;  ///< the map was changed
   /// Moved along with others, because they were not in the bundle (made meanwhile, mostly).
   int n_followed_keyframes = 0, n_followed_points = 0;
@@ -60,6 +63,6 @@ struct GlobalBundleCommit {
 ///
 /// Nothing is changed when the bundle is not solved, when the map was cleared since, and when
 /// another big change has happened since (a loop closed meanwhile would be torn open again).
-GlobalBundleCommit commit_global_bundle(Map& map, const GatheredBundle& bundle);
+FullBundleCommit commit_full_bundle(Map& map, const GatheredBundle& bundle);
 
 }  // namespace orbslam

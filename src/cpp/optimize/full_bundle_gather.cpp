@@ -4,7 +4,7 @@
 #include <numeric>
 #include <vector>
 
-#include "optimize/global_bundle_adjustment.hpp"
+#include "optimize/full_bundle_adjustment.hpp"
 
 namespace orbslam {
 namespace {
@@ -98,7 +98,7 @@ void gather_points(const Map& map, const std::vector<MapPointId>& ids, GatheredB
 
 }  // namespace
 
-GatheredBundle gather_global_bundle(const Map& map) {
+GatheredBundle gather_full_bundle(const Map& map) {
   GatheredBundle bundle(map);
   std::vector<MapPointId> points;
   {

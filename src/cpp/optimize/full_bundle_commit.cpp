@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "map/map_rewrite.hpp"
-#include "optimize/global_bundle_adjustment.hpp"
+#include "optimize/full_bundle_adjustment.hpp"
 
 namespace orbslam {
 namespace {
@@ -15,7 +15,7 @@ constexpr int kPreparations = 3;
 /// The map's new geometry, and the version of the map that it was worked out for.
 struct Preparation {
   MapRewrite rewrite;
-  GlobalBundleCommit counts;
+  FullBundleCommit counts;
   std::uint64_t structure_version = 0, geometry_version = 0;
 
   bool fits(const Map& map) const {
@@ -107,7 +107,7 @@ bool is_outdated(const GatheredBundle& bundle, const Map& map) {
 
 }  // namespace
 
-GlobalBundleCommit commit_global_bundle(Map& map, const GatheredBundle& bundle) {
+FullBundleCommit commit_full_bundle(Map& map, const GatheredBundle& bundle) {
   if (!bundle.solved) return {};
   for (int i = 1;; ++i) {
     Preparation prepared;

@@ -11,7 +11,7 @@
 #include <memory>
 #include <thread>
 
-#include "optimize/global_bundle_adjustment.hpp"
+#include "optimize/full_bundle_adjustment.hpp"
 #include "support/loop_map.hpp"
 
 namespace {
@@ -56,26 +56,26 @@ LoopMapOptions loop_options(const benchmark::State& state, bool monocular) {
   return options;
 }
 
-GlobalBundleOptions bundle_options(bool robust) {
-  GlobalBundleOptions options;
+FullBundleOptions bundle_options(bool robust) {
+  FullBundleOptions options;
   options.robust = robust;
   return options;
 }
 
-void BM_GlobalBundle(benchmark::State& state, bool monocular, bool robust) {
+void BM_FullBundle(benchmark::State& state, bool monocular, bool robust) {
   for (auto _ : state) {
     LoopMap loop(loop_options(state, monocular));
     state.counters["error_before_m"] = loop.pose_error();
     const Stopwatch gathering;
-    GatheredBundle bundle = gather_global_bundle(loop.map);
+    GatheredBundle bundle = gather_full_bundle(loop.map);
     state.counters["gather_ms"] = 1e3 * gathering.seconds();
     const Stopwatch solving;
-    const BundleSummary summary = solve_global_bundle(bundle, bundle_options(robust), nullptr, 1);
+    const BundleSummary summary = solve_full_bundle(bundle, bundle_options(robust), nullptr, 1);
     state.counters["solve_s"] = solving.seconds();
     state.counters["solve_wall_s"] = solving.wall_seconds();
     write_sections = {};
     const Stopwatch committing;
-    if (!commit_global_bundle(loop.map, bundle).committed) state.SkipWithError("not committed");
+    if (!commit_full_bundle(loop.map, bundle).committed) state.SkipWithError("not committed");
     state.counters["commit_ms"] = 1e3 * committing.seconds();
     state.counters["write_ms"] = 1e3 * write_sections.longest;
     state.counters["write_wall_ms"] = 1e3 * write_sections.wall_longest;
@@ -90,14 +90,14 @@ void BM_GlobalBundle(benchmark::State& state, bool monocular, bool robust) {
 
 #define SIZES Arg(250)->Arg(500)->Arg(1000)->Arg(2000)->Arg(4000)
 #define ONCE UseManualTime()->Iterations(1)->Unit(benchmark::kMillisecond)
-BENCHMARK_CAPTURE(BM_GlobalBundle, stereo, false, true)->SIZES->ONCE;
-BENCHMARK_CAPTURE(BM_GlobalBundle, mono, true, true)->SIZES->ONCE;
-BENCHMARK_CAPTURE(BM_GlobalBundle, stereo_without_kernel, false, false)->Arg(1000)->ONCE;
+BENCHMARK_CAPTURE(BM_FullBundle, stereo, false, true)->SIZES->ONCE;
+BENCHMARK_CAPTURE(BM_FullBundle, mono, true, true)->SIZES->ONCE;
+BENCHMARK_CAPTURE(BM_FullBundle, stereo_without_kernel, false, false)->Arg(1000)->ONCE;
 
 /// From raising the flag until the solver returns, raised at moments spread over a run.
 void BM_AbortLatency(benchmark::State& state) {
   const LoopMap loop(loop_options(state, false));
-  const GatheredBundle gathered = gather_global_bundle(loop.map);
+  const GatheredBundle gathered = gather_full_bundle(loop.map);
   double longest = 0, longest_wall = 0, sum = 0;
   int n = 0;
   for (auto _ : state) {
@@ -114,7 +114,7 @@ void BM_AbortLatency(benchmark::State& state) {
         wall_raised = run.wall_seconds();
         abort = true;
       });
-      const bool aborted = solve_global_bundle(bundle, bundle_options(true), &abort, 1).aborted;
+      const bool aborted = solve_full_bundle(bundle, bundle_options(true), &abort, 1).aborted;
       const double returned = run.seconds(), wall_returned = run.wall_seconds();
       done = true;
       other.join();
