@@ -3,7 +3,6 @@
 // ORBSLAM2PY_BENCH_FEATURES the number of features; without them a synthetic image and 1000.
 #include <benchmark/benchmark.h>
 
-#include <algorithm>
 #include <cstdlib>
 #include <fstream>
 #include <opencv2/core.hpp>
@@ -19,6 +18,7 @@
 #include "features/orientation.hpp"
 #include "features/pyramid_builder.hpp"
 #include "features/quadtree.hpp"
+#include "measure.hpp"
 
 namespace orbslam {
 namespace {
@@ -67,27 +67,15 @@ int n_features() {
   return named ? std::atoi(named) : 1000;
 }
 
-double percentile(std::vector<double> values, double fraction) {
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(fraction * static_cast<double>(values.size() - 1))];
-}
-
 const Kernels& kernels_of(const benchmark::State& state) {
   return choose_kernels(state.range(0) == 0 ? KernelChoice::portable : KernelChoice::automatic);
 }
 
+/// Names the kernels that the benchmark runs with.
 template <class Body>
-void measure(benchmark::State& state, Body body) {
-  std::vector<double> milliseconds;
+void measure_kernels(benchmark::State& state, Body body) {
   state.SetLabel(kernels_of(state).name);
-  for (auto _ : state) {
-    const auto before = cv::getTickCount();
-    body();
-    milliseconds.push_back(1e3 * static_cast<double>(cv::getTickCount() - before) /
-                           cv::getTickFrequency());
-  }
-  state.counters["median_ms"] = percentile(milliseconds, 0.5);
-  state.counters["p99_ms"] = percentile(milliseconds, 0.99);
+  measure(state, body);
 }
 
 /// What each stage gets from the one before.
@@ -120,19 +108,19 @@ void extract(benchmark::State& state) {
   options.n_features = n_features();
   OrbExtractor extractor(options,
                          state.range(0) == 0 ? KernelChoice::portable : KernelChoice::automatic);
-  measure(state, [&] { benchmark::DoNotOptimize(extractor.extract(image())); });
+  measure_kernels(state, [&] { benchmark::DoNotOptimize(extractor.extract(image())); });
 }
 
 void pyramid(benchmark::State& state) {
   PyramidBuilder builder;
-  measure(state, [&] {
+  measure_kernels(state, [&] {
     benchmark::DoNotOptimize(builder.build(image(), prepared().scales, kernels_of(state)));
   });
 }
 
 void corners(benchmark::State& state) {
   CornerGrid grid;
-  measure(state, [&] {
+  measure_kernels(state, [&] {
     for (const cv::Mat& level : prepared().pyramid.levels) {
       benchmark::DoNotOptimize(grid.detect(level, 20, 7, LevelMask{}, kernels_of(state)));
     }
@@ -142,7 +130,7 @@ void corners(benchmark::State& state) {
 void quadtree(benchmark::State& state) {
   Quadtree tree;
   const Prepared& given = prepared();
-  measure(state, [&] {
+  measure_kernels(state, [&] {
     for (std::size_t level = 0; level < given.corners.size(); ++level) {
       const cv::Mat& grey = given.pyramid.levels[level];
       benchmark::DoNotOptimize(tree.distribute(given.corners[level], grey.cols - 32, grey.rows - 32,
@@ -153,7 +141,7 @@ void quadtree(benchmark::State& state) {
 
 void blur(benchmark::State& state) {
   GaussianBlur gaussian;
-  measure(state, [&] {
+  measure_kernels(state, [&] {
     for (const cv::Mat& level : prepared().pyramid.levels) {
       benchmark::DoNotOptimize(gaussian.blur(level, kernels_of(state)));
     }
@@ -173,7 +161,7 @@ void for_each_kept(const std::vector<cv::Mat>& levels, Body body) {
 }
 
 void orientation(benchmark::State& state) {
-  measure(state, [&] {
+  measure_kernels(state, [&] {
     for_each_kept(prepared().pyramid.levels, [&](const std::uint8_t* centre, auto stride) {
       std::int32_t m10 = 0, m01 = 0;
       kernels_of(state).moments(centre, stride, &m10, &m01);
@@ -185,7 +173,7 @@ void orientation(benchmark::State& state) {
 
 void descriptors(benchmark::State& state) {
   std::uint8_t descriptor[32];
-  measure(state, [&] {
+  measure_kernels(state, [&] {
     for_each_kept(prepared().blurred, [&](const std::uint8_t* centre, auto stride) {
       kernels_of(state).brief(centre, stride, 0.6F, 0.8F, descriptor);
       benchmark::DoNotOptimize(descriptor);

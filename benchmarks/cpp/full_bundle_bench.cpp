@@ -5,12 +5,12 @@
 #include <benchmark/benchmark.h>
 #include <dlfcn.h>
 #include <pthread.h>
-#include <time.h>
 
 #include <chrono>
 #include <memory>
 #include <thread>
 
+#include "measure.hpp"
 #include "optimize/full_bundle_adjustment.hpp"
 #include "support/loop_map.hpp"
 
@@ -20,11 +20,7 @@ using namespace orbslam;
 using testing::LoopMap;
 using testing::LoopMapOptions;
 
-double seconds_of(clockid_t clock) {
-  timespec now{};
-  clock_gettime(clock, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
+double seconds_of(clockid_t clock) { return 1e-3 * milliseconds_of(clock); }
 
 /// Write sections of this thread: the longest, in seconds of its processor time and of the wall.
 struct WriteSections {
@@ -38,7 +34,8 @@ LockFunction next(const char* name) {
   return reinterpret_cast<LockFunction>(dlsym(RTLD_NEXT, name));
 }
 
-class Stopwatch {
+/// Time of the process and of the wall.
+class BothClocks {
  public:
   double seconds() const { return seconds_of(CLOCK_PROCESS_CPUTIME_ID) - began_; }
   double wall_seconds() const { return seconds_of(CLOCK_MONOTONIC) - wall_began_; }
@@ -66,15 +63,15 @@ void BM_FullBundle(benchmark::State& state, bool monocular, bool robust) {
   for (auto _ : state) {
     LoopMap loop(loop_options(state, monocular));
     state.counters["error_before_m"] = loop.pose_error();
-    const Stopwatch gathering;
+    const BothClocks gathering;
     GatheredBundle bundle = gather_full_bundle(loop.map);
     state.counters["gather_ms"] = 1e3 * gathering.seconds();
-    const Stopwatch solving;
+    const BothClocks solving;
     const BundleSummary summary = solve_full_bundle(bundle, bundle_options(robust), nullptr, 1);
     state.counters["solve_s"] = solving.seconds();
     state.counters["solve_wall_s"] = solving.wall_seconds();
     write_sections = {};
-    const Stopwatch committing;
+    const BothClocks committing;
     if (!commit_full_bundle(loop.map, bundle).committed) state.SkipWithError("not committed");
     state.counters["commit_ms"] = 1e3 * committing.seconds();
     state.counters["write_ms"] = 1e3 * write_sections.longest;
@@ -104,7 +101,7 @@ void BM_AbortLatency(benchmark::State& state) {
     for (double part = 0.05; part < 4; part += 0.25) {
       GatheredBundle bundle = gathered;
       std::atomic<bool> abort{false}, done{false};
-      const Stopwatch run;
+      const BothClocks run;
       double raised = 0, wall_raised = 0;
       std::thread other([&] {
         while (!done && run.seconds() < part) {

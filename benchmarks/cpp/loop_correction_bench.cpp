@@ -3,26 +3,22 @@
 // about 16 keyframes. Applying is told apart into what is done under the read lock (prepare) and
 // under the write lock (write). Median and least milliseconds of processor time over six maps.
 #include <benchmark/benchmark.h>
-#include <time.h>
 
-#include <algorithm>
 #include <memory>
-#include <string>
+#include <vector>
 
 #include "loops/prepared_correction.hpp"
 #include "loops/ring_scene.hpp"
+#include "measure.hpp"
 
 namespace orbslam {
 namespace {
 
 using testing::RingOptions;
 using testing::RingScene;
+
 /// Processor time of this thread.
-double milliseconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
-}
+double milliseconds() { return milliseconds_of(CLOCK_THREAD_CPUTIME_ID); }
 
 std::unique_ptr<RingScene> make_scene(int n_keyframes, bool monocular) {
   RingOptions options;
@@ -35,12 +31,6 @@ std::unique_ptr<RingScene> make_scene(int n_keyframes, bool monocular) {
   options.turn_drift = 0.05 / n_keyframes;
   options.log_scale_drift = monocular ? 0.2 / n_keyframes : 0;
   return std::make_unique<RingScene>(options);
-}
-
-void report(benchmark::State& state, const std::string& name, std::vector<double> times) {
-  std::sort(times.begin(), times.end());
-  state.counters[name + "_ms"] = times[times.size() / 2];
-  state.counters[name + "_least_ms"] = times.front();
 }
 
 void BM_CorrectLoop(benchmark::State& state) {
@@ -64,9 +54,9 @@ void BM_CorrectLoop(benchmark::State& state) {
     state.counters["fused"] = result.n_fused;
     state.counters["group"] = static_cast<double>(correction.group.size());
   }
-  report(state, "plan", plan);
-  report(state, "prepare", prepare);
-  report(state, "write", write);
+  report_times(state, plan, "plan_");
+  report_times(state, prepare, "prepare_");
+  report_times(state, write, "write_");
 }
 BENCHMARK(BM_CorrectLoop)
     ->ArgNames({"keyframes", "monocular"})

@@ -7,7 +7,6 @@
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <memory>
 #include <random>
@@ -15,6 +14,7 @@
 
 #include "keyframe_ring.hpp"
 #include "loops/loop_detection.hpp"
+#include "measure.hpp"
 #include "places/place_recognition.hpp"
 
 namespace orbslam {
@@ -63,28 +63,21 @@ void BM_DetectLoop(benchmark::State& state) {
   Revisit scene(n, state.range(1) != 0);
   const KeyFrameId last(n - 1);
   LoopConsistency consistency;
-  std::vector<double> milliseconds;
   std::size_t n_candidates = 0, n_consistent = 0;
-  for (auto _ : state) {
+  const auto unknown = [&] {
     scene.index.erase(last);
-    const auto begin = std::chrono::steady_clock::now();
-    const double least_score = lowest_neighbour_score(scene.map, last);
+    return last;
+  };
+  measure_prepared(state, unknown, [&](KeyFrameId keyframe) {
+    const double least_score = lowest_neighbour_score(scene.map, keyframe);
     std::vector<KeyFrameId> candidates;
-    for (const auto& c : find_loop_candidates(scene.index, scene.map, last, least_score)) {
+    for (const auto& c : find_loop_candidates(scene.index, scene.map, keyframe, least_score)) {
       candidates.push_back(c.keyframe);
     }
     n_consistent = consistency.update(scene.map, candidates).size();
-    index_keyframe(scene.index, scene.map, last);
-    const std::chrono::duration<double, std::milli> taken =
-        std::chrono::steady_clock::now() - begin;
-    milliseconds.push_back(taken.count());
-    state.SetIterationTime(1e-3 * taken.count());
+    index_keyframe(scene.index, scene.map, keyframe);
     n_candidates = candidates.size();
-  }
-  std::sort(milliseconds.begin(), milliseconds.end());
-  state.counters["median_ms"] = milliseconds[milliseconds.size() / 2];
-  state.counters["min_ms"] = milliseconds.front();
-  state.counters["p99_ms"] = milliseconds[milliseconds.size() * 99 / 100];
+  });
   state.counters["candidates"] = static_cast<double>(n_candidates);
   state.counters["consistent"] = static_cast<double>(n_consistent);
   state.counters["words"] = static_cast<double>(scene.map.find(last)->frame->words.words.size());

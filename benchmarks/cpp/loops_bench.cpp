@@ -2,8 +2,6 @@
 // Loops: verification of one candidate, and how far drift may have carried the map.
 #include <benchmark/benchmark.h>
 
-#include <algorithm>
-#include <chrono>
 #include <vector>
 
 #include "keyframe_ring.hpp"
@@ -54,34 +52,23 @@ BENCHMARK(BM_VerifyLoopCandidate)
     ->ArgsProduct({{0, 50, 80, 100}, {0, 1}})
     ->Unit(benchmark::kMillisecond);
 
+void sizes_of_map(benchmark::internal::Benchmark* bench) {
+  bench->ArgName("keyframes")->ArgsProduct({{250, 500, 1000, 2000, 4000}});
+  bench->Iterations(100)->Unit(benchmark::kMillisecond);
+}
+
 void BM_AssessDrift(benchmark::State& state) {
   const KeyFrameRing ring(state.range(0));
   measure(state,
           [&] { benchmark::DoNotOptimize(assess_drift(ring.map, ring.loops.front(), true)); });
 }
-BENCHMARK(BM_AssessDrift)
-    ->ArgName("keyframes")
-    ->Arg(250)
-    ->Arg(500)
-    ->Arg(1000)
-    ->Arg(2000)
-    ->Arg(4000)
-    ->Iterations(100)
-    ->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_AssessDrift)->Apply(sizes_of_map);
 
 void BM_ChooseLoopOfEight(benchmark::State& state) {
   const KeyFrameRing ring(state.range(0));
   measure(state, [&] { benchmark::DoNotOptimize(choose_loop(ring.map, ring.loops, true)); });
 }
-BENCHMARK(BM_ChooseLoopOfEight)
-    ->ArgName("keyframes")
-    ->Arg(250)
-    ->Arg(500)
-    ->Arg(1000)
-    ->Arg(2000)
-    ->Arg(4000)
-    ->Iterations(100)
-    ->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_ChooseLoopOfEight)->Apply(sizes_of_map);
 
 }  // namespace
 }  // namespace orbslam

@@ -2,10 +2,9 @@
 // The verbs of the map on a map of 80 keyframes with 1000 keypoints each.
 #include <benchmark/benchmark.h>
 
-#include <algorithm>
-#include <chrono>
 #include <memory>
 #include <random>
+#include <utility>
 
 #include "map/content_hash.hpp"
 #include "map/culling.hpp"
@@ -13,6 +12,7 @@
 #include "map/keyframe_insertion.hpp"
 #include "map/local_map.hpp"
 #include "map/snapshot.hpp"
+#include "measure.hpp"
 
 namespace orbslam {
 namespace {
@@ -81,39 +81,15 @@ std::unique_ptr<Map> make_map() {
   return map;
 }
 
-/// Runs `step`, which returns seconds, and reports median and 99th percentile besides the mean.
-template <class Step>
-void run(benchmark::State& state, Step&& step) {
-  std::vector<double> seconds;
-  for (auto iteration : state) {
-    static_cast<void>(iteration);
-    seconds.push_back(step());
-    state.SetIterationTime(seconds.back());
-  }
-  std::sort(seconds.begin(), seconds.end());
-  const auto quantile = [&](double q) {
-    return 1e3 * seconds[static_cast<std::size_t>(q * static_cast<double>(seconds.size() - 1))];
-  };
-  state.counters["median_ms"] = quantile(0.5);
-  state.counters["p99_ms"] = quantile(0.99);
-}
-
-template <class Step>
-double seconds_of(Step&& step) {
-  const auto begin = std::chrono::steady_clock::now();
-  step();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-}
-
 void BM_SelectLocalMap(benchmark::State& state) {
   const auto map = make_map();
   TrackedFrame frame = track(*map, kKeyFrames, true);
   LocalMap local;
-  run(state, [&] { return seconds_of([&] { local = select_local_map(*map, frame); }); });
+  measure(state, [&] { local = select_local_map(*map, frame); });
   state.counters["keyframes"] = static_cast<double>(local.keyframes.size());
   state.counters["points"] = static_cast<double>(local.points.size());
 }
-BENCHMARK(BM_SelectLocalMap)->UseManualTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_SelectLocalMap)->Unit(benchmark::kMillisecond);
 
 void BM_SelectWholeMap(benchmark::State& state) {
   // Points of all ages, so that all 80 keyframes are voted for.
@@ -124,90 +100,87 @@ void BM_SelectWholeMap(benchmark::State& state) {
     frame.map_points[i] = ids[i * ids.size() / kKeypoints];
   }
   LocalMap local;
-  run(state, [&] { return seconds_of([&] { local = select_local_map(*map, frame); }); });
+  measure(state, [&] { local = select_local_map(*map, frame); });
   state.counters["keyframes"] = static_cast<double>(local.keyframes.size());
   state.counters["points"] = static_cast<double>(local.points.size());
 }
-BENCHMARK(BM_SelectWholeMap)->UseManualTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_SelectWholeMap)->Unit(benchmark::kMillisecond);
 
 void BM_GatherThousandPoints(benchmark::State& state) {
   const auto map = make_map();
   const TrackedFrame frame = track(*map, kKeyFrames, true);
-  run(state, [&] {
-    return seconds_of([&] { benchmark::DoNotOptimize(gather_points(*map, frame.map_points)); });
-  });
+  measure(state, [&] { benchmark::DoNotOptimize(gather_points(*map, frame.map_points)); });
 }
-BENCHMARK(BM_GatherThousandPoints)->UseManualTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_GatherThousandPoints)->Unit(benchmark::kMillisecond);
 
 void BM_InsertKeyframe(benchmark::State& state) {
-  run(state, [&] {
-    const auto map = make_map();
-    TrackedFrame frame = track(*map, kKeyFrames, false);
-    return seconds_of([&] { insert_keyframe(*map, frame, true); });
-  });
+  measure_prepared(
+      state,
+      [] {
+        auto map = make_map();
+        TrackedFrame frame = track(*map, kKeyFrames, false);
+        return std::pair(std::move(map), std::move(frame));
+      },
+      [](auto& given) { insert_keyframe(*given.first, given.second, true); });
 }
 BENCHMARK(BM_InsertKeyframe)->UseManualTime()->Unit(benchmark::kMillisecond)->Iterations(30);
 
 void BM_ProcessNewKeyframe(benchmark::State& state) {
-  run(state, [&] {
-    const auto map = make_map();
-    TrackedFrame frame = track(*map, kKeyFrames, true);
-    const KeyFrameId id = insert_keyframe(*map, frame, true);
-    std::vector<MapPointId> recent;
-    return seconds_of([&] { process_new_keyframe(*map, id, recent); });
-  });
+  measure_prepared(
+      state,
+      [] {
+        auto map = make_map();
+        TrackedFrame frame = track(*map, kKeyFrames, true);
+        const KeyFrameId id = insert_keyframe(*map, frame, true);
+        return std::pair(std::move(map), id);
+      },
+      [](auto& given) {
+        std::vector<MapPointId> recent;
+        process_new_keyframe(*given.first, given.second, recent);
+      });
 }
 BENCHMARK(BM_ProcessNewKeyframe)->UseManualTime()->Unit(benchmark::kMillisecond)->Iterations(30);
 
 void BM_UpdateConnections(benchmark::State& state) {
   const auto map = make_map();
-  run(state, [&] { return seconds_of([&] { map->update_connections(KeyFrameId(40)); }); });
+  measure(state, [&] { map->update_connections(KeyFrameId(40)); });
 }
-BENCHMARK(BM_UpdateConnections)->UseManualTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_UpdateConnections)->Unit(benchmark::kMillisecond);
 
 void BM_UpdateThousandPoints(benchmark::State& state) {
   const auto map = make_map();
   const auto slots = map->find(KeyFrameId(60))->map_points;
-  run(state, [&] {
-    return seconds_of([&] {
-      for (const MapPointId id : slots) map->update_point(id);
-    });
+  measure(state, [&] {
+    for (const MapPointId id : slots) map->update_point(id);
   });
 }
-BENCHMARK(BM_UpdateThousandPoints)->UseManualTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_UpdateThousandPoints)->Unit(benchmark::kMillisecond);
 
 void BM_CullKeyframes(benchmark::State& state) {
   double n_died = 0;
-  run(state, [&] {
-    const auto map = make_map();
-    return seconds_of([&] {
-      n_died = static_cast<double>(cull_keyframes(*map, KeyFrameId(kKeyFrames - 1), true).size());
-    });
+  measure_prepared(state, make_map, [&](auto& map) {
+    n_died = static_cast<double>(cull_keyframes(*map, KeyFrameId(kKeyFrames - 1), true).size());
   });
   state.counters["died"] = n_died;
 }
 BENCHMARK(BM_CullKeyframes)->UseManualTime()->Unit(benchmark::kMillisecond)->Iterations(30);
 
 void BM_EraseKeyframe(benchmark::State& state) {  // the longest write section of culling
-  run(state, [&] {
-    const auto map = make_map();
-    return seconds_of([&] { map->erase_keyframe(KeyFrameId(40)); });
-  });
+  measure_prepared(state, make_map, [](auto& map) { map->erase_keyframe(KeyFrameId(40)); });
 }
 BENCHMARK(BM_EraseKeyframe)->UseManualTime()->Unit(benchmark::kMillisecond)->Iterations(30);
 
 void BM_SnapshotPoints(benchmark::State& state) {
   const auto map = make_map();
-  run(state, [&] { return seconds_of([&] { benchmark::DoNotOptimize(snapshot_points(*map)); }); });
+  measure(state, [&] { benchmark::DoNotOptimize(snapshot_points(*map)); });
 }
-BENCHMARK(BM_SnapshotPoints)->UseManualTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_SnapshotPoints)->Unit(benchmark::kMillisecond);
 
 void BM_CheckInvariants(benchmark::State& state) {
   const auto map = make_map();
-  run(state,
-      [&] { return seconds_of([&] { benchmark::DoNotOptimize(check_invariants(*map, false)); }); });
+  measure(state, [&] { benchmark::DoNotOptimize(check_invariants(*map, false)); });
 }
-BENCHMARK(BM_CheckInvariants)->UseManualTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_CheckInvariants)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace orbslam

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <benchmark/benchmark.h>
-#include <time.h>
 
 #include <algorithm>
-#include <chrono>
 #include <memory>
 #include <vector>
 
@@ -13,40 +11,13 @@
 #include "matching/for_initialization.hpp"
 #include "matching/for_triangulation.hpp"
 #include "matching/fuse.hpp"
+#include "measure.hpp"
 #include "support/synthetic_frames.hpp"
 
 namespace {
 
 using namespace orbslam;
 using namespace orbslam::testing;
-
-/// Processor time of this thread [ms]: the better measure while other programs run.
-double thread_milliseconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
-}
-
-/// Runs `work` on what `prepare` returns (not timed), reports the median and 99th percentile.
-template <class Prepare, class Work>
-void measure(benchmark::State& state, Prepare prepare, Work work) {
-  std::vector<double> milliseconds, cpu;
-  for (auto _ : state) {
-    auto input = prepare();
-    const double cpu_begin = thread_milliseconds();
-    const auto begin = std::chrono::steady_clock::now();
-    work(input);
-    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;
-    state.SetIterationTime(taken.count());
-    milliseconds.push_back(1e3 * taken.count());
-    cpu.push_back(thread_milliseconds() - cpu_begin);
-  }
-  std::sort(milliseconds.begin(), milliseconds.end());
-  std::sort(cpu.begin(), cpu.end());
-  state.counters["median_ms"] = milliseconds[milliseconds.size() / 2];
-  state.counters["cpu_median_ms"] = cpu[cpu.size() / 2];
-  state.counters["p99_ms"] = milliseconds[milliseconds.size() * 99 / 100];
-}
 
 /// Sizes of a KITTI keyframe (2000 features) or a TUM one (1000).
 struct Size {
@@ -201,7 +172,7 @@ void match_last_frame(benchmark::State& state, const Size& size) {
   const TrackedFrame current = tracked_frame(world, world.random_pose(), 0);
   const PointBatch points = gather_points(*world.map, last.map_points);
   int n = 0;
-  measure(
+  measure_prepared(
       state, [&] { return current; },
       [&](TrackedFrame& frame) { n = match_last_frame(frame, last, points, 15, true); });
   state.counters["points"] = static_cast<double>(points.size());
@@ -215,7 +186,7 @@ void match_local_map(benchmark::State& state, const Size& size, float radius_fac
   const TrackedFrame current = tracked_frame(world, world.random_pose(), size.n_observed / 2);
   const PointBatch points = gather_points(*world.map, world.living_points());
   LocalMapMatches matches;
-  measure(
+  measure_prepared(
       state, [&] { return current; },
       [&](TrackedFrame& frame) { matches = match_local_map(frame, points, {}, radius_factor); });
   state.counters["points"] = static_cast<double>(points.size());
@@ -229,7 +200,7 @@ void match_keyframe_by_words(benchmark::State& state, const Size& size) {
   World world(size, 10);
   const TrackedFrame current = tracked_frame(world, world.random_pose(), 0);
   int n = 0;
-  measure(
+  measure_prepared(
       state, [&] { return current; },
       [&](TrackedFrame& frame) {
         n = match_keyframe_by_words(*world.map, world.last_keyframe(), frame, 0.7F);
@@ -248,7 +219,7 @@ void match_for_initialization(benchmark::State& state, const Size& size) {
   for (const Keypoint& keypoint : initial->keypoints) {
     positions.emplace_back(keypoint.x, keypoint.y);
   }
-  measure(
+  measure_prepared(
       state, [&] { return positions; },
       [&](std::vector<Eigen::Vector2f>& previous) {
         match_for_initialization(*initial, *current, previous, 100, 0.9F);
@@ -258,7 +229,7 @@ BENCHMARK_CAPTURE(match_for_initialization, tum, kTum)->UseManualTime();
 
 void create_new_points(benchmark::State& state, const Size& size) {
   std::size_t n = 0;
-  measure(
+  measure_prepared(
       state, [&] { return std::make_unique<World>(size, 30); },
       [&](std::unique_ptr<World>& world) {
         n = create_new_points(*world->map, world->last_keyframe(), {}, nullptr).size();
@@ -277,7 +248,7 @@ BENCHMARK_CAPTURE(create_new_points, tum, kTum)
 // `settled`: everything has been fused before, so that only the searches cost.
 void fuse_with_neighbours(benchmark::State& state, const Size& size, bool settled) {
   int changes = 0;
-  measure(
+  measure_prepared(
       state,
       [&] {
         auto world = std::make_unique<World>(size, 80);

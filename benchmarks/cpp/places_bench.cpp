@@ -3,11 +3,11 @@
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <random>
 
+#include "measure.hpp"
 #include "places/vocabulary.hpp"
 #include "places/vocabulary_training.hpp"
 
@@ -61,13 +61,6 @@ const Vocabulary& tree(int depth) {
   return depth == 5 ? *small : *large;
 }
 
-/// Median and 99th percentile beside Google Benchmark's mean, in milliseconds.
-void report(benchmark::State& state, std::vector<double>& milliseconds) {
-  std::sort(milliseconds.begin(), milliseconds.end());
-  state.counters["median_ms"] = milliseconds[milliseconds.size() / 2];
-  state.counters["p99_ms"] = milliseconds[milliseconds.size() * 99 / 100];
-}
-
 void transform(benchmark::State& state) {
   const Vocabulary& vocabulary = tree(static_cast<int>(state.range(0)));
   const auto n = static_cast<std::size_t>(state.range(1));
@@ -75,15 +68,8 @@ void transform(benchmark::State& state) {
   for (std::uint64_t seed = 0; seed < 16; ++seed) images.push_back(clustered(n, seed));
   WordVector words;
   DirectIndex index;
-  std::vector<double> milliseconds;
   std::size_t image = 0;
-  for (auto _ : state) {
-    const auto begin = std::chrono::steady_clock::now();
-    vocabulary.transform(images[image++ % images.size()], words, index);
-    const auto end = std::chrono::steady_clock::now();
-    milliseconds.push_back(std::chrono::duration<double, std::milli>(end - begin).count());
-  }
-  report(state, milliseconds);
+  measure(state, [&] { vocabulary.transform(images[image++ % images.size()], words, index); });
 }
 BENCHMARK(transform)
     ->ArgNames({"depth", "features"})

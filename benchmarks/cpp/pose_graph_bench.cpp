@@ -4,11 +4,11 @@
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <random>
 #include <vector>
 
+#include "measure.hpp"
 #include "optimize/pose_graph.hpp"
 
 namespace {
@@ -43,12 +43,12 @@ PoseGraph round_trip(std::uint32_t n) {
       Similarity(scale, Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero()) * S_true[n - 1];
 
   PoseGraph graph;
-  const auto measure = [&](std::uint32_t i, std::uint32_t j, const std::vector<Similarity>& S) {
+  const auto add_edge = [&](std::uint32_t i, std::uint32_t j, const std::vector<Similarity>& S) {
     graph.edges.push_back({i, j, S[j] * S[i].inverse()});
   };
   for (std::uint32_t i = 1; i < n; ++i) {
     const std::uint32_t neighbours = 3 + static_cast<std::uint32_t>(random() % 4);
-    for (std::uint32_t k = 1; k <= std::min(i, neighbours); ++k) measure(i, i - k, S_iw);
+    for (std::uint32_t k = 1; k <= std::min(i, neighbours); ++k) add_edge(i, i - k, S_iw);
   }
   graph.S_iw = S_iw;
   graph.fixed.assign(n, 0);
@@ -57,7 +57,7 @@ PoseGraph round_trip(std::uint32_t n) {
     graph.S_iw[i] = S_iw[i] * S_iw[n - 1].inverse() * S_loop;
   }
   for (std::uint32_t k = 0; k < kLoop; ++k) {
-    measure(n - 1 - k / 2, k - k / 2, graph.S_iw);
+    add_edge(n - 1 - k / 2, k - k / 2, graph.S_iw);
   }
   return graph;
 }
@@ -67,20 +67,10 @@ void BM_OptimizePoseGraph(benchmark::State& state) {
   PoseGraphOptions options;
   options.fix_scale = state.range(1) != 0;
   options.eigen_cholesky = state.range(2) != 0;
-  PoseGraph graph;
   PoseGraphSummary summary;
-  std::vector<double> milliseconds;
-  for (auto _ : state) {
-    graph = start;
-    const auto begin = std::chrono::steady_clock::now();
-    summary = optimize_pose_graph(graph, options, nullptr);
-    const std::chrono::duration<double, std::milli> taken =
-        std::chrono::steady_clock::now() - begin;
-    milliseconds.push_back(taken.count());
-  }
-  std::sort(milliseconds.begin(), milliseconds.end());
-  state.counters["median_ms"] = milliseconds[milliseconds.size() / 2];
-  state.counters["min_ms"] = milliseconds.front();
+  measure_prepared(
+      state, [&] { return start; },
+      [&](PoseGraph& graph) { summary = optimize_pose_graph(graph, options, nullptr); });
   state.counters["iterations"] = summary.iterations;
   state.counters["cost_before"] = summary.initial_cost;
   state.counters["cost_after"] = summary.final_cost;
@@ -88,6 +78,7 @@ void BM_OptimizePoseGraph(benchmark::State& state) {
 BENCHMARK(BM_OptimizePoseGraph)
     ->ArgNames({"keyframes", "fix_scale", "eigen"})
     ->ArgsProduct({{250, 500, 1000, 2000, 4000}, {0, 1}, {0, 1}})
+    ->UseManualTime()
     ->Unit(benchmark::kMillisecond);
 
 }  // namespace

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <benchmark/benchmark.h>
 
-#include <algorithm>
-#include <chrono>
-#include <vector>
-
+#include "measure.hpp"
 #include "synthetic/paths.hpp"
 #include "synthetic/world.hpp"
 
@@ -12,22 +9,12 @@ namespace {
 
 using namespace orbslam::synthetic;
 
-/// Renders one pose after the other; reports the median and the 99th percentile per image.
+/// Renders one pose after the other.
 template <class PoseAt>
 void render_along(benchmark::State& state, const World& world, const RenderOptions& options,
                   PoseAt pose_at) {
-  std::vector<double> milliseconds;
   int i = 0;
-  for (auto _ : state) {
-    const auto begin = std::chrono::steady_clock::now();
-    benchmark::DoNotOptimize(render(world, pose_at(i++).inverse(), options));
-    const std::chrono::duration<double, std::milli> taken =
-        std::chrono::steady_clock::now() - begin;
-    milliseconds.push_back(taken.count());
-  }
-  std::sort(milliseconds.begin(), milliseconds.end());
-  state.counters["median_ms"] = milliseconds[milliseconds.size() / 2];
-  state.counters["p99_ms"] = milliseconds[milliseconds.size() * 99 / 100];
+  measure(state, [&] { benchmark::DoNotOptimize(render(world, pose_at(i++).inverse(), options)); });
 }
 
 void room_640x480(benchmark::State& state) {

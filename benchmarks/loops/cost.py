@@ -97,10 +97,10 @@ def _correction(build: Path) -> list[Step]:
         parts = ("plan", "prepare", "write")
         whole.add(
             n,
-            sum(record[f"{part}_ms"] for part in parts),
-            sum(record[f"{part}_least_ms"] for part in parts),
+            sum(record[f"{part}_median_ms"] for part in parts),
+            sum(record[f"{part}_min_ms"] for part in parts),
         )
-        lock.add(n, record["write_ms"], record["write_least_ms"])
+        lock.add(n, record["write_median_ms"], record["write_min_ms"])
     return [whole, lock]
 
 
