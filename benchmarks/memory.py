@@ -116,11 +116,9 @@ def main() -> None:
     parser = new_parser(__doc__)
     add_counts(
         parser,
-        [
-            ("frames", 100_000, "images shown"),
-            ("views", 40, "different images along the path"),
-            ("every", 10_000, "frames between two samples"),
-        ],
+        frames=(100_000, "images shown"),
+        views=(40, "different images along the path"),
+        every=(10_000, "frames between two samples"),
     )
     parser.add_argument("--deterministic", action="store_true", help="map inline, no threads")
     parser.add_argument("--json", type=Path, help="also write the figures here")

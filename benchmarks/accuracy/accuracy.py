@@ -139,10 +139,8 @@ def main() -> None:
     parser = new_parser(__doc__)
     add_counts(
         parser,
-        [
-            ("runs", 5, "threaded runs; seeds of one camera"),
-            ("starts", 5, "first frames of deterministic runs"),
-        ],
+        runs=(5, "threaded runs; seeds of one camera"),
+        starts=(5, "first frames of deterministic runs"),
     )
     parser.add_argument("--only", choices=("mono", "depth"), help="one of the two tables")
     add_width(parser)

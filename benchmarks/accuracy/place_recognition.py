@@ -104,7 +104,7 @@ def main() -> None:
         default=[default_vocabulary_path()],
         help="files to compare [the package's]",
     )
-    add_counts(parser, [("features", 1000, "features per image")])
+    add_counts(parser, features=(1000, "features per image"))
     add_width(parser, 160)
     arguments = parser.parse_args()
     sets = [

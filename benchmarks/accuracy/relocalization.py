@@ -303,8 +303,7 @@ def main() -> None:
     parser.add_argument("--frames", type=int, help="mapped frames [all, localization: 200]")
     parser.add_argument("--count", type=int, help="tries, or foreign images")
     add_counts(
-        parser,
-        [("beyond", 60, "frames past the end of the map"), ("seed", 0, "of all random draws")],
+        parser, beyond=(60, "frames past the end of the map"), seed=(0, "of all random draws")
     )
     arguments = parser.parse_args()
     counts = {"kidnap": 20, "recall": 300, "foreign": 1000}

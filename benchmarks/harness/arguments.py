@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
@@ -45,10 +44,11 @@ def add_sensors(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--sensors", nargs="+", choices=SENSORS, default=SENSORS, help="[all]")
 
 
-def add_counts(parser: argparse.ArgumentParser, counts: Sequence[tuple[str, int, str]]) -> None:
-    """Options that count something: name, default, help."""
-    for name, default, words in counts:
-        parser.add_argument(f"--{name}", type=int, default=default, help=f"{words} [{default}]")
+def add_counts(parser: argparse.ArgumentParser, **counts: tuple[int, str]) -> None:
+    """Options that count something: default and help by name."""
+    for name, (default, words) in counts.items():
+        option = f"--{name.replace('_', '-')}"
+        parser.add_argument(option, type=int, default=default, help=f"{words} [{default}]")
 
 
 def console_of(arguments: argparse.Namespace) -> Console:

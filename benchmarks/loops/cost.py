@@ -21,7 +21,7 @@ from benchmarks.harness import reference
 from benchmarks.harness.arguments import add_build, add_width, console_of, new_parser
 from benchmarks.harness.folders import how_to_build
 from benchmarks.harness.machine import print_machine
-from benchmarks.harness.runs import benchmark_records, run_module
+from benchmarks.harness.runs import Record, benchmark_records, run_module
 from benchmarks.harness.steps import Row, steps_table
 from benchmarks.harness.tables import new_table
 from benchmarks.harness.yardstick import Times, Yardstick
@@ -61,13 +61,18 @@ class Step:
 
 
 # ---- the steps -----------------------------------------------------------------------------------
+def _measured(step: Step, found: dict[str, Record], name: str) -> Step:
+    """Fill a step with the records of a benchmark; `name` has a place for the size."""
+    for n in SIZES:
+        record = found[name.format(n)]
+        step.add(n, record["median_ms"], record["min_ms"])
+    return step
+
+
 def _detection(build: Path) -> list[Step]:
     found = benchmark_records(build, "loop_detection_bench", "BM_DetectLoop")
     step = Step("detection", "at a place seen before; in a new one about half")
-    for n in SIZES:
-        record = found[f"BM_DetectLoop/keyframes:{n}/known:1"]
-        step.add(n, record["median_ms"], record["min_ms"])
-    return [step]
+    return [_measured(step, found, "BM_DetectLoop/keyframes:{}/known:1")]
 
 
 def _verification(build: Path) -> list[Step]:
@@ -108,10 +113,7 @@ def _essential_graph(build: Path) -> list[Step]:
     pattern = "BM_OptimizePoseGraph/.*fix_scale:0/eigen:0"
     found = benchmark_records(build, "pose_graph_bench", pattern, "--benchmark_min_time=1.5")
     step = Step("essential_graph", "with scales (one camera); four and a half edges a keyframe")
-    for n in SIZES:
-        record = found[f"BM_OptimizePoseGraph/keyframes:{n}/fix_scale:0/eigen:0"]
-        step.add(n, record["median_ms"], record["min_ms"])
-    return [step]
+    return [_measured(step, found, "BM_OptimizePoseGraph/keyframes:{}/fix_scale:0/eigen:0")]
 
 
 def _full_adjustment(build: Path) -> list[Step]:

@@ -124,7 +124,7 @@ def main() -> None:
     names = sorted({case.name for case in cases})
     parser.add_argument("--case", choices=names, default="corridor", help="[corridor]")
     parser.add_argument("--sensor", choices=SENSORS, default="rgbd", help="[rgbd]")
-    add_counts(parser, [("seed", 1, "of the case")])
+    add_counts(parser, seed=(1, "of the case"))
     output = CHECKOUT / "docs" / "images" / "loop_closing.png"
     parser.add_argument("--output", type=Path, default=output, help="[the picture of the README]")
     arguments = parser.parse_args()

@@ -271,12 +271,10 @@ def parse() -> argparse.Namespace:
     add_sensors(parser)
     add_counts(
         parser,
-        [
-            ("seeds", 10, "runs of every case"),
-            ("first-seed", 0, "seed of the first of them"),
-            ("without", 1, "of these, again without loops"),
-            ("jobs", 1, "runs at the same time"),
-        ],
+        seeds=(10, "runs of every case"),
+        first_seed=(0, "seed of the first of them"),
+        without=(1, "of these, again without loops"),
+        jobs=(1, "runs at the same time"),
     )
     parser.add_argument("--deterministic", action="store_true", help="mapping and loops inline")
     parser.add_argument("--list", action="store_true", help="only show the cases")

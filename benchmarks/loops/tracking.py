@@ -190,11 +190,9 @@ def main() -> None:
     parser = new_parser(__doc__)
     add_counts(
         parser,
-        [
-            ("passes", 2, "runs of each kind"),
-            ("frames", 300, "frames of a run"),
-            ("keyframes", 1000, "keyframes of the made-up map"),
-        ],
+        passes=(2, "runs of each kind"),
+        frames=(300, "frames of a run"),
+        keyframes=(1000, "keyframes of the made-up map"),
     )
     parser.add_argument("--json", action="store_true", help="print everything as JSON")
     add_width(parser)

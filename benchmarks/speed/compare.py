@@ -58,7 +58,7 @@ def main() -> None:
     parser.add_argument(
         "--only", choices=PARTS, action="append", help="only this part (repeatable)"
     )
-    add_counts(parser, [("runs", 5, "runs of each sequence")])
+    add_counts(parser, runs=(5, "runs of each sequence"))
     add_build(parser)
     add_width(parser)
     arguments = parser.parse_args()
