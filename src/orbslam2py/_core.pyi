@@ -13,7 +13,7 @@ from orbslam2py.errors import SettingsError
 from orbslam2py.errors import StateError
 from orbslam2py.errors import VocabularyError
 import typing
-__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'GatheredBundle', 'FullBundleCommit', 'FullBundleOptions', 'FullBundleResult', 'ImageBounds', 'ImageError', 'KeyFrameIndex', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapFileError', 'MapSnapshot', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'anchor_frame', 'apply_loop_correction', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'check_invariants', 'choose_loop', 'commit_full_bundle', 'corridor_way', 'count_map_points', 'count_sightings', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'describe', 'direct_index_of', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'fundamental_matrix', 'fuse_points', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'full_bundle_adjustment', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'match_for_initialization', 'match_for_triangulation', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'plan_loop_correction', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'refresh_associations', 'render', 'room_T_wc', 'seed_of', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'snapshot_points', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'verify_loop_candidate', 'words_of']
+__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FullBundleCommit', 'FullBundleOptions', 'FullBundleResult', 'GatheredBundle', 'ImageBounds', 'ImageError', 'KeyFrameIndex', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapFileError', 'MapSnapshot', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'anchor_frame', 'apply_loop_correction', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'check_invariants', 'choose_loop', 'commit_full_bundle', 'corridor_way', 'count_map_points', 'count_sightings', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'describe', 'direct_index_of', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'full_bundle_adjustment', 'fundamental_matrix', 'fuse_points', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'match_for_initialization', 'match_for_triangulation', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'plan_loop_correction', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'refresh_associations', 'render', 'room_T_wc', 'seed_of', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'snapshot_points', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'verify_loop_candidate', 'words_of']
 class Pose:
     """
     Rigid transform. `T_ab` maps coordinates of frame b into frame a.
@@ -2615,6 +2615,14 @@ def follow_map(map: Map, frame: TrackedFrame) -> tuple[PointBatch, float]:
     successors, dead ones are dropped. Returns (PointBatch of the frame's points, by how much
     lengths around the frame have been multiplied since).
     """
+def full_bundle_adjustment(map: Map, options: FullBundleOptions = ..., abort: StopFlag | None = None, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> FullBundleResult:
+    """
+    Refine all keyframes (but 0), unpublished ones included, and all points.
+
+    gather_full_bundle, solve_full_bundle and commit_full_bundle in one call. After an
+    abort, or when the map was cleared meanwhile, the map stays as it was. No observation is
+    erased. Takes the map's locks for short sections only.
+    """
 def fundamental_matrix(T_1w: Pose, T_2w: Pose, K_1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"], K_2: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
     """
     The (3, 3) matrix F_12 with x_1^T F_12 x_2 = 0 for pixels (u, v, 1) of cameras with
@@ -2640,14 +2648,6 @@ def gather_full_bundle(map: Map) -> GatheredBundle:
 def gather_points(map: Map, ids: typing.Annotated[numpy.typing.ArrayLike, numpy.int64]) -> PointBatch:
     """
     The living points among `ids` ((n,) int64), in that order.
-    """
-def full_bundle_adjustment(map: Map, options: FullBundleOptions = ..., abort: StopFlag | None = None, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> FullBundleResult:
-    """
-    Refine all keyframes (but 0), unpublished ones included, and all points.
-
-    gather_full_bundle, solve_full_bundle and commit_full_bundle in one call. After an
-    abort, or when the map was cleared meanwhile, the map stays as it was. No observation is
-    erased. Takes the map's locks for short sections only.
     """
 def hamming_distances(a: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8], b: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8]) -> numpy.typing.NDArray[numpy.int32]:
     """
@@ -2759,7 +2759,7 @@ def median_scene_depth(map: Map, id: int) -> float | None:
     """
 def optimize_essential_graph(correction: LoopCorrection, abort: StopFlag | None = None, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> PoseGraphSummary:
     """
-    Spread the loop's error over all keyframes (spec 16, section 6), in place, without locks.
+    Spread the loop's error over all keyframes, in place, without locks.
 
     `abort`: a StopFlag polled once per iteration, or None. 1 thread gives the same bytes in
     every run. Returns a PoseGraphSummary.
@@ -2783,7 +2783,7 @@ def optimize_pose(T_cw: Pose, intrinsics: typing.Annotated[numpy.typing.ArrayLik
     """
 def plan_loop_correction(map: Map, loop: Loop, fix_scale: bool) -> LoopCorrection:
     """
-    Work out how a loop corrects the map (spec 14, section 4).
+    Work out how a loop corrects the map.
 
     Carries the loop's similarity to the neighbours of its current keyframe, finds which points
     are in the map twice, and builds the essential graph. `fix_scale`: where depth is measured.
@@ -2917,8 +2917,8 @@ def verify_loop_candidate(map: Map, current: int, candidate: int, options: LoopV
     Verify by geometry that two keyframes show the same place.
 
     Matches by words, a similarity by RANSAC, guided matching, refinement, projection of
-    the points around the candidate (spec 14, section 3). Returns a Loop, or None when a
-    step finds too little or a keyframe is dead. The map is not changed.
+    the points around the candidate. Returns a Loop, or None when a step finds too little or
+    a keyframe is dead. The map is not changed.
     """
 def words_of(frame: Frame) -> WordVector:
     """

@@ -14,17 +14,15 @@ from os import PathLike
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import FloatArray
 from orbslam2py._files import atomic_write
 from orbslam2py.calibration.chessboard import Board, BoardView, BoardViews, choose_views
 from orbslam2py.errors import DatasetError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import CameraSettings, OrbSettings, Settings
+from orbslam2py.settings import CameraSettings, OrbSettings, Sensor, Settings
 
 _log = logging.getLogger(__name__)
 
-Array = NDArray[np.float64]
 
 #: Zhang's method needs two slanted views for five parameters; with fewer than this nothing would
 #: show that something is wrong.
@@ -55,12 +53,12 @@ class CalibratedView:
     """
 
     name: str
-    corners: Array
-    projected: Array
-    T_cb: Array
+    corners: FloatArray
+    projected: FloatArray
+    T_cb: FloatArray
 
     @property
-    def residuals(self) -> Array:
+    def residuals(self) -> FloatArray:
         """Found minus projected, (n, 2) pixels."""
         return self.corners - self.projected
 
@@ -96,9 +94,9 @@ class Calibration:
         Images looked at, and those with the board.
     """
 
-    K: Array
-    distortion: Array
-    deviations: Array
+    K: FloatArray
+    distortion: FloatArray
+    deviations: FloatArray
     size: tuple[int, int]
     rms: float
     board: Board
@@ -108,12 +106,12 @@ class Calibration:
     n_found: int
 
     @property
-    def residuals(self) -> Array:
+    def residuals(self) -> FloatArray:
         """Residuals of all corners of all views, (n, 2) pixels."""
         return np.concatenate([view.residuals for view in self.views])
 
     @property
-    def corners(self) -> Array:
+    def corners(self) -> FloatArray:
         """Corners of all views as found, (n, 2) pixels."""
         return np.concatenate([view.corners for view in self.views])
 

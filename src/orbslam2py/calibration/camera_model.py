@@ -10,11 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import CameraSettings, OrbSettings, Settings
-
-Array = NDArray[np.float64]
+from orbslam2py.settings import CameraSettings, OrbSettings, Sensor, Settings
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +29,8 @@ class CameraModel:
         Width and height [pixels]; None if the file does not tell.
     """
 
-    K: Array
-    distortion: Array
+    K: FloatArray
+    distortion: FloatArray
     size: tuple[int, int] | None
 
     def settings(self, fps: float, n_features: int) -> Settings:
@@ -49,8 +47,23 @@ class CameraModel:
         return Settings(Sensor.MONOCULAR, camera, OrbSettings(n_features=n_features))
 
 
-def numbers_of(path: Path, where: str, value: object, count: tuple[int, ...]) -> Array:
-    """Make float64 (n,) finite numbers of a value in a file; `count` names the lengths allowed."""
+def checked_numbers(path: Path, where: str, value: object, count: tuple[int, ...]) -> FloatArray:
+    """Make float64 (n,) finite numbers of a value in a file.
+
+    Parameters
+    ----------
+    path, where
+        The file and the place in it, for the message.
+    value
+        A number, or numbers nested in any way.
+    count
+        Lengths allowed; any if empty.
+
+    Raises
+    ------
+    SettingsError
+        If these are other than finite numbers, or not so many.
+    """
     try:
         found = np.asarray(value, dtype=np.float64).reshape(-1)
     except (TypeError, ValueError):
@@ -71,9 +84,9 @@ def require_supported(path: Path, what: str, name: object, supported: tuple[str,
         )
 
 
-def checked_camera_matrix(path: Path, K: NDArray[Any]) -> Array:
+def checked_camera_matrix(path: Path, K: NDArray[Any]) -> FloatArray:
     """Check a camera matrix (3, 3): no skew, focal lengths above 0."""
-    K = numbers_of(path, "the camera matrix", K, (9,)).reshape(3, 3)
+    K = checked_numbers(path, "the camera matrix", K, (9,)).reshape(3, 3)
     if K[0, 0] <= 0 or K[1, 1] <= 0:
         raise SettingsError(f"{path}: focal lengths {K[0, 0]:g}, {K[1, 1]:g} must be above 0")
     if abs(K[0, 1]) > 1e-6 * K[0, 0]:
@@ -81,9 +94,9 @@ def checked_camera_matrix(path: Path, K: NDArray[Any]) -> Array:
     return K
 
 
-def five_coefficients(path: Path, coefficients: NDArray[Any]) -> Array:
+def five_coefficients(path: Path, coefficients: NDArray[Any]) -> FloatArray:
     """Bring 0, 4, 5 or more coefficients to k1, k2, p1, p2, k3; further ones must be zero."""
-    given = numbers_of(path, "the distortion", coefficients, ())
+    given = checked_numbers(path, "the distortion", coefficients, ())
     if given.size not in (0, 4, 5, 8, 12, 14):
         raise SettingsError(
             f"{path}: {given.size} distortion coefficients; there must be k1, k2, p1, p2 and "

@@ -10,30 +10,27 @@ from typing import Any
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import FloatArray
 from orbslam2py.calibration.camera_model import (
     CameraModel,
     checked_camera_matrix,
+    checked_numbers,
     checked_size,
     five_coefficients,
-    numbers_of,
     require_supported,
 )
 from orbslam2py.datasets.rectification import rectification_of_pair
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings.builtin import EUROC_CLOSE_FACTOR
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import (
+from orbslam2py.settings import (
     CameraRectification,
     CameraSettings,
-    DepthSettings,
     OrbSettings,
+    Sensor,
     Settings,
     StereoRectification,
+    builtin_settings,
 )
-
-Array = NDArray[np.float64]
 
 
 def parse_yaml(path: Path, text: str) -> Mapping[str, Any]:
@@ -72,8 +69,8 @@ def kalibr_settings(
         return _kalibr_camera(path, name, document[name]).settings(fps, n_features)
     left, right = (_kalibr_camera(path, name, document[name]) for name in names[:2])
     where = f"{names[1]}."
-    T = numbers_of(path, f"{where}T_cn_cnm1", _value(path, where, document[names[1]], "T_cn_cnm1"),
-                 (16,)).reshape(4, 4)  # fmt: skip
+    given = _value(path, where, document[names[1]], "T_cn_cnm1")
+    T = checked_numbers(path, f"{where}T_cn_cnm1", given, (16,)).reshape(4, 4)
     if np.abs(T[:3, :3] @ T[:3, :3].T - np.eye(3)).max() > 1e-3:
         raise SettingsError(f"{path}: {where}T_cn_cnm1 is no 4 x 4 rigid transform")
     if left.size is None or left.size != right.size:
@@ -93,16 +90,16 @@ def _kalibr_camera(path: Path, name: str, values: object) -> CameraModel:
     distortion_model = values.get("distortion_model", "none")
     require_supported(path, f"{where}distortion_model", distortion_model, ("radtan", "none"))
     intrinsics = _value(path, where, values, "intrinsics")
-    fx, fy, cx, cy = numbers_of(path, f"{where}intrinsics", intrinsics, (4,))
+    fx, fy, cx, cy = checked_numbers(path, f"{where}intrinsics", intrinsics, (4,))
     coefficients = np.zeros(0)
     if distortion_model == "radtan":
         given = _value(path, where, values, "distortion_coeffs")
-        coefficients = numbers_of(path, f"{where}distortion_coeffs", given, (4,))
+        coefficients = checked_numbers(path, f"{where}distortion_coeffs", given, (4,))
     resolution = _value(path, where, values, "resolution")
     return CameraModel(
         np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]),
         five_coefficients(path, coefficients),
-        checked_size(path, numbers_of(path, f"{where}resolution", resolution, (2,)).tolist()),
+        checked_size(path, checked_numbers(path, f"{where}resolution", resolution, (2,)).tolist()),
     )
 
 
@@ -121,20 +118,22 @@ def ros_camera(path: Path, values: Mapping[str, Any]) -> CameraModel:
         five_coefficients(
             path, _ros_matrix(path, values, ("distortion_coefficients", "D", "d"), ())
         ),
-        checked_size(path, numbers_of(path, "image_width and image_height", size, (2,)).tolist()),
+        checked_size(
+            path, checked_numbers(path, "image_width and image_height", size, (2,)).tolist()
+        ),
     )
 
 
 def _ros_matrix(
     path: Path, values: Mapping[str, Any], names: tuple[str, ...], count: tuple[int, ...]
-) -> Array:
+) -> FloatArray:
     name = next((name for name in names if name in values), None)
     if name is None:
         raise SettingsError(f"{path}: {names[0]} is missing")
     value = values[name]
     if isinstance(value, Mapping):
         value = _value(path, f"{name}.", value, "data")
-    return numbers_of(path, name, value, count)
+    return checked_numbers(path, name, value, count)
 
 
 def ros_pair_settings(
@@ -173,16 +172,19 @@ def _pair_settings(
             f"projection matrix is shifted by {-P_right[0, 3]:g}, {-P_right[1, 3]:g} pixel metres"
         )
     camera = CameraSettings(
-        *(float(P[0, 0]), float(P[1, 1]), float(P[0, 2]), float(P[1, 2])),
+        fx=float(P[0, 0]),
+        fy=float(P[1, 1]),
+        cx=float(P[0, 2]),
+        cy=float(P[1, 2]),
         width=rectification.left.width,
         height=rectification.left.height,
         fps=fps,
         bf=bf,
     )
     return Settings(
-        Sensor.STEREO,
-        camera,
-        OrbSettings(n_features=n_features),
-        DepthSettings(EUROC_CLOSE_FACTOR),
-        rectification,
+        sensor=Sensor.STEREO,
+        camera=camera,
+        orb=OrbSettings(n_features=n_features),
+        depth=builtin_settings("euroc", Sensor.STEREO).depth,
+        rectification=rectification,
     )

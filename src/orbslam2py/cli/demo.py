@@ -10,8 +10,8 @@ import typer
 
 from orbslam2py.cli.run import run_and_show
 from orbslam2py.runs.options import RunOptions
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
+from orbslam2py.settings import Sensor
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
 DEFAULT_OUTPUT = Path("runs/demo")
 

@@ -13,7 +13,7 @@ from rich.markup import escape
 from orbslam2py.cli.display import Display, log_to, print_error, progress_bar, report_table
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.interrupts import StopOnInterrupt
-from orbslam2py.datasets import open_source
+from orbslam2py.datasets import open_input
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.outputs import new_output_folder
@@ -125,7 +125,7 @@ def run(
 ) -> None:
     """Track a recorded sequence, a video or a camera; write trajectory, map and report."""
     log_to(Console(stderr=True), quiet=quiet)  # opening warns already
-    images = open_source(sequence, sensor, settings=settings, fps=fps, times=times, mask=mask)
+    images = open_input(sequence, sensor, settings=settings, fps=fps, times=times, mask=mask)
     options = RunOptions(
         sensor,
         SystemOptions(

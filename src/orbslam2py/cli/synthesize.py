@@ -11,10 +11,10 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from orbslam2py.datasets.base import Layout
+from orbslam2py.datasets import Layout
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence, SyntheticWorld
+from orbslam2py.settings import Sensor
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence, SyntheticWorld
 
 EXAMPLE = """
 **Example**

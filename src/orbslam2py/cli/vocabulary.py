@@ -17,7 +17,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from orbslam2py import _core as core
 from orbslam2py._version import __version__
 from orbslam2py.errors import VocabularyError
-from orbslam2py.vocabulary.vocabulary import (
+from orbslam2py.vocabulary import (
     convert_vocabulary,
     read_training_images,
     save_vocabulary,

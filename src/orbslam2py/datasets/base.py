@@ -12,10 +12,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py.errors import DatasetError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import Settings
-from orbslam2py.trajectory.trajectory import Trajectory
+from orbslam2py.settings import Sensor, Settings
+from orbslam2py.trajectory import Trajectory
 
 _log = logging.getLogger(__name__)
 
@@ -48,10 +48,10 @@ class Images:
         uint8 (h, w): no keypoint lies in `image` where it is 0. None: anywhere.
     """
 
-    image: NDArray[np.uint8]
-    right: NDArray[np.uint8] | None = None
+    image: ByteArray
+    right: ByteArray | None = None
     depth: NDArray[np.generic] | None = None
-    mask: NDArray[np.uint8] | None = None
+    mask: ByteArray | None = None
 
 
 class Source(Protocol):
@@ -169,7 +169,7 @@ class Sequence(Source, Protocol):
     """
 
     @property
-    def timestamps(self) -> NDArray[np.float64]: ...  # noqa: D102
+    def timestamps(self) -> FloatArray: ...  # noqa: D102
 
     def __len__(self) -> int:
         """Return the number of frames."""
@@ -218,7 +218,7 @@ class Stamps:
         Line number of each in the file, from 1.
     """
 
-    seconds: NDArray[np.float64]
+    seconds: FloatArray
     texts: tuple[str, ...]
     lines: tuple[int, ...]
 

@@ -12,14 +12,14 @@ from typing import Any, Protocol
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import ByteArray
 from orbslam2py.datasets.base import Images, LiveFrame
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.images import quiet_opencv
 from orbslam2py.datasets.unposed import UnposedSource
 from orbslam2py.errors import DatasetError, StateError
-from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings import Sensor
 
 _log = logging.getLogger(__name__)
 
@@ -96,7 +96,7 @@ class LiveCamera(UnposedSource):
         self._thread: threading.Thread | None = None
         # Guards the fields below; notified when one of them changes.
         self._changed = threading.Condition()
-        self._newest: tuple[float, NDArray[np.uint8]] | None = None
+        self._newest: tuple[float, ByteArray] | None = None
         self._n_dropped = 0
         self._failure: str | None = None
         self._stopped = False

@@ -7,17 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py.datasets.base import Images, LiveFrame, LiveSource, Sequence
 from orbslam2py.datasets.image_folder import image_files
 from orbslam2py.datasets.images import read_image
 from orbslam2py.errors import DatasetError, ImageError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import Settings
-from orbslam2py.trajectory.trajectory import Trajectory
-
-Mask = NDArray[np.uint8]
+from orbslam2py.settings import Sensor, Settings
+from orbslam2py.trajectory import Trajectory
 
 
 class StaticMask:
@@ -40,7 +37,7 @@ class StaticMask:
         self._path = path
         self._mask = read_mask(path)
 
-    def mask(self, index: int, image: NDArray[np.uint8]) -> Mask:
+    def mask(self, index: int, image: ByteArray) -> ByteArray:
         """Return the mask of an image.
 
         Raises
@@ -90,7 +87,7 @@ class MaskFolder:
                 f"name{example} or in the same order, or a single file"
             )
 
-    def mask(self, index: int, image: NDArray[np.uint8]) -> Mask:
+    def mask(self, index: int, image: ByteArray) -> ByteArray:
         """Read the mask of an image.
 
         Raises
@@ -101,7 +98,7 @@ class MaskFolder:
         return _fitting(self._paths[index], read_mask(self._paths[index]), image)
 
 
-def read_mask(path: Path) -> Mask:
+def read_mask(path: Path) -> ByteArray:
     """Read a mask: uint8 (h, w), 0 where no keypoint may lie.
 
     Images with several equal channels are taken as well.
@@ -124,7 +121,7 @@ def read_mask(path: Path) -> Mask:
     return np.ascontiguousarray(colour[:, :, 0])
 
 
-def _fitting(path: Path, mask: Mask, image: NDArray[np.uint8]) -> Mask:
+def _fitting(path: Path, mask: ByteArray, image: ByteArray) -> ByteArray:
     if mask.shape != image.shape[:2]:
         raise ImageError(
             f"mask {path} is {mask.shape[1]} x {mask.shape[0]}, "
@@ -198,7 +195,7 @@ class MaskedSequence(_Masked):
         return len(self._sequence)
 
     @property
-    def timestamps(self) -> NDArray[np.float64]:
+    def timestamps(self) -> FloatArray:
         """Time of every frame in seconds, float64 (n,)."""
         return self._sequence.timestamps
 

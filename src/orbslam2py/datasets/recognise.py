@@ -12,7 +12,7 @@ from orbslam2py.datasets.kitti import KittiSequence
 from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.datasets.tum import TumSequence, find_association
 from orbslam2py.errors import DatasetError
-from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings import Sensor
 
 _MARKS = (
     "rgb.txt or associations.txt (TUM), times.txt and image_0 (KITTI), mav0/cam0 or cam0 (EuRoC)"

@@ -9,14 +9,16 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py.errors import ImageError
-from orbslam2py.settings.settings import CameraRectification, StereoRectification
-
-Array = NDArray[np.float64]
+from orbslam2py.settings import CameraRectification, StereoRectification
 
 
 def rectification_of_pair(
-    K: tuple[Array, Array], D: tuple[Array, Array], T_right_left: Array, size: tuple[int, int]
+    K: tuple[FloatArray, FloatArray],
+    D: tuple[FloatArray, FloatArray],
+    T_right_left: FloatArray,
+    size: tuple[int, int],
 ) -> StereoRectification:
     """Find the rectification of a calibrated pair.
 
@@ -46,7 +48,7 @@ def rectification_of_pair(
     )
 
 
-def _float64(matrix: NDArray[Any]) -> Array:
+def _float64(matrix: NDArray[Any]) -> FloatArray:
     return np.asarray(matrix, dtype=np.float64)
 
 
@@ -70,7 +72,7 @@ class Rectifier:
             cv2.CV_32FC1,
         )
 
-    def rectify(self, image: NDArray[np.uint8], what: object = "image") -> NDArray[np.uint8]:
+    def rectify(self, image: ByteArray, what: object = "image") -> ByteArray:
         """Resample an image bilinearly; black where the raw image has no pixels.
 
         Parameters

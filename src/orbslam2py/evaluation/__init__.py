@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How far an estimate is from the truth: paths, laps, poses found in a map, closed loops."""
 
+from orbslam2py.evaluation.alignment import Alignment, Similarity, align, match_poses
 from orbslam2py.evaluation.keyframes import (
     PoseError,
     errors_through_keyframes,
@@ -18,13 +19,9 @@ from orbslam2py.evaluation.loops import (
 )
 from orbslam2py.evaluation.metrics import (
     SEGMENT_LENGTHS,
-    Alignment,
     ErrorStatistics,
     Evaluation,
-    Similarity,
-    align,
     evaluate_trajectory,
-    match_poses,
     one_second_pairs,
     relative_errors,
     segment_errors,

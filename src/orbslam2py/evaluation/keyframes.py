@@ -11,11 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.errors import DatasetError
 from orbslam2py.evaluation.metrics import relative_errors
-from orbslam2py.trajectory.rotations import Array, inverse_poses, rotation_angles
+from orbslam2py.trajectory.rotations import inverse_poses, rotation_angles
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class PoseError:
         return self.translation_m <= metres and self.rotation_deg <= degrees
 
 
-def pose_error(estimate: Array, truth: Array) -> PoseError:
+def pose_error(estimate: FloatArray, truth: FloatArray) -> PoseError:
     """Compare two poses.
 
     Parameters
@@ -51,7 +51,7 @@ def pose_error(estimate: Array, truth: Array) -> PoseError:
     return PoseError(float(np.linalg.norm(error[:3, 3])), float(np.degrees(angle)))
 
 
-def nearest_keyframes(true_T_wc: Array, true_T_wk: Array) -> NDArray[np.int64]:
+def nearest_keyframes(true_T_wc: FloatArray, true_T_wk: FloatArray) -> IntArray:
     """Find the keyframe that is nearest to each camera; a metre is as far as a radian.
 
     Parameters
@@ -63,7 +63,7 @@ def nearest_keyframes(true_T_wc: Array, true_T_wk: Array) -> NDArray[np.int64]:
 
     Returns
     -------
-    NDArray
+    IntArray
         Indices into the keyframes, (n,).
 
     Raises
@@ -82,8 +82,13 @@ def nearest_keyframes(true_T_wc: Array, true_T_wk: Array) -> NDArray[np.int64]:
 
 
 def errors_through_keyframes(
-    T_wc: Array, true_T_wc: Array, T_wk: Array, true_T_wk: Array, *, metres_per_unit: float = 1.0
-) -> tuple[Array, Array]:
+    T_wc: FloatArray,
+    true_T_wc: FloatArray,
+    T_wk: FloatArray,
+    true_T_wk: FloatArray,
+    *,
+    metres_per_unit: float = 1.0,
+) -> tuple[FloatArray, FloatArray]:
     """Take the errors of poses relative to the nearest keyframes of their map.
 
     Parameters

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import DatasetError
-from orbslam2py.evaluation.metrics import align, match_poses
-from orbslam2py.trajectory.association import MAX_DIFFERENCE
-from orbslam2py.trajectory.rotations import Array, inverse_poses, rotation_angles
-from orbslam2py.trajectory.trajectory import Trajectory
+from orbslam2py.evaluation.alignment import align, match_poses
+from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory
+from orbslam2py.trajectory.rotations import inverse_poses, rotation_angles
 
 # How far the truth may be from what a true loop says.
 _TOLERANCE_METRES = 0.3
@@ -66,7 +66,7 @@ class Revisit:
 
 
 def loop_error(
-    S_cm: Array, true_T_wc: Array, true_T_wm: Array, *, metres_per_unit: float = 1.0
+    S_cm: FloatArray, true_T_wc: FloatArray, true_T_wm: FloatArray, *, metres_per_unit: float = 1.0
 ) -> LoopError:
     """Compare what a loop says with the truth.
 
@@ -168,7 +168,7 @@ def find_revisits(
     return [Revisit(float(truth.timestamps[a]), float(truth.timestamps[b])) for a, b in spans]
 
 
-def closed_revisits(revisits: Sequence[Revisit], timestamps: Array) -> NDArray[np.bool_]:
+def closed_revisits(revisits: Sequence[Revisit], timestamps: FloatArray) -> NDArray[np.bool_]:
     """Tell for every revisit whether one of the true loops belongs to it.
 
     A loop may close a little before or after, since the same places are seen from further away: it
@@ -198,7 +198,7 @@ def _nearest(trajectory: Trajectory, timestamp: float) -> int:
     return int(np.argmin(np.abs(trajectory.timestamps - timestamp)))
 
 
-def _path_lengths(trajectory: Trajectory) -> Array:
+def _path_lengths(trajectory: Trajectory) -> FloatArray:
     """Metres from the start, (n,)."""
     steps = np.linalg.norm(np.diff(trajectory.positions, axis=0), axis=1)
     return np.concatenate([[0.0], np.cumsum(steps)])

@@ -6,27 +6,27 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from orbslam2py import _core as core
-from orbslam2py.trajectory.trajectory import Trajectory
+from orbslam2py._arrays import FloatArray, IntArray
+from orbslam2py.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
 class MapSnapshot:
     """A consistent copy of the map, in the frame of keyframe 0's first pose (the world)."""
 
-    keyframe_ids: npt.NDArray[np.int64]
+    keyframe_ids: IntArray
     """(k,) ascending."""
-    keyframe_timestamps: npt.NDArray[np.float64]
+    keyframe_timestamps: FloatArray
     """(k,) seconds."""
-    keyframe_T_wc: npt.NDArray[np.float64]
+    keyframe_T_wc: FloatArray
     """(k, 4, 4) camera to world."""
-    point_ids: npt.NDArray[np.int64]
+    point_ids: IntArray
     """(p,) ascending."""
-    point_positions: npt.NDArray[np.float64]
+    point_positions: FloatArray
     """(p, 3) world [m]."""
-    loop_edges: npt.NDArray[np.int64]
+    loop_edges: IntArray
     """(l, 2) ids of the keyframes that a closed loop connects."""
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Generator
@@ -10,10 +11,10 @@ from dataclasses import dataclass
 from typing import TypeGuard
 
 import numpy as np
-import numpy.typing as npt
 
-from orbslam2py.datasets.base import Images, LiveSource, Sequence
-from orbslam2py.runs.prefetch import Prefetcher
+from orbslam2py._arrays import FloatArray
+from orbslam2py.datasets import Images, LiveSource, Sequence
+from orbslam2py.runs.prefetch import prefetch
 
 #: Seconds between two looks at whether the run was stopped.
 _WAIT_SLICE = 0.2
@@ -65,7 +66,7 @@ class RecordedFeed:
         """Yield the frames, at the time they are due if real time is played, until `stop`."""
         sequence = self._sequence
         clock = _Clock(sequence.timestamps, self._indices, stop) if self._realtime else None
-        with Prefetcher[Images](sequence, self._indices, stop=stop) as images:
+        with contextlib.closing(prefetch(sequence.load, self._indices, stop)) as images:
             for position, (index, item) in enumerate(images):
                 dropped = clock is not None and clock.must_drop(position)
                 if stop.is_set():
@@ -117,9 +118,7 @@ def is_sequence(source: Sequence | LiveSource) -> TypeGuard[Sequence]:
 class _Clock:
     """Plays time stamps: a frame is dropped when the next one has come before it was taken."""
 
-    def __init__(
-        self, timestamps: npt.NDArray[np.float64], indices: list[int], stop: threading.Event
-    ) -> None:
+    def __init__(self, timestamps: FloatArray, indices: list[int], stop: threading.Event) -> None:
         self._due = np.asarray(timestamps)[indices]
         self._stop = stop
         self._offset: float | None = None

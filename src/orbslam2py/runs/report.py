@@ -13,7 +13,7 @@ from typing import Any
 
 from orbslam2py._version import __version__
 from orbslam2py.errors import OrbSlamError
-from orbslam2py.evaluation.metrics import Alignment, Evaluation, evaluate_trajectory
+from orbslam2py.evaluation import Alignment, Evaluation, evaluate_trajectory
 from orbslam2py.runs.result import RunResult
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.events import LoopClosed

@@ -15,14 +15,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
+from orbslam2py._arrays import FloatArray
 from orbslam2py.slam.worker import Worker
 
 _log = logging.getLogger(__name__)
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -162,7 +158,7 @@ class EventDispatcher:
     def post(self, event: Event) -> None:
         """Queue an event for the function that listens to its type; nothing if there is none."""
         listener = self._listeners[type(event)]
-        if listener is None or self.worker.ended:
+        if listener is None:
             return
 
         def deliver() -> None:
@@ -171,4 +167,4 @@ class EventDispatcher:
             except Exception:
                 _log.exception("a callback failed on %s", type(event).__name__)
 
-        self.worker.submit(deliver)
+        self.worker.offer(deliver)  # a shutdown ends the deliveries

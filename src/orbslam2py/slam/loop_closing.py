@@ -99,8 +99,8 @@ class LoopClosing:
         )
 
     def insert_keyframe(self, keyframe: int) -> None:
-        """Queue a keyframe."""
-        self.worker.submit(keyframe)
+        """Queue a keyframe, unless a shutdown has begun: mapping may end after loop closing."""
+        self.worker.offer(keyframe)
 
     def reset(self) -> None:
         """Drop waiting keyframes and what the last ones proposed."""

@@ -238,7 +238,7 @@ def _make_tracking(
         slam_map,
         vocabulary,
         sensor,
-        settings.max_frames,
+        settings.max_keyframe_interval,
         Relocalizer(slam_map, back_end.keyframe_index, seed),
         TrackingThresholds(),
     )
@@ -248,6 +248,8 @@ def _make_tracking(
         mapping,
         initializer=initializer,
         search=search,
-        keyframe_decision=KeyframeDecision(slam_map, mapping.worker, sensor, settings.max_frames),
+        keyframe_decision=KeyframeDecision(
+            slam_map, mapping.worker, sensor, settings.max_keyframe_interval
+        ),
         has_depth=sensor.has_depth,
     )

@@ -9,8 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
-IdArray = npt.NDArray[np.int64]
+from orbslam2py._arrays import FloatArray, IntArray
 
 
 class TrackingState(enum.IntEnum):
@@ -104,7 +103,7 @@ class TrackingRecord:
 
 
 # ---- inside the pipeline ---------------------------------------------------------------------
-def _nothing() -> IdArray:
+def _nothing() -> IntArray:
     return np.zeros(0, np.int64)
 
 
@@ -124,7 +123,7 @@ class PoseEstimate:
     """Of these, accepted by the optimisation."""
     covariance: FloatArray | None = None
     """(6, 6), see `TrackingRecord.covariance`."""
-    discarded: IdArray = field(default_factory=_nothing)
+    discarded: IntArray = field(default_factory=_nothing)
     """Ids of the points that were matched and thrown out as outliers, ascending."""
     visual_odometry: bool = False
     """The pose hangs on the depths of the frame before more than on the map."""

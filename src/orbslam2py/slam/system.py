@@ -17,9 +17,8 @@ import numpy.typing as npt
 from orbslam2py import _core as core
 from orbslam2py.errors import StateError, WorkerError
 from orbslam2py.maps.snapshot import MapSnapshot, keyframe_trajectory, take_snapshot
-from orbslam2py.settings.builtin import resolve_settings
 from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import Settings
+from orbslam2py.settings.settings import Settings, resolve_settings
 from orbslam2py.slam.back_end import BackEnd
 from orbslam2py.slam.events import Callbacks, LoopClosed
 from orbslam2py.slam.front_end import Mask, PairMask

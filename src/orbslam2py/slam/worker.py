@@ -19,7 +19,6 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from types import TracebackType
 from typing import Generic, TypeVar
 
 from orbslam2py._core import StopFlag
@@ -67,12 +66,7 @@ class PauseTicket:
     def __enter__(self) -> PauseTicket:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.release()
 
 
@@ -177,19 +171,32 @@ class Worker(Generic[Job]):
         """Append jobs, and ask a running step to end early; none begins before all are queued.
 
         Inline, all of them are done on return.
+
+        Raises
+        ------
+        StateError
+            After `finish`.
+        WorkerError
+            If a step has failed.
         """
-        self.raise_if_failed()
-        if self._finish_requested:
+        if not self.offer(*jobs):
             raise StateError(f"{self.name} has been shut down")
-        if not jobs:
-            return
+
+    def offer(self, *jobs: Job) -> bool:
+        """As `submit`, for work that nobody misses after the end: False, and nothing is queued."""
+        self.raise_if_failed()
         with self._condition:
+            if self._finish_requested:
+                return False
+            if not jobs:
+                return True
             self._queue.extend(jobs)
             self.waiting_flag.set()
             self.interrupt_flag.set()
             self._condition.notify_all()
         if not self._threaded:
             self._run_inline()
+        return True
 
     def _run_inline(self) -> None:
         try:

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orbslam2py import _core as core
+from orbslam2py._arrays import FloatArray
 
 
 class SyntheticWorld(str, Enum):
@@ -61,7 +61,7 @@ class Scene:
         """Time that going the whole way so often takes."""
         return _LOOKING_AROUND if self.way is None else laps * self.way.length() / speed
 
-    def T_wc(self, seconds: float, speed: float, lateral: float, yaw: float) -> NDArray[np.float64]:
+    def T_wc(self, seconds: float, speed: float, lateral: float, yaw: float) -> FloatArray:
         """Camera to world (4, 4) at a time.
 
         Parameters

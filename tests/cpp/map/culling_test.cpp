@@ -20,6 +20,7 @@ struct RecentCase {
 
 class RecentPoints : public ::testing::TestWithParam<RecentCase> {};
 
+// See docs/method/mapping.md#culling-of-points.
 TEST_P(RecentPoints, FollowTheTable) {
   const RecentCase& c = GetParam();
   MapBuilder builder;
@@ -87,6 +88,7 @@ struct Scene {
   bool died() const { return builder.map.find(kf(1)) == nullptr; }
 };
 
+// See docs/method/mapping.md#culling-of-keyframes.
 TEST(CullKeyframes, MoreThanNinetyPerCentIsStrict) {
   Scene at_limit(90);
   at_limit.cull();
