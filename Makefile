@@ -92,7 +92,7 @@ stress: build/.system-packages
 # ---- the rest ------------------------------------------------------------------------------------
 bench: install
 	@cmake --preset release >/dev/null && cmake --build build/release -j $(JOBS) --target benchmarks
-	@$(BIN)/python benchmarks/compare.py
+	@$(BIN)/python -m benchmarks.speed.compare
 
 wheel: $(VENV)/.requirements
 	@$(BIN)/pip wheel --no-deps --no-build-isolation -w dist .
