@@ -5,12 +5,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= $(shell nproc)
 
-.PHONY: demo test bench lint types stubs format sanitize stress tidy wheel install clean \
+.PHONY: demo test bench lint types stubs docs format sanitize stress tidy wheel install clean \
   test-cpp test-python help
 
 help:
 	@echo "make demo      install what is needed, run the demonstration"
 	@echo "make test      all tests: C++, Python, lint, types"
+	@echo "make docs      the documentation site, in build/site"
 	@echo "make bench     measure, and compare with the reference's figures where they are known"
 	@echo "make sanitize  C++ tests under the address, undefined-behaviour and thread sanitizers"
 	@echo "make stress    ten minutes of all threads at random under the thread sanitizer"
@@ -47,7 +48,7 @@ demo: install
 	@$(BIN)/orbslam2py demo
 
 # ---- tests ---------------------------------------------------------------------------------------
-test: lint test-cpp test-python types stubs
+test: lint test-cpp test-python types stubs docs
 	@echo "All tests passed."
 
 test-cpp: build/.system-packages
@@ -70,6 +71,11 @@ types: install
 # The stubs of the C++ extension are part of the source; they must say what the build says.
 stubs: install
 	@$(BIN)/python scripts/generate_stubs.py --check
+
+# The documentation site; a warning fails.
+docs: install
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	@echo "The documentation is in build/site/index.html."
 
 # Slow (minutes), so not part of `make test`.
 tidy: build/.system-packages

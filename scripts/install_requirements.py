@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Install what pyproject.toml names: build requirements, dependencies, test dependencies."""
+"""Install what pyproject.toml names: to build, to run, to test, to make the documentation."""
 
 import subprocess
 import sys
@@ -15,6 +15,7 @@ wanted = [
     *project["build-system"]["requires"],
     *project["project"]["dependencies"],
     *project["project"]["optional-dependencies"]["test"],
+    *project["project"]["optional-dependencies"]["docs"],
 ]
 command = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
 sys.exit(subprocess.run([*command, *wanted], check=False).returncode)

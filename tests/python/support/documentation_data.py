@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The sequences, videos and files that the documentation's commands name, small, made once."""
+
+from __future__ import annotations
+
+import shutil
+import tarfile
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from orbslam2py import _core as core
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+from orbslam2py.trajectory import write_tum
+from orbslam2py.vocabulary import read_training_images, save_vocabulary, train_vocabulary
+
+FRAMES, SIZE = 40, (320, 240)
+
+CAMCHAIN = """\
+cam0:
+  camera_model: pinhole
+  distortion_coeffs: [-0.28, 0.07, 0.0002, 0.00002]
+  distortion_model: radtan
+  intrinsics: [458.6, 457.3, 367.2, 248.4]
+  resolution: [752, 480]
+cam1:
+  T_cn_cnm1:
+  - [1.0, 0.0, 0.0, -0.11]
+  - [0.0, 1.0, 0.0, 0.0]
+  - [0.0, 0.0, 1.0, 0.0]
+  - [0.0, 0.0, 0.0, 1.0]
+  camera_model: pinhole
+  distortion_coeffs: [-0.28, 0.07, -0.0001, -0.00003]
+  distortion_model: radtan
+  intrinsics: [457.6, 456.1, 380.0, 255.2]
+  resolution: [752, 480]
+"""
+
+
+def make_data(folder: Path) -> None:
+    """Fill a folder with everything the documentation takes as given."""
+    sequences = {
+        "rgbd_dataset_freiburg1_desk": ("rgbd", "tum"),
+        "dataset/sequences/06": ("stereo", "kitti"),
+        "V1_01_easy": ("stereo", "euroc"),
+    }
+    for name, (sensor, layout) in sequences.items():
+        _walk(sensor).write(folder / name, layout)
+    single = _walk("mono")
+    images = [single.load(i).image for i in range(FRAMES)]
+    single.settings.save(folder / "my.yaml")
+    write_tum(folder / "groundtruth.txt", single.ground_truth())
+    write_video(folder / "video.mp4", images, 20)
+    (folder / "photographs").mkdir()
+    for i, image in enumerate(images):
+        write_image(folder / f"photographs/{i:03d}.png", image)
+    hood = np.full(images[0].shape, 255, np.uint8)
+    hood[-24:] = 0
+    write_image(folder / "hood.png", hood)
+    write_video(folder / "board.mp4", chessboard_views(single.camera.matrix, 16), 4)
+    (folder / "camchain.yaml").write_text(CAMCHAIN)
+    _write_vocabulary(folder)
+
+
+def _walk(sensor: str) -> SyntheticSequence:
+    return SyntheticSequence(
+        SyntheticOptions(world="corridor", sensor=sensor, frames=FRAMES, size=SIZE)
+    )
+
+
+def _write_vocabulary(folder: Path) -> None:
+    options = core.TrainingOptions()
+    options.branching, options.depth = 6, 3
+    vocabulary = train_vocabulary(read_training_images(folder / "photographs")[:10], options)
+    assert vocabulary is not None
+    save_vocabulary(vocabulary, folder / "ORBvoc.txt")
+    with tarfile.open(folder / "ORBvoc.txt.tar.gz", "w:gz") as archive:
+        archive.add(folder / "ORBvoc.txt", "ORBvoc.txt")
+
+
+def chessboard_views(K: np.ndarray, n: int) -> list[np.ndarray]:
+    """A board of 9 x 6 inner corners and squares of 25 mm as the camera of the video sees it."""
+    columns, rows, square, pixels = 9, 6, 0.025, 40
+    row, column = np.mgrid[: rows + 1, : columns + 1]
+    shades = np.where((row + column) % 2, 230, 30).astype(np.uint8)
+    board = np.pad(
+        np.kron(shades, np.ones((pixels, pixels), np.uint8)), pixels, constant_values=230
+    )
+    # From pixels of the picture to metres on the board, whose first inner corner is its origin.
+    metres = np.diag([square / pixels, square / pixels, 1.0])
+    metres[:2, 2] = (0.5 / pixels - 2) * square
+    middle = np.array([(columns - 1) * square / 2, (rows - 1) * square / 2, 0.0])
+    generator = np.random.default_rng(1)
+    views = []
+    for _ in range(n):
+        R = cv2.Rodrigues(generator.uniform([-0.6, -0.6, -0.3], [0.6, 0.6, 0.3]))[0]
+        distance = generator.uniform(0.28, 0.4)
+        t = np.array([*generator.uniform(-0.3, 0.3, 2) * distance, distance]) - R @ middle
+        H = K @ np.column_stack([R[:, 0], R[:, 1], t]) @ metres
+        # Half the size in two steps, which smooths the edges of the squares.
+        large = np.diag([2.0, 2.0, 1.0])
+        large[:2, 2] = 0.5
+        view = cv2.warpPerspective(board, large @ H, (2 * SIZE[0], 2 * SIZE[1]), borderValue=230)
+        views.append(cv2.resize(view, SIZE, interpolation=cv2.INTER_AREA))
+    return views
+
+
+def write_video(path: Path, images: list[np.ndarray], fps: float) -> None:
+    height, width = images[0].shape
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), fps, (width, height))
+    assert writer.isOpened()
+    for image in images:
+        writer.write(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR))
+    writer.release()
+
+
+def write_image(path: Path, image: np.ndarray) -> None:
+    assert cv2.imwrite(str(path), image)
+
+
+def copy_data(data: Path, folder: Path) -> None:
+    """Give a document a folder of its own; large things are shared."""
+    for source in data.iterdir():
+        if source.is_dir():
+            (folder / source.name).symlink_to(source)
+        else:
+            shutil.copy(source, folder / source.name)
