@@ -62,6 +62,7 @@ test-python: install
 lint: $(VENV)/.requirements
 	@$(BIN)/ruff check src tests examples benchmarks scripts
 	@$(BIN)/ruff format --check src tests examples benchmarks scripts
+	@PYTHONPATH=src $(BIN)/lint-imports >build/lint-imports.log || { cat build/lint-imports.log; exit 1; }
 	@find src/cpp tests/cpp benchmarks -name '*.cpp' -o -name '*.hpp' | xargs clang-format --dry-run -Werror
 
 types: install
@@ -97,7 +98,7 @@ stress: build/.system-packages
 # ---- the rest ------------------------------------------------------------------------------------
 bench: install
 	@cmake --preset release >/dev/null && cmake --build build/release -j $(JOBS) --target benchmarks
-	@$(BIN)/python benchmarks/compare.py
+	@$(BIN)/python -m benchmarks.speed.compare
 
 wheel: $(VENV)/.requirements
 	@$(BIN)/pip wheel --no-deps --no-build-isolation -w dist .

@@ -5,25 +5,25 @@ A short path through the synthetic room is rendered once at 160x120 and then fed
 RGB-D images, for as many frames as wanted. Once the place is mapped only the trajectory should
 grow. Resident memory is read after ``malloc_trim``, so that freed blocks do not count.
 
-    python benchmarks/memory.py --frames 100000
+    python -m benchmarks.memory --frames 100000
 """
 
 from __future__ import annotations
 
-import argparse
-import ctypes
 import json
 import sys
 import time
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from rich.console import Console
 from rich.table import Table
 
-from orbslam2py.settings.settings import OrbSettings
-from orbslam2py.slam.system import System
-from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
+from benchmarks.harness.arguments import add_counts, add_width, console_of, new_parser
+from benchmarks.harness.process_memory import resident_mb
+from benchmarks.harness.tables import in_words, new_table
+from orbslam2py import System
+from orbslam2py.settings import OrbSettings
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
 TARGET_KB_PER_FRAME = 0.5
 SIZE = (160, 120)
@@ -59,15 +59,6 @@ class MemoryResult:
         return (last.resident_kb - first.resident_kb) / (last.frame - first.frame)
 
 
-def resident_kb() -> float:
-    """Resident memory of this process [1000 bytes], without what malloc only keeps for later."""
-    ctypes.CDLL(None).malloc_trim(0)
-    for line in Path("/proc/self/status").read_text().splitlines():
-        if line.startswith("VmRSS"):
-            return float(line.split()[1]) * 1.024
-    raise OSError("/proc/self/status has no VmRSS")
-
-
 def measure(n_frames: int, n_views: int, *, every: int, deterministic: bool) -> MemoryResult:
     """Feed `n_frames` images; sample memory after `SETTLED_AFTER` and `every` further frames."""
     options = SyntheticOptions(sensor="rgbd", frames=n_views, size=SIZE, noise=1.0)
@@ -91,7 +82,7 @@ def measure(n_frames: int, n_views: int, *, every: int, deterministic: bool) -> 
                 samples.append(
                     Sample(
                         done,
-                        resident_kb(),
+                        1e3 * resident_mb(trimmed=True),
                         system.n_keyframes,
                         system.n_map_points,
                         time.perf_counter() - begin,
@@ -102,9 +93,11 @@ def measure(n_frames: int, n_views: int, *, every: int, deterministic: bool) -> 
 
 
 def memory_table(result: MemoryResult) -> Table:
-    table = Table(title=f"Memory over the same place, {SIZE[0]}x{SIZE[1]} RGB-D")
-    for name in ("frames", "resident MB", "keyframes", "points", "seconds", "kB/frame so far"):
-        table.add_column(name, justify="right")
+    table = new_table(
+        f"Memory over the same place, {SIZE[0]}x{SIZE[1]} RGB-D",
+        [],
+        ["frames", "resident MB", "keyframes", "points", "seconds", "kB/frame so far"],
+    )
     first = result.samples[0]
     for sample in result.samples:
         grown = (sample.resident_kb - first.resident_kb) / max(1, sample.frame - first.frame)
@@ -120,12 +113,16 @@ def memory_table(result: MemoryResult) -> Table:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--frames", type=int, default=100_000)
-    parser.add_argument("--views", type=int, default=40, help="different images along the path")
-    parser.add_argument("--every", type=int, default=10_000, help="frames between two samples")
+    parser = new_parser(__doc__)
+    add_counts(
+        parser,
+        frames=(100_000, "images shown"),
+        views=(40, "different images along the path"),
+        every=(10_000, "frames between two samples"),
+    )
     parser.add_argument("--deterministic", action="store_true", help="map inline, no threads")
     parser.add_argument("--json", type=Path, help="also write the figures here")
+    add_width(parser, 100)
     arguments = parser.parse_args()
     if arguments.frames < 2 * SETTLED_AFTER:
         parser.error(f"--frames must be {2 * SETTLED_AFTER} or more")
@@ -135,12 +132,12 @@ def main() -> None:
         every=arguments.every,
         deterministic=arguments.deterministic,
     )
-    console = Console(width=100)
+    console = console_of(arguments)
     console.print(memory_table(result))
     met = result.kb_per_frame <= TARGET_KB_PER_FRAME and not result.n_resets
     console.print(
         f"{result.kb_per_frame:.3f} kB a frame after the first {SETTLED_AFTER} "
-        f"(target {TARGET_KB_PER_FRAME}: {'met' if met else 'NOT met'}); "
+        f"(target {TARGET_KB_PER_FRAME}: {in_words(met)}); "
         f"{result.n_lost} frames without a pose, {result.n_resets} resets"
     )
     if arguments.json is not None:

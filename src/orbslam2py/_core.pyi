@@ -13,7 +13,7 @@ from orbslam2py.errors import SettingsError
 from orbslam2py.errors import StateError
 from orbslam2py.errors import VocabularyError
 import typing
-__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'GatheredBundle', 'GlobalBundleCommit', 'GlobalBundleOptions', 'GlobalBundleResult', 'ImageBounds', 'ImageError', 'KeyFrameIndex', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapFileError', 'MapSnapshot', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'anchor_frame', 'apply_loop_correction', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'check_invariants', 'choose_loop', 'commit_global_bundle', 'corridor_way', 'count_map_points', 'count_sightings', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'describe', 'direct_index_of', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'fundamental_matrix', 'fuse_points', 'fuse_with_neighbours', 'gather_global_bundle', 'gather_points', 'global_bundle_adjustment', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'match_for_initialization', 'match_for_triangulation', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'plan_loop_correction', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'refresh_associations', 'render', 'room_T_wc', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'snapshot_points', 'solve_bundle', 'solve_epnp', 'solve_global_bundle', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'verify_loop_candidate', 'words_of']
+__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FullBundleCommit', 'FullBundleOptions', 'FullBundleResult', 'GatheredBundle', 'ImageBounds', 'ImageError', 'KeyFrameIndex', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapFileError', 'MapSnapshot', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'anchor_frame', 'apply_loop_correction', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'check_invariants', 'choose_loop', 'commit_full_bundle', 'corridor_way', 'count_map_points', 'count_sightings', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'describe', 'direct_index_of', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'full_bundle_adjustment', 'fundamental_matrix', 'fuse_points', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'match_for_initialization', 'match_for_triangulation', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'plan_loop_correction', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'refresh_associations', 'render', 'room_T_wc', 'seed_of', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'snapshot_points', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'verify_loop_candidate', 'words_of']
 class Pose:
     """
     Rigid transform. `T_ab` maps coordinates of frame b into frame a.
@@ -509,7 +509,7 @@ class TrackedFrame:
     """
     A frame with the pose and the associations the tracker gives it. Arrays are copies.
     """
-    def __init__(self, frame: Frame) -> None:
+    def __init__(self, features: Frame) -> None:
         ...
     def associate(self, i: typing.SupportsInt | typing.SupportsIndex, point: int, position: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
         """
@@ -557,8 +557,10 @@ class TrackedFrame:
         Map.big_change_index of the map that the pose belongs to.
         """
     @property
-    def frame(self) -> Frame:
-        ...
+    def features(self) -> Frame:
+        """
+        What was seen: keypoints, descriptors and depths.
+        """
     @property
     def id(self) -> int:
         """
@@ -767,7 +769,7 @@ class Map:
     @property
     def epoch(self) -> int:
         """
-        Grows with clear(); ids restart then.
+        Which map it is: 0 for the first; clear() begins the next, and its ids restart.
         """
     @property
     def geometry_version(self) -> int:
@@ -1263,7 +1265,7 @@ class TrainingOptions:
         ...
 class Vocabulary:
     """
-    A tree over ORB descriptors whose leaves are the visual words. Immutable; shared by threads and systems. See orbslam2py.vocabulary.vocabulary for reading any format.
+    A tree over ORB descriptors whose leaves are the visual words. Immutable; shared by threads and systems. See orbslam2py.vocabulary for reading any format.
     """
     @staticmethod
     def from_table(branching: typing.SupportsInt | typing.SupportsIndex, depth: typing.SupportsInt | typing.SupportsIndex, scoring: Scoring, weighting: Weighting, parents: typing.Annotated[numpy.typing.ArrayLike, numpy.uint32], is_word: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8], centres: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8], weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> Vocabulary:
@@ -1920,9 +1922,9 @@ class LocalBundleResult:
         """
         Of the solver.
         """
-class GlobalBundleOptions:
+class FullBundleOptions:
     """
-    How global_bundle_adjustment works.
+    How full_bundle_adjustment works.
     """
     def __init__(self, iterations: typing.SupportsInt | typing.SupportsIndex = 10, robust: bool = True, max_seconds: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         ...
@@ -1951,9 +1953,9 @@ class GlobalBundleOptions:
     @robust.setter
     def robust(self, arg0: bool) -> None:
         ...
-class GlobalBundleResult:
+class FullBundleResult:
     """
-    What global_bundle_adjustment did.
+    What full_bundle_adjustment did.
     """
     @property
     def committed(self) -> bool:
@@ -2004,9 +2006,9 @@ class GatheredBundle:
         """
         It holds a result that may be committed.
         """
-class GlobalBundleCommit:
+class FullBundleCommit:
     """
-    What commit_global_bundle did.
+    What commit_full_bundle did.
     """
     @property
     def committed(self) -> bool:
@@ -2526,7 +2528,7 @@ def choose_loop(map: Map, loops: collections.abc.Sequence[Loop], fix_scale: bool
     None when there is none, or when plausible ones put the keyframe at different
     places. Raises ValueError when the loops are of different keyframes.
     """
-def commit_global_bundle(map: Map, bundle: GatheredBundle) -> GlobalBundleCommit:
+def commit_full_bundle(map: Map, bundle: GatheredBundle) -> FullBundleCommit:
     """
     Move the map to the result in one write section, which counts as a big change.
 
@@ -2613,6 +2615,14 @@ def follow_map(map: Map, frame: TrackedFrame) -> tuple[PointBatch, float]:
     successors, dead ones are dropped. Returns (PointBatch of the frame's points, by how much
     lengths around the frame have been multiplied since).
     """
+def full_bundle_adjustment(map: Map, options: FullBundleOptions = ..., abort: StopFlag | None = None, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> FullBundleResult:
+    """
+    Refine all keyframes (but 0), unpublished ones included, and all points.
+
+    gather_full_bundle, solve_full_bundle and commit_full_bundle in one call. After an
+    abort, or when the map was cleared meanwhile, the map stays as it was. No observation is
+    erased. Takes the map's locks for short sections only.
+    """
 def fundamental_matrix(T_1w: Pose, T_2w: Pose, K_1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"], K_2: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
     """
     The (3, 3) matrix F_12 with x_1^T F_12 x_2 = 0 for pixels (u, v, 1) of cameras with
@@ -2629,7 +2639,7 @@ def fuse_with_neighbours(map: Map, current: int, n_neighbours: typing.SupportsIn
     Fuse a keyframe's points with those of its first and second neighbours, both ways;
     refresh its points and connections. Returns the number of changes.
     """
-def gather_global_bundle(map: Map) -> GatheredBundle:
+def gather_full_bundle(map: Map) -> GatheredBundle:
     """
     Copy all keyframes that points tie to each other, and these points.
 
@@ -2638,14 +2648,6 @@ def gather_global_bundle(map: Map) -> GatheredBundle:
 def gather_points(map: Map, ids: typing.Annotated[numpy.typing.ArrayLike, numpy.int64]) -> PointBatch:
     """
     The living points among `ids` ((n,) int64), in that order.
-    """
-def global_bundle_adjustment(map: Map, options: GlobalBundleOptions = ..., abort: StopFlag | None = None, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> GlobalBundleResult:
-    """
-    Refine all keyframes (but 0), unpublished ones included, and all points.
-
-    gather_global_bundle, solve_global_bundle and commit_global_bundle in one call. After an
-    abort, or when the map was cleared meanwhile, the map stays as it was. No observation is
-    erased. Takes the map's locks for short sections only.
     """
 def hamming_distances(a: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8], b: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8]) -> numpy.typing.NDArray[numpy.int32]:
     """
@@ -2757,7 +2759,7 @@ def median_scene_depth(map: Map, id: int) -> float | None:
     """
 def optimize_essential_graph(correction: LoopCorrection, abort: StopFlag | None = None, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> PoseGraphSummary:
     """
-    Spread the loop's error over all keyframes (spec 16, section 6), in place, without locks.
+    Spread the loop's error over all keyframes, in place, without locks.
 
     `abort`: a StopFlag polled once per iteration, or None. 1 thread gives the same bytes in
     every run. Returns a PoseGraphSummary.
@@ -2781,7 +2783,7 @@ def optimize_pose(T_cw: Pose, intrinsics: typing.Annotated[numpy.typing.ArrayLik
     """
 def plan_loop_correction(map: Map, loop: Loop, fix_scale: bool) -> LoopCorrection:
     """
-    Work out how a loop corrects the map (spec 14, section 4).
+    Work out how a loop corrects the map.
 
     Carries the loop's similarity to the neighbours of its current keyframe, finds which points
     are in the map twice, and builds the essential graph. `fix_scale`: where depth is measured.
@@ -2822,6 +2824,11 @@ def render(world: World, T_cw: typing.Annotated[numpy.typing.ArrayLike, numpy.fl
 def room_T_wc(size: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], seconds: typing.SupportsFloat | typing.SupportsIndex, period: typing.SupportsFloat | typing.SupportsIndex = 30.0) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
     """
     Camera to world (4, 4) of somebody looking around in a room, once in `period` seconds.
+    """
+def seed_of(seed: typing.SupportsInt | typing.SupportsIndex, first: typing.SupportsInt | typing.SupportsIndex, second: typing.SupportsInt | typing.SupportsIndex) -> int:
+    """
+    One seed (uint64) out of the system's and two ids: another one for other ids or another
+    order, the same on every platform.
     """
 def select_local_map(map: Map, frame: TrackedFrame) -> LocalMap:
     """
@@ -2868,7 +2875,7 @@ def solve_epnp(points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], 
     `intrinsics`: fx, fy, cx, cy [pixels]. Returns an EpnpPose, or None for collinear points.
     All points count as inliers. Raises ValueError for bad shapes.
     """
-def solve_global_bundle(bundle: GatheredBundle, options: GlobalBundleOptions = ..., abort: StopFlag | None = None, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> BundleSummary:
+def solve_full_bundle(bundle: GatheredBundle, options: FullBundleOptions = ..., abort: StopFlag | None = None, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> BundleSummary:
     """
     Refine a gathered bundle; returns a BundleSummary. Takes no lock.
 
@@ -2910,8 +2917,8 @@ def verify_loop_candidate(map: Map, current: int, candidate: int, options: LoopV
     Verify by geometry that two keyframes show the same place.
 
     Matches by words, a similarity by RANSAC, guided matching, refinement, projection of
-    the points around the candidate (spec 14, section 3). Returns a Loop, or None when a
-    step finds too little or a keyframe is dead. The map is not changed.
+    the points around the candidate. Returns a Loop, or None when a step finds too little or
+    a keyframe is dead. The map is not changed.
     """
 def words_of(frame: Frame) -> WordVector:
     """

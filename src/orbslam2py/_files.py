@@ -1,14 +1,29 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writing files so that a reader sees the old content or the new one, never a part."""
+"""Writing files and folders so that a reader sees the old content or the new, never a part."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import secrets
+import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO, Any, NoReturn
+
+#: Endings of names, in lower case, that OpenCV reads as single images.
+IMAGE_SUFFIXES = (
+    ".png",
+    ".jpg",
+    ".jpeg",
+    ".bmp",
+    ".tif",
+    ".tiff",
+    ".webp",
+    ".pgm",
+    ".ppm",
+    ".jp2",
+)
 
 
 @contextlib.contextmanager
@@ -56,6 +71,42 @@ def atomic_write(path: str | os.PathLike[str], *, binary: bool = False) -> Itera
         raise
     except BaseException:
         _remove(temporary)
+        raise
+
+
+@contextlib.contextmanager
+def atomic_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Make a folder that appears under its name only when everything in it was written.
+
+    Yields a temporary folder beside it, which takes the place of `path` at the end of the ``with``
+    block. If the block raises, the temporary folder is removed and an existing folder stays as it
+    was; else the existing one is removed with all it holds.
+
+    Parameters
+    ----------
+    path
+        The folder; a symbolic link is followed.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written or replaced.
+    """
+    target = Path(os.path.realpath(path))
+    token = secrets.token_hex(4)
+    temporary = target.with_name(f".{target.name}.{token}.tmp")
+    temporary.mkdir(parents=True)
+    try:
+        yield temporary
+        if target.exists() and any(target.iterdir()):
+            old = target.with_name(f".{target.name}.{token}.old")
+            target.replace(old)
+            temporary.replace(target)
+            shutil.rmtree(old)
+        else:
+            temporary.replace(target)
+    except BaseException:
+        shutil.rmtree(temporary, ignore_errors=True)
         raise
 
 

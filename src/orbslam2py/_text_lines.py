@@ -47,7 +47,14 @@ def content_lines(path: str | Path, separator: str | None = None) -> list[TextLi
 
 
 def numbers_of(path: str | Path, line: TextLine, counts: tuple[int, ...]) -> list[float]:
-    """Convert all fields of a line.
+    """Convert all fields of a line to finite numbers.
+
+    Parameters
+    ----------
+    path, line
+        The file, for messages, and a line of it.
+    counts
+        How many fields it may have.
 
     Raises
     ------

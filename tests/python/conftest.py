@@ -1,26 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the tests share."""
+"""For all tests: no hang, no thread left behind, the extra data."""
 
 from __future__ import annotations
 
 import gc
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from interleaving import LIMIT, Stage
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.system import System
-from small_sequences import new_system, play
-from watchdog import watchdog, worker_threads
-
-_CHECKOUT = Path(__file__).resolve().parents[2]
-
-
-def _shared_folder() -> Path:
-    return Path(os.environ.get("ORBSLAM2PY_SHARED", _CHECKOUT.parent / "shared"))
+from support.data import shared_folder
+from support.watchdog import watchdog, worker_threads
 
 
 @pytest.fixture(autouse=True)
@@ -43,25 +33,7 @@ def shared_data() -> Path:
 
     Mark the test with ``@pytest.mark.shared`` as well, so that it can be left out by name.
     """
-    folder = _shared_folder() / "data"
+    folder = shared_folder()
     if not folder.is_dir():
         pytest.skip(f"no extra data in {folder}: set ORBSLAM2PY_SHARED to its folder")
     return folder
-
-
-@pytest.fixture
-def slam() -> Iterator[System]:
-    """A system with a small map whose workers have nothing to do."""
-    system = new_system(Sensor.RGBD, wait_for_mapping=True)
-    play(system, 30)
-    assert system.wait_until_idle(LIMIT)
-    assert system.n_keyframes >= 3
-    yield system
-    system.shutdown(drain=False, timeout=LIMIT)
-
-
-@pytest.fixture
-def stage(monkeypatch: pytest.MonkeyPatch) -> Iterator[Stage]:
-    stage = Stage(monkeypatch)
-    yield stage
-    stage.open_all()

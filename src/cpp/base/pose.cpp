@@ -33,7 +33,8 @@ Pose Pose::exp(const Vector6d& xi) {
   const double angle_squared = omega.squaredNorm();
   const double angle = std::sqrt(angle_squared);
 
-  // Half-angle coefficients of the quaternion and the two coefficients of V (spec 16, section 1);
+  // With a the angle and W = [omega]x: the quaternion is (cos(a/2), sin(a/2) / a omega), the
+  // translation V upsilon with V = I + b W + c W^2, b = (1 - cos a) / a^2, c = (a - sin a) / a^3.
   // Taylor series below 1e-4 rad, where the closed forms lose digits.
   double sin_half_over_angle, b, c;
   if (angle < 1e-4) {

@@ -19,7 +19,7 @@ double valid_scale(double scale) {
 }
 
 /// W(omega, sigma) = integral over u in [0, 1] of exp(sigma u) R(u omega), for sigma >= 0: the
-/// matrix of t = W upsilon (spec 16, section 1).
+/// matrix of t = W upsilon, where (omega, upsilon, sigma) is the logarithm and t the translation.
 ///
 /// Its coefficients follow from phi(z) = (exp(z) - 1) / z at z = sigma + i a, a = |omega|:
 /// C = phi(sigma), A = Im phi(z) / a, B = (C - Re phi(z)) / a^2. The closed forms cancel where a,

@@ -10,6 +10,7 @@
 #include "base/errors.hpp"
 #include "base/pose.hpp"
 #include "base/scale_pyramid.hpp"
+#include "base/seeds.hpp"
 #include "bindings/arrays.hpp"
 #include "bindings/bindings.hpp"
 
@@ -178,12 +179,25 @@ void bind_scale_pyramid(py::module_& module) {
            "Level at which a point is expected that was seen at most `max_distance` away.");
 }
 
+void bind_seeds(py::module_& module) {
+  module.def(
+      "seed_of",
+      [](std::uint64_t seed, std::int64_t first, std::int64_t second) {
+        return seed_of(
+            {seed, static_cast<std::uint64_t>(first), static_cast<std::uint64_t>(second)});
+      },
+      py::arg("seed"), py::arg("first"), py::arg("second"),
+      "One seed (uint64) out of the system's and two ids: another one for other ids or another\n"
+      "order, the same on every platform.");
+}
+
 }  // namespace
 
 void bind_base(py::module_& module) {
   register_errors(module);
   bind_pose(module);
   bind_scale_pyramid(module);
+  bind_seeds(module);
 }
 
 }  // namespace orbslam::bindings

@@ -196,9 +196,10 @@ void bind_tracked_frame(py::module_& module) {
       module, "TrackedFrame",
       "A frame with the pose and the associations the tracker gives it. Arrays are copies.")
       .def(py::init([](const std::shared_ptr<Frame>& frame) { return TrackedFrame(frame); }),
-           py::arg("frame").none(false))
+           py::arg("features").none(false))
       .def_property_readonly(
-          "frame", [](const TrackedFrame& t) { return std::const_pointer_cast<Frame>(t.frame); })
+          "features", [](const TrackedFrame& t) { return std::const_pointer_cast<Frame>(t.frame); },
+          "What was seen: keypoints, descriptors and depths.")
       .def_property_readonly(
           "id", [](const TrackedFrame& t) { return t.frame->id; }, "Id of the frame.")
       .def_property_readonly(

@@ -197,7 +197,7 @@ void bind_pnp_ransac(py::module_& module) {
              return PnpOptions{{probability, min_inliers, inlier_ratio, max_iterations, exponent},
                                max_chi2};
            }),
-           "probability"_a = 0.99, "min_inliers"_a = 10, "inlier_ratio"_a = 0.5,
+           "probability"_a = 0.99, "min_inliers"_a = kPnpMinInliers, "inlier_ratio"_a = 0.5,
            "max_iterations"_a = 300, "exponent"_a = 3, "max_chi2"_a = 5.991,
            "`exponent`: sample size in the count of iterations. `max_chi2`: limit of the squared\n"
            "error over the variance.");

@@ -51,7 +51,7 @@ void bind_correction(py::module_& module) {
           "Points that move along.");
   module.def(
       "plan_loop_correction", &plan_loop_correction, "map"_a, "loop"_a, "fix_scale"_a, Release(),
-      "Work out how a loop corrects the map (spec 14, section 4).\n\n"
+      "Work out how a loop corrects the map.\n\n"
       "Carries the loop's similarity to the neighbours of its current keyframe, finds which "
       "points\n"
       "are in the map twice, and builds the essential graph. `fix_scale`: where depth is "
@@ -65,8 +65,7 @@ void bind_correction(py::module_& module) {
         return optimize_essential_graph(correction, flag_of(abort), n_threads);
       },
       "correction"_a, "abort"_a = py::none(), "n_threads"_a = 1, Release(),
-      "Spread the loop's error over all keyframes (spec 16, section 6), in place, without "
-      "locks.\n\n"
+      "Spread the loop's error over all keyframes, in place, without locks.\n\n"
       "`abort`: a StopFlag polled once per iteration, or None. 1 thread gives the same bytes in\n"
       "every run. Returns a PoseGraphSummary.");
   module.def(

@@ -83,8 +83,8 @@ void bind_verification(py::module_& module) {
       "options"_a, Release(),
       "Verify by geometry that two keyframes show the same place.\n\n"
       "Matches by words, a similarity by RANSAC, guided matching, refinement, projection of\n"
-      "the points around the candidate (spec 14, section 3). Returns a Loop, or None when a\n"
-      "step finds too little or a keyframe is dead. The map is not changed.");
+      "the points around the candidate. Returns a Loop, or None when a step finds too little or\n"
+      "a keyframe is dead. The map is not changed.");
 }
 
 void bind_choice(py::module_& module) {

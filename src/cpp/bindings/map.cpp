@@ -88,7 +88,9 @@ void bind_queries(MapClass& map) {
                             "Number of published keyframes.")
       .def_property_readonly("n_points", py::cpp_function(reader(&Map::n_points), Release()),
                              "Number of living points.")
-      .def_property_readonly("epoch", &Map::epoch, "Grows with clear(); ids restart then.")
+      .def_property_readonly("epoch", &Map::epoch,
+                             "Which map it is: 0 for the first; clear() begins the next, and its "
+                             "ids restart.")
       .def_property_readonly("big_change_index", &Map::big_change_index,
                              "Grows when poses or points moved as a whole.")
       .def_property_readonly("structure_version", &Map::structure_version,
@@ -316,7 +318,7 @@ void bind_local_map(py::module_& module) {
 
 void bind_keyframe_verbs(py::module_& module) {
   module.def("insert_keyframe", &insert_keyframe, "map"_a, "frame"_a, "create_points"_a,
-             "n_minimum"_a = std::size_t{100}, Release(),
+             "n_minimum"_a = kFewestDepthPoints, Release(),
              "Make a keyframe of a tracked frame, with points from its depths; its id.");
   module.def(
       "process_new_keyframe",

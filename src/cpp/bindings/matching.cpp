@@ -213,7 +213,7 @@ void bind_temporary_points(py::module_& module) {
   module.attr("FIRST_TEMPORARY_POINT") = kFirstTemporaryPoint.value;
   module.def(
       "add_temporary_points", &add_temporary_points, "last"_a, "points"_a,
-      "n_minimum"_a = std::size_t{100}, Release(),
+      "n_minimum"_a = kFewestDepthPoints, Release(),
       "Give the last frame's depths without a map point temporary points (localization).\n\n"
       "All close ones, and far ones until `n_minimum` keypoints have been visited, nearest\n"
       "first. They are appended to `points` (gather_points of the last frame) and associated\n"

@@ -10,7 +10,7 @@
 #include "bindings/bindings.hpp"
 #include "bindings/stop_flag.hpp"
 #include "optimize/bundle_adjustment.hpp"
-#include "optimize/global_bundle_adjustment.hpp"
+#include "optimize/full_bundle_adjustment.hpp"
 #include "optimize/local_bundle_adjustment.hpp"
 #include "optimize/monocular_map.hpp"
 #include "optimize/pose_optimization.hpp"
@@ -234,7 +234,7 @@ void bind_local_bundle(py::module_& module) {
       "gives an empty result, a reset meanwhile drops it.");
 }
 
-void bind_global_bundle_steps(py::module_& module) {
+void bind_full_bundle_steps(py::module_& module) {
   py::class_<GatheredBundle>(module, "GatheredBundle",
                              "A copy of the keyframes and points of a map to be refined together.")
       .def_property_readonly(
@@ -246,27 +246,27 @@ void bind_global_bundle_steps(py::module_& module) {
           "n_observations", [](const GatheredBundle& b) { return b.problem.observations.size(); },
           "Observations.")
       .def_readonly("solved", &GatheredBundle::solved, "It holds a result that may be committed.");
-  py::class_<GlobalBundleCommit>(module, "GlobalBundleCommit", "What commit_global_bundle did.")
-      .def_readonly("committed", &GlobalBundleCommit::committed, "Whether the map was changed.")
-      .def_readonly("n_followed_keyframes", &GlobalBundleCommit::n_followed_keyframes,
+  py::class_<FullBundleCommit>(module, "FullBundleCommit", "What commit_full_bundle did.")
+      .def_readonly("committed", &FullBundleCommit::committed, "Whether the map was changed.")
+      .def_readonly("n_followed_keyframes", &FullBundleCommit::n_followed_keyframes,
                     "Keyframes that were not in the bundle and moved with their parents.")
-      .def_readonly("n_followed_points", &GlobalBundleCommit::n_followed_points,
+      .def_readonly("n_followed_points", &FullBundleCommit::n_followed_points,
                     "Points that were not in the bundle and moved with their reference keyframe.");
-  module.def("gather_global_bundle", &gather_global_bundle, "map"_a,
+  module.def("gather_full_bundle", &gather_full_bundle, "map"_a,
              py::call_guard<py::gil_scoped_release>(),
              "Copy all keyframes that points tie to each other, and these points.\n\n"
              "First of three steps, between which the map may change. Takes the read lock.");
   module.def(
-      "solve_global_bundle",
-      [](GatheredBundle& bundle, const GlobalBundleOptions& options,
+      "solve_full_bundle",
+      [](GatheredBundle& bundle, const FullBundleOptions& options,
          const std::shared_ptr<StopFlag>& abort,
-         int n_threads) { return solve_global_bundle(bundle, options, flag_of(abort), n_threads); },
-      "bundle"_a, py::arg_v("options", GlobalBundleOptions(), "GlobalBundleOptions()"),
+         int n_threads) { return solve_full_bundle(bundle, options, flag_of(abort), n_threads); },
+      "bundle"_a, py::arg_v("options", FullBundleOptions(), "FullBundleOptions()"),
       "abort"_a = py::none(), "n_threads"_a = 1, py::call_guard<py::gil_scoped_release>(),
       "Refine a gathered bundle; returns a BundleSummary. Takes no lock.\n\n"
       "`abort`: a StopFlag polled once per iteration, or None; what an aborted run has reached\n"
       "is not committed. Results that are worse or not finite are not either.");
-  module.def("commit_global_bundle", &commit_global_bundle, "map"_a, "bundle"_a,
+  module.def("commit_full_bundle", &commit_full_bundle, "map"_a, "bundle"_a,
              py::call_guard<py::gil_scoped_release>(),
              "Move the map to the result in one write section, which counts as a big change.\n\n"
              "Keyframes and points made since the gathering move along with their parents and\n"
@@ -275,38 +275,35 @@ void bind_global_bundle_steps(py::module_& module) {
              "local mapping still meanwhile.");
 }
 
-void bind_global_bundle(py::module_& module) {
-  py::class_<GlobalBundleOptions>(module, "GlobalBundleOptions",
-                                  "How global_bundle_adjustment works.")
+void bind_full_bundle(py::module_& module) {
+  py::class_<FullBundleOptions>(module, "FullBundleOptions", "How full_bundle_adjustment works.")
       .def(py::init([](int iterations, bool robust, double max_seconds) {
-             return GlobalBundleOptions{iterations, robust, max_seconds};
+             return FullBundleOptions{iterations, robust, max_seconds};
            }),
            "iterations"_a = 10, "robust"_a = true, "max_seconds"_a = 0.0)
-      .def_readwrite("iterations", &GlobalBundleOptions::iterations, "Accepted steps at most.")
-      .def_readwrite("robust", &GlobalBundleOptions::robust, "Huber kernel on all observations.")
-      .def_readwrite("max_seconds", &GlobalBundleOptions::max_seconds,
+      .def_readwrite("iterations", &FullBundleOptions::iterations, "Accepted steps at most.")
+      .def_readwrite("robust", &FullBundleOptions::robust, "Huber kernel on all observations.")
+      .def_readwrite("max_seconds", &FullBundleOptions::max_seconds,
                      "No step is begun that would probably end later; what was reached is used.\n"
                      "0: no limit, and results do not depend on the speed of the machine.");
-  py::class_<GlobalBundleResult>(module, "GlobalBundleResult", "What global_bundle_adjustment did.")
-      .def_readonly("n_keyframes", &GlobalBundleResult::n_keyframes,
+  py::class_<FullBundleResult>(module, "FullBundleResult", "What full_bundle_adjustment did.")
+      .def_readonly("n_keyframes", &FullBundleResult::n_keyframes,
                     "Keyframes, fixed ones included.")
-      .def_readonly("n_points", &GlobalBundleResult::n_points, "Points refined.")
-      .def_readonly("n_observations", &GlobalBundleResult::n_observations, "Observations used.")
-      .def_readonly("committed", &GlobalBundleResult::committed, "Whether the map was changed.")
-      .def_readonly("summary", &GlobalBundleResult::summary, "Of the solver.");
+      .def_readonly("n_points", &FullBundleResult::n_points, "Points refined.")
+      .def_readonly("n_observations", &FullBundleResult::n_observations, "Observations used.")
+      .def_readonly("committed", &FullBundleResult::committed, "Whether the map was changed.")
+      .def_readonly("summary", &FullBundleResult::summary, "Of the solver.");
   module.def(
-      "global_bundle_adjustment",
-      [](Map& map, const GlobalBundleOptions& options, const std::shared_ptr<StopFlag>& abort,
-         int n_threads) {
-        return global_bundle_adjustment(map, options, flag_of(abort), n_threads);
-      },
-      "map"_a, py::arg_v("options", GlobalBundleOptions(), "GlobalBundleOptions()"),
+      "full_bundle_adjustment",
+      [](Map& map, const FullBundleOptions& options, const std::shared_ptr<StopFlag>& abort,
+         int n_threads) { return full_bundle_adjustment(map, options, flag_of(abort), n_threads); },
+      "map"_a, py::arg_v("options", FullBundleOptions(), "FullBundleOptions()"),
       "abort"_a = py::none(), "n_threads"_a = 1, py::call_guard<py::gil_scoped_release>(),
       "Refine all keyframes (but 0), unpublished ones included, and all points.\n\n"
-      "gather_global_bundle, solve_global_bundle and commit_global_bundle in one call. After an\n"
+      "gather_full_bundle, solve_full_bundle and commit_full_bundle in one call. After an\n"
       "abort, or when the map was cleared meanwhile, the map stays as it was. No observation is\n"
       "erased. Takes the map's locks for short sections only.");
-  bind_global_bundle_steps(module);
+  bind_full_bundle_steps(module);
 }
 
 void bind_monocular_map(py::module_& module) {
@@ -344,7 +341,7 @@ void bind_monocular_map(py::module_& module) {
         return create_monocular_map(map, initial, current, T_21, partners, positions, min_points);
       },
       "map"_a, "initial"_a, "current"_a, "T_21"_a, "matches"_a, "points"_a,
-      "min_points"_a = std::size_t{100},
+      "min_points"_a = kFewestInitialPoints,
       "Make the first map of a single camera from two described frames.\n\n"
       "`T_21`: initial to current camera, up to scale. `matches`: (n,) int32, per initial "
       "keypoint\n"
@@ -363,7 +360,7 @@ void bind_optimize(py::module_& module) {
   bind_pose_optimization(module);
   bind_bundle(module);
   bind_local_bundle(module);
-  bind_global_bundle(module);
+  bind_full_bundle(module);
   bind_monocular_map(module);
 }
 

@@ -22,7 +22,8 @@ struct LevelMask {
 };
 
 /// FAST corners of one level, found in cells of about 30 pixels: a cell that has corners at the
-/// first threshold keeps those, any other takes what the second finds.
+/// first threshold keeps those, any other takes what the second finds. See
+/// docs/method/features.md#corners.
 class CornerGrid {
  public:
   /// Corners in the order of cells, row-major in each cell. The list is valid until the next call.

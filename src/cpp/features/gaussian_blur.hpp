@@ -10,7 +10,8 @@
 namespace orbslam {
 
 /// Gaussian blur 7 x 7 of sigma 2 with reflection at the border (without repeating the edge), the
-/// same bytes as cv::GaussianBlur but without its threads.
+/// same bytes as cv::GaussianBlur but without its threads. Descriptors are taken from it: see
+/// docs/method/features.md#descriptors.
 class GaussianBlur {
  public:
   /// `image`: CV_8UC1, at least 4 x 4 pixels. The result shares a buffer of this object and is

@@ -14,7 +14,8 @@ struct ImagePyramid {
   std::vector<cv::Mat> levels;
 };
 
-/// Bilinear pyramid of a grey image. Level 0 shares the input's pixels.
+/// Bilinear pyramid of a grey image. Level 0 shares the input's pixels; levels too small for a
+/// pixel are empty. See docs/method/features.md#pyramid.
 ImagePyramid build_pyramid(const cv::Mat& grey, const ScalePyramid& scales);
 
 }  // namespace orbslam

@@ -41,7 +41,8 @@ struct ResizeColumns {
   const std::uint8_t* block_shuffle = nullptr;
 };
 
-/// One implementation of all inner loops. Every implementation gives the same bytes.
+/// One implementation of all inner loops. Every implementation gives the same bytes. What they
+/// compute: docs/method/features.md#pyramid and what follows it.
 struct Kernels {
   const char* name;
 
@@ -85,10 +86,11 @@ enum class KernelChoice {
   avx2,
 };
 
+/// Those for any processor.
 const Kernels& portable_kernels();
 /// Null where the library was built without them (not an x86 processor).
 const Kernels* avx2_kernels();
-/// Throws SettingsError when AVX2 is asked for and the processor has none.
+/// The kernels asked for. Throws SettingsError when that is AVX2 and the processor has none.
 const Kernels& choose_kernels(KernelChoice choice);
 
 }  // namespace orbslam

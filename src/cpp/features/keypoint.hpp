@@ -9,6 +9,7 @@
 namespace orbslam {
 
 /// One ORB keypoint. Coordinates are level-0 pixels, the centre of the top-left pixel is (0, 0).
+/// See docs/method/features.md#pyramid.
 struct Keypoint {
   float x = 0;
   float y = 0;

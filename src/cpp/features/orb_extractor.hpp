@@ -31,7 +31,7 @@ struct Extraction {
 /// (ORB: Rublee et al. 2011; distribution by quadtree: Mur-Artal et al. 2015, section III).
 ///
 /// An extractor owns its scratch buffers: one thread at a time per extractor. The result depends
-/// on the image and the options only.
+/// on the image and the options only. See docs/method/features.md#pyramid and what follows it.
 class OrbExtractor {
  public:
   /// `kernels` chooses between implementations that give the same bytes. Throws SettingsError for

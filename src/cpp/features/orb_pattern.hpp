@@ -6,7 +6,8 @@
 namespace orbslam {
 
 /// The 256 learned point pairs (x1, y1, x2, y2) of rotated BRIEF, in pixels from the keypoint
-/// (Rublee et al. 2011; the table of OpenCV's ORB, see third_party_notes/orb_pattern.md).
+/// (Rublee et al. 2011; the table of OpenCV's ORB, see third_party_notes/orb_pattern.md). See
+/// docs/method/features.md#descriptors.
 // clang-format off
 inline constexpr std::int8_t orb_pattern[256][4] = {
     {8, -3, 9, 5}, {4, 2, 7, -12}, {-11, 9, -8, 2}, {7, -12, 12, -13},
@@ -84,6 +85,7 @@ struct OrbPatternColumns {
   alignas(32) float y2[256];
 };
 
+/// The table by columns, made by the compiler.
 constexpr OrbPatternColumns make_orb_pattern_columns() {
   OrbPatternColumns columns{};
   for (int i = 0; i < 256; ++i) {

@@ -29,7 +29,7 @@ class ResizePlan {
   std::vector<std::int16_t> rows_[2];
 };
 
-/// build_pyramid with buffers that are kept between images.
+/// build_pyramid with buffers that are kept between images. See docs/method/features.md#pyramid.
 class PyramidBuilder {
  public:
   ImagePyramid build(const cv::Mat& grey, const ScalePyramid& scales, const Kernels& kernels);

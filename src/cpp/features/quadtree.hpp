@@ -9,7 +9,8 @@
 namespace orbslam {
 
 /// Chooses corners spread over an area: it is divided into quarters until there are about as many
-/// boxes as corners wanted, then the strongest corner of each box is kept.
+/// boxes as corners wanted, then the strongest corner of each box is kept. See
+/// docs/method/features.md#even-distribution.
 class Quadtree {
  public:
   /// `corners` lie in [0, width) x [0, height). Returns about `quota` of them, at most

@@ -15,16 +15,21 @@ struct FrameContext {
   std::shared_ptr<const ScalePyramid> scales;
 };
 
-/// Frame of a single camera: undistorted keypoints, no depth.
+/// Frame of a single camera: undistorted keypoints, no depth. See
+/// docs/method/frame.md#undistortion.
 std::shared_ptr<Frame> build_monocular_frame(const FrameContext& context, FrameId id,
                                              double timestamp, Features features);
 
-/// Frame of a rectified pair; depth by stereo matching (frame/stereo_matching.hpp).
+/// Frame of a rectified pair; depth by stereo matching (frame/stereo_matching.hpp). Throws
+/// StateError for a camera without a baseline, ImageError as match_stereo() does. See
+/// docs/method/frame.md#stereo-matching.
 std::shared_ptr<Frame> build_stereo_frame(const FrameContext& context, FrameId id, double timestamp,
                                           Extraction left, const Extraction& right);
 
-/// Frame of a colour image with registered depth (CV_32FC1, metres; <= 0 or NaN: no depth).
-/// Throws ImageError when the depth image has another size or type.
+/// Frame of a colour image with registered depth (CV_32FC1, metres; <= 0, infinite or NaN: no
+/// depth), which is read at the pixel of the distorted keypoint. Throws ImageError when the depth
+/// image has another size or type, StateError for a camera without a (virtual) baseline. See
+/// docs/method/frame.md#rgb-d-depth.
 std::shared_ptr<Frame> build_rgbd_frame(const FrameContext& context, FrameId id, double timestamp,
                                         Features features, const cv::Mat& depth);
 

@@ -14,7 +14,8 @@ namespace orbslam {
 ///
 /// The extractors must be two different ones (StateError). An exception of either side arrives
 /// here after both have ended, the left one first. Images and masks as for
-/// OrbExtractor::extract; both images must have the same size (ImageError).
+/// OrbExtractor::extract; both images must have the same size (ImageError). See
+/// docs/method/frame.md#images.
 std::pair<Extraction, Extraction> extract_pair(OrbExtractor& left_extractor,
                                                OrbExtractor& right_extractor, WorkerThread& helper,
                                                const cv::Mat& left, const cv::Mat& right,

@@ -37,6 +37,7 @@ struct Frame {
   std::size_t size() const { return keypoints.size(); }
   /// The one test of "is a stereo observation": a virtual right column may be negative.
   bool has_depth(std::size_t i) const { return depth[i] > 0.0F; }
+  /// The depth can be trusted from one view: see docs/method/frame.md#close-and-far-points.
   bool is_close(std::size_t i) const {
     return depth[i] > 0.0F && depth[i] < static_cast<float>(camera->close_depth());
   }

@@ -8,7 +8,7 @@ namespace orbslam {
 /// The grey image (CV_8UC1) of a grey, colour (3 channels) or colour + alpha (4) image, uint8:
 /// 0.299 R + 0.587 G + 0.114 B. `is_rgb`: the first channel is red, else blue. A grey image
 /// comes back as it is, sharing its pixels. Throws ImageError for an empty image and for other
-/// types.
+/// types. See docs/method/frame.md#images.
 cv::Mat to_grey(const cv::Mat& image, bool is_rgb);
 /// The same into `grey`, whose memory is reused if its size and type fit.
 void to_grey(const cv::Mat& image, bool is_rgb, cv::Mat& grey);

@@ -15,7 +15,8 @@ struct GridCell {
   int column = -1, row = -1;
 };
 
-/// Keypoint indices in 64 x 48 cells over the undistorted image bounds, for area queries.
+/// Keypoint indices in 64 x 48 cells over the undistorted image bounds, for area queries. See
+/// docs/method/frame.md#keypoint-grid.
 class KeypointGrid {
  public:
   static constexpr int kColumns = 64;

@@ -15,7 +15,8 @@ void nearest_keypoints(const Frame& frame, std::size_t n_minimum,
     return frame.depth[a] != frame.depth[b] ? frame.depth[a] < frame.depth[b] : a < b;
   });
   const double close_depth = frame.camera->close_depth();
-  // The first far one beyond the minimum is still taken (spec 08, defect 13).
+  // The first far one beyond the minimum is still taken: the original makes the point before it
+  // asks whether there are enough, and its maps are to be comparable.
   for (std::size_t n = n_minimum; n < indices.size(); ++n) {
     if (frame.depth[indices[n]] > close_depth) {
       indices.resize(n + 1);

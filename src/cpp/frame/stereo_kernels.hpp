@@ -21,9 +21,10 @@ struct WindowPair {
 };
 
 /// sums[k]: sum over the window of |(L - L_centre) - (R_k - R_k_centre)| for the right window
-/// that starts at column k of the strip, k = 0..10.
+/// that starts at column k of the strip, k = 0..10. See docs/method/frame.md#stereo-matching.
 using ShiftedSad = void (*)(const WindowPair& windows, int* sums);
 
+/// The version for any processor.
 void shifted_sad_portable(const WindowPair& windows, int* sums);
 #if defined(__x86_64__)
 /// Same results as the portable version; needs a CPU with AVX2.

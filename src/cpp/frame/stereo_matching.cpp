@@ -22,6 +22,7 @@ using stereo::kWindow;
 constexpr float kUnknown = -1.0F;
 constexpr int kDescriptorLimit = 75;
 constexpr int kLevelTolerance = 1;
+constexpr float kRowBand = 2.0F;  // pixels of a keypoint's level by which its row may be off
 constexpr float kSmallestDisparity = 0.01F;
 // 1.5 * 1.4, after the usual robust estimate of a standard deviation from a median.
 constexpr float kOutlierFactor = 2.1F;
@@ -33,15 +34,14 @@ struct Candidate {
   std::uint32_t index;
 };
 
-// For every image row the right keypoints that may lie on it, in ascending index: the row of a
-// keypoint is known to two pixels of its level.
+// For every image row the right keypoints that may lie on it, in ascending index.
 class RowTable {
  public:
   RowTable(const std::vector<Keypoint>& keypoints, const ScalePyramid& scales, int rows)
       : offsets_(static_cast<std::size_t>(rows) + 1, 0) {
     std::vector<std::pair<int, int>> spans(keypoints.size());
     for (std::size_t i = 0; i < keypoints.size(); ++i) {
-      const float r = 2.0F * scales.scale(keypoints[i].level);
+      const float r = kRowBand * scales.scale(keypoints[i].level);
       const int first = std::max(0, static_cast<int>(std::floor(keypoints[i].y - r)));
       const int last = std::min(rows - 1, static_cast<int>(std::ceil(keypoints[i].y + r)));
       spans[i] = {first, last};

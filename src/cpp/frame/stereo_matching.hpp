@@ -15,7 +15,8 @@ struct StereoMatches {
 /// Depth of the left keypoints of a rectified pair: descriptor search along rows, sliding 11x11
 /// SAD window on the keypoint's level, parabola for the sub-pixel shift, removal of matches whose
 /// SAD is above 2.1 times the median. bf in pixel metre, max_disparity in pixels (fx: depth of at
-/// least one baseline). Both pyramids must have the levels of the keypoints, else ImageError.
+/// least one baseline). Both pyramids must have the levels of the keypoints, else ImageError. See
+/// docs/method/frame.md#stereo-matching.
 StereoMatches match_stereo(const Extraction& left, const Extraction& right,
                            const ScalePyramid& scales, double bf, double max_disparity);
 

@@ -6,14 +6,16 @@
 
 namespace orbslam {
 
-/// Bag of words of an image: ascending word ids and their weights, L1-normalised.
+/// Bag of words of an image: ascending word ids and their weights, L1-normalised. See
+/// docs/method/words.md#word-vectors.
 struct WordVector {
   std::vector<std::uint32_t> words;
   std::vector<double> weights;
 };
 
 /// Direct index: which features fall under which vocabulary node. Nodes ascend; the features of
-/// nodes[i] are indices[offsets[i]] .. indices[offsets[i + 1] - 1], ascending.
+/// nodes[i] are indices[offsets[i]] .. indices[offsets[i + 1] - 1], ascending. See
+/// docs/method/words.md#groups-of-words.
 struct DirectIndex {
   std::vector<std::uint32_t> nodes;
   std::vector<std::uint32_t> offsets;  ///< nodes.size() + 1 entries, or empty

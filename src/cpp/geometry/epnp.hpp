@@ -18,7 +18,8 @@ struct EpnpPose {
 /// with a cost linear in n (Lepetit, Moreno-Noguer and Fua 2009). No outliers are looked for and
 /// no depth is asked to be positive. Nothing when the points are collinear or not finite. Points
 /// on a plane are expressed by three control points instead of four.
-/// Throws std::invalid_argument for fewer than 4 points or different counts.
+/// Throws std::invalid_argument for fewer than 4 points or different counts. See
+/// docs/method/relocalization.md#pose-from-points.
 std::optional<EpnpPose> solve_epnp(const Eigen::Ref<const Eigen::Matrix3Xd>& points,
                                    const Eigen::Ref<const Eigen::Matrix2Xd>& pixels,
                                    const Pinhole& pinhole);

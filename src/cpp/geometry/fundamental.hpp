@@ -14,7 +14,8 @@ Eigen::Matrix3d fit_fundamental(const PointPairs& pairs, const EightPairs& sampl
 /// The fundamental matrix of the sample with the strictly highest score. A direction (point to
 /// epipolar line) counts with 5.991 minus the squared distance over sigma^2 [pixels] while the
 /// latter is at most 3.841; 5.991 makes the scores comparable with those of homographies. An
-/// inlier stays within 3.841 in both directions.
+/// inlier stays within 3.841 in both directions. See
+/// docs/method/start.md#homography-or-fundamental-matrix.
 ScoredModel best_fundamental(const PointPairs& pairs, const std::vector<EightPairs>& samples,
                              const Normalization& normalization_1,
                              const Normalization& normalization_2, double sigma);

@@ -13,7 +13,8 @@ Eigen::Matrix3d fit_homography(const PointPairs& pairs, const EightPairs& sample
 
 /// The homography of the sample with the strictly highest score: the sum over pairs and both
 /// directions of what is left of 5.991 after subtracting the squared transfer error over sigma^2
-/// [pixels]. An inlier stays within the limit in both directions.
+/// [pixels]. An inlier stays within the limit in both directions. See
+/// docs/method/start.md#homography-or-fundamental-matrix.
 ScoredModel best_homography(const PointPairs& pairs, const std::vector<EightPairs>& samples,
                             const Normalization& normalization_1,
                             const Normalization& normalization_2, double sigma);

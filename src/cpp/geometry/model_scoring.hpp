@@ -13,7 +13,8 @@ struct PairErrors {
   Eigen::ArrayXd in_1, in_2;
 };
 
-/// When a direction counts, and with how much: `credit` minus its error.
+/// When a direction counts, and with how much: `credit` minus its error. See
+/// docs/method/start.md#homography-or-fundamental-matrix.
 struct ErrorGate {
   double limit = 0;
   double credit = 0;
@@ -30,6 +31,7 @@ inline double score_errors(const PairErrors& errors, double inverse_sigma2, Erro
   return score;
 }
 
+/// Flags and counts the pairs whose errors are within the limit in both directions.
 inline void mark_inliers(const PairErrors& errors, double inverse_sigma2, ErrorGate gate,
                          ScoredModel& model) {
   const auto fits = [&](double error) { return error * inverse_sigma2 <= gate.limit; };

@@ -6,6 +6,10 @@
 namespace orbslam {
 namespace {
 
+constexpr double kInlierShare = 0.9;   // of the model's inliers, that the best motion must place
+constexpr double kSecondShare = 0.75;  // of the best one's points, for a homography's second best
+constexpr double kSimilarShare = 0.7;  // the same for each other motion of a fundamental matrix
+
 std::size_t best_of(const std::vector<MotionScore>& scores) {
   const auto best = std::max_element(
       scores.begin(), scores.end(),
@@ -52,9 +56,9 @@ MotionChoice choose_homography_motion(const std::vector<MotionScore>& scores, st
   for (std::size_t i = 0; i < scores.size(); ++i) {
     if (i != index) second = std::max(second, scores[i].n_good);
   }
-  const bool enough_points =
-      scores[index].n_good > limits.min_points && best > 0.9 * static_cast<double>(n_inliers);
-  const bool unique = static_cast<double>(second) < 0.75 * best;
+  const bool enough_points = scores[index].n_good > limits.min_points &&
+                             best > kInlierShare * static_cast<double>(n_inliers);
+  const bool unique = static_cast<double>(second) < kSecondShare * best;
   return {judge(enough_points, scores[index].parallax >= limits.min_parallax, unique), index};
 }
 
@@ -62,10 +66,10 @@ MotionChoice choose_fundamental_motion(const std::vector<MotionScore>& scores,
                                        std::size_t n_inliers, const MotionLimits& limits) {
   const std::size_t index = best_of(scores);
   const auto best = static_cast<double>(scores[index].n_good);
-  const auto most = static_cast<std::size_t>(0.9 * static_cast<double>(n_inliers));
+  const auto most = static_cast<std::size_t>(kInlierShare * static_cast<double>(n_inliers));
   const bool enough_points = scores[index].n_good >= std::max(most, limits.min_points);
   const auto similar = std::count_if(scores.begin(), scores.end(), [&](const MotionScore& score) {
-    return static_cast<double>(score.n_good) > 0.7 * best;
+    return static_cast<double>(score.n_good) > kSimilarShare * best;
   });
   return {judge(enough_points, scores[index].parallax > limits.min_parallax, similar <= 1), index};
 }

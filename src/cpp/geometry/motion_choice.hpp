@@ -26,7 +26,7 @@ struct MotionChoice {
 
 /// Accepts the best of a homography's motions when it has more than min_points good points and
 /// more than 90 % of `n_inliers`, at least min_parallax, and the second best has fewer than 75 %
-/// of its points. `scores` must not be empty.
+/// of its points. `scores` must not be empty. See docs/method/start.md#choosing-the-motion.
 MotionChoice choose_homography_motion(const std::vector<MotionScore>& scores, std::size_t n_inliers,
                                       const MotionLimits& limits);
 

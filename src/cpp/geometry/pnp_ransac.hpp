@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -20,8 +21,10 @@ struct PnpProblem {
   Pinhole pinhole;
 };
 
+inline constexpr std::size_t kPnpMinInliers = 10;  ///< fewest inliers that make a pose
+
 struct PnpOptions {
-  RansacOptions ransac{0.99, 10, 0.5, 300, 3};
+  RansacOptions ransac{0.99, kPnpMinInliers, 0.5, 300, 3};
   double max_chi2 = 5.991;  ///< squared error over sigma2 that an inlier stays below
 };
 
@@ -33,7 +36,8 @@ struct PnpPose {
 };
 
 /// RANSAC over EPnP, in slices: the tracker lets several candidate keyframes take turns. How the
-/// iterations are sliced does not change what is found.
+/// iterations are sliced does not change what is found. See
+/// docs/method/relocalization.md#pose-from-points.
 class PnpRansac {
  public:
   /// Throws std::invalid_argument when the arrays differ in length, or an option is out of range.

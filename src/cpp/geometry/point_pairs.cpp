@@ -6,6 +6,12 @@
 #include <string>
 
 namespace orbslam {
+namespace {
+
+// Deviations far below a pixel's float32 resolution are rounding, not extent.
+constexpr double kLeastDeviation = 1e-6;
+
+}  // namespace
 
 void PointPairs::resize(std::size_t count) {
   for (Eigen::ArrayXd* column : {&u_1, &v_1, &u_2, &v_2}) {
@@ -63,8 +69,7 @@ bool normalize(const std::vector<Eigen::Vector2f>& points, Normalization& normal
   mean /= count;
   for (const auto& point : points) deviation += (point.cast<double>().array() - mean).abs();
   deviation /= count;
-  // Deviations far below a pixel's float32 resolution are rounding, not extent.
-  const bool extended = (deviation > 1e-6).all() && deviation.isFinite().all();
+  const bool extended = (deviation > kLeastDeviation).all() && deviation.isFinite().all();
   if (!extended) return false;
   normalization = {1 / deviation.x(), 1 / deviation.y(), -mean.x() / deviation.x(),
                    -mean.y() / deviation.y()};

@@ -17,7 +17,8 @@ struct PointPairs {
 };
 
 /// The pairs of all initial points i with matches[i] >= 0, ascending by i.
-/// Throws std::invalid_argument when a match is out of range or the lengths differ.
+/// Throws std::invalid_argument when a match is out of range or the lengths differ. See
+/// docs/method/start.md#two-views.
 PointPairs gather_pairs(const std::vector<Eigen::Vector2f>& initial,
                         const std::vector<Eigen::Vector2f>& current,
                         const std::vector<int>& matches);

@@ -53,7 +53,8 @@ struct RansacOptions {
 };
 
 /// Iterations to run on `count` correspondences: in [1, max_iterations], 1 when all must be
-/// inliers; 0 when there are fewer than min_inliers, so that no model can be found.
+/// inliers; 0 when there are fewer than min_inliers, so that no model can be found. See
+/// docs/method/relocalization.md#pose-from-points.
 int ransac_iterations(std::size_t count, const RansacOptions& options);
 
 /// Throws std::invalid_argument, beginning with `what`, when an option or the gate max_chi2 is out

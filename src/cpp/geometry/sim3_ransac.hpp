@@ -34,8 +34,9 @@ struct Sim3Estimate {
   std::size_t n_inliers = 0;
 };
 
-/// RANSAC over the closed form of three correspondences, in slices: the loop closer lets several
-/// candidate keyframes take turns. How the iterations are sliced does not change what is found.
+/// RANSAC over the closed form of three correspondences, in slices: where the refinement refuses a
+/// similarity, verify_loop_candidate() goes on behind it. How the iterations are sliced does not
+/// change what is found. See docs/method/loops.md#verification.
 class Sim3Ransac {
  public:
   /// Throws std::invalid_argument when the arrays differ in length, or an option is out of range.

@@ -9,7 +9,8 @@
 namespace orbslam {
 
 /// Linear triangulation of two normalised rays (x, y, 1): the world point whose algebraic error in
-/// both cameras is least; nothing when it lies at infinity.
+/// both cameras is least; nothing when it lies at infinity. See
+/// docs/method/mapping.md#new-points.
 std::optional<Eigen::Vector3d> triangulate(const Eigen::Vector3d& ray_1,
                                            const Eigen::Vector3d& ray_2, const Pose& T_1w,
                                            const Pose& T_2w);

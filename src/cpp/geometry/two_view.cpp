@@ -15,6 +15,7 @@ namespace orbslam {
 namespace {
 
 constexpr double homography_threshold = 0.40;
+constexpr double max_chi2 = 4.0;  // squared reprojection error over sigma^2 of a good pair
 constexpr std::size_t sample_size = std::tuple_size_v<EightPairs>;
 
 void check_options(const TwoViewOptions& options) {
@@ -83,7 +84,7 @@ std::vector<MotionSupport> check_motions(const std::vector<Motion>& motions,
   std::vector<MotionSupport> supports(motions.size());
   const auto check_every_second = [&](std::size_t first) {
     for (std::size_t i = first; i < motions.size(); i += 2) {
-      supports[i] = check_motion(motions[i], pairs, inliers, pinhole, 4 * sigma * sigma);
+      supports[i] = check_motion(motions[i], pairs, inliers, pinhole, max_chi2 * sigma * sigma);
     }
   };
   run_both(

@@ -64,7 +64,7 @@ std::vector<EightPairs> draw_samples(std::size_t n_matches, int n_samples, std::
 /// which one gives the motion hypotheses, and the best of these must win clearly. There is no
 /// second attempt with the other model. With a helper thread both models and the hypotheses are
 /// worked on in two threads; the result is the same. Throws std::invalid_argument for matches
-/// that do not fit the points and for options out of range.
+/// that do not fit the points and for options out of range. See docs/method/start.md#two-views.
 TwoViewResult reconstruct_two_views(const TwoViewInput& input, const TwoViewOptions& options,
                                     std::uint64_t seed, WorkerThread* helper);
 

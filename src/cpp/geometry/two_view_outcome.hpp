@@ -3,7 +3,8 @@
 
 namespace orbslam {
 
-/// Whether two views gave a reconstruction, or why not.
+/// Whether two views gave a reconstruction, or why not. See
+/// docs/method/start.md#choosing-the-motion.
 enum class TwoViewOutcome {
   reconstructed,
   too_few_matches,    ///< fewer than TwoViewOptions::min_matches

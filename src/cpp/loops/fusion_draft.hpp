@@ -21,7 +21,8 @@ using SharedPoints = std::vector<std::pair<KeyFrameId, int>>;
 std::vector<KeyFrameId> neighbours_by(const SharedPoints& shared);
 
 /// The slots of a group of keyframes, the points in them and the points on the far side of a loop,
-/// copied, so that fusions are tried out one after the other while the map stays as it is.
+/// copied, so that fusions are tried out one after the other while the map stays as it is. See
+/// docs/method/loops.md#fusion-across-the-loop.
 class FusionDraft {
  public:
   /// Copies living keyframes, and living points of `far`, each once. The caller holds a lock.

@@ -20,7 +20,7 @@ struct KeyFrameWay {
 
 /// Which keyframes have a measured relative pose, and where they are: a copy of the map's
 /// covisibility graph (KeyFrame::neighbours), spanning tree and loop edges, for searches without
-/// a lock.
+/// a lock. See docs/method/loops.md#choice.
 class KeyFrameGraph {
  public:
   /// The caller holds a lock.

@@ -9,7 +9,8 @@
 namespace orbslam {
 
 /// A place seen again: the present keyframe, the one that showed the place before, and the
-/// similarity between their cameras, with which the drift gathered meanwhile can be taken out.
+/// similarity between their cameras, with which the drift gathered meanwhile can be taken out. See
+/// docs/method/loops.md#verification.
 struct Loop {
   KeyFrameId current, matched;
   Similarity S_cm;                      ///< camera of `matched` to camera of `current`

@@ -22,7 +22,8 @@ constexpr double kRotation = 0.1;      // radians, drift over a short way and me
 constexpr double kRotationOfTurn = 0.03;
 constexpr double kRotationOfPath = 0.01;             // radians per scene depth
 constexpr double kMaxRotation = 1.0471975511965976;  // 60 degrees
-const double kLogScale = std::log(1.5);
+constexpr double kScaleDrift = 1.5;                  // over a short way
+const double kLogScale = std::log(kScaleDrift);
 constexpr double kLogScaleOfPath = 0.01;  // per scene depth
 /// The difference of two measurements errs by the root of 2 times as much as one; rounded up.
 constexpr double kTwoMeasurements = 1.5;

@@ -50,7 +50,8 @@ LoopDrift assess_drift(const Map& map, const Loop& loop, bool fix_scale);
 /// at places (position or orientation) that differ by more than drift between their far ends and
 /// the error of both measurements can explain. Loops that drift cannot explain have no say: they
 /// are other places that look the same. Takes the read lock while it copies.
-/// Throws std::invalid_argument when the loops are not all of one keyframe.
+/// Throws std::invalid_argument when the loops are not all of one keyframe. See
+/// docs/method/loops.md#choice.
 std::optional<Loop> choose_loop(const Map& map, const std::vector<Loop>& loops, bool fix_scale);
 
 }  // namespace orbslam

@@ -13,7 +13,7 @@
 namespace orbslam {
 
 /// What closing a loop does to the map, worked out on copies, so that everybody else sees the map
-/// before or after it and never between (spec 14, section 4 and 7.2).
+/// before or after it and never between. See docs/method/loops.md#correction.
 ///
 /// The caller keeps local mapping still from plan_loop_correction() to apply_loop_correction().
 struct LoopCorrection {
@@ -42,12 +42,18 @@ struct LoopCorrection {
   std::vector<std::pair<MapPointId, std::uint32_t>> carried;
 };
 
-/// Propagates the loop's similarity to the group, finds which points are the same on both sides,
-/// and builds the essential graph with the links that this makes (spec 14, 4.4 to 4.8; 16, 6).
-/// Takes the map's read lock in short sections.
+/// Propagates the loop's similarity to the group, along the relative poses within it; finds which
+/// points are the same on both sides (the loop's matches, and the far side's points projected into
+/// every corrected keyframe of the group); and builds the essential graph with the links that this
+/// makes. Points move with their FusionDraft::carrier(), those that have none with their reference
+/// keyframe. The correction has no keyframes when an end of the loop is dead or unpublished. Takes
+/// the map's read lock in short sections; the map is not changed. Throws std::invalid_argument
+/// unless the loop has one match, or an invalid id, per keypoint of its current keyframe.
 LoopCorrection plan_loop_correction(const Map& map, const Loop& loop, bool fix_scale);
 
-/// Solves its graph. After an abort the correction must not be applied.
+/// Solves its graph in place (optimize_pose_graph()), without locks; nothing to do when it is
+/// empty. `abort` is polled once per iteration; nullptr: never. After an abort the correction must
+/// not be applied.
 PoseGraphSummary optimize_essential_graph(LoopCorrection& correction,
                                           const std::atomic<bool>* abort, int n_threads = 1);
 
@@ -60,7 +66,8 @@ struct LoopCorrectionResult {
 
 /// Fusions, poses, points, connections and the loop edge, in one write section, which counts as a
 /// big change. Keyframes that were not planned for (the tracker may just have inserted one) follow
-/// the keyframe before them.
+/// the keyframe before them. Prepared under the read lock. Nothing is changed when the map was
+/// cleared meanwhile, an end of the loop has died or the correction is empty.
 LoopCorrectionResult apply_loop_correction(Map& map, const LoopCorrection& correction);
 
 }  // namespace orbslam

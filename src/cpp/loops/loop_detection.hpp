@@ -8,8 +8,8 @@
 namespace orbslam {
 
 /// A loop is believed only when the same part of the map is proposed by consecutive keyframes
-/// (Mur-Artal et al. 2015, section VII-A; spec 14, section 2). Remembers what the keyframe before
-/// proposed. One thread.
+/// (Mur-Artal et al. 2015, section VII-A). Remembers what the keyframe before proposed. One thread.
+/// See docs/method/loops.md#consistency.
 class LoopConsistency {
  public:
   static constexpr int kNeeded = 3;  ///< consecutive confirmations

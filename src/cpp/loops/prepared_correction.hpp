@@ -9,7 +9,8 @@
 namespace orbslam {
 
 /// The two halves of apply_loop_correction(): what is worked out under a read lock, and what is
-/// left for the write section. Refers to the correction, which must outlive it.
+/// left for the write section. Refers to the correction, which must outlive it. See
+/// docs/method/loops.md#correction.
 class PreparedCorrection {
  public:
   /// The caller holds a lock.

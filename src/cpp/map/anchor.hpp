@@ -9,7 +9,7 @@ namespace orbslam {
 
 // Poses of frames are kept relative to a keyframe, because optimisation moves keyframes. The pose
 // of that keyframe must be the one of the map that the frame was tracked in: a loop closed between
-// tracking and taking note would otherwise enter the relative pose.
+// tracking and taking note would otherwise enter the relative pose. See docs/method/map.md#anchors.
 
 /// A keyframe, living or culled, where it is now. The caller holds a lock. Throws StateError for an
 /// unknown one.

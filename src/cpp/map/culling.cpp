@@ -9,6 +9,7 @@ constexpr std::int64_t kObservationAge = 2;  ///< keyframes after which observat
 constexpr std::int64_t kProbation = 3;       ///< keyframes after which a point is trusted
 constexpr double kRedundantShare = 0.9;
 constexpr int kOtherObservers = 3;
+constexpr int kLevelSlack = 1;  ///< levels by which others may see a point at a coarser scale
 
 enum class Verdict { kDrop, kKill, kKeep };
 
@@ -19,11 +20,11 @@ Verdict judge(const MapPoint& point, KeyFrameId current, int min_observations) {
   return age >= kProbation ? Verdict::kDrop : Verdict::kKeep;
 }
 
-/// Seen by three others at the same or a finer scale (one level of slack).
+/// Seen by enough others at the same or a finer scale, with some slack.
 bool is_redundant(const Map& map, const MapPoint& point, const KeyFrame& keyframe,
                   std::size_t slot) {
   if (point.observation_count <= kOtherObservers) return false;
-  const int coarsest = keyframe.frame->keypoints[slot].level + 1;
+  const int coarsest = keyframe.frame->keypoints[slot].level + kLevelSlack;
   int n_others = 0;
   for (const Observation& observation : point.observations) {
     if (observation.keyframe == keyframe.id) continue;

@@ -11,7 +11,8 @@
 namespace orbslam {
 
 /// Objects owned by ascending id: O(1) look-up, iteration in id order, and pages that are freed
-/// once all their objects have died, so that memory follows the number of live objects.
+/// once all their objects have died, so that memory follows the number of live objects. See
+/// docs/method/map.md#replaced-and-dead-points.
 template <class IdType, class Object>
 class IdTable {
  public:

@@ -13,7 +13,8 @@
 namespace orbslam {
 
 /// A frame that stays. `frame` never changes and may be read without a lock once the pointer has
-/// been copied; the rest belongs to the Map and is read and written under its lock.
+/// been copied; the rest belongs to the Map and is read and written under its lock. See
+/// docs/method/map.md#keyframes.
 struct KeyFrame {
   KeyFrameId id;
   std::shared_ptr<const Frame> frame;

@@ -5,7 +5,6 @@
 #include <string>
 
 #include "base/errors.hpp"
-#include "frame/nearest_keypoints.hpp"
 #include "map/anchor.hpp"
 
 namespace orbslam {

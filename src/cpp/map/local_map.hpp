@@ -16,16 +16,20 @@ struct LocalMap {
 };
 
 /// Exchanges replaced points of the frame for their living successors, refreshes the copies of
-/// positions, and drops associations with dead points. Temporary points stay. Takes the read lock.
+/// positions, and drops associations with dead points. Of two keypoints whose points were merged
+/// one keeps the survivor. Temporary points stay. Takes the read lock.
 void refresh_associations(const Map& map, TrackedFrame& frame);
 /// The same; the caller holds a lock.
 void refresh_associations_locked(const Map& map, TrackedFrame& frame);
 
-/// Keyframes voted for by the frame's points, extended by neighbours, children and parents until
-/// there are more than 80, and all their points (spec 08, 7.1 and 7.2). Drops associations with
-/// dead points from the frame; temporary points stay and have no vote. The frame is anchored at the
-/// reference keyframe; should the map have moved as a whole since its pose was predicted, the pose
-/// follows first. Takes the read lock once, so the result is one consistent view.
+/// Keyframes that observe points of the frame (each point votes for its observers, ascending ids),
+/// then for each of these at most one of its ten best neighbours, one child and the parent, until
+/// there are more than 80; and all points of these keyframes. The reference keyframe has most
+/// votes, of equal ones the lowest id. Refreshes the frame's associations first
+/// (refresh_associations()); temporary points have no vote. The frame is anchored at the reference
+/// keyframe; should the map have moved as a whole since its pose was predicted, the pose follows
+/// first. Takes the read lock once, so the result is one consistent view. See
+/// docs/method/tracking.md#local-map.
 LocalMap select_local_map(const Map& map, TrackedFrame& frame);
 
 }  // namespace orbslam

@@ -31,8 +31,11 @@ struct ScaledPose {
 ///
 /// Ids are never reused before clear(). A pointer returned by find() is valid while the lock is
 /// held; across sections keep ids and look them up again.
+///
+/// See docs/method/map.md#keyframes and what follows it, docs/method/threads.md#locks.
 class Map {
  public:
+  // See docs/method/map.md#covisibility and docs/method/loops.md#essential-graph.
   static constexpr int kCovisibilityThreshold = 15;  ///< shared points that make a neighbour
   static constexpr int kEssentialWeight = 100;       ///< shared points of an essential-graph edge
 

@@ -23,7 +23,7 @@ struct PointGeometry {
 };
 
 /// A 3-D point of the map. Only the Map changes it, so that both sides of an observation, the
-/// count and the derived fields always agree.
+/// count and the derived fields always agree. See docs/method/map.md#map-points.
 struct MapPoint {
   MapPointId id;
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< world

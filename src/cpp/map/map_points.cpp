@@ -9,6 +9,9 @@
 namespace orbslam {
 namespace {
 
+/// A point that loses an observation dies when its weighted count is not above this.
+constexpr int kDyingCount = 2;
+
 bool precedes(const Observation& observation, KeyFrameId keyframe) {
   return observation.keyframe < keyframe;
 }
@@ -96,7 +99,7 @@ void Map::erase_observation(MapPointId point_id, KeyFrameId keyframe_id) {
   observed->observation_count -= weight_of(*it);
   all.erase(it);
   ++structure_version_;
-  if (observed->observation_count <= 2) {
+  if (observed->observation_count <= kDyingCount) {
     erase_point(point_id);
   } else if (observed->reference_keyframe == keyframe_id) {
     observed->reference_keyframe = all.front().keyframe;

@@ -10,7 +10,8 @@ namespace orbslam {
 
 /// New poses and positions for many keyframes and points. What follows from them (viewing
 /// directions and scale ranges of the points) is worked out before the write section, so that
-/// this only copies.
+/// this only copies. See docs/method/loops.md#correction and
+/// docs/method/adjustment.md#full-bundle-adjustment.
 class MapRewrite {
  public:
   /// `rescaled`: lengths around the keyframe are multiplied by it.

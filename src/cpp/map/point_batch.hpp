@@ -8,7 +8,7 @@
 namespace orbslam {
 
 /// Copies of map points as flat arrays, gathered under one short read lock, so that searches run
-/// without locks on data that does not change under them.
+/// without locks on data that does not change under them. See docs/method/threads.md#locks.
 struct PointBatch {
   std::vector<MapPointId> ids;
   std::vector<Eigen::Vector3d> positions;

@@ -10,6 +10,7 @@ namespace orbslam {
 
 /// Row-major 4x4 matrix, as NumPy lays it out.
 using Matrix4 = std::array<double, 16>;
+/// The homogeneous matrix of a pose.
 Matrix4 row_major(const Pose& pose);
 
 /// Published keyframes by ascending id.
@@ -49,12 +50,18 @@ struct MapSnapshot {
   PointSnapshot points;
 };
 
-// Copies for viewers, exporters and users; each is one consistent view and takes the read lock.
+// Copies for viewers, exporters and users; each is one consistent view and takes the read lock. See
+// docs/method/map.md#keyframes.
+
+/// The published keyframes.
 KeyFrameSnapshot snapshot_keyframes(const Map& map);
 /// Edges between published keyframes with weight >= min_weight.
 EdgeSnapshot snapshot_edges(const Map& map, int min_weight = Map::kCovisibilityThreshold);
+/// All points.
 PointSnapshot snapshot_points(const Map& map);
+/// The observations of all points, those by unpublished keyframes included.
 ObservationSnapshot snapshot_observations(const Map& map);
+/// Keyframes, loop edges and points together.
 MapSnapshot snapshot_map(const Map& map);
 
 }  // namespace orbslam

@@ -17,8 +17,8 @@ struct Trajectory {
 };
 
 /// Remembers each frame relative to its reference keyframe, so that all later optimisation moves
-/// the frames with their keyframes (spec 03, sections 6 and 7). Not synchronised: one thread
-/// records and rebuilds.
+/// the frames with their keyframes. Not synchronised: one thread records and rebuilds. See
+/// docs/method/map.md#anchors.
 class TrajectoryRecorder {
  public:
   /// Appends a frame. Without a pose or a reference keyframe it repeats the last relative pose (at

@@ -197,7 +197,7 @@ void look_at(const Projector& projector, const ScalePyramid& scales, const Point
   view.visible = true;
 }
 
-// Spec 06, 2.6 for one point in view. Returns the keypoint or -1.
+// The keypoint that match_local_map() gives to a point in view, or kUnmatched.
 std::int64_t find_in_view(const TrackedFrame& tracked, const FrustumView& view,
                           const Descriptor& wanted, float radius_factor,
                           std::vector<std::uint32_t>& candidates) {

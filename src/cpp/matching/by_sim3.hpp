@@ -10,24 +10,33 @@
 
 namespace orbslam {
 
-/// Spec 06, 2.8: further matches between two keyframes of which S_12 is known roughly. `matches`
-/// holds per keypoint of `a` the matched point of `b`, or an invalid id; matches are added to it
-/// where the point of a keypoint, carried through the similarity and searched for in the other
-/// image, finds a keypoint whose own point finds it back. Distances are compared in the units of
-/// the map in which the point's scale range was measured. Returns the number of new matches, 0
-/// when a keyframe is dead. Takes the read lock while it copies.
-/// Throws std::invalid_argument unless `matches` has one entry per keypoint of `a`.
-int match_by_similarity(const Map& map, KeyFrameId a, KeyFrameId b, const Similarity& S_ab,
-                        std::vector<MapPointId>& matches, float radius_factor = 7.5F);
+// Search radii of the three functions below, in pixels of the predicted level.
+inline constexpr float kSimilarityRadius = 7.5F;
+inline constexpr float kLoopRadius = 10.0F;
+inline constexpr float kLoopFusionRadius = 4.0F;
 
-/// Spec 06, 2.7: points on the far side of a loop projected into a keyframe at its corrected place
-/// `S_cw`. `matches` holds per keypoint the matched point or an invalid id; free keypoints are
-/// matched to points (each listed once) that are not in it. Returns the number of new matches, 0
-/// for a dead keyframe. Takes the read lock while it copies.
-/// Throws std::invalid_argument unless `matches` has one entry per keypoint.
+/// Further matches between two keyframes of which S_ab is known roughly. `matches` holds per
+/// keypoint of `a` the matched point of `b`, or an invalid id; matches are added to it where the
+/// point of a keypoint, carried through the similarity and searched for in the other image, finds a
+/// keypoint whose own point finds it back. A point is searched within `radius_factor` pixels of its
+/// predicted level, on that level or the next finer one; at most kDescriptorHigh bits differ.
+/// Distances are compared in the units of the map in which the point's scale range was measured.
+/// Returns the number of new matches, 0 when a keyframe is dead. Takes the read lock while it
+/// copies. Throws std::invalid_argument unless `matches` has one entry per keypoint of `a`. See
+/// docs/method/loops.md#verification.
+int match_by_similarity(const Map& map, KeyFrameId a, KeyFrameId b, const Similarity& S_ab,
+                        std::vector<MapPointId>& matches, float radius_factor = kSimilarityRadius);
+
+/// Projects points on the far side of a loop into a keyframe at its corrected place `S_cw`.
+/// `matches` holds per keypoint the matched point or an invalid id; free keypoints are matched to
+/// living points (each listed once) that are not in it. A point that the keyframe should show
+/// (expect_in_keyframe()) takes the keypoint with the most similar descriptor, of which at most
+/// kDescriptorLow bits differ, within `radius_factor` pixels of its predicted level, on that level
+/// or the next finer one. Returns the number of new matches, 0 for a dead keyframe. Takes the read
+/// lock while it copies. Throws std::invalid_argument unless `matches` has one entry per keypoint.
 int match_loop_points(const Map& map, KeyFrameId keyframe, const Similarity& S_cw,
                       const std::vector<MapPointId>& points, std::vector<MapPointId>& matches,
-                      float radius_factor = 10.0F);
+                      float radius_factor = kLoopRadius);
 
 /// A point of the map and the keypoint of a keyframe that shows it.
 struct PointSighting {
@@ -35,10 +44,11 @@ struct PointSighting {
   std::uint32_t keypoint = 0;
 };
 
-/// Spec 06, 2.11: the same search for a keyframe that is to be corrected. Keypoints may be occupied
-/// and may be found by several points, since what is found shows which points are the same; in the
-/// order of `points`. Takes no lock.
+/// The same search for a keyframe that is to be corrected. Keypoints may be occupied and may be
+/// found by several points, since what is found shows which points are the same; in the order of
+/// `points`. Takes no lock. See docs/method/loops.md#fusion-across-the-loop.
 std::vector<PointSighting> find_loop_fusions(const Frame& frame, const Similarity& S_cw,
-                                             const PointBatch& points, float radius_factor = 4.0F);
+                                             const PointBatch& points,
+                                             float radius_factor = kLoopFusionRadius);
 
 }  // namespace orbslam

@@ -9,11 +9,17 @@
 
 namespace orbslam {
 
-/// Spec 06, 2.2: points of a keyframe matched to a frame, only between features under the same
-/// vocabulary node. Replaces the frame's associations. Returns their number.
+/// Matches the points of a keyframe to a frame: each feature that has a living point is compared
+/// with those features of the frame only that fall under the same vocabulary node. A match has at
+/// most kDescriptorLow differing bits and fewer than `ratio` times those of the second best in the
+/// node; a feature of the frame is used once. Matches whose rotation disagrees with the majority
+/// are dropped. Replaces the frame's associations. Returns their number, 0 for a dead keyframe.
+/// Takes the read lock while it copies. Throws StateError when a frame has not been described. See
+/// docs/method/words.md#matching-by-words.
 int match_keyframe_by_words(const Map& map, KeyFrameId keyframe, TrackedFrame& frame, float ratio);
 
-/// Spec 06, 2.3: pairs (feature of a, feature of b), ascending feature of a, both with points.
+/// The same between two keyframes, only for features with living points on both sides: pairs
+/// (feature of a, feature of b), ascending feature of a, one to one. Empty when one is dead.
 std::vector<std::pair<std::uint32_t, std::uint32_t>> match_keyframes_by_words(const Map& map,
                                                                               KeyFrameId a,
                                                                               KeyFrameId b,

@@ -19,7 +19,8 @@ struct NodeFeatures {
 };
 
 /// Calls visit(features of a, features of b) for every vocabulary node that both frames have
-/// features under, ascending. Throws StateError when a frame has not been described.
+/// features under, ascending. Throws StateError when a frame has not been described. See
+/// docs/method/words.md#groups-of-words.
 template <class Visitor>
 void for_each_common_node(const Frame& a, const Frame& b, Visitor&& visit) {
   for (const Frame* frame : {&a, &b}) {

@@ -81,7 +81,7 @@ class EpipolarGeometry {
   double squared_normal_ = 0;
 };
 
-// Spec 06, 2.9. Marks the matched features of b as occupied.
+// The pairs of match_for_triangulation(). Marks the matched features of b as occupied.
 FeaturePairs find_pairs(const FreeFeatures& a, FreeFeatures& b) {
   const Frame& frame_a = *a.frame;
   const Frame& frame_b = *b.frame;

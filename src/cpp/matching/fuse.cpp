@@ -43,8 +43,8 @@ bool reprojection_agrees(const Frame& frame, std::size_t keypoint, const ImagePo
   return error * frame.scales->inverse_sigma2(feature.level) <= gate;
 }
 
-// Spec 06, 2.10, steps 1 to 3: the batch's points that are not `observed` in the target and match
-// one of its keypoints, in the order of the batch.
+// The batch's points that are not `observed` in the target and match one of its keypoints, in the
+// order of the batch.
 void find_fusions(const PointBatch& points, const std::vector<std::uint8_t>& observed,
                   const Target& target, float radius_factor, std::vector<Fusion>& fusions) {
   thread_local std::vector<std::uint32_t> candidates;
@@ -76,7 +76,7 @@ void find_fusions(const PointBatch& points, const std::vector<std::uint8_t>& obs
 // Whether points that gain an observation are refreshed at once or all together afterwards.
 enum class Refresh { kNow, kLater };
 
-// Step 4, under the write lock: only what still stands is changed. Returns the number of changes.
+// Under the write lock: only what still stands is changed. Returns the number of changes.
 int apply_fusions(Map& map, const Target& target, const PointBatch& points,
                   const std::vector<Fusion>& fusions, Refresh when) {
   const KeyFrame* keyframe = map.find(target.id);

@@ -11,7 +11,8 @@ namespace orbslam {
 
 /// A small table from map point id to a number, for "is this point one of those" in loops over
 /// thousands of points. Open addressing in one flat buffer that is reused: no allocation once it
-/// has grown, and never iterated, so its inner order cannot leak into results.
+/// has grown, and never iterated, so its inner order cannot leak into results
+/// (docs/method/threads.md#deterministic-mode).
 class PointIdIndex {
  public:
   static constexpr std::int32_t kNone = -1;

@@ -7,8 +7,10 @@
 
 namespace orbslam {
 
-/// Keeps the matches whose rotation agrees with the majority: a histogram of 12 bins of 30
-/// degrees with wrap-around, of which the three fullest survive (spec 06, 1.2).
+/// Finds the matches whose rotation disagrees with the majority: a histogram of 12 bins of 30
+/// degrees, centred on multiples of their width, of which the three fullest survive; the second and
+/// the third only with at least a tenth of the fullest. See
+/// docs/method/words.md#matching-by-words.
 class OrientationHistogram {
  public:
   static constexpr int kBins = 12;
@@ -19,7 +21,7 @@ class OrientationHistogram {
   std::vector<std::uint32_t> inconsistent() const;
   void clear();
 
-  /// Indices of the bins that survive (-1: none).
+  /// Indices of the bins that survive, fullest first, of equal ones the lower (-1: none).
   static std::array<int, 3> fullest(const std::array<std::size_t, kBins>& counts);
 
  private:

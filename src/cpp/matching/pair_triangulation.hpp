@@ -8,9 +8,13 @@
 
 namespace orbslam {
 
-/// Decides whether a pair of matched features of two frames makes a map point, and where it lies
-/// (spec 13, 5.3): from the two rays when their parallax is wide enough, else from the depth of
-/// the feature that measures it better; then depth, reprojection and scale must agree.
+/// Decides whether a pair of matched features of two frames makes a map point, and where it lies.
+/// It is triangulated from the two rays when their parallax is wider than that of a measured depth
+/// over the rig's baseline and, without a depth, wider than 1.15 degrees; else it lies at the
+/// measured depth with the wider parallax, and without one there is no point. Then it must be in
+/// front of both cameras, reproject within a chi-square gate in both, and its distances must fit
+/// the levels of both features to 1.5 times the pyramid's factor. See
+/// docs/method/mapping.md#new-points.
 class PairTriangulation {
  public:
   /// The frames must outlive this object.

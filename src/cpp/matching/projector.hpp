@@ -12,7 +12,9 @@ struct ImagePoint {
   double u = 0, v = 0, right_u = 0, z = 0;
 };
 
-/// Projects many world points into one frame. All tests are written so that NaN fails them.
+/// Projects many world points into one frame; points on or behind the camera's plane are refused.
+/// All tests are written so that NaN fails them. See
+/// docs/method/tracking.md#matching-the-local-map.
 class Projector {
  public:
   Projector(const Frame& frame, const Pose& T_cw)
@@ -25,7 +27,7 @@ class Projector {
 
   const Eigen::Vector3d& center() const { return center_; }
 
-  /// Frames accept both ends of the image bounds (spec 05, section 3).
+  /// Frames accept both ends of the image bounds.
   bool project_into_frame(const Eigen::Vector3d& p_w, ImagePoint& image) const {
     return project(p_w, image) && bounds_.contains(image.u, image.v);
   }
@@ -54,9 +56,12 @@ class Projector {
   double bf_;
 };
 
-/// Whether a point that is `distance` away can show the scales it was seen at (10 to 20 % slack).
+inline constexpr double kNearestFactor = 0.8;   ///< of a point's min_distance
+inline constexpr double kFarthestFactor = 1.2;  ///< of a point's max_distance
+
+/// Whether a point that is `distance` away can show the scales it was seen at (20 % slack).
 inline bool in_scale_range(double distance, double min_distance, double max_distance) {
-  return distance >= 0.8 * min_distance && distance <= 1.2 * max_distance;
+  return distance >= kNearestFactor * min_distance && distance <= kFarthestFactor * max_distance;
 }
 
 /// Where a keyframe should show a point, and on which level of its pyramid.

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "base/errors.hpp"
-#include "frame/nearest_keypoints.hpp"
 
 namespace orbslam {
 

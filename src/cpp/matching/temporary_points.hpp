@@ -2,20 +2,22 @@
 #pragma once
 
 #include "frame/frame.hpp"
+#include "frame/nearest_keypoints.hpp"
 #include "map/point_batch.hpp"
 
 namespace orbslam {
 
-/// Spec 08, 4.2 (localization mode): gives the keypoints of the last frame that have a depth but no
-/// map point a temporary point where the depth puts them, so that the next frame can be tracked
-/// outside the map: all close ones, and far ones until `n_minimum` keypoints (with or without a map
-/// point) have been visited, nearest first. `points` holds the last frame's map points
-/// (gather_points); the temporary ones are appended, as seen from the frame's pose. Ids are
-/// kFirstTemporaryPoint plus the keypoint's index: they are valid for one pair of frames, and
+/// In localization mode: gives the keypoints of the last frame that have a depth but no map point a
+/// temporary point where the depth puts them, so that the next frame can be tracked outside the
+/// map. Visited are the keypoints of nearest_keypoints(), with or without a map point: all close
+/// ones, and far ones until `n_minimum` are passed, nearest first. `points` holds the last frame's
+/// map points (gather_points); the temporary ones are appended, as seen from the frame's pose. Ids
+/// are kFirstTemporaryPoint plus the keypoint's index: they are valid for one pair of frames, and
 /// temporary points left in `last` from before are dropped first. Returns the number of points
-/// made. Throws StateError when the frame has no pose.
+/// made. Throws StateError when the frame has no pose. See
+/// docs/method/tracking.md#localization-mode.
 std::size_t add_temporary_points(TrackedFrame& last, PointBatch& points,
-                                 std::size_t n_minimum = 100);
+                                 std::size_t n_minimum = kFewestDepthPoints);
 
 /// Drops the associations with temporary points. Returns their number.
 std::size_t discard_temporary(TrackedFrame& frame);

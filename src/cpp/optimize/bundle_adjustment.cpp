@@ -22,6 +22,11 @@ constexpr double kInitialDamping = 1e-5;
 // Hardly damped steps converge quadratically: after one with a smaller relative decrease of the
 // cost than this, the next would change nothing that matters.
 constexpr double kConverged = 1e-4;
+// More than Ceres' default, but not so much that depths of small parallax shoot beyond their mark
+// and the step is rejected.
+constexpr double kInitialTrustRadius = 1e5;
+// With more free poses the reduced camera system is sparse enough to gain by it.
+constexpr std::size_t kMaxDenseCameras = 30;
 
 using Observation = BundleProblem::Observation;
 
@@ -284,20 +289,17 @@ class BundleSolver final : public ceres::EvaluationCallback {
     ceres::Solver::Options solver;
     solver.max_num_iterations = 2 * iterations;
     solver.function_tolerance = 0;  // would throw the last step away; BundleIterations keeps it
-    // More than the default, but not so much that depths of small parallax shoot beyond their mark
-    // and the step is rejected.
-    solver.initial_trust_region_radius = 1e5;
+    solver.initial_trust_region_radius = kInitialTrustRadius;
     solver.num_threads = options_.n_threads;
     solver.logging_type = ceres::SILENT;
     solver.jacobi_scaling = false;  // the damping takes care of different units
-    // Above some thirty free poses the reduced camera system is sparse enough to gain by it.
-    // Without any, the points do not depend on each other, which only a sparse solver sees.
+    // Without free poses the points do not depend on each other, which only a sparse solver sees.
     if (free_cameras_.empty()) {
       solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
       return solver;
     }
     solver.linear_solver_type =
-        free_cameras_.size() <= 30 ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
+        free_cameras_.size() <= kMaxDenseCameras ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
     auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
     std::vector<double*> blocks;
     problem_.GetParameterBlocks(&blocks);

@@ -9,7 +9,7 @@
 
 namespace orbslam {
 
-/// A bundle adjustment as flat arrays: no map, no locks (spec 16, 9.7).
+/// A bundle adjustment as flat arrays: no map, no locks. See docs/method/adjustment.md#residuals.
 struct BundleProblem {
   struct Camera {
     Pose T_cw;

@@ -11,7 +11,8 @@
 namespace orbslam {
 
 /// Part of a map copied into a BundleProblem, with the ids to find the way back. Filled under the
-/// map's read lock, solved without a lock, committed under the write lock.
+/// map's read lock, solved without a lock, committed under the write lock. See
+/// docs/method/adjustment.md#local-bundle-adjustment.
 struct GatheredBundle {
   BundleProblem problem;
   std::vector<KeyFrameId> keyframes;     ///< per camera of the problem

@@ -22,10 +22,10 @@ class TimeLimit {
   std::chrono::time_point<std::chrono::steady_clock, std::chrono::duration<double>> end_;
 };
 
-/// Ends a minimisation by the rules of spec 16, 9.4: after `max_successful` successful steps, after
-/// three in a row with a relative decrease below 1e-3 or one below `converged`, after ten rejected
-/// ones in a row, when `abort` is raised, or when another iteration as long as the last would go
-/// beyond `limit`. What was reached is kept.
+/// Ends a minimisation of Ceres: after `max_successful` successful steps, after three in a row with
+/// a relative decrease below 1e-3 or one below `converged`, after ten rejected ones in a row, when
+/// `abort` is raised, or when another iteration as long as the last would go beyond `limit`. What
+/// was reached is kept. See docs/method/adjustment.md#stopping.
 class BundleIterations final : public ceres::IterationCallback {
  public:
   /// The pointers may be nullptr: never.
@@ -53,6 +53,7 @@ class BundleIterations final : public ceres::IterationCallback {
   bool aborted_ = false, timed_out_ = false;
 };
 
+/// Whether there is a flag and it is set.
 inline bool is_raised(const std::atomic<bool>* flag) { return flag != nullptr && flag->load(); }
 
 }  // namespace orbslam

@@ -8,6 +8,7 @@ namespace orbslam {
 /// A point of a bundle as a direction and an inverse depth seen from a fixed place (Civera et al.
 /// 2008; Montiel et al. 2006): what cameras see of a point is nearly linear in these, also where
 /// its depth is hardly known, so that steps may be long. The three parameters are 0 at the start.
+/// See docs/method/adjustment.md#full-bundle-adjustment.
 class BundlePoint {
  public:
   static constexpr int kParameters = 3;

@@ -13,7 +13,8 @@ namespace orbslam {
 /// A camera of a bundle in a chart around its starting pose: six parameters (w, v) stand for
 /// T_cw = (exp(w) R, exp(w) t + v) with (R, t) the pose at the start. To first order that is the
 /// left perturbation (rotation, translation) of the camera, and being a plain vector space it saves
-/// Ceres a product by a manifold's Jacobian per observation.
+/// Ceres a product by a manifold's Jacobian per observation. See
+/// docs/method/adjustment.md#residuals.
 class BundleView {
  public:
   static constexpr int kParameters = 6;

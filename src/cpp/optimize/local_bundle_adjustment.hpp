@@ -17,15 +17,18 @@ struct LocalBundleResult {
   BundleSummary summary;
 };
 
-/// Spec 16, section 5: refines `current`, its neighbours and all their points; other observers are
-/// fixed. Gathers under the read lock, solves without a lock, and commits in one write section
-/// that re-checks what has died meanwhile. An epoch change in between drops the result, and a dead
-/// or unknown `current` gives an empty one (a reset may have been faster).
+/// Refines `current`, its neighbours and all their points; other observers of these are fixed
+/// (Mur-Artal et al. 2015, section VI-D). Two stages (BundleOptions): with kernels, then without,
+/// on the inliers of the first. Gathers under the read lock, solves without a lock, and commits in
+/// one write section that re-checks what has died meanwhile. An epoch change in between drops the
+/// result, and a dead or unknown `current` gives an empty one (a reset may have been faster).
 ///
 /// Fixed are keyframe 0, the outer observers and, where that leaves fewer fixed poses than the
 /// gauge needs (two for a single camera because of the scale, else one), the oldest local
-/// keyframes. After an abort the progress is written; observations are erased only if the first
-/// stage was finished.
+/// keyframes. `abort` is polled once per iteration; nullptr: never. After an abort the progress is
+/// written; observations are erased only if the first stage was finished. See
+/// docs/method/mapping.md#local-bundle-adjustment and
+/// docs/method/adjustment.md#local-bundle-adjustment.
 LocalBundleResult local_bundle_adjustment(Map& map, KeyFrameId current,
                                           const std::atomic<bool>* abort, bool monocular = false,
                                           int n_threads = 1);

@@ -8,7 +8,7 @@
 #include "base/errors.hpp"
 #include "map/anchor.hpp"
 #include "map/scene_depth.hpp"
-#include "optimize/global_bundle_adjustment.hpp"
+#include "optimize/full_bundle_adjustment.hpp"
 
 namespace orbslam {
 namespace {
@@ -53,7 +53,7 @@ void add_points(Map& map, const MonocularMap& made, FrameId frame, const std::ve
   }
 }
 
-/// Steps 1 to 3: keyframes, points, covisibility. `epoch`: of the map that they belong to.
+/// Makes keyframes, points and covisibility. `epoch`: of the map that they belong to.
 MonocularMap build(Map& map, const TrackedFrame& initial, const TrackedFrame& current,
                    const Pose& T_21, const std::vector<int>& matches,
                    const std::vector<Eigen::Vector3d>& points, std::uint64_t& epoch) {
@@ -77,8 +77,9 @@ int count_points(const Map& map, KeyFrameId id) {
       slots.begin(), slots.end(), [&](MapPointId point) { return map.find(point) != nullptr; }));
 }
 
-/// Keyframe 0 is the origin, so scaling about it leaves its pose as it is. Each point is scaled
-/// once, and its distance limits and direction follow (spec 07, defects 1 and 13).
+/// Keyframe 0 is the origin, so scaling about it leaves its pose as it is. Scale range and
+/// direction of every point follow: the original leaves them as they were, and the first frames
+/// then miss points or look for them on the wrong level.
 void scale_map(Map& map, KeyFrameId second, double factor) {
   const Pose& T_21 = map.find(second)->T_cw;
   map.set_pose(second, Pose(T_21.rotation(), factor * T_21.translation()));
@@ -88,7 +89,8 @@ void scale_map(Map& map, KeyFrameId second, double factor) {
   }
 }
 
-/// Steps 6 and 7, under the write lock. Every reason to fail is found before anything is scaled.
+/// Scales the median depth to 1, under the write lock. Every reason to fail is found before
+/// anything is scaled.
 MonocularMapFailure normalise(Map& map, MonocularMap& made, std::size_t min_points) {
   made.n_points = count_points(map, made.second);
   const auto depth = median_scene_depth(map, *map.find(made.first));
@@ -126,8 +128,8 @@ MonocularMap create_monocular_map(Map& map, TrackedFrame& initial, TrackedFrame&
   check_matches(*initial.frame, *current.frame, matches, points);
   std::uint64_t epoch = 0;
   MonocularMap made = build(map, initial, current, T_21, matches, points, epoch);
-  GatheredBundle bundle = gather_global_bundle(map);
-  made.summary = solve_global_bundle(bundle, {kIterations, true}, nullptr, 1);
+  GatheredBundle bundle = gather_full_bundle(map);
+  made.summary = solve_full_bundle(bundle, {kIterations, true}, nullptr, 1);
 
   const auto lock = map.write_lock();
   if (map.epoch() != epoch) {

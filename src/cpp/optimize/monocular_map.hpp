@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <limits>
 #include <vector>
 
@@ -9,6 +10,9 @@
 #include "optimize/bundle_adjustment.hpp"
 
 namespace orbslam {
+
+/// Points that the first map of a single camera must have at least.
+inline constexpr std::size_t kFewestInitialPoints = 100;
 
 enum class MonocularMapFailure {
   kNone,
@@ -28,13 +32,13 @@ struct MonocularMap {
   BundleSummary summary;  ///< of the bundle adjustment
 };
 
-/// Spec 07, B.8: makes the first map of a single camera from two frames whose relative pose is
-/// known up to scale. Keyframe 0 (the world's frame) and 1 are made, the matched points are added
-/// with both observations, everything is refined by full bundle adjustment (20 iterations, robust),
-/// and the map is scaled so that the median depth in keyframe 0 is 1. Both keyframes are connected
-/// and published at the end, in one section with the scaling: nobody sees the map before. Local
-/// mapping takes them both, in order, afterwards; the points then enter its list of recent points
-/// with the second.
+/// Makes the first map of a single camera from two frames whose relative pose is known up to scale
+/// (Mur-Artal et al. 2015, section IV). Keyframe 0 (the world's frame) and 1 are made, the matched
+/// points are added with both observations, everything is refined by full bundle adjustment (20
+/// iterations, robust), and the map is scaled so that the median depth in keyframe 0 is 1. Both
+/// keyframes are connected and published at the end, in one section with the scaling: nobody sees
+/// the map before. Local mapping takes them both, in order, afterwards; the points then enter its
+/// list of recent points with the second.
 ///
 /// `matches`: per keypoint of `initial` its partner in `current` or -1. `points`: per keypoint of
 /// `initial` its position in the frame of the initial camera, read where matched; matches whose
@@ -43,10 +47,11 @@ struct MonocularMap {
 /// On success both frames have the final pose, associations with all points and their keyframe as
 /// reference. On failure they are unchanged, and the keyframes and points made stay in the map,
 /// unpublished: the caller must clear it. Throws StateError when the map is not empty, a frame is
-/// not described, or the lists do not fit the frames (sizes, indices, one-to-one).
+/// not described, or the lists do not fit the frames (sizes, indices, one-to-one). Takes the write
+/// lock twice, not while it refines. See docs/method/start.md#the-first-map.
 MonocularMap create_monocular_map(Map& map, TrackedFrame& initial, TrackedFrame& current,
                                   const Pose& T_21, const std::vector<int>& matches,
                                   const std::vector<Eigen::Vector3d>& points,
-                                  std::size_t min_points = 100);
+                                  std::size_t min_points = kFewestInitialPoints);
 
 }  // namespace orbslam

@@ -36,10 +36,10 @@ struct PoseGraphSummary {
 };
 
 /// Minimises the sum of |log(S_ji S_iw S_jw^-1)|^2 over the free vertices (Strasdat et al. 2010;
-/// Mur-Artal et al. 2015, section VII-D; spec 16, section 6), in place, practically by
-/// Gauss-Newton: damping starts when a step fails. Ends after `iterations` accepted steps, three in
-/// a row that lower the cost by less than a thousandth or one by less than 1e-9 of it, ten rejected
-/// ones in a row, or when nothing is left to gain.
+/// Mur-Artal et al. 2015, section VII-D), in place, practically by Gauss-Newton: damping starts
+/// when a step fails. Ends after `iterations` accepted steps, three in a row that lower the cost by
+/// less than a thousandth or one by less than 1e-9 of it, ten rejected ones in a row, or when
+/// nothing is left to gain.
 ///
 /// In a part of the graph that no edges join to a fixed vertex, its first vertex is held: the part
 /// agrees with its measurements then and stays where that vertex is. Vertices without edges keep
@@ -47,7 +47,8 @@ struct PoseGraphSummary {
 ///
 /// Throws StateError, with the graph as it was: no vertex is fixed, the two vectors over vertices
 /// differ in size, an edge names a vertex that does not exist or joins one to itself, a vertex or
-/// an edge has a number that is not finite or a scale beyond exp(+-100).
+/// an edge has a number that is not finite or a scale beyond exp(+-100). See
+/// docs/method/adjustment.md#pose-graph.
 PoseGraphSummary optimize_pose_graph(PoseGraph& graph, const PoseGraphOptions& options,
                                      const std::atomic<bool>* abort);
 

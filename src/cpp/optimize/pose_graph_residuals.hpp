@@ -17,7 +17,8 @@ inline constexpr double kMaxLogScale = 100;
 /// scale. To first order that is the left perturbation (rotation, translation, logarithm of the
 /// scale). Where scales or rotations have drifted far, steps that leave the centres alone take half
 /// the iterations of such that do not, and being a plain vector space the chart saves Ceres a
-/// product by a manifold's Jacobian per edge. Without the last parameter the scale is kept.
+/// product by a manifold's Jacobian per edge. Without the last parameter the scale is kept. See
+/// docs/method/adjustment.md#pose-graph.
 class PoseGraphView {
  public:
   explicit PoseGraphView(const Similarity& S_iw) : start_(S_iw), S_iw_(S_iw) {}

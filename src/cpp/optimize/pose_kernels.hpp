@@ -45,7 +45,8 @@ struct NormalEquations {
 
 /// `huber` is the kernel's width on whitened residuals, or 0 for plain least squares. Both return
 /// the (robustified) sum of squares and add the group's part to `equations` if given. Points on the
-/// camera's plane take no part. Summation order is fixed.
+/// camera's plane take no part. Summation order is fixed. See
+/// docs/method/adjustment.md#pose-of-a-frame.
 double accumulate_mono(const Group& group, const Projection& projection, const Pose& T_cw,
                        double huber, NormalEquations* equations);
 double accumulate_stereo(const Group& group, const Projection& projection, const Pose& T_cw,

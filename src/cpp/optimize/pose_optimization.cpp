@@ -63,7 +63,7 @@ class DampedStep {
       : workspace_(w), projection_(projection), robust_(robust) {}
 
   void start(const NormalEquations& equations) {
-    lambda_ = 1e-5 * equations.H.diagonal().maxCoeff();
+    lambda_ = kFirstDamping * equations.H.diagonal().maxCoeff();
     growth_ = 2;
   }
 
@@ -80,7 +80,7 @@ class DampedStep {
         const bool optimistic = trial == 0;
         const double candidate_cost =
             evaluate(workspace_, projection_, candidate, robust_, optimistic ? &next_ : nullptr);
-        const double predicted = step.dot(lambda_ * step + equations.b) + 1e-3;
+        const double predicted = step.dot(lambda_ * step + equations.b) + kGainOffset;
         gain = std::isfinite(candidate_cost) ? (cost - candidate_cost) / predicted : -1;
         if (gain > 0) {
           T_cw = candidate;
@@ -88,7 +88,7 @@ class DampedStep {
           if (!optimistic) evaluate(workspace_, projection_, candidate, robust_, &next_);
           equations = next_;
           const double cubed = std::pow(2 * gain - 1, 3);
-          lambda_ *= std::max(1.0 / 3.0, std::min(2.0 / 3.0, 1 - cubed));
+          lambda_ *= std::max(kLeastDampingFactor, std::min(kMostDampingFactor, 1 - cubed));
           growth_ = 2;
           return true;
         }

@@ -27,12 +27,13 @@ struct PoseEstimate {
   int iterations = 0;
 };
 
-/// Pose of a frame from fixed points (spec 16, section 3): four rounds of damped Gauss-Newton from
-/// the initial pose with a Huber kernel (off in the last), outliers re-classified after each at
-/// 5.991 (two residuals) and 7.815 (three); a point that is not in front of the camera is an
-/// outlier. Fewer than 10 observations, or fewer than 3 inliers left: no further round. Fewer than
-/// 3 observations: returned unchanged, 0 inliers. Observations with NaN or infinite numbers are
-/// outliers and take no part.
+/// Pose of a frame from fixed points: four rounds of at most ten iterations of damped Gauss-Newton,
+/// each from the initial pose with a Huber kernel (off in the last) and without the outliers of the
+/// round before; all are re-classified after each at 5.991 (two residuals) and 7.815 (three); a
+/// point that is not in front of the camera is an outlier. Fewer than 10 observations, or fewer
+/// than 3 inliers left: no further round. Fewer than 3 observations: returned unchanged, 0 inliers.
+/// Observations with NaN or infinite numbers are outliers and take no part. See
+/// docs/method/adjustment.md#pose-of-a-frame.
 PoseEstimate optimize_pose(const Pose& T_cw_initial, const Pinhole& pinhole, double bf,
                            const std::vector<PoseObservation>& observations);
 

@@ -19,6 +19,7 @@ constexpr int kFirstIterations = 5;
 constexpr int kMoreIterations = 10;  // after outliers were found
 constexpr int kTrials = 10;
 constexpr int kMinMatches = 10;
+constexpr double kMaxLogScaleStep = 100;  // beyond, the scale leaves the range of numbers
 
 /// Normal equations H x = b and the robustified sum of squares they belong to.
 struct System {
@@ -39,12 +40,13 @@ class Refinement {
         width_(std::sqrt(options.max_chi2)),
         outlier_(outlier) {}
 
-  /// Levenberg-Marquardt on the matches that are not outliers, with the rules of spec 16,
-  /// section 1. Returns the number of iterations.
+  /// Levenberg-Marquardt (gates.hpp) on the matches that are not outliers. Ends after
+  /// `max_iterations`, after kSmallDecreases small decreases in a row, or when no damping lowers
+  /// the cost. Returns the number of iterations.
   int minimise(int max_iterations, Similarity& S_12) const {
     System system = evaluate(S_12);
     if (!std::isfinite(system.cost)) return 0;
-    double lambda = 1e-5 * system.H.diagonal().maxCoeff();
+    double lambda = kFirstDamping * system.H.diagonal().maxCoeff();
     int small_decreases = 0;
     for (int iteration = 1; iteration <= max_iterations; ++iteration) {
       const double before = system.cost;
@@ -110,16 +112,16 @@ class Refinement {
       double gain = -1;
       if (factor.info() == Eigen::Success) {
         const Vector7d step = factor.solve(system.b);
-        // A scale that leaves the range of numbers is no candidate.
-        if (step.allFinite() && std::abs(step(6)) < 100) {
+        if (step.allFinite() && std::abs(step(6)) < kMaxLogScaleStep) {
           const Similarity candidate = Similarity::exp(step) * S_12;
           const System next = evaluate(candidate);
-          const double predicted = step.dot(lambda * step + system.b) + 1e-3;
+          const double predicted = step.dot(lambda * step + system.b) + kGainOffset;
           if (std::isfinite(next.cost)) gain = (system.cost - next.cost) / predicted;
           if (gain > 0) {
             S_12 = candidate;
             system = next;
-            lambda *= std::max(1.0 / 3.0, std::min(2.0 / 3.0, 1 - std::pow(2 * gain - 1, 3)));
+            const double cubed = std::pow(2 * gain - 1, 3);
+            lambda *= std::max(kLeastDampingFactor, std::min(kMostDampingFactor, 1 - cubed));
             return true;
           }
         }

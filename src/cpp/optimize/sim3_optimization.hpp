@@ -31,14 +31,14 @@ struct SimilarityEstimate {
   int iterations = 0;
 };
 
-/// Refines S_12 on matches (spec 16, section 7): pixels of keyframe 1 minus projections of
-/// S_12 point_2, and pixels of keyframe 2 minus projections of S_12^-1 point_1, with a Huber
-/// kernel. 5 iterations of damped Gauss-Newton; matches with a residual beyond max_chi2 or a point
-/// that is not in front of the other camera become outliers; 10 more iterations without them (5
-/// when there are none), and those left are judged once more. With fewer than 10 matches left
-/// after the first judgement S_12 stays at its start and n_inliers is 0. Matches with NaN or
-/// infinite numbers are outliers and take no part.
-/// Throws std::invalid_argument unless max_chi2 > 0.
+/// Refines S_12 on matches: pixels of keyframe 1 minus projections of S_12 point_2, and pixels of
+/// keyframe 2 minus projections of S_12^-1 point_1, with a Huber kernel. 5 iterations of damped
+/// Gauss-Newton; matches with a residual beyond max_chi2 or a point that is not in front of the
+/// other camera become outliers; 10 more iterations without them (5 when there are none), and those
+/// left are judged once more. With fewer than 10 matches left after the first judgement S_12 stays
+/// at its start and n_inliers is 0. Matches with NaN or infinite numbers are outliers and take no
+/// part. Throws std::invalid_argument unless max_chi2 > 0. See
+/// docs/method/adjustment.md#similarity-of-two-keyframes.
 SimilarityEstimate optimize_similarity(const Similarity& S_12_initial, const Pinhole& pinhole_1,
                                        const Pinhole& pinhole_2,
                                        const std::vector<SimilarityMatch>& matches,

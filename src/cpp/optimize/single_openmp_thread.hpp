@@ -9,7 +9,7 @@ namespace orbslam {
 
 /// While it lives, parallel OpenMP regions that this thread enters have no other threads. CHOLMOD
 /// asks for four of its own whatever the caller wants; they would take the processor from tracking
-/// and, on two processors, end no sooner.
+/// and, on two processors, end no sooner. See docs/decisions.md, number 30.
 class SingleOpenMpThread {
  public:
 #ifdef ORBSLAM2PY_OPENMP

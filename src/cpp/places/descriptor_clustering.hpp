@@ -33,7 +33,7 @@ struct Clustering {
 /// distance), ties to the lower cluster, centres by majority of every bit (a tie gives 1). A
 /// cluster that loses its members continues from the descriptor farthest from its centre. Up to
 /// n_clusters descriptors are a cluster each. `keep_going` is asked once per iteration from the
-/// calling thread; when it says no, the result is unfinished.
+/// calling thread; when it says no, the result is unfinished. See docs/method/words.md#vocabulary.
 Clustering cluster_descriptors(const DescriptorSet& set, const ClusteringOptions& options,
                                std::uint64_t seed, const std::function<bool()>& keep_going);
 

@@ -29,7 +29,8 @@ struct PlaceQuery {
 using NeighbourLookup = std::function<std::vector<KeyFrameId>(KeyFrameId)>;
 
 /// Inverted file: which keyframes contain a word. Its lock protects the lists only; queries score
-/// without it and keep their counters to themselves, so that several can run at the same time.
+/// without it and keep their counters to themselves, so that several can run at the same time. See
+/// docs/method/words.md#index-of-keyframes.
 class KeyFrameIndex {
  public:
   static constexpr float kCommonWordShare = 0.8F;  ///< of the largest number of common words
@@ -44,8 +45,11 @@ class KeyFrameIndex {
   std::size_t size() const;
   bool contains(KeyFrameId id) const;
 
-  /// Keyframes that look like the query: those with many common words, scored, grouped with their
-  /// covisible neighbours; the best of each good group, each once, by ascending id (spec 12).
+  /// Keyframes that look like the query. Those that share more than kCommonWordShare of the largest
+  /// number of common words are scored. Each that reaches query.min_score makes a group with those
+  /// of its kGroupNeighbours best neighbours that were scored too. Groups whose scores add up to
+  /// more than kGroupShare of the best group's are good: the best keyframe of each, each once, by
+  /// ascending id. `neighbours` is called without the index's lock.
   std::vector<PlaceCandidate> query(const WordVector& words, const PlaceQuery& query,
                                     const NeighbourLookup& neighbours) const;
 

@@ -20,11 +20,13 @@ void index_keyframe(KeyFrameIndex& index, const Map& map, KeyFrameId id);
 double lowest_neighbour_score(const Map& map, KeyFrameId id);
 
 /// Keyframes that may close a loop with this one: not connected to it, and at least as similar as
-/// `min_score`. Ascending ids, living ones only. Throws StateError when the keyframe is dead.
+/// `min_score`. Ascending ids, living ones only. Throws StateError when the keyframe is dead. See
+/// docs/method/loops.md#detection.
 std::vector<PlaceCandidate> find_loop_candidates(const KeyFrameIndex& index, const Map& map,
                                                  KeyFrameId id, double min_score);
 
-/// Keyframes that may show what a described frame shows, for relocalization.
+/// Keyframes that may show what a described frame shows, for relocalization. Ascending ids, living
+/// ones only. See docs/method/relocalization.md#candidates.
 std::vector<PlaceCandidate> find_relocalization_candidates(const KeyFrameIndex& index,
                                                            const Map& map, const Frame& frame);
 

@@ -50,11 +50,13 @@ struct NodeProblem {
   std::string what;
 };
 
-/// The first row that breaks the rules of the tree (spec 11, section 2): parents come before
-/// their children, words have none, the others have 1 to `branching`, no path is longer than
-/// `depth`, weights are finite and not negative.
+/// The first row that breaks the rules of the tree, or nothing: parents come before their children,
+/// words have no children, the others have 1 to `branching`, no path is longer than `depth`,
+/// weights are finite and not negative.
 std::optional<NodeProblem> find_problem(int branching, int depth, const NodeRows& rows);
 
+/// Where a descriptor ends when it descends the tree, at every node to the nearest child, the first
+/// of equals.
 struct Quantised {
   std::uint32_t word = 0;
   std::uint32_t node = 0;  ///< ancestor at kDirectIndexDepth, or the leaf if it is shallower
@@ -63,7 +65,8 @@ struct Quantised {
 
 /// A tree over ORB descriptors whose leaves are the visual words (Galvez-Lopez and Tardos, 2012).
 /// Immutable, shared by threads and systems. Node numbers seen from outside are those of the text
-/// format. Either memory-mapped from the binary format or built from a list of nodes.
+/// format. Either memory-mapped from the binary format or built from a list of nodes. See
+/// docs/method/words.md#vocabulary.
 class Vocabulary {
  public:
   /// Memory-maps a file in the binary format (places/vocabulary_file.hpp). Pages are shared
@@ -100,7 +103,9 @@ class Vocabulary {
   void check_content() const;
 
   Quantised quantise(const Descriptor& descriptor) const;
-  /// Words and direct index of an image (spec 11, section 4).
+  /// Words and direct index of an image. A word counts with its weight in the tree, with
+  /// TF-IDF and TF weighting once per occurrence; the counts are then divided by their sum. Words
+  /// of weight 0 are left out of both. See docs/method/words.md#word-vectors.
   void transform(const std::vector<Descriptor>& descriptors, WordVector& words,
                  DirectIndex& direct_index) const;
 
@@ -110,7 +115,8 @@ class Vocabulary {
   std::unique_ptr<Impl> impl_;
 };
 
-/// L1 score of two word vectors, 0 (disjoint) to 1 (identical).
+/// L1 score of two word vectors, 0 (disjoint) to 1 (identical): the sum, over the common words, of
+/// the smaller weight.
 double similarity(const WordVector& a, const WordVector& b);
 
 /// Fills words and direct index of a frame that is not shared yet (idempotent).

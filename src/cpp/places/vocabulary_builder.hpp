@@ -18,7 +18,7 @@ struct TreeParameters {
 NodeRows rows_of(const NodeTable& table);
 
 /// Renumbers nodes breadth-first and writes them in the binary layout, sealed. Throws
-/// VocabularyError naming the first bad node or parameter.
+/// VocabularyError naming the first bad node or parameter. See docs/method/words.md#vocabulary.
 VocabularyImage build_image(const TreeParameters& parameters, const NodeRows& rows);
 
 /// The inverse: nodes in text order. Throws VocabularyError, naming the vocabulary, when the

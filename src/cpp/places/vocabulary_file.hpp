@@ -23,7 +23,8 @@ namespace orbslam {
 //   comment      UTF-8 text: where the vocabulary comes from, its licence
 //
 // Nodes are numbered breadth-first with siblings adjacent, the root is node 0: the children of one
-// node are one block of memory, and `link` of the inner nodes is ascending without gaps.
+// node are one block of memory, and `link` of the inner nodes is ascending without gaps. See
+// docs/method/words.md#vocabulary.
 
 /// A vocabulary made from a text file remembers which one, so that it can serve as its cache.
 struct VocabularySource {

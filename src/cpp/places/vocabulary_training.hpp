@@ -38,6 +38,7 @@ using TrainingProgress = std::function<bool(double)>;
 /// TF-IDF and IDF, else 1. Node numbers: the children of the root, then the subtree of the first,
 /// and so on. Depends on the descriptors, their order, the options and the seed only.
 /// Returns nullptr when cancelled. Throws SettingsError, or VocabularyError without descriptors.
+/// See docs/method/words.md#vocabulary.
 std::shared_ptr<const Vocabulary> train_vocabulary(const TrainingSet& images,
                                                    const TrainingOptions& options,
                                                    const TrainingProgress& progress = {});

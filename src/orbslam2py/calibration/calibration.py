@@ -14,17 +14,15 @@ from os import PathLike
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import FloatArray
 from orbslam2py._files import atomic_write
 from orbslam2py.calibration.chessboard import Board, BoardView, BoardViews, choose_views
 from orbslam2py.errors import DatasetError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import CameraSettings, OrbSettings, Settings
+from orbslam2py.settings import CameraSettings, OrbSettings, Sensor, Settings
 
 _log = logging.getLogger(__name__)
 
-Array = NDArray[np.float64]
 
 #: Zhang's method needs two slanted views for five parameters; with fewer than this nothing would
 #: show that something is wrong.
@@ -42,7 +40,7 @@ _GRID = (8, 6)
 
 @dataclass(frozen=True, eq=False)
 class CalibratedView:
-    """A view that was used.
+    """A view of the board from which the camera was calibrated.
 
     Attributes
     ----------
@@ -55,12 +53,12 @@ class CalibratedView:
     """
 
     name: str
-    corners: Array
-    projected: Array
-    T_cb: Array
+    corners: FloatArray
+    projected: FloatArray
+    T_cb: FloatArray
 
     @property
-    def residuals(self) -> Array:
+    def residuals(self) -> FloatArray:
         """Found minus projected, (n, 2) pixels."""
         return self.corners - self.projected
 
@@ -87,18 +85,18 @@ class Calibration:
     rms
         Reprojection error over all corners: root mean square of the distances [pixels].
     board
-        What was looked at.
+        The chessboard.
     views
-        What was used.
+        The views from which the camera was calibrated.
     left_out
         Names of views that did not fit the others.
     n_searched, n_found
         Images looked at, and those with the board.
     """
 
-    K: Array
-    distortion: Array
-    deviations: Array
+    K: FloatArray
+    distortion: FloatArray
+    deviations: FloatArray
     size: tuple[int, int]
     rms: float
     board: Board
@@ -108,12 +106,12 @@ class Calibration:
     n_found: int
 
     @property
-    def residuals(self) -> Array:
+    def residuals(self) -> FloatArray:
         """Residuals of all corners of all views, (n, 2) pixels."""
         return np.concatenate([view.residuals for view in self.views])
 
     @property
-    def corners(self) -> Array:
+    def corners(self) -> FloatArray:
         """Corners of all views as found, (n, 2) pixels."""
         return np.concatenate([view.corners for view in self.views])
 
@@ -163,29 +161,52 @@ class Calibration:
         n_features
             Features per image; by default 1000, or 2000 for images above 0.6 megapixels.
         rgb
-            Colour order of the images that will be tracked.
+            Whether the images that will be tracked are RGB (True) or BGR.
+
+        Raises
+        ------
+        SettingsError
+            If a number is out of range.
         """
         width, height = self.size
         k1, k2, p1, p2, k3 = self.distortion.tolist()
         if n_features is None:
             n_features = 1000 if width * height <= 600_000 else 2000
         camera = CameraSettings(
-            *(self.K[0, 0], self.K[1, 1], self.K[0, 2], self.K[1, 2]),
-            *(k1, k2, p1, p2, k3),
+            fx=self.K[0, 0],
+            fy=self.K[1, 1],
+            cx=self.K[0, 2],
+            cy=self.K[1, 2],
+            k1=k1,
+            k2=k2,
+            p1=p1,
+            p2=p2,
+            k3=k3,
             width=width,
             height=height,
             fps=fps,
             rgb=rgb,
         )
-        return Settings(Sensor.MONOCULAR, camera, OrbSettings(n_features=n_features))
+        return Settings(
+            sensor=Sensor.MONOCULAR, camera=camera, orb=OrbSettings(n_features=n_features)
+        )
 
     def save(
         self, path: str | PathLike[str], *, fps: float = 30.0, n_features: int | None = None
     ) -> None:
         """Write a settings file that says where it comes from.
 
+        Parameters
+        ----------
+        path
+            The file; replaced only when everything was written.
+        fps, n_features
+            As for `settings`.
+
         Raises
         ------
+        SettingsError
+            If a number is out of range.
         OSError
             If the file cannot be written; an existing file is kept then.
         """

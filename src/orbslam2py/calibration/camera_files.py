@@ -17,9 +17,9 @@ import numpy as np
 from orbslam2py.calibration.camera_model import (
     CameraModel,
     checked_camera_matrix,
+    checked_numbers,
     checked_size,
     five_coefficients,
-    numbers_of,
     require_supported,
 )
 from orbslam2py.calibration.yaml_camera_files import (
@@ -30,7 +30,7 @@ from orbslam2py.calibration.yaml_camera_files import (
 )
 from orbslam2py.datasets.images import quiet_opencv
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings.settings import Settings
+from orbslam2py.settings import Settings
 
 
 class CameraFileFormat(str, Enum):
@@ -69,7 +69,7 @@ def read_camera_file(
     right
         ROS: the file of the right camera of a rectified pair; `path` is the left one's.
     fps, n_features
-        What such files do not tell.
+        Frames per second and ORB features per image, which such files do not tell.
 
     Returns
     -------
@@ -129,8 +129,14 @@ def _recognise(path: Path, text: str) -> CameraFileFormat:
 _OPENCV_NAMES = {
     "camera_matrix": ("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "M1", "mtx"),
     "distortion_coefficients": (
-        *("distortion_coefficients", "Distortion_Coefficients", "distCoeffs", "dist_coeffs"),
-        *("distortion", "dist", "D", "D1"),
+        "distortion_coefficients",
+        "Distortion_Coefficients",
+        "distCoeffs",
+        "dist_coeffs",
+        "distortion",
+        "dist",
+        "D",
+        "D1",
     ),
     "image_width": ("image_width", "image_Width", "width"),
     "image_height": ("image_height", "image_Height", "height"),
@@ -207,8 +213,12 @@ def _colmap(path: Path, text: str, number: int | None) -> CameraModel:
         width, height, *parameters = [float(value) for value in values]
     except ValueError as error:
         raise SettingsError(f"{where}: {error}") from None
-    numbers_of(where, f"parameters of {model}", parameters, (max(places) + 1,))
+    checked_numbers(where, f"parameters of {model}", parameters, (max(places) + 1,))
     fx, fy, cx, cy, k1, k2, p1, p2 = (0.0 if i < 0 else parameters[i] for i in places)
     # COLMAP's pixels begin at their corner: the centre of the first one is (0.5, 0.5).
     K = np.array([[fx, 0.0, cx - 0.5], [0.0, fy, cy - 0.5], [0.0, 0.0, 1.0]])
-    return CameraModel(K, np.array([k1, k2, p1, p2, 0.0]), checked_size(where, [width, height]))
+    return CameraModel(
+        K=K,
+        distortion=np.array([k1, k2, p1, p2, 0.0]),
+        size=checked_size(where, [width, height]),
+    )

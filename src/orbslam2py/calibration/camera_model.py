@@ -10,11 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import CameraSettings, OrbSettings, Settings
-
-Array = NDArray[np.float64]
+from orbslam2py.settings import CameraSettings, OrbSettings, Sensor, Settings
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +29,8 @@ class CameraModel:
         Width and height [pixels]; None if the file does not tell.
     """
 
-    K: Array
-    distortion: Array
+    K: FloatArray
+    distortion: FloatArray
     size: tuple[int, int] | None
 
     def settings(self, fps: float, n_features: int) -> Settings:
@@ -40,17 +38,41 @@ class CameraModel:
         k1, k2, p1, p2, k3 = self.distortion.tolist()
         width, height = self.size or (None, None)
         camera = CameraSettings(
-            *(self.K[0, 0], self.K[1, 1], self.K[0, 2], self.K[1, 2]),
-            *(k1, k2, p1, p2, k3),
+            fx=self.K[0, 0],
+            fy=self.K[1, 1],
+            cx=self.K[0, 2],
+            cy=self.K[1, 2],
+            k1=k1,
+            k2=k2,
+            p1=p1,
+            p2=p2,
+            k3=k3,
             width=width,
             height=height,
             fps=fps,
         )
-        return Settings(Sensor.MONOCULAR, camera, OrbSettings(n_features=n_features))
+        return Settings(
+            sensor=Sensor.MONOCULAR, camera=camera, orb=OrbSettings(n_features=n_features)
+        )
 
 
-def numbers_of(path: Path, where: str, value: object, count: tuple[int, ...]) -> Array:
-    """Make float64 (n,) finite numbers of a value in a file; `count` names the lengths allowed."""
+def checked_numbers(path: Path, where: str, value: object, count: tuple[int, ...]) -> FloatArray:
+    """Make float64 (n,) finite numbers of a value in a file.
+
+    Parameters
+    ----------
+    path, where
+        The file and the place in it, for the message.
+    value
+        A number, or numbers nested in any way.
+    count
+        Lengths allowed; any if empty.
+
+    Raises
+    ------
+    SettingsError
+        If these are other than finite numbers, or not so many.
+    """
     try:
         found = np.asarray(value, dtype=np.float64).reshape(-1)
     except (TypeError, ValueError):
@@ -71,9 +93,15 @@ def require_supported(path: Path, what: str, name: object, supported: tuple[str,
         )
 
 
-def checked_camera_matrix(path: Path, K: NDArray[Any]) -> Array:
-    """Check a camera matrix (3, 3): no skew, focal lengths above 0."""
-    K = numbers_of(path, "the camera matrix", K, (9,)).reshape(3, 3)
+def checked_camera_matrix(path: Path, K: NDArray[Any]) -> FloatArray:
+    """Check a camera matrix (3, 3) [pixels].
+
+    Raises
+    ------
+    SettingsError
+        If there is skew, or a focal length is not above 0.
+    """
+    K = checked_numbers(path, "the camera matrix", K, (9,)).reshape(3, 3)
     if K[0, 0] <= 0 or K[1, 1] <= 0:
         raise SettingsError(f"{path}: focal lengths {K[0, 0]:g}, {K[1, 1]:g} must be above 0")
     if abs(K[0, 1]) > 1e-6 * K[0, 0]:
@@ -81,9 +109,15 @@ def checked_camera_matrix(path: Path, K: NDArray[Any]) -> Array:
     return K
 
 
-def five_coefficients(path: Path, coefficients: NDArray[Any]) -> Array:
-    """Bring 0, 4, 5 or more coefficients to k1, k2, p1, p2, k3; further ones must be zero."""
-    given = numbers_of(path, "the distortion", coefficients, ())
+def five_coefficients(path: Path, coefficients: NDArray[Any]) -> FloatArray:
+    """Bring 0, 4, 5 or more coefficients to k1, k2, p1, p2, k3; float64 (5,).
+
+    Raises
+    ------
+    SettingsError
+        If there is another number of them, or further ones are not zero.
+    """
+    given = checked_numbers(path, "the distortion", coefficients, ())
     if given.size not in (0, 4, 5, 8, 12, 14):
         raise SettingsError(
             f"{path}: {given.size} distortion coefficients; there must be k1, k2, p1, p2 and "
@@ -100,7 +134,13 @@ def five_coefficients(path: Path, coefficients: NDArray[Any]) -> Array:
 
 
 def checked_size(path: Path, size: list[Any]) -> tuple[int, int]:
-    """Check an image size: whole numbers above 0."""
+    """Check width and height of an image [pixels].
+
+    Raises
+    ------
+    SettingsError
+        If they are no whole numbers above 0.
+    """
     width, height = (float(value) for value in size)
     if not (width.is_integer() and height.is_integer() and min(width, height) >= 1):
         raise SettingsError(f"{path}: an image size of {width:g} x {height:g} makes no sense")

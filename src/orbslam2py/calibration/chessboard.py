@@ -10,16 +10,15 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import ByteArray, FloatArray
+from orbslam2py.datasets import VideoReader
 from orbslam2py.datasets.image_folder import image_files
 from orbslam2py.datasets.images import read_image
-from orbslam2py.datasets.video import VideoReader
 from orbslam2py.errors import DatasetError, ImageError, SettingsError
 
 _log = logging.getLogger(__name__)
 
-Array = NDArray[np.float64]
 
 #: Images of a video that are searched per second, if nothing else is said.
 _PER_SECOND = 4.0
@@ -56,6 +55,13 @@ class Board:
     def parse(cls, text: str, square: float) -> Board:
         """Make a board of a text such as ``9x6``.
 
+        Parameters
+        ----------
+        text
+            Inner corners, columns x rows.
+        square
+            Side of a square [m].
+
         Raises
         ------
         SettingsError
@@ -69,7 +75,7 @@ class Board:
         return cls(int(parts[0]), int(parts[1]), square)
 
     @property
-    def points(self) -> Array:
+    def points(self) -> FloatArray:
         """Corners (n, 3) in the frame of the board [m]: z = 0, row by row."""
         grid = np.zeros((self.rows * self.columns, 3))
         grid[:, :2] = np.mgrid[: self.columns, : self.rows].T.reshape(-1, 2) * self.square
@@ -92,12 +98,12 @@ class BoardView:
     """
 
     name: str
-    corners: Array
+    corners: FloatArray
 
 
 @dataclass
 class BoardViews:
-    """What a search found.
+    """What a search for the board in a folder or a video found.
 
     Attributes
     ----------
@@ -118,19 +124,19 @@ class BoardViews:
     fps: float | None = None
 
 
-def find_board(image: NDArray[np.uint8], board: Board) -> Array | None:
+def find_board(image: ByteArray, board: Board) -> FloatArray | None:
     """Find all inner corners with sub-pixel accuracy.
 
     Parameters
     ----------
     image
-        (h, w) or (h, w, 3 or 4).
+        uint8 (h, w), or (h, w, 3 or 4) in the order BGR.
     board
         What to look for.
 
     Returns
     -------
-    Array or None
+    FloatArray or None
         (n, 2) pixels; None if they are not all seen.
     """
     grey = _grey(image)
@@ -236,7 +242,7 @@ def choose_views(found: BoardViews, most: int) -> list[BoardView]:
     return [found.views[i] for i in sorted(chosen)]
 
 
-def _features(corners: Array, size: tuple[int, int]) -> Array:
+def _features(corners: FloatArray, size: tuple[int, int]) -> FloatArray:
     """Describe a view by numbers of about 0 to 1: centre, size, and moments that show slant."""
     scale = float(np.hypot(*size))
     centre = corners.mean(axis=0)
@@ -253,7 +259,7 @@ def _features(corners: Array, size: tuple[int, int]) -> Array:
 
 def _images(
     source: Path, every: int | None, result: BoardViews
-) -> Iterator[tuple[str, NDArray[np.uint8] | ImageError]]:
+) -> Iterator[tuple[str, ByteArray | ImageError]]:
     if every is not None and every < 1:
         raise SettingsError(f"every {every} images makes no sense; give 1 or more")
     if source.is_dir():
@@ -286,7 +292,7 @@ def _check_size(source: str | Path, name: str, size: tuple[int, int], result: Bo
         )
 
 
-def _grey(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def _grey(image: ByteArray) -> ByteArray:
     if image.ndim == 2:
         return image
     code = cv2.COLOR_BGR2GRAY if image.shape[2] == 3 else cv2.COLOR_BGRA2GRAY

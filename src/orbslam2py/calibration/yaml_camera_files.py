@@ -10,34 +10,37 @@ from typing import Any
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import FloatArray
 from orbslam2py.calibration.camera_model import (
     CameraModel,
     checked_camera_matrix,
+    checked_numbers,
     checked_size,
     five_coefficients,
-    numbers_of,
     require_supported,
 )
 from orbslam2py.datasets.rectification import rectification_of_pair
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings.builtin import EUROC_CLOSE_FACTOR
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import (
+from orbslam2py.settings import (
     CameraRectification,
     CameraSettings,
-    DepthSettings,
     OrbSettings,
+    Sensor,
     Settings,
     StereoRectification,
+    builtin_settings,
 )
-
-Array = NDArray[np.float64]
 
 
 def parse_yaml(path: Path, text: str) -> Mapping[str, Any]:
-    """Parse a file that holds named values."""
+    """Parse the text of a file that holds named values.
+
+    Raises
+    ------
+    SettingsError
+        Naming the file, if it is no YAML or holds something else.
+    """
     # OpenCV's head line, which some write, is no YAML.
     text = re.sub(r"\A%YAML:1\.0\s*(?:\n---)?", "", text)
     try:
@@ -59,7 +62,22 @@ def _value(path: Path, where: str, values: Mapping[str, Any], key: str) -> Any:
 def kalibr_settings(
     path: Path, document: Mapping[str, Any], number: int | None, fps: float, n_features: int
 ) -> Settings:
-    """Make settings of a camchain: of one camera, or of the pair of the first two."""
+    """Make settings of Kalibr's camchain: of one camera, or of the pair of the first two.
+
+    Parameters
+    ----------
+    path, document
+        The file, for messages, and its values.
+    number
+        Which camera; None for the only one or the pair.
+    fps, n_features
+        Frames per second and ORB features per image, which the file does not tell.
+
+    Raises
+    ------
+    SettingsError
+        If values are missing or wrong, or a model is not supported.
+    """
     names = sorted(
         (key for key in document if re.fullmatch(r"cam\d+", str(key))), key=lambda key: int(key[3:])
     )
@@ -72,8 +90,8 @@ def kalibr_settings(
         return _kalibr_camera(path, name, document[name]).settings(fps, n_features)
     left, right = (_kalibr_camera(path, name, document[name]) for name in names[:2])
     where = f"{names[1]}."
-    T = numbers_of(path, f"{where}T_cn_cnm1", _value(path, where, document[names[1]], "T_cn_cnm1"),
-                 (16,)).reshape(4, 4)  # fmt: skip
+    given = _value(path, where, document[names[1]], "T_cn_cnm1")
+    T = checked_numbers(path, f"{where}T_cn_cnm1", given, (16,)).reshape(4, 4)
     if np.abs(T[:3, :3] @ T[:3, :3].T - np.eye(3)).max() > 1e-3:
         raise SettingsError(f"{path}: {where}T_cn_cnm1 is no 4 x 4 rigid transform")
     if left.size is None or left.size != right.size:
@@ -93,16 +111,16 @@ def _kalibr_camera(path: Path, name: str, values: object) -> CameraModel:
     distortion_model = values.get("distortion_model", "none")
     require_supported(path, f"{where}distortion_model", distortion_model, ("radtan", "none"))
     intrinsics = _value(path, where, values, "intrinsics")
-    fx, fy, cx, cy = numbers_of(path, f"{where}intrinsics", intrinsics, (4,))
+    fx, fy, cx, cy = checked_numbers(path, f"{where}intrinsics", intrinsics, (4,))
     coefficients = np.zeros(0)
     if distortion_model == "radtan":
         given = _value(path, where, values, "distortion_coeffs")
-        coefficients = numbers_of(path, f"{where}distortion_coeffs", given, (4,))
+        coefficients = checked_numbers(path, f"{where}distortion_coeffs", given, (4,))
     resolution = _value(path, where, values, "resolution")
     return CameraModel(
         np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]),
         five_coefficients(path, coefficients),
-        checked_size(path, numbers_of(path, f"{where}resolution", resolution, (2,)).tolist()),
+        checked_size(path, checked_numbers(path, f"{where}resolution", resolution, (2,)).tolist()),
     )
 
 
@@ -111,7 +129,13 @@ _ROS_MODELS = ("plumb_bob", "rational_polynomial", "radtan")
 
 
 def ros_camera(path: Path, values: Mapping[str, Any]) -> CameraModel:
-    """Read the raw camera of a camera_info."""
+    """Read the raw camera of ROS's camera_info.
+
+    Raises
+    ------
+    SettingsError
+        If values are missing or wrong, or the model is not supported.
+    """
     model = values.get("distortion_model", "plumb_bob") or "plumb_bob"
     require_supported(path, "distortion_model", model, _ROS_MODELS)
     size = [_value(path, "", values, key) for key in ("image_width", "image_height")]
@@ -121,20 +145,22 @@ def ros_camera(path: Path, values: Mapping[str, Any]) -> CameraModel:
         five_coefficients(
             path, _ros_matrix(path, values, ("distortion_coefficients", "D", "d"), ())
         ),
-        checked_size(path, numbers_of(path, "image_width and image_height", size, (2,)).tolist()),
+        checked_size(
+            path, checked_numbers(path, "image_width and image_height", size, (2,)).tolist()
+        ),
     )
 
 
 def _ros_matrix(
     path: Path, values: Mapping[str, Any], names: tuple[str, ...], count: tuple[int, ...]
-) -> Array:
+) -> FloatArray:
     name = next((name for name in names if name in values), None)
     if name is None:
         raise SettingsError(f"{path}: {names[0]} is missing")
     value = values[name]
     if isinstance(value, Mapping):
         value = _value(path, f"{name}.", value, "data")
-    return numbers_of(path, name, value, count)
+    return checked_numbers(path, name, value, count)
 
 
 def ros_pair_settings(
@@ -143,14 +169,30 @@ def ros_pair_settings(
     fps: float,
     n_features: int,
 ) -> Settings:
-    """Make settings of the files (path, values) of a rectified pair."""
+    """Make settings of the camera_info files of a rectified pair.
+
+    Parameters
+    ----------
+    left, right
+        Path, for messages, and values of either file.
+    fps, n_features
+        Frames per second and ORB features per image, which the files do not tell.
+
+    Raises
+    ------
+    SettingsError
+        If values are missing or wrong, or the cameras are no rectified pair.
+    """
     cameras = []
     for path, values in (left, right):
         raw = ros_camera(path, values)
         assert raw.size is not None
         R = _ros_matrix(path, values, ("rectification_matrix", "R", "r"), (9,)).reshape(3, 3)
         P = _ros_matrix(path, values, ("projection_matrix", "P", "p"), (12,)).reshape(3, 4)
-        cameras.append(CameraRectification(raw.K, raw.distortion, R, P, *raw.size))
+        width, height = raw.size
+        cameras.append(
+            CameraRectification(K=raw.K, D=raw.distortion, R=R, P=P, width=width, height=height)
+        )
     if (cameras[0].width, cameras[0].height) != (cameras[1].width, cameras[1].height):
         raise SettingsError(f"{left[0]} and {right[0]} have different image sizes")
     P_left, P_right = cameras[0].P, cameras[1].P
@@ -159,7 +201,8 @@ def ros_pair_settings(
             f"{left[0]} and {right[0]} are no rectified pair: their projection_matrix must be "
             "equal but for the last column, which is 0 for the left camera"
         )
-    return _pair_settings(right[0], StereoRectification(*cameras), fps, n_features)
+    rectification = StereoRectification(left=cameras[0], right=cameras[1])
+    return _pair_settings(right[0], rectification, fps, n_features)
 
 
 def _pair_settings(
@@ -173,16 +216,19 @@ def _pair_settings(
             f"projection matrix is shifted by {-P_right[0, 3]:g}, {-P_right[1, 3]:g} pixel metres"
         )
     camera = CameraSettings(
-        *(float(P[0, 0]), float(P[1, 1]), float(P[0, 2]), float(P[1, 2])),
+        fx=float(P[0, 0]),
+        fy=float(P[1, 1]),
+        cx=float(P[0, 2]),
+        cy=float(P[1, 2]),
         width=rectification.left.width,
         height=rectification.left.height,
         fps=fps,
         bf=bf,
     )
     return Settings(
-        Sensor.STEREO,
-        camera,
-        OrbSettings(n_features=n_features),
-        DepthSettings(EUROC_CLOSE_FACTOR),
-        rectification,
+        sensor=Sensor.STEREO,
+        camera=camera,
+        orb=OrbSettings(n_features=n_features),
+        depth=builtin_settings("euroc", Sensor.STEREO).depth,
+        rectification=rectification,
     )

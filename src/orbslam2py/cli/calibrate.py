@@ -12,10 +12,15 @@ from rich.markup import escape
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from orbslam2py.calibration.calibration import Calibration
-from orbslam2py.calibration.calibration import calibrate as calibrate_views
-from orbslam2py.calibration.camera_files import CameraFileFormat, read_camera_file
-from orbslam2py.calibration.chessboard import Board, BoardViews, find_views
+from orbslam2py.calibration import (
+    Board,
+    BoardViews,
+    Calibration,
+    CameraFileFormat,
+    find_views,
+    read_camera_file,
+)
+from orbslam2py.calibration import calibrate as calibrate_views
 from orbslam2py.calibration.plot import draw_residuals
 from orbslam2py.errors import SettingsError
 

@@ -8,10 +8,10 @@ from typing import Annotated
 
 import typer
 
-from orbslam2py.cli.run import run_and_write
-from orbslam2py.runs.result import RunOptions
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence
+from orbslam2py.cli.run import run_and_show
+from orbslam2py.runs.options import RunOptions
+from orbslam2py.settings import Sensor
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
 DEFAULT_OUTPUT = Path("runs/demo")
 
@@ -34,7 +34,7 @@ def demo(
     sequence = SyntheticSequence(options)
     # Results of an earlier demo are replaced, other files are not.
     force = output == DEFAULT_OUTPUT or (output / "report.json").is_file()
-    code = run_and_write(sequence, RunOptions(sensor), output=output, force=force, quiet=quiet)
+    code = run_and_show(sequence, RunOptions(sensor), output=output, force=force, quiet=quiet)
     if not quiet:
         typer.echo(f"Look at {output / 'trajectory.png'}.")
     raise typer.Exit(code)

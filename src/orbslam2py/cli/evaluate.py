@@ -17,8 +17,8 @@ from orbslam2py._files import atomic_write
 from orbslam2py.datasets import open_sequence
 from orbslam2py.datasets.euroc_calibration import read_sensor_yaml
 from orbslam2py.errors import DatasetError
-from orbslam2py.evaluation.metrics import Alignment, evaluate_trajectory
-from orbslam2py.trajectory.trajectory import Trajectory, TrajectoryFormat, read_trajectory
+from orbslam2py.evaluation import Alignment, evaluate_trajectory
+from orbslam2py.trajectory import Trajectory, TrajectoryFormat, read_trajectory
 
 _log = logging.getLogger(__name__)
 

@@ -11,10 +11,10 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from orbslam2py.datasets.base import Layout
+from orbslam2py.datasets import Layout
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.synthetic.sequence import SyntheticOptions, SyntheticSequence, SyntheticWorld
+from orbslam2py.settings import Sensor
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence, SyntheticWorld
 
 EXAMPLE = """
 **Example**
@@ -25,42 +25,45 @@ EXAMPLE = """
 """
 
 
+World = Annotated[SyntheticWorld, typer.Option(help="Where the camera moves.")]
+Sensors = Annotated[Sensor, typer.Option(help="What delivers the images.")]
+Layouts = Annotated[
+    Layout | None,
+    typer.Option(
+        help="File names and formats: tum for mono and rgbd, kitti or euroc for mono and stereo.  "
+        "[default: kitti for stereo, else tum]"
+    ),
+]
+Frames = Annotated[int | None, typer.Option(help="Number of images.  [default: the whole way]")]
+Laps = Annotated[
+    float | None,
+    typer.Option(
+        help="Instead of --frames: how often to go around, where the way comes back to its start.  "
+        "[default: 1.2; figure-eight: 1.1]"
+    ),
+]
+Fps = Annotated[float | None, typer.Option(help="Frames per second.  [default: 20; streets: 10]")]
+Speed = Annotated[
+    float | None,
+    typer.Option(
+        help="Metres per second, not for room.  [default: 0.7; two-rooms: 0.4; streets: 10]"
+    ),
+]
+Size = Annotated[
+    str | None, typer.Option(metavar="WxH", help="Pixels.  [default: 640x480; streets: 1241x376]")
+]
+
+
 def synthesize(
     folder: Annotated[Path, typer.Argument(help="Folder to write; must be new or empty.")],
-    world: Annotated[
-        SyntheticWorld, typer.Option(help="Where the camera moves.")
-    ] = SyntheticWorld.ROOM,
-    sensor: Annotated[Sensor, typer.Option(help="What delivers the images.")] = Sensor.STEREO,
-    layout: Annotated[
-        Layout | None,
-        typer.Option(
-            help="File names and formats: tum for mono and rgbd, kitti or euroc for mono and "
-            "stereo.  [default: kitti for stereo, else tum]"
-        ),
-    ] = None,
-    frames: Annotated[
-        int | None, typer.Option(help="Number of images.  [default: the whole way]")
-    ] = None,
-    laps: Annotated[
-        float | None,
-        typer.Option(
-            help="Instead of --frames: how often to go around, where the way comes back to its "
-            "start.  [default: 1.2; figure-eight: 1.1]"
-        ),
-    ] = None,
-    fps: Annotated[
-        float | None, typer.Option(help="Frames per second.  [default: 20; streets: 10]")
-    ] = None,
-    speed: Annotated[
-        float | None,
-        typer.Option(
-            help="Metres per second, not for room.  [default: 0.7; two-rooms: 0.4; streets: 10]"
-        ),
-    ] = None,
-    size: Annotated[
-        str | None,
-        typer.Option(metavar="WxH", help="Pixels.  [default: 640x480; streets: 1241x376]"),
-    ] = None,
+    world: World = SyntheticWorld.ROOM,
+    sensor: Sensors = Sensor.STEREO,
+    layout: Layouts = None,
+    frames: Frames = None,
+    laps: Laps = None,
+    fps: Fps = None,
+    speed: Speed = None,
+    size: Size = None,
     seed: Annotated[int, typer.Option(help="Another seed, another world.")] = 0,
     noise: Annotated[float, typer.Option(help="Noise of the images [grey levels].")] = 0.0,
     depth_noise: Annotated[
@@ -85,13 +88,32 @@ def synthesize(
         size=None if size is None else parse_size(size),
         seed=seed,
         noise=noise,
-        exposure=exposure,
         depth_noise=depth_noise,
+        exposure=exposure,
         lateral=lateral,
         yaw=yaw,
     )
     sequence = SyntheticSequence(options)
     console = Console(quiet=quiet)
+    _write(sequence, folder, layout, force=force, console=console)
+    console.print(
+        f"{len(sequence)} frames are in [bold]{escape(str(folder))}[/]",
+        highlight=False,
+        soft_wrap=True,
+    )
+
+
+synthesize.__doc__ = f"{synthesize.__doc__}\n{EXAMPLE}"
+
+
+def _write(
+    sequence: SyntheticSequence,
+    folder: Path,
+    layout: Layout | None,
+    *,
+    force: bool,
+    console: Console,
+) -> None:
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
     with Progress(*columns, TimeRemainingColumn(), console=console, transient=True) as bar:
         task = bar.add_task("Rendering", total=len(sequence))
@@ -101,14 +123,6 @@ def synthesize(
             force=force,
             progress=lambda done, total: bar.update(task, completed=done, total=total),
         )
-    console.print(
-        f"{len(sequence)} frames are in [bold]{escape(str(folder))}[/]",
-        highlight=False,
-        soft_wrap=True,
-    )
-
-
-synthesize.__doc__ = f"{synthesize.__doc__}\n{EXAMPLE}"
 
 
 def parse_size(text: str) -> tuple[int, int]:

@@ -14,10 +14,10 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
-from orbslam2py._version import __version__
 from orbslam2py import _core as core
+from orbslam2py._version import __version__
 from orbslam2py.errors import VocabularyError
-from orbslam2py.vocabulary.vocabulary import (
+from orbslam2py.vocabulary import (
     convert_vocabulary,
     read_training_images,
     save_vocabulary,

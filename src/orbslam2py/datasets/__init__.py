@@ -7,7 +7,7 @@ from orbslam2py.datasets.image_folder import ImageFolder
 from orbslam2py.datasets.kitti import KittiSequence
 from orbslam2py.datasets.live import LiveCamera
 from orbslam2py.datasets.masks import MaskedCamera, MaskedSequence
-from orbslam2py.datasets.open_source import open_source
+from orbslam2py.datasets.open_input import open_input
 from orbslam2py.datasets.recognise import open_sequence, recognise
 from orbslam2py.datasets.tum import TumSequence
 from orbslam2py.datasets.video import VideoReader, VideoSequence
@@ -28,7 +28,7 @@ __all__ = [
     "TumSequence",
     "VideoReader",
     "VideoSequence",
+    "open_input",
     "open_sequence",
-    "open_source",
     "recognise",
 ]

@@ -12,10 +12,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py.errors import DatasetError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import Settings
-from orbslam2py.trajectory.trajectory import Trajectory
+from orbslam2py.settings import Sensor, Settings
+from orbslam2py.trajectory import Trajectory
 
 _log = logging.getLogger(__name__)
 
@@ -48,10 +48,10 @@ class Images:
         uint8 (h, w): no keypoint lies in `image` where it is 0. None: anywhere.
     """
 
-    image: NDArray[np.uint8]
-    right: NDArray[np.uint8] | None = None
+    image: ByteArray
+    right: ByteArray | None = None
     depth: NDArray[np.generic] | None = None
-    mask: NDArray[np.uint8] | None = None
+    mask: ByteArray | None = None
 
 
 class Source(Protocol):
@@ -103,9 +103,9 @@ class LiveFrame:
     timestamp
         Seconds since 1970 when it came; grows from image to image whatever the system's clock does.
     text
-        The same as text.
+        The time stamp in decimal seconds.
     images
-        The image.
+        The image, with its mask if there is one.
     """
 
     timestamp: float
@@ -162,6 +162,8 @@ class LiveSource(Source, Protocol):
 class Sequence(Source, Protocol):
     """A sequence of known length, recorded or made up; see `Source`.
 
+    The ``index`` of a frame is its place in the sequence, from 0, whichever frames a run takes.
+
     Attributes
     ----------
     timestamps
@@ -169,14 +171,20 @@ class Sequence(Source, Protocol):
     """
 
     @property
-    def timestamps(self) -> NDArray[np.float64]: ...  # noqa: D102
+    def timestamps(self) -> FloatArray: ...  # noqa: D102
 
     def __len__(self) -> int:
         """Return the number of frames."""
         ...
 
     def timestamp_text(self, index: int, /) -> str:
-        """Return the time of a frame in seconds, with all digits of the source."""
+        """Return the time of a frame in seconds, with all digits of the source.
+
+        Parameters
+        ----------
+        index
+            Place of the frame in the sequence, from 0.
+        """
         ...
 
     def default_settings(self) -> Settings:
@@ -193,6 +201,11 @@ class Sequence(Source, Protocol):
 
     def load(self, index: int, /) -> Images:
         """Read (and rectify) the images of a frame.
+
+        Parameters
+        ----------
+        index
+            Place of the frame in the sequence, from 0.
 
         Raises
         ------
@@ -218,7 +231,7 @@ class Stamps:
         Line number of each in the file, from 1.
     """
 
-    seconds: NDArray[np.float64]
+    seconds: FloatArray
     texts: tuple[str, ...]
     lines: tuple[int, ...]
 
@@ -236,6 +249,15 @@ class Stamps:
 
 def choose_sensor(folder: Path, wanted: Sensor | None, available: tuple[Sensor, ...]) -> Sensor:
     """Return the wanted sensor, or the richest available one.
+
+    Parameters
+    ----------
+    folder
+        Where the images are, for the message.
+    wanted
+        None for the richest.
+    available
+        Sensors there are images for, the richest first.
 
     Raises
     ------

@@ -8,9 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from orbslam2py.errors import DatasetError
-from orbslam2py.settings.builtin import BUILTIN_NAMES, builtin_settings
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import Settings
+from orbslam2py.settings import BUILTIN_NAMES, Sensor, Settings, builtin_settings
 
 #: What a caller may give: settings, a file, a built-in name, or None to let the folder decide.
 SettingsChoice = Settings | str | Path | None

@@ -9,8 +9,9 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import ByteArray
+from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py._text_lines import content_lines
 from orbslam2py.datasets.base import Images, Layout, Stamps, require_frames
 from orbslam2py.datasets.choose_settings import SettingsChoice
@@ -23,13 +24,10 @@ from orbslam2py.datasets.images import read_image
 from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.datasets.rectification import Rectifier
 from orbslam2py.errors import DatasetError, SettingsError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import Settings, StereoRectification
-from orbslam2py.trajectory.trajectory import Trajectory, read_euroc
+from orbslam2py.settings import Sensor, Settings, StereoRectification
+from orbslam2py.trajectory import Trajectory, read_euroc
 
 _log = logging.getLogger(__name__)
-
-_IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 
 def find_root(folder: Path) -> Path | None:
@@ -166,7 +164,7 @@ class EurocSequence(RecordedSequence):
             )
         return self.settings.rectification
 
-    def _read(self, path: Path) -> NDArray[np.uint8]:
+    def _read(self, path: Path) -> ByteArray:
         return read_image(path, rgb=self.settings.camera.rgb)
 
     def _settings_folders(self) -> tuple[Path, ...]:
@@ -212,7 +210,7 @@ def _list_images(camera: Path) -> _CameraList:
 
 
 def _guess_path(camera: Path, stamp: str) -> Path:
-    candidates = [camera / "data" / (stamp + suffix) for suffix in _IMAGE_SUFFIXES]
+    candidates = [camera / "data" / (stamp + suffix) for suffix in IMAGE_SUFFIXES]
     return next((path for path in candidates if path.is_file()), candidates[0])
 
 
@@ -223,6 +221,6 @@ def _list_folder(folder: Path) -> _CameraList:
     found = sorted(
         (int(path.stem), path)
         for path in folder.iterdir()
-        if path.suffix.lower() in _IMAGE_SUFFIXES and path.stem.isdigit()
+        if path.suffix.lower() in IMAGE_SUFFIXES and path.stem.isdigit()
     )
     return _CameraList(folder, dict(found), {stamp: k for k, (stamp, _) in enumerate(found, 1)})

@@ -7,18 +7,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import FloatArray
 from orbslam2py.datasets.rectification import rectification_of_pair
 from orbslam2py.errors import DatasetError
-from orbslam2py.settings.builtin import EUROC_CLOSE_FACTOR, EUROC_STEREO_ORB
-from orbslam2py.settings.opencv_yaml import Entry, parse_number, scan
-from orbslam2py.settings.reader import read_matrix
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import CameraSettings, DepthSettings, OrbSettings, Settings
+from orbslam2py.settings import (
+    CameraSettings,
+    OrbSettings,
+    Sensor,
+    Settings,
+    builtin_settings,
+)
+from orbslam2py.settings.opencv_yaml import Entry, parse_number, read_matrix, scan
 from orbslam2py.trajectory.rotations import inverse_poses, nearest_rotations, poses_from
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,14 +40,14 @@ class SensorCalibration:
         Images per second.
     """
 
-    T_BS: Array
-    intrinsics: Array
-    distortion: Array
+    T_BS: FloatArray
+    intrinsics: FloatArray
+    distortion: FloatArray
     size: tuple[int, int]
     rate: float
 
     @property
-    def camera_matrix(self) -> Array:
+    def camera_matrix(self) -> FloatArray:
         """Camera matrix (3, 3), pixels."""
         fx, fy, cx, cy = self.intrinsics
         return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
@@ -54,6 +55,16 @@ class SensorCalibration:
 
 def read_sensor_yaml(path: Path) -> SensorCalibration:
     """Read the calibration of a pinhole camera.
+
+    Parameters
+    ----------
+    path
+        EuRoC's ``sensor.yaml`` of a camera.
+
+    Returns
+    -------
+    SensorCalibration
+        With 20 images per second if the file does not tell its rate.
 
     Raises
     ------
@@ -96,8 +107,14 @@ def monocular_settings(camera: SensorCalibration) -> Settings:
     return Settings(
         sensor=Sensor.MONOCULAR,
         camera=CameraSettings(
-            *(fx, fy, cx, cy),
-            *(k1, k2, p1, p2),
+            fx=fx,
+            fy=fy,
+            cx=cx,
+            cy=cy,
+            k1=k1,
+            k2=k2,
+            p1=p1,
+            p2=p2,
             width=camera.size[0],
             height=camera.size[1],
             fps=camera.rate,
@@ -116,30 +133,34 @@ def stereo_settings(left: SensorCalibration, right: SensorCalibration) -> Settin
         left.size,
     )
     P = rectification.left.P
+    published = builtin_settings("euroc", Sensor.STEREO)
     return Settings(
         sensor=Sensor.STEREO,
         camera=CameraSettings(
-            *(float(P[0, 0]), float(P[1, 1]), float(P[0, 2]), float(P[1, 2])),
+            fx=float(P[0, 0]),
+            fy=float(P[1, 1]),
+            cx=float(P[0, 2]),
+            cy=float(P[1, 2]),
             width=left.size[0],
             height=left.size[1],
             fps=left.rate,
             bf=-float(rectification.right.P[0, 3]),
             rgb=True,
         ),
-        orb=EUROC_STEREO_ORB,
-        depth=DepthSettings(EUROC_CLOSE_FACTOR),
+        orb=published.orb,
+        depth=published.depth,
         rectification=rectification,
     )
 
 
-def _matrix(path: Path, entry: Entry) -> Array:
+def _matrix(path: Path, entry: Entry) -> FloatArray:
     try:
         return read_matrix(entry)
     except ValueError as error:
         raise DatasetError(f"{path}:{entry.line}: {error}") from None
 
 
-def _numbers(path: Path, entry: Entry, count: int) -> Array:
+def _numbers(path: Path, entry: Entry, count: int) -> FloatArray:
     items = (entry.value,) if isinstance(entry.value, str) else entry.value
     if not isinstance(items, tuple) or len(items) != count:
         raise DatasetError(f"{path}:{entry.line}: {entry.key} must hold {count} numbers")

@@ -6,20 +6,15 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from orbslam2py._arrays import FloatArray
+from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.datasets.base import Images
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.images import read_image
 from orbslam2py.datasets.unposed import UnposedSource, chosen_stamps
 from orbslam2py.errors import DatasetError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import Settings
+from orbslam2py.settings import Sensor, Settings
 
-IMAGE_SUFFIXES = frozenset(
-    {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm", ".jp2"}
-)
 _SETTINGS_FILE = "settings.yaml"
 
 
@@ -99,7 +94,7 @@ class ImageFolder(UnposedSource):
         return len(self.paths)
 
     @property
-    def timestamps(self) -> NDArray[np.float64]:
+    def timestamps(self) -> FloatArray:
         """Time of every frame in seconds, float64 (n,)."""
         return self._stamps.seconds
 

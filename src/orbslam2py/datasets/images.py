@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from orbslam2py._arrays import ByteArray
 from orbslam2py.errors import DatasetError, ImageError
 
 _PNG, _PNG_END = b"\x89PNG", b"IEND"
@@ -29,7 +30,7 @@ def quiet_opencv() -> Iterator[None]:
         cv2.utils.logging.setLogLevel(level)
 
 
-def read_image(path: Path, *, rgb: bool) -> NDArray[np.uint8]:
+def read_image(path: Path, *, rgb: bool) -> ByteArray:
     """Read a grey or colour image as it is.
 
     Parameters
@@ -41,7 +42,7 @@ def read_image(path: Path, *, rgb: bool) -> NDArray[np.uint8]:
 
     Returns
     -------
-    NDArray[np.uint8]
+    ByteArray
         (h, w), (h, w, 3) or (h, w, 4).
 
     Raises

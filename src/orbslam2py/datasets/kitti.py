@@ -8,18 +8,23 @@ import re
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py._text_lines import content_lines, number_of
 from orbslam2py.datasets.base import Images, Layout, Stamps, require_frames
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.images import read_image
 from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.errors import DatasetError, SettingsError
-from orbslam2py.settings.builtin import KITTI_VIEWERS
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import CameraSettings, DepthSettings, OrbSettings, Settings
-from orbslam2py.trajectory.trajectory import Trajectory, read_kitti
+from orbslam2py.settings import (
+    CameraSettings,
+    DepthSettings,
+    OrbSettings,
+    Sensor,
+    Settings,
+    builtin_settings,
+)
+from orbslam2py.trajectory import Trajectory, read_kitti
 
 _log = logging.getLogger(__name__)
 
@@ -91,7 +96,7 @@ class KittiSequence(RecordedSequence):
             _log.warning("%s holds %d poses for %d frames", path, len(poses), len(self))
         return Trajectory(self.timestamps[:n], poses.T_wc[:n])
 
-    def _read(self, camera: str, index: int) -> NDArray[np.uint8]:
+    def _read(self, camera: str, index: int) -> ByteArray:
         return read_image(self._path(camera, index), rgb=self.settings.camera.rgb)
 
     def _path(self, camera: str, index: int) -> Path:
@@ -139,7 +144,7 @@ class KittiSequence(RecordedSequence):
                 camera=camera,
                 orb=OrbSettings(n_features=2000),
                 depth=DepthSettings(_CLOSE_FACTOR) if stereo else None,
-                viewer=KITTI_VIEWERS[self.sensor],
+                viewer=builtin_settings("kitti00-02", self.sensor).viewer,
             )
         except SettingsError as error:
             raise DatasetError(f"{path}: {error}") from error
@@ -165,7 +170,7 @@ def _read_times(path: Path) -> Stamps:
     )
 
 
-def _read_calibration(path: Path) -> dict[str, NDArray[np.float64]]:
+def _read_calibration(path: Path) -> dict[str, FloatArray]:
     """Projection matrices (3, 4) by name; lines with other names (Tr) are left out."""
     projections = {}
     for line in content_lines(path):

@@ -12,14 +12,14 @@ from typing import Any, Protocol
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import ByteArray
 from orbslam2py.datasets.base import Images, LiveFrame
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.images import quiet_opencv
 from orbslam2py.datasets.unposed import UnposedSource
 from orbslam2py.errors import DatasetError, StateError
-from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings import Sensor
 
 _log = logging.getLogger(__name__)
 
@@ -54,8 +54,8 @@ class LiveCamera(UnposedSource):
 
     Parameters
     ----------
-    index
-        Number of the camera, from 0.
+    number
+        Number of the camera among those of the machine, from 0.
     sensor
         Monocular.
     settings
@@ -81,22 +81,22 @@ class LiveCamera(UnposedSource):
 
     def __init__(
         self,
-        index: int,
+        number: int,
         sensor: Sensor | None = None,
         *,
         settings: SettingsChoice = None,
         fps: float | None = None,
         open_capture: Callable[[int], Capture] = cv2.VideoCapture,
     ) -> None:
-        super().__init__(f"camera {index}", f"camera{index}", sensor, settings, fps)
-        self.index = index
+        super().__init__(f"camera {number}", f"camera{number}", sensor, settings, fps)
+        self.number = number
         self._fps = fps
         self._open_capture = open_capture
         self._capture: Capture | None = None
         self._thread: threading.Thread | None = None
         # Guards the fields below; notified when one of them changes.
         self._changed = threading.Condition()
-        self._newest: tuple[float, NDArray[np.uint8]] | None = None
+        self._newest: tuple[float, ByteArray] | None = None
         self._n_dropped = 0
         self._failure: str | None = None
         self._stopped = False
@@ -117,7 +117,7 @@ class LiveCamera(UnposedSource):
             If it cannot be opened, with the cameras there are.
         """
         if self._thread is not None:
-            raise StateError(f"camera {self.index} is open already, or was; make a new object")
+            raise StateError(f"camera {self.number} is open already, or was; make a new object")
         self.open()
         self._seen_at = time.monotonic()
         self._thread = threading.Thread(target=self._run, name="camera", daemon=True)
@@ -131,7 +131,7 @@ class LiveCamera(UnposedSource):
         if self._thread is not None:
             self._thread.join(_PATIENCE)
             if self._thread.is_alive():
-                _log.warning("camera %d does not answer; it is not waited for", self.index)
+                _log.warning("camera %d does not answer; it is not waited for", self.number)
                 return
         if self._capture is not None:
             self._capture.release()
@@ -147,7 +147,7 @@ class LiveCamera(UnposedSource):
         if self._capture is not None:
             return
         with quiet_opencv():
-            capture = self._open_capture(self.index)
+            capture = self._open_capture(self.number)
         if not capture.isOpened():
             others = existing_cameras()
             there = (
@@ -155,8 +155,8 @@ class LiveCamera(UnposedSource):
                 if others
                 else "this machine has none (no /dev/video*)"
             )
-            hint = "; it may be in use, or not allowed for you" if self.index in others else ""
-            raise DatasetError(f"camera {self.index} cannot be opened{hint}; {there}")
+            hint = "; it may be in use, or not allowed for you" if self.number in others else ""
+            raise DatasetError(f"camera {self.number} cannot be opened{hint}; {there}")
         camera = self.settings.camera
         if camera.width is not None and camera.height is not None:
             capture.set(cv2.CAP_PROP_FRAME_WIDTH, camera.width)
@@ -194,7 +194,9 @@ class LiveCamera(UnposedSource):
                 if self._failure is not None:
                     raise DatasetError(self._failure)
                 if time.monotonic() > self._seen_at + _PATIENCE:
-                    raise DatasetError(f"camera {self.index} has sent no image for {_PATIENCE:g} s")
+                    raise DatasetError(
+                        f"camera {self.number} has sent no image for {_PATIENCE:g} s"
+                    )
                 return None
         timestamp, image = taken
         return LiveFrame(timestamp, f"{timestamp:.6f}", Images(self._ordered(image)))
@@ -212,7 +214,7 @@ class LiveCamera(UnposedSource):
         try:
             self._read_until_stopped(self._capture)
         except Exception as error:  # an exception here would end the thread unseen
-            self._fail(f"camera {self.index} failed: {error}")
+            self._fail(f"camera {self.number} failed: {error}")
 
     def _read_until_stopped(self, capture: Capture) -> None:
         # Wall clock at the start, monotonic from then on: time stamps must grow.
@@ -223,7 +225,7 @@ class LiveCamera(UnposedSource):
             if not good or image is None:
                 failures += 1
                 if failures > _MOST_FAILURES:
-                    self._fail(f"camera {self.index} sends no more images; was it unplugged?")
+                    self._fail(f"camera {self.number} sends no more images; was it unplugged?")
                     return
                 time.sleep(_WAIT_SLICE)
                 continue

@@ -7,17 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py.datasets.base import Images, LiveFrame, LiveSource, Sequence
 from orbslam2py.datasets.image_folder import image_files
 from orbslam2py.datasets.images import read_image
 from orbslam2py.errors import DatasetError, ImageError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import Settings
-from orbslam2py.trajectory.trajectory import Trajectory
-
-Mask = NDArray[np.uint8]
+from orbslam2py.settings import Sensor, Settings
+from orbslam2py.trajectory import Trajectory
 
 
 class StaticMask:
@@ -40,8 +37,20 @@ class StaticMask:
         self._path = path
         self._mask = read_mask(path)
 
-    def mask(self, index: int, image: NDArray[np.uint8]) -> Mask:
+    def mask(self, index: int, image: ByteArray) -> ByteArray:
         """Return the mask of an image.
+
+        Parameters
+        ----------
+        index
+            Not looked at: the mask is the same for all.
+        image
+            The image the mask is for, uint8 (h, w) or (h, w, channels).
+
+        Returns
+        -------
+        ByteArray
+            (h, w), 0 where no keypoint may lie.
 
         Raises
         ------
@@ -90,8 +99,20 @@ class MaskFolder:
                 f"name{example} or in the same order, or a single file"
             )
 
-    def mask(self, index: int, image: NDArray[np.uint8]) -> Mask:
+    def mask(self, index: int, image: ByteArray) -> ByteArray:
         """Read the mask of an image.
+
+        Parameters
+        ----------
+        index
+            Place of the frame in the sequence, from 0.
+        image
+            The image the mask is for, uint8 (h, w) or (h, w, channels).
+
+        Returns
+        -------
+        ByteArray
+            (h, w), 0 where no keypoint may lie.
 
         Raises
         ------
@@ -101,7 +122,7 @@ class MaskFolder:
         return _fitting(self._paths[index], read_mask(self._paths[index]), image)
 
 
-def read_mask(path: Path) -> Mask:
+def read_mask(path: Path) -> ByteArray:
     """Read a mask: uint8 (h, w), 0 where no keypoint may lie.
 
     Images with several equal channels are taken as well.
@@ -124,7 +145,7 @@ def read_mask(path: Path) -> Mask:
     return np.ascontiguousarray(colour[:, :, 0])
 
 
-def _fitting(path: Path, mask: Mask, image: NDArray[np.uint8]) -> Mask:
+def _fitting(path: Path, mask: ByteArray, image: ByteArray) -> ByteArray:
     if mask.shape != image.shape[:2]:
         raise ImageError(
             f"mask {path} is {mask.shape[1]} x {mask.shape[0]}, "
@@ -198,7 +219,7 @@ class MaskedSequence(_Masked):
         return len(self._sequence)
 
     @property
-    def timestamps(self) -> NDArray[np.float64]:
+    def timestamps(self) -> FloatArray:
         """Time of every frame in seconds, float64 (n,)."""
         return self._sequence.timestamps
 
@@ -207,7 +228,7 @@ class MaskedSequence(_Masked):
         return self._sequence.timestamp_text(index)
 
     def default_settings(self) -> Settings:
-        """Choose settings by what comes with the images."""
+        """Choose settings by what comes with the images; see `datasets.base.Sequence`."""
         return self._sequence.default_settings()
 
     def load(self, index: int, /) -> Images:
@@ -246,7 +267,7 @@ class MaskedCamera(_Masked):
         return self._camera.n_dropped
 
     def open(self) -> None:
-        """Open the camera."""
+        """Open the camera; see `datasets.base.LiveSource.open`."""
         self._camera.open()
 
     def __enter__(self) -> MaskedCamera:
@@ -257,6 +278,6 @@ class MaskedCamera(_Masked):
         self._camera.__exit__(*details)
 
     def take(self, timeout: float, /) -> LiveFrame | None:
-        """Take the newest image, with the mask."""
+        """Take the newest image, with the mask; see `datasets.base.LiveSource.take`."""
         frame = self._camera.take(timeout)
         return frame and replace(frame, images=self._with_mask(0, frame.images))

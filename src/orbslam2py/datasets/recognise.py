@@ -12,7 +12,7 @@ from orbslam2py.datasets.kitti import KittiSequence
 from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.datasets.tum import TumSequence, find_association
 from orbslam2py.errors import DatasetError
-from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings import Sensor
 
 _MARKS = (
     "rgb.txt or associations.txt (TUM), times.txt and image_0 (KITTI), mav0/cam0 or cam0 (EuRoC)"
@@ -20,7 +20,12 @@ _MARKS = (
 
 
 def recognise(folder: str | Path) -> Layout:
-    """Tell the layout of a sequence.
+    """Tell the layout of a recorded sequence by the files in its folder.
+
+    Parameters
+    ----------
+    folder
+        The sequence; for EuRoC also its ``mav0``.
 
     Raises
     ------
@@ -72,6 +77,11 @@ def open_sequence(
         Association file of a TUM sequence; by default one in the folder, else by time stamps.
     layout
         How to read the folder, if it should not be recognised.
+
+    Returns
+    -------
+    RecordedSequence
+        With the interface of `datasets.base.Sequence`; images are read when asked for.
 
     Raises
     ------

@@ -8,8 +8,8 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import FloatArray
 from orbslam2py.datasets.base import (
     Images,
     Layout,
@@ -17,10 +17,8 @@ from orbslam2py.datasets.base import (
     choose_sensor,
 )
 from orbslam2py.datasets.choose_settings import SettingsChoice, choose_settings
-from orbslam2py.settings.builtin import resolve_settings
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import Settings
-from orbslam2py.trajectory.trajectory import Trajectory
+from orbslam2py.settings import Sensor, Settings, resolve_settings
+from orbslam2py.trajectory import Trajectory
 
 
 class RecordedSequence(ABC):
@@ -63,7 +61,7 @@ class RecordedSequence(ABC):
 
     @cached_property
     def settings(self) -> Settings:
-        """What the caller chose, or `default_settings`."""
+        """The settings the caller chose, or `default_settings`."""
         return self.default_settings() if self._chosen is None else self._chosen
 
     def default_settings(self) -> Settings:
@@ -74,7 +72,7 @@ class RecordedSequence(ABC):
         return len(self._stamps.texts)
 
     @property
-    def timestamps(self) -> NDArray[np.float64]:
+    def timestamps(self) -> FloatArray:
         """Time of every frame in seconds, float64 (n,)."""
         return self._stamps.seconds
 

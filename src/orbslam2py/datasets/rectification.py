@@ -3,20 +3,19 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py.errors import ImageError
-from orbslam2py.settings.settings import CameraRectification, StereoRectification
-
-Array = NDArray[np.float64]
+from orbslam2py.settings import CameraRectification, StereoRectification
 
 
 def rectification_of_pair(
-    K: tuple[Array, Array], D: tuple[Array, Array], T_right_left: Array, size: tuple[int, int]
+    K: tuple[FloatArray, FloatArray],
+    D: tuple[FloatArray, FloatArray],
+    T_right_left: FloatArray,
+    size: tuple[int, int],
 ) -> StereoRectification:
     """Find the rectification of a calibrated pair.
 
@@ -30,24 +29,32 @@ def rectification_of_pair(
     T_right_left
         Transform (4, 4) from left to right camera coordinates [m].
     size
-        Width and height of the images.
+        Width and height of the images [pixels].
     """
     R_left, R_right, P_left, P_right, *_ = cv2.stereoRectify(
-        *(K[0], D[0], K[1], D[1]),
-        size,
-        np.ascontiguousarray(T_right_left[:3, :3]),
-        np.ascontiguousarray(T_right_left[:3, 3:]),
+        cameraMatrix1=K[0],
+        distCoeffs1=D[0],
+        cameraMatrix2=K[1],
+        distCoeffs2=D[1],
+        imageSize=size,
+        R=np.ascontiguousarray(T_right_left[:3, :3]),
+        T=np.ascontiguousarray(T_right_left[:3, 3:]),
         flags=cv2.CALIB_ZERO_DISPARITY,
         alpha=0,
     )
-    return StereoRectification(
-        left=CameraRectification(K[0], D[0], _float64(R_left), _float64(P_left), *size),
-        right=CameraRectification(K[1], D[1], _float64(R_right), _float64(P_right), *size),
+    width, height = size
+    left, right = (
+        CameraRectification(
+            K=K[i],
+            D=D[i],
+            R=np.asarray(R, dtype=np.float64),
+            P=np.asarray(P, dtype=np.float64),
+            width=width,
+            height=height,
+        )
+        for i, (R, P) in enumerate(((R_left, P_left), (R_right, P_right)))
     )
-
-
-def _float64(matrix: NDArray[Any]) -> Array:
-    return np.asarray(matrix, dtype=np.float64)
+    return StereoRectification(left=left, right=right)
 
 
 class Rectifier:
@@ -70,7 +77,7 @@ class Rectifier:
             cv2.CV_32FC1,
         )
 
-    def rectify(self, image: NDArray[np.uint8], what: object = "image") -> NDArray[np.uint8]:
+    def rectify(self, image: ByteArray, what: object = "image") -> ByteArray:
         """Resample an image bilinearly; black where the raw image has no pixels.
 
         Parameters

@@ -6,8 +6,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import FloatArray
 from orbslam2py._text_lines import content_lines, number_of
 from orbslam2py.datasets.base import Stamps
 from orbslam2py.errors import DatasetError
@@ -30,7 +30,7 @@ def stamps_of_rate(n: int, fps: float) -> Stamps:
     return stamps_of_seconds(seconds)
 
 
-def stamps_of_seconds(seconds: NDArray[np.float64]) -> Stamps:
+def stamps_of_seconds(seconds: FloatArray) -> Stamps:
     """Make time stamps of float64 (n,) seconds, written with nine decimals."""
     return Stamps(seconds, tuple(f"{time:.9f}" for time in seconds.tolist()), ())
 

@@ -15,9 +15,8 @@ from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.images import read_depth, read_image
 from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.errors import DatasetError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.trajectory.association import MAX_DIFFERENCE, associate
-from orbslam2py.trajectory.trajectory import Trajectory, read_tum
+from orbslam2py.settings import Sensor
+from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory, associate, read_tum
 
 _log = logging.getLogger(__name__)
 

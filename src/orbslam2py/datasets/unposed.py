@@ -9,22 +9,20 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import ByteArray
 from orbslam2py.datasets.base import Stamps, choose_sensor
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.time_files import read_time_file, stamps_of_rate
 from orbslam2py.errors import DatasetError, SettingsError
-from orbslam2py.settings.builtin import BUILTIN_NAMES, resolve_settings
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import CameraSettings, Settings
-from orbslam2py.trajectory.trajectory import Trajectory
+from orbslam2py.settings import BUILTIN_NAMES, CameraSettings, Sensor, Settings, resolve_settings
+from orbslam2py.trajectory import Trajectory
 
 _log = logging.getLogger(__name__)
 
 
 class UnposedSource:
-    """Images of a single camera, of which nothing else is known.
+    """Images of a single camera without true poses and without calibration.
 
     Parameters
     ----------
@@ -74,7 +72,7 @@ class UnposedSource:
         """Return None: there are no true poses."""
         return None
 
-    def _ordered(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def _ordered(self, image: ByteArray) -> ByteArray:
         """Give OpenCV's image the colour order of the settings; look at the size of the first."""
         if not self._size_checked:
             self._size_checked = True
@@ -83,14 +81,16 @@ class UnposedSource:
             image = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), dtype=np.uint8)
         return np.ascontiguousarray(image)
 
-    def _warn_of_size(self, image: NDArray[np.uint8]) -> None:
+    def _warn_of_size(self, image: ByteArray) -> None:
         camera = self.settings.camera
         given, found = (camera.width, camera.height), (image.shape[1], image.shape[0])
         if None not in given and given != found:
             _log.warning(
                 "%s has images of %d x %d pixels, but the settings are for %d x %d: "
                 "focal lengths and distortion do not fit",
-                *(self._what, *found, *given),
+                self._what,
+                *found,
+                *given,
             )
 
 
@@ -104,7 +104,7 @@ def _with_rate(camera: CameraSettings, fps: float) -> CameraSettings:
 def chosen_stamps(
     n: int, fps: float | None, times: str | Path | None, otherwise: Stamps | float
 ) -> Stamps:
-    """Take the time stamps that were asked for.
+    """Choose the time stamps of images: from a rate, from a file, or else their own.
 
     Parameters
     ----------

@@ -10,17 +10,16 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import ByteArray, FloatArray
+from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.datasets.base import Images, Stamps
 from orbslam2py.datasets.choose_settings import SettingsChoice
-from orbslam2py.datasets.image_folder import IMAGE_SUFFIXES
 from orbslam2py.datasets.images import quiet_opencv
 from orbslam2py.datasets.time_files import stamps_of_rate, stamps_of_seconds
 from orbslam2py.datasets.unposed import UnposedSource, chosen_stamps
 from orbslam2py.errors import DatasetError, ImageError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import Settings
+from orbslam2py.settings import Sensor, Settings
 
 _log = logging.getLogger(__name__)
 
@@ -51,7 +50,7 @@ class VideoReader:
         #: Frames per second as the file tells; 0 if it does not.
         self.fps = _rate(self._capture)
 
-    def scan(self) -> NDArray[np.float64]:
+    def scan(self) -> FloatArray:
         """Decode the file once and return the time of every frame in seconds, float64 (n,).
 
         What files say about their number of frames is often wrong.
@@ -70,12 +69,17 @@ class VideoReader:
             raise self._no_frames()
         return np.array(seconds, dtype=np.float64)
 
-    def read(self, index: int) -> NDArray[np.uint8]:
+    def read(self, index: int) -> ByteArray:
         """Decode a frame.
+
+        Parameters
+        ----------
+        index
+            Number of the frame in the video, from 0.
 
         Returns
         -------
-        NDArray[np.uint8]
+        ByteArray
             (h, w, 3) in the order BGR, or (h, w).
 
         Raises
@@ -96,8 +100,18 @@ class VideoReader:
             raise ImageError(f"video {self.path} has {image.dtype} pixels; 8 bits are needed")
         return np.asarray(image, dtype=np.uint8)
 
-    def frames(self, step: int = 1) -> Iterator[NDArray[np.uint8] | ImageError]:
+    def frames(self, step: int = 1) -> Iterator[ByteArray | ImageError]:
         """Yield every so many frames from the beginning; an error in the place of a bad one.
+
+        Parameters
+        ----------
+        step
+            1 for all frames, 2 for every second one.
+
+        Yields
+        ------
+        ByteArray or ImageError
+            (h, w, 3) in the order BGR, or (h, w).
 
         Raises
         ------
@@ -118,7 +132,7 @@ class VideoReader:
             raise self._no_frames()
 
     def close(self) -> None:
-        """Give the file free."""
+        """Close the file."""
         self._capture.release()
 
     def _no_frames(self) -> DatasetError:
@@ -195,7 +209,7 @@ class VideoSequence(UnposedSource):
         return len(self._stamps.texts)
 
     @property
-    def timestamps(self) -> NDArray[np.float64]:
+    def timestamps(self) -> FloatArray:
         """Time of every frame in seconds, float64 (n,)."""
         return self._stamps.seconds
 
@@ -211,7 +225,7 @@ class VideoSequence(UnposedSource):
         """Decode a frame; see `datasets.base.Sequence.load`. Fast only in order."""
         return Images(self._ordered(self._reader.read(index)))
 
-    def _own_stamps(self, seconds: NDArray[np.float64]) -> Stamps:
+    def _own_stamps(self, seconds: FloatArray) -> Stamps:
         if np.isfinite(seconds).all() and (np.diff(seconds) > 0).all():
             return stamps_of_seconds(seconds)
         if not self._reader.fps:
@@ -220,6 +234,7 @@ class VideoSequence(UnposedSource):
             )
         _log.warning(
             "the time stamps of %s do not grow; taking a constant %g frames per second",
-            *(self.path, self._reader.fps),
+            self.path,
+            self._reader.fps,
         )
         return stamps_of_rate(len(seconds), self._reader.fps)

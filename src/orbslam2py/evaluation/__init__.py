@@ -1,16 +1,27 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How far an estimate is from the truth: alignment, absolute and relative errors, laps."""
+"""How far an estimate is from the truth: paths, laps, poses found in a map, closed loops."""
 
+from orbslam2py.evaluation.alignment import Alignment, Similarity, align, match_poses
+from orbslam2py.evaluation.keyframes import (
+    PoseError,
+    errors_through_keyframes,
+    nearest_keyframes,
+    pose_error,
+)
 from orbslam2py.evaluation.laps import LapError, lap_error, scale_drift
+from orbslam2py.evaluation.loops import (
+    LoopError,
+    Revisit,
+    closed_revisits,
+    find_revisits,
+    loop_error,
+    metres_per_unit_at,
+)
 from orbslam2py.evaluation.metrics import (
     SEGMENT_LENGTHS,
-    Alignment,
     ErrorStatistics,
     Evaluation,
-    Similarity,
-    align,
     evaluate_trajectory,
-    match_poses,
     one_second_pairs,
     relative_errors,
     segment_errors,
@@ -22,12 +33,22 @@ __all__ = [
     "ErrorStatistics",
     "Evaluation",
     "LapError",
+    "LoopError",
+    "PoseError",
+    "Revisit",
     "Similarity",
     "align",
+    "closed_revisits",
+    "errors_through_keyframes",
     "evaluate_trajectory",
+    "find_revisits",
     "lap_error",
+    "loop_error",
     "match_poses",
+    "metres_per_unit_at",
+    "nearest_keyframes",
     "one_second_pairs",
+    "pose_error",
     "relative_errors",
     "scale_drift",
     "segment_errors",

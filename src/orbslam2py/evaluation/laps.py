@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import DatasetError
-from orbslam2py.evaluation.metrics import Similarity, align, match_poses, relative_errors
-from orbslam2py.trajectory.association import MAX_DIFFERENCE
-from orbslam2py.trajectory.rotations import Array
-from orbslam2py.trajectory.trajectory import Trajectory
+from orbslam2py.evaluation.alignment import Similarity, align, match_poses
+from orbslam2py.evaluation.metrics import relative_errors
+from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ def scale_drift(
 
 def _lap(
     estimate: Trajectory, truth: Trajectory, length: float | None, max_difference: float
-) -> tuple[Array, Array, Array]:
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Poses (n, 4, 4) of the lap, estimated and true, and metres from its start (n,)."""
     estimate = estimate.select(~estimate.lost)
     truth = truth.select(~truth.lost)

@@ -8,16 +8,14 @@ over path segments as the KITTI odometry benchmark does (Geiger et al., CVPR 201
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from orbslam2py.errors import DatasetError
-from orbslam2py.trajectory.association import MAX_DIFFERENCE, associate
-from orbslam2py.trajectory.rotations import Array, inverse_poses, rotation_angles
-from orbslam2py.trajectory.trajectory import Trajectory
+from orbslam2py._arrays import FloatArray, IntArray
+from orbslam2py.evaluation.alignment import Alignment, Similarity, align, match_poses
+from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory
+from orbslam2py.trajectory.rotations import inverse_poses, rotation_angles
 
 #: Lengths of KITTI's path segments [m].
 SEGMENT_LENGTHS = (100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0)
@@ -25,60 +23,17 @@ _SEGMENT_STEP = 10  # frames between the starts of segments
 _SECOND_TOLERANCE = 0.1  # how far "one second later" may be off [s]
 
 
-class Alignment(str, Enum):
-    """How the estimate is moved onto the truth before the absolute error is taken."""
-
-    SE3 = "se3"
-    SIM3 = "sim3"
-    NONE = "none"
-
-    def __str__(self) -> str:
-        return self.value
-
-
-@dataclass(frozen=True, eq=False)
-class Similarity:
-    """A similarity transform ``y = scale * R @ x + t``.
+@dataclass(frozen=True)
+class ErrorStatistics:
+    """Figures over many errors of one kind, in the unit of the errors.
 
     Attributes
     ----------
-    scale
-        Ratio of lengths, above 0.
-    R
-        Rotation, float64 (3, 3).
-    t
-        Translation, float64 (3,).
+    rmse
+        Root of the mean square.
+    mean, median, max
+        Of the errors.
     """
-
-    scale: float
-    R: Array
-    t: Array
-
-    @classmethod
-    def identity(cls) -> Similarity:
-        """Make the transform that changes nothing."""
-        return cls(1.0, np.eye(3), np.zeros(3))
-
-    def inverse(self) -> Similarity:
-        """Make the transform that undoes this one."""
-        return Similarity(1 / self.scale, self.R.T, -(self.R.T @ self.t) / self.scale)
-
-    def apply(self, points: Array) -> Array:
-        """Transform points (n, 3)."""
-        moved: Array = self.scale * points @ self.R.T + self.t
-        return moved
-
-    def apply_to_poses(self, T_wc: Array) -> Array:
-        """Transform camera poses (n, 4, 4): positions as points, orientations turned."""
-        moved: Array = T_wc.copy()
-        moved[:, :3, :3] = self.R @ T_wc[:, :3, :3]
-        moved[:, :3, 3] = self.apply(T_wc[:, :3, 3])
-        return moved
-
-
-@dataclass(frozen=True)
-class ErrorStatistics:
-    """Figures over many errors of one kind, in their unit."""
 
     rmse: float
     mean: float
@@ -86,8 +41,8 @@ class ErrorStatistics:
     max: float
 
     @classmethod
-    def of(cls, errors: Array) -> ErrorStatistics:
-        """Take the figures of at least one error (n,)."""
+    def of(cls, errors: FloatArray) -> ErrorStatistics:
+        """Take the figures of errors, float64 (n,), n > 0."""
         return cls(
             rmse=float(np.sqrt(np.mean(errors**2))),
             mean=float(np.mean(errors)),
@@ -172,6 +127,11 @@ def evaluate_trajectory(
     timed
         False if the time stamps are only frame numbers: no figures over one second then.
 
+    Returns
+    -------
+    Evaluation
+        Positions in metres if the truth is.
+
     Raises
     ------
     DatasetError
@@ -208,38 +168,9 @@ def evaluate_trajectory(
     )
 
 
-def align(points: Array, targets: Array, *, with_scale: bool = False) -> Similarity:
-    """Find the transform that moves points nearest to their targets (Umeyama, PAMI 1991).
-
-    Parameters
-    ----------
-    points, targets
-        float64 (n, 3), at least one.
-    with_scale
-        Whether lengths may change. They do not if one of the sets is a single place, where no
-        scale can be seen; a rotation that cannot be seen is chosen so that nothing is turned.
-
-    Returns
-    -------
-    Similarity
-        Always finite.
-    """
-    centre, target_centre = points.mean(axis=0), targets.mean(axis=0)
-    x, y = points - centre, targets - target_centre
-    U, stretch, Vt = np.linalg.svd(y.T @ x / len(x))
-    signs = np.array([1.0, 1.0, np.sign(np.linalg.det(U) * np.linalg.det(Vt))])
-    R = U @ (signs[:, None] * Vt) if stretch[0] > 0 else np.eye(3)
-    scale = 1.0
-    spread, target_spread = np.mean(np.sum(x**2, axis=1)), np.mean(np.sum(y**2, axis=1))
-    if with_scale and spread > 1e-18 and target_spread > 1e-18:
-        fitted = float(np.sum(stretch * signs) / spread)
-        scale = fitted if fitted > 1e-12 else 1.0
-    return Similarity(scale, R, target_centre - scale * R @ centre)
-
-
 def relative_errors(
-    estimate: Array, truth: Array, pairs: tuple[NDArray[np.int64], NDArray[np.int64]]
-) -> tuple[Array, Array]:
+    estimate: FloatArray, truth: FloatArray, pairs: tuple[IntArray, IntArray]
+) -> tuple[FloatArray, FloatArray]:
     """Take the errors of motions between pairs of poses.
 
     Parameters
@@ -261,13 +192,18 @@ def relative_errors(
     return np.linalg.norm(error[:, :3, 3], axis=1), rotation_angles(error[:, :3, :3])
 
 
-def one_second_pairs(times: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def one_second_pairs(times: FloatArray) -> tuple[IntArray, IntArray]:
     """Pair every pose with the one nearest to a second later, if there is one within 0.1 s.
 
     Parameters
     ----------
     times
         Seconds in increasing order, (n,).
+
+    Returns
+    -------
+    first, second
+        Indices into `times`, int64 (k,) each.
     """
     if not len(times):
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
@@ -281,7 +217,7 @@ def one_second_pairs(times: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]
     return first.astype(np.int64), nearer[first].astype(np.int64)
 
 
-def segment_errors(estimate: Array, truth: Array) -> Array:
+def segment_errors(estimate: FloatArray, truth: FloatArray) -> FloatArray:
     """Take KITTI's errors over path segments of 100 to 800 m.
 
     Segments start at every tenth pose and end at the first pose more than their length further
@@ -294,7 +230,7 @@ def segment_errors(estimate: Array, truth: Array) -> Array:
 
     Returns
     -------
-    Array
+    FloatArray
         (k, 2): translation error per metre of length, and rotation error [rad] per metre.
     """
     steps = np.linalg.norm(np.diff(truth[:, :3, 3], axis=0), axis=1)
@@ -309,32 +245,8 @@ def segment_errors(estimate: Array, truth: Array) -> Array:
     return np.concatenate(errors)
 
 
-def match_poses(
-    estimate: Trajectory, truth: Trajectory, max_difference: float = MAX_DIFFERENCE
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Find which poses belong together by their time stamps.
-
-    Returns
-    -------
-    i, j
-        Indices into the estimate and into the truth, (k,) each, k > 0.
-
-    Raises
-    ------
-    DatasetError
-        If no time stamps match.
-    """
-    i, j = associate(estimate.timestamps, truth.timestamps, max_difference)
-    if not len(i):
-        raise DatasetError(
-            f"no poses to compare: no time stamps of estimate ({_span(estimate)}) and ground truth "
-            f"({_span(truth)}) differ by less than {max_difference} s"
-        )
-    return i, j
-
-
 def _relative_statistics(
-    estimate: Array, truth: Array, pairs: tuple[NDArray[np.int64], NDArray[np.int64]]
+    estimate: FloatArray, truth: FloatArray, pairs: tuple[IntArray, IntArray]
 ) -> tuple[ErrorStatistics | None, ErrorStatistics | None]:
     if not len(pairs[0]):
         return None, None
@@ -344,10 +256,3 @@ def _relative_statistics(
 
 def _rmse(statistics: ErrorStatistics | None) -> float | None:
     return None if statistics is None else statistics.rmse
-
-
-def _span(trajectory: Trajectory) -> str:
-    if not len(trajectory):
-        return "no poses"
-    times = trajectory.timestamps
-    return f"{len(times)} poses from {times.min():.3f} to {times.max():.3f} s"

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The map outside of a running system: plain copies of it."""
+"""The map outside of a running system: plain copies of it, and files of them."""
 
-from orbslam2py.maps.snapshot import MapSnapshot
+from orbslam2py.maps.ply import write_ply
+from orbslam2py.maps.snapshot import MapSnapshot, keyframe_trajectory, take_snapshot
 
-__all__ = ["MapSnapshot"]
+__all__ = ["MapSnapshot", "keyframe_trajectory", "take_snapshot", "write_ply"]

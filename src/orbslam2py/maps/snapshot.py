@@ -6,34 +6,33 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from orbslam2py import _core as core
-from orbslam2py.slam.records import FrameFeatures
-from orbslam2py.trajectory.trajectory import Trajectory
+from orbslam2py._arrays import FloatArray, IntArray
+from orbslam2py.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
 class MapSnapshot:
     """A consistent copy of the map, in the frame of keyframe 0's first pose (the world)."""
 
-    keyframe_ids: npt.NDArray[np.int64]
+    keyframe_ids: IntArray
     """(k,) ascending."""
-    keyframe_timestamps: npt.NDArray[np.float64]
+    keyframe_timestamps: FloatArray
     """(k,) seconds."""
-    keyframe_T_wc: npt.NDArray[np.float64]
+    keyframe_T_wc: FloatArray
     """(k, 4, 4) camera to world."""
-    point_ids: npt.NDArray[np.int64]
+    point_ids: IntArray
     """(p,) ascending."""
-    point_positions: npt.NDArray[np.float64]
+    point_positions: FloatArray
     """(p, 3) world [m]."""
-    loop_edges: npt.NDArray[np.int64]
+    loop_edges: IntArray
     """(l, 2) ids of the keyframes that a closed loop connects."""
 
 
-def take_snapshot(world: core.Map) -> MapSnapshot:
+def take_snapshot(slam_map: core.Map) -> MapSnapshot:
     """Copy keyframe poses, points and loop edges in one consistent view."""
-    snapshot = core.snapshot_map(world)
+    snapshot = core.snapshot_map(slam_map)
     keyframes, points = snapshot.keyframes, snapshot.points
     return MapSnapshot(
         keyframe_ids=keyframes.ids,
@@ -45,30 +44,10 @@ def take_snapshot(world: core.Map) -> MapSnapshot:
     )
 
 
-def keyframe_trajectory(world: core.Map) -> Trajectory:
+def keyframe_trajectory(slam_map: core.Map) -> Trajectory:
     """Poses of the keyframes, relative to keyframe 0."""
-    keyframes = core.snapshot_keyframes(world)
+    keyframes = core.snapshot_keyframes(slam_map)
     T_wc = keyframes.T_wc
     if len(T_wc):
         T_wc = np.linalg.inv(T_wc[0]) @ T_wc
     return Trajectory(timestamps=keyframes.timestamps, T_wc=T_wc)
-
-
-def frame_trajectory(recorder: core.TrajectoryRecorder, world: core.Map) -> Trajectory:
-    """Poses of all recorded frames, relative to keyframe 0, after the latest optimisation."""
-    poses = recorder.rebuild(world)
-    return Trajectory(
-        timestamps=poses.timestamps, T_wc=poses.T_wc, lost=poses.lost, indices=poses.frames
-    )
-
-
-def frame_features(frame: core.TrackedFrame) -> FrameFeatures:
-    """Copy the keypoints of a frame and what they were matched to."""
-    ids = frame.map_points
-    return FrameFeatures(
-        keypoints=frame.frame.keypoints,
-        levels=frame.frame.levels,
-        depths=frame.frame.depth,
-        map_point_ids=ids,
-        inliers=(ids >= 0) & (frame.outlier == 0),
-    )

@@ -1,7 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A sequence in, a folder of results out."""
 
-from orbslam2py.runs.result import FrameRow, RunOptions, RunResult
+from orbslam2py.runs.options import RunOptions
+from orbslam2py.runs.result import FrameRow, RunResult
+from orbslam2py.runs.run import FinishedRun, run_sequence
 from orbslam2py.runs.runner import SequenceRunner
+from orbslam2py.slam.options import SystemOptions
 
-__all__ = ["FrameRow", "RunOptions", "RunResult", "SequenceRunner"]
+__all__ = [
+    "FinishedRun",
+    "FrameRow",
+    "RunOptions",
+    "RunResult",
+    "SequenceRunner",
+    "SystemOptions",
+    "run_sequence",
+]

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Generator
@@ -10,10 +11,10 @@ from dataclasses import dataclass
 from typing import TypeGuard
 
 import numpy as np
-import numpy.typing as npt
 
-from orbslam2py.datasets.base import Images, LiveSource, Sequence
-from orbslam2py.runs.prefetch import Prefetcher
+from orbslam2py._arrays import FloatArray
+from orbslam2py.datasets import Images, LiveSource, Sequence
+from orbslam2py.runs.prefetch import prefetch
 
 #: Seconds between two looks at whether the run was stopped.
 _WAIT_SLICE = 0.2
@@ -21,14 +22,15 @@ _WAIT_SLICE = 0.2
 
 @dataclass(frozen=True)
 class FedFrame:
-    """One frame.
+    """A frame on its way from the source to the system.
 
     Attributes
     ----------
     index
-        In the sequence; counts the images that a camera delivered.
+        Place in the sequence, from 0, whichever of its frames the run takes; for a camera the
+        number of images taken before.
     timestamp, text
-        Seconds, as number and as the source's text.
+        Time stamp in seconds, as a number and as the source wrote it.
     item
         The images; an exception if they could not be read; None if the frame is to be dropped.
     """
@@ -47,7 +49,7 @@ class RecordedFeed:
     sequence : Sequence
         Images and time stamps.
     indices : list of int
-        Which frames, in order.
+        Places in the sequence of the frames to take, in order.
     realtime : bool
         Play the time stamps, and drop frames that are overtaken.
     """
@@ -62,10 +64,13 @@ class RecordedFeed:
         self.n_frames: int | None = len(indices)
 
     def frames(self, stop: threading.Event) -> Generator[FedFrame, None, None]:
-        """Yield the frames, at the time they are due if real time is played, until `stop`."""
+        """Yield the frames, at the time they are due if real time is played, until `stop` is set.
+
+        Frames that cannot be read carry their error.
+        """
         sequence = self._sequence
         clock = _Clock(sequence.timestamps, self._indices, stop) if self._realtime else None
-        with Prefetcher[Images](sequence, self._indices, stop=stop) as images:
+        with contextlib.closing(prefetch(sequence.load, self._indices, stop)) as images:
             for position, (index, item) in enumerate(images):
                 dropped = clock is not None and clock.must_drop(position)
                 if stop.is_set():
@@ -99,7 +104,13 @@ class LiveFeed:
         return self._camera.n_dropped
 
     def frames(self, stop: threading.Event) -> Generator[FedFrame, None, None]:
-        """Yield images until `stop`."""
+        """Yield the newest image again and again, until `stop` is set.
+
+        Raises
+        ------
+        DatasetError
+            If the camera cannot be opened or sends no more images.
+        """
         index = 0
         with self._camera as camera:
             while not stop.is_set() and index != self._max_frames:
@@ -110,22 +121,20 @@ class LiveFeed:
 
 
 def is_sequence(source: Sequence | LiveSource) -> TypeGuard[Sequence]:
-    """Whether the source has a known length."""
+    """Whether the source is a sequence, which has a known length, and no camera."""
     return hasattr(source, "__len__")
 
 
 class _Clock:
     """Plays time stamps: a frame is dropped when the next one has come before it was taken."""
 
-    def __init__(
-        self, timestamps: npt.NDArray[np.float64], indices: list[int], stop: threading.Event
-    ) -> None:
+    def __init__(self, timestamps: FloatArray, indices: list[int], stop: threading.Event) -> None:
         self._due = np.asarray(timestamps)[indices]
         self._stop = stop
         self._offset: float | None = None
 
     def must_drop(self, position: int) -> bool:
-        """Wait until the frame is due; True if its successor is already there."""
+        """Wait until the frame at a position of the run is due; True if its successor is too."""
         now = time.perf_counter()
         if self._offset is None:
             self._offset = now - float(self._due[position])

@@ -20,27 +20,37 @@ import numpy.typing as npt
 
 from orbslam2py._files import atomic_write
 from orbslam2py.errors import DatasetError
+from orbslam2py.maps.ply import write_ply
 from orbslam2py.runs.plots import draw_trajectory
 from orbslam2py.runs.report import RunEvaluation
 from orbslam2py.runs.result import FrameRow, RunResult
 from orbslam2py.settings.sensor import Sensor
+from orbslam2py.trajectory import Trajectory, write_kitti, write_tum
 from orbslam2py.trajectory.rotations import quaternions_from_rotations
-from orbslam2py.trajectory.trajectory import Trajectory, write_kitti, write_tum
 
 _log = logging.getLogger(__name__)
 
 STAGES = ("wait", "extract", "stereo", "predict", "local_map", "keyframe", "track")
 
 
-def prepare_output_folder(folder: Path | None, name: str, *, force: bool) -> Path:
+def new_output_folder(name: str) -> Path:
+    """A folder that does not exist yet: ``runs/<name>-<time>``, below the working folder."""
+    stem = Path("runs") / f"{name}-{time.strftime('%Y%m%d-%H%M%S')}"
+    folder = stem
+    for number in range(2, 100):
+        if not folder.exists():
+            break
+        folder = stem.with_name(f"{stem.name}-{number}")
+    return folder
+
+
+def prepare_output_folder(folder: Path, *, force: bool) -> Path:
     """Make the folder that takes the results, and see that it can be written.
 
     Parameters
     ----------
-    folder : Path, optional
-        The folder; ``runs/<name>-<time>`` if None.
-    name : str
-        Name of the sequence.
+    folder : Path
+        The folder.
     force : bool
         Accept a folder that holds files.
 
@@ -49,13 +59,6 @@ def prepare_output_folder(folder: Path | None, name: str, *, force: bool) -> Pat
     DatasetError
         If it is not empty (without `force`), not a folder, or not writable.
     """
-    if folder is None:
-        stem = Path("runs") / f"{name}-{time.strftime('%Y%m%d-%H%M%S')}"
-        folder = stem
-        for number in range(2, 100):
-            if not folder.exists():
-                break
-            folder = stem.with_name(f"{stem.name}-{number}")
     if folder.exists() and not folder.is_dir():
         raise DatasetError(f"{folder} is not a folder; give another one with --output")
     if folder.exists() and any(folder.iterdir()) and not force:
@@ -169,18 +172,6 @@ def anchored_points(result: RunResult) -> npt.NDArray[np.float64]:
     T_0w = np.linalg.inv(snapshot.keyframe_T_wc[0])
     points: npt.NDArray[np.float64] = snapshot.point_positions @ T_0w[:3, :3].T + T_0w[:3, 3]
     return points
-
-
-def write_ply(path: Path, points: npt.NDArray[np.float64]) -> None:
-    """Write points (p, 3) [m] as a binary PLY file that common viewers open."""
-    header = (
-        "ply\nformat binary_little_endian 1.0\ncomment camera frame of keyframe 0: "
-        f"x right, y down, z forward [m]\nelement vertex {len(points)}\n"
-        "property float x\nproperty float y\nproperty float z\nend_header\n"
-    )
-    with atomic_write(path, binary=True) as stream:
-        stream.write(header.encode())
-        stream.write(np.ascontiguousarray(points, dtype="<f4").tobytes())
 
 
 def _write_text(path: Path, text: str) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 
 from orbslam2py._version import __version__
 from orbslam2py.errors import OrbSlamError
-from orbslam2py.evaluation.metrics import Alignment, Evaluation, evaluate_trajectory
+from orbslam2py.evaluation import Alignment, Evaluation, evaluate_trajectory
 from orbslam2py.runs.result import RunResult
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.events import LoopClosed
@@ -75,9 +75,9 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "layout": result.sequence.layout,
         "sensor": options.sensor.value,
         "settings": result.settings.to_yaml(),
-        "deterministic": options.deterministic,
+        "deterministic": options.system.deterministic,
         "realtime": options.realtime,
-        "seed": options.seed,
+        "seed": options.system.seed,
         "frames": n_frames,
         "tracked": n_tracked,
         "tracked_fraction": n_tracked / n_frames if n_frames else 0.0,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a run is asked for, and what it gives."""
+"""What a run gives."""
 
 from __future__ import annotations
 
@@ -9,89 +9,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from orbslam2py.datasets.base import Source
-from orbslam2py.errors import DatasetError
 from orbslam2py.maps.snapshot import MapSnapshot
-from orbslam2py.settings.sensor import Sensor
+from orbslam2py.runs.options import RunOptions
 from orbslam2py.settings.settings import Settings
 from orbslam2py.slam.events import LoopClosed
-from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord, check_time_limit
+from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
 from orbslam2py.slam.records import TrackingRecord, TrackingState
 from orbslam2py.trajectory.trajectory import Trajectory
-
-
-@dataclass(frozen=True)
-class RunOptions:
-    """What to run and how.
-
-    Raises
-    ------
-    SettingsError
-        If the time limit is not more than 0, or given for a deterministic run.
-    """
-
-    sensor: Sensor
-    deterministic: bool = False
-    realtime: bool = False
-    """Follow the time stamps and drop frames as a camera would; otherwise every frame is tracked,
-    as fast as possible, waiting for mapping."""
-    start: int = 0
-    """Index of the first frame."""
-    stride: int = 1
-    """Take every so many frames."""
-    max_frames: int | None = None
-    """Take at most so many frames."""
-    seed: int = 0
-    localize_after: int | None = None
-    """Switch to localization mode after so many frames."""
-    loop_closing: bool = True
-    """Recognise places seen before and take out the drift."""
-    full_adjustment: bool = True
-    """After a loop, refine the whole map."""
-    full_adjustment_time_limit: float | None = None
-    """Seconds after which that ends with what it has reached."""
-
-    def __post_init__(self) -> None:
-        check_time_limit(self.full_adjustment_time_limit, deterministic=self.deterministic)
-
-    def indices(self, n_frames: int) -> list[int]:
-        """Indices of the frames of a sequence that are used.
-
-        Raises
-        ------
-        DatasetError
-            If there are none, or the options contradict each other.
-        """
-        if self.deterministic and self.realtime:
-            raise DatasetError(
-                "--deterministic and --realtime exclude each other: dropping frames depends on time"
-            )
-        if (
-            self.start < 0
-            or self.stride < 1
-            or (self.max_frames is not None and self.max_frames < 1)
-        ):
-            raise DatasetError("--start must be 0 or more, --stride and --max-frames 1 or more")
-        indices = list(range(self.start, n_frames, self.stride))
-        if not indices:
-            raise DatasetError(f"--start {self.start} is past the end: {n_frames} frames")
-        return indices[: self.max_frames]
-
-    def check_for_camera(self) -> None:
-        """See that the options make sense for a camera.
-
-        Raises
-        ------
-        DatasetError
-            Naming the option that does not.
-        """
-        if self.deterministic or self.realtime:
-            name = "--deterministic" if self.deterministic else "--realtime"
-            raise DatasetError(f"{name} is for recorded images: a camera always goes in real time")
-        if self.start != 0 or self.stride != 1:
-            name = "--start" if self.start != 0 else "--stride"
-            raise DatasetError(f"{name} is for recorded images, not for a camera")
-        if self.max_frames is not None and self.max_frames < 1:
-            raise DatasetError("--max-frames must be 1 or more")
 
 
 @dataclass(frozen=True)

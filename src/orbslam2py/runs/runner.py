@@ -8,7 +8,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any, cast
 
 import numpy as np
@@ -18,7 +18,8 @@ from orbslam2py import _core as core
 from orbslam2py.datasets.base import Images, LiveSource, Sequence
 from orbslam2py.errors import DatasetError, ImageError, OrbSlamError
 from orbslam2py.runs.feeds import FedFrame, LiveFeed, RecordedFeed, is_sequence
-from orbslam2py.runs.result import DROPPED, FrameRow, RunOptions, RunResult
+from orbslam2py.runs.options import RunOptions
+from orbslam2py.runs.result import DROPPED, FrameRow, RunResult
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
 from orbslam2py.slam.records import TrackingRecord
@@ -69,7 +70,11 @@ class SequenceRunner:
             options.check_for_camera()
             self._feed = LiveFeed(cast(LiveSource, sequence), options.max_frames)
         self.result = RunResult(
-            *(sequence, settings, options, self._feed.n_frames), is_live=self._feed.is_live
+            sequence=sequence,
+            settings=settings,
+            options=options,
+            n_frames=self._feed.n_frames,
+            is_live=self._feed.is_live,
         )
 
     def run(
@@ -93,17 +98,9 @@ class SequenceRunner:
         """
         result, options = self.result, self._options
         begin = time.perf_counter()
-        system = System(
-            result.settings,
-            options.sensor,
-            self._vocabulary,
-            deterministic=options.deterministic,
-            wait_for_mapping=not (options.realtime or self._feed.is_live),
-            loop_closing=options.loop_closing,
-            full_adjustment=options.full_adjustment,
-            full_adjustment_time_limit=options.full_adjustment_time_limit,
-            seed=options.seed,
-        )
+        in_time = options.realtime or self._feed.is_live
+        how = replace(options.system, wait_for_mapping=not in_time)
+        system = System(result.settings, options.sensor, self._vocabulary, **asdict(how))
         stop = stop or threading.Event()
         try:
             self._process(system, progress, stop)

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What must be known before the first image: sensor, camera, features, depth."""
 
-from orbslam2py.settings.builtin import BUILTIN_NAMES, builtin_settings, resolve_settings
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import (
+from orbslam2py.settings.builtin import BUILTIN_NAMES
+from orbslam2py.settings.groups import (
     CameraRectification,
     CameraSettings,
     DepthSettings,
     OrbSettings,
-    Settings,
     StereoRectification,
     ViewerSettings,
 )
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings.settings import Settings, builtin_settings, resolve_settings
 
 __all__ = [
     "BUILTIN_NAMES",

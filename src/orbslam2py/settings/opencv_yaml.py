@@ -13,6 +13,10 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
+from orbslam2py._arrays import FloatArray
+
 _KEY = re.compile(r"^(?P<key>[A-Za-z_][\w.\-]*)\s*:(?P<value>.*)$")
 _NUMBER = re.compile(r"^[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?$")
 _NOT_FINITE = re.compile(r"^[+-]?\.?(nan|inf|infinity)$", re.IGNORECASE)
@@ -90,6 +94,55 @@ def parse_number(text: str) -> float:
     if _NOT_FINITE.match(text):
         raise ValueError(f"{text} is not finite")
     raise ValueError(f"'{text}' is not a number" if text else "the value is empty")
+
+
+def read_number(entry: Entry) -> float:
+    """Make the finite number of a scalar entry.
+
+    Raises
+    ------
+    ValueError
+        With a sentence for the user that begins with the key.
+    """
+    if not isinstance(entry.value, str):
+        raise ValueError(f"{entry.key} must be one number, not a list or a map")
+    try:
+        return parse_number(entry.value)
+    except ValueError as error:
+        raise ValueError(f"{entry.key}: {error}") from None
+
+
+def read_matrix(entry: Entry) -> FloatArray:
+    """Make the float64 (rows, cols) matrix of an entry with rows, cols and data.
+
+    Raises
+    ------
+    ValueError
+        With a sentence for the user.
+    """
+    if not isinstance(entry.value, Mapping):
+        raise ValueError(f"{entry.key} must be a matrix with rows, cols and data")
+    missing = [name for name in ("rows", "cols", "data") if name not in entry.value]
+    if missing:
+        raise ValueError(f"{entry.key} has no {' and no '.join(missing)}")
+    shape = []
+    for name in ("rows", "cols"):
+        number = read_number(entry.value[name])
+        if not number.is_integer() or not 1 <= number <= 1000:
+            raise ValueError(f"{entry.key}: {name} is {number:g}; allowed: 1 to 1000")
+        shape.append(int(number))
+    data = entry.value["data"].value
+    if not isinstance(data, tuple):
+        raise ValueError(f"{entry.key}: data must be a list [...]")
+    if len(data) != shape[0] * shape[1]:
+        raise ValueError(
+            f"{entry.key} should hold {shape[0]} x {shape[1]} = {shape[0] * shape[1]} numbers, "
+            f"found {len(data)}"
+        )
+    try:
+        return np.array([parse_number(item) for item in data], dtype=np.float64).reshape(shape)
+    except ValueError as error:
+        raise ValueError(f"{entry.key}: {error}") from None
 
 
 def _content_lines(text: str) -> list[_Line]:

@@ -1,43 +1,63 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An ORB-SLAM settings file to `Settings`, with every problem reported at once."""
+"""An ORB-SLAM settings file to groups of settings, with every problem reported at once.
+
+`Settings` is made of the groups by whoever asked for them, so that nothing here needs to know it.
+"""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import keys as schema
-from orbslam2py.settings.opencv_yaml import Document, Entry, Problem, parse_number, scan
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import (
+from orbslam2py.settings.groups import (
     CameraRectification,
     CameraSettings,
     DepthSettings,
     OrbSettings,
-    Settings,
+    SettingsGroups,
     StereoRectification,
     ViewerSettings,
     thresholds_swapped,
 )
+from orbslam2py.settings.opencv_yaml import (
+    Document,
+    Entry,
+    Problem,
+    read_matrix,
+    read_number,
+    scan,
+)
+from orbslam2py.settings.sensor import Sensor
 
 _log = logging.getLogger(__name__)
 _MOST_PROBLEMS = 30
-_GROUPS: dict[str, type[Any]] = {
-    "camera": CameraSettings,
-    "depth": DepthSettings,
-    "orb": OrbSettings,
-    "viewer": ViewerSettings,
-}
 
 
-def read_settings(path: Path, sensor: Sensor, *, allow_unknown: bool) -> Settings:
-    """See `Settings.load`."""
+def read_groups(path: Path, sensor: Sensor, *, allow_unknown: bool) -> SettingsGroups:
+    """Read a settings file for a sensor.
+
+    What is allowed but probably a mistake is logged as a warning.
+
+    Parameters
+    ----------
+    path
+        The file, in OpenCV's YAML dialect.
+    sensor
+        What to read it for: keys that only other sensors use are not looked at.
+    allow_unknown
+        Log keys nobody knows as warnings instead of refusing the file.
+
+    Raises
+    ------
+    SettingsError
+        If the file cannot be read, or listing everything that is wrong: file, line, key, allowed
+        values, nearest key.
+    """
     try:
         text = path.read_text(encoding="utf-8", errors="replace")
     except OSError as error:
@@ -50,21 +70,20 @@ def read_settings(path: Path, sensor: Sensor, *, allow_unknown: bool) -> Setting
         problems.append(Problem(None, "the file holds no settings"))
     _check_names(document, path, allow_unknown)
     _check_camera_type(document)
-    values = _read_groups(document, sensor)
-    rectification = None
-    if sensor is Sensor.STEREO:
-        rectification = _read_rectification(document)
+    values = _read_values(document, sensor)
+    rectification = _read_rectification(document) if sensor is Sensor.STEREO else None
     _raise_if_any(path, problems)
 
-    groups: dict[str, Any] = {
-        name: kind(**values[name])
-        for name, kind in _GROUPS.items()
-        if name != "depth" or sensor.has_depth
-    }
-    settings = Settings(sensor=sensor, rectification=rectification, **groups)
-    for warning in _doubts(settings):
+    groups = SettingsGroups(
+        camera=CameraSettings(**values["camera"]),
+        orb=OrbSettings(**values["orb"]),
+        depth=DepthSettings(**values["depth"]) if sensor.has_depth else None,
+        rectification=rectification,
+        viewer=ViewerSettings(**values["viewer"]),
+    )
+    for warning in _doubts(sensor, groups):
         _log.warning("%s: %s", path, warning)
-    return settings
+    return groups
 
 
 def _raise_if_any(path: Path, problems: list[Problem]) -> None:
@@ -100,8 +119,9 @@ def _check_camera_type(document: Document) -> None:
         )
 
 
-def _read_groups(document: Document, sensor: Sensor) -> dict[str, dict[str, Any]]:
-    values: dict[str, dict[str, Any]] = {name: {} for name in _GROUPS}
+def _read_values(document: Document, sensor: Sensor) -> dict[str, dict[str, Any]]:
+    """Read the checked values of the scalar keys by group and field."""
+    values: dict[str, dict[str, Any]] = {key.group: {} for key in schema.KEYS}
     for key in schema.KEYS:
         if sensor not in key.sensors:
             continue
@@ -111,7 +131,7 @@ def _read_groups(document: Document, sensor: Sensor) -> dict[str, dict[str, Any]
                 document.problems.append(_missing(document, key, sensor))
             continue
         try:
-            number = _scalar(entry)
+            number = _number(key, entry)
             # ORB-SLAM's files may say 0 for "unknown rate".
             if not (key.name == "Camera.fps" and number == 0):
                 values[key.group][key.field] = schema.convert(key, number)
@@ -133,15 +153,11 @@ def _missing(document: Document, key: schema.Key, sensor: Sensor) -> Problem:
     return Problem(None, text)
 
 
-def _scalar(entry: Entry) -> float:
-    if not isinstance(entry.value, str):
-        raise ValueError(f"{entry.key} must be one number, not a list or a map")
+def _number(key: schema.Key, entry: Entry) -> float:
     try:
-        return parse_number(entry.value)
+        return read_number(entry)
     except ValueError as error:
-        key = next((key for key in schema.KEYS if key.name == entry.key), None)
-        allowed = f"; allowed: {key.rule.text}" if key else ""
-        raise ValueError(f"{entry.key}: {error}{allowed}") from None
+        raise ValueError(f"{error}; allowed: {key.rule.text}") from None
 
 
 def _read_rectification(document: Document) -> StereoRectification | None:
@@ -165,7 +181,7 @@ def _read_camera_rectification(document: Document, side: str) -> CameraRectifica
         entry = document.entries[f"{side}.{name}"]
         try:
             if name in ("width", "height"):
-                number = _scalar(entry)
+                number = read_number(entry)
                 if not number.is_integer() or not 1 <= number <= 65535:
                     raise ValueError(
                         f"{entry.key} is {number:g}; allowed: whole numbers 1 to 65535"
@@ -184,56 +200,24 @@ def _read_camera_rectification(document: Document, side: str) -> CameraRectifica
         return None
 
 
-def read_matrix(entry: Entry) -> NDArray[np.float64]:
-    """Make the float64 (rows, cols) matrix of an entry with rows, cols and data.
-
-    Raises
-    ------
-    ValueError
-        With a sentence for the user.
-    """
-    if not isinstance(entry.value, Mapping):
-        raise ValueError(f"{entry.key} must be a matrix with rows, cols and data")
-    missing = [name for name in ("rows", "cols", "data") if name not in entry.value]
-    if missing:
-        raise ValueError(f"{entry.key} has no {' and no '.join(missing)}")
-    shape = []
-    for name in ("rows", "cols"):
-        number = _scalar(entry.value[name])
-        if not number.is_integer() or not 1 <= number <= 1000:
-            raise ValueError(f"{entry.key}: {name} is {number:g}; allowed: 1 to 1000")
-        shape.append(int(number))
-    data = entry.value["data"].value
-    if not isinstance(data, tuple):
-        raise ValueError(f"{entry.key}: data must be a list [...]")
-    if len(data) != shape[0] * shape[1]:
-        raise ValueError(
-            f"{entry.key} should hold {shape[0]} x {shape[1]} = {shape[0] * shape[1]} numbers, "
-            f"found {len(data)}"
-        )
-    try:
-        return np.array([parse_number(item) for item in data], dtype=np.float64).reshape(shape)
-    except ValueError as error:
-        raise ValueError(f"{entry.key}: {error}") from None
-
-
-def _doubts(settings: Settings) -> list[str]:
+def _doubts(sensor: Sensor, groups: SettingsGroups) -> list[str]:
     """Say what is allowed but probably a mistake."""
-    camera, found = settings.camera, []
+    camera, orb, rectification = groups["camera"], groups["orb"], groups["rectification"]
+    found = []
     if camera.width is not None and not 0 <= camera.cx < camera.width:
         found.append(f"Camera.cx {camera.cx:g} lies outside the image ({camera.width} wide)")
     if camera.height is not None and not 0 <= camera.cy < camera.height:
         found.append(f"Camera.cy {camera.cy:g} lies outside the image ({camera.height} high)")
-    if settings.orb.n_features < 200:
-        found.append(f"ORBextractor.nFeatures {settings.orb.n_features} is very few")
-    if settings.sensor is Sensor.STEREO and camera.is_distorted:
+    if orb.n_features < 200:
+        found.append(f"ORBextractor.nFeatures {orb.n_features} is very few")
+    if sensor is Sensor.STEREO and camera.is_distorted:
         found.append("stereo input must be rectified; distortion must be zero")
-    if settings.rectification is not None:
-        P = settings.rectification.left.P
+    if rectification is not None:
+        P = rectification.left.P
         expected = np.array([P[0, 0], P[1, 1], P[0, 2], P[1, 2]])
         given = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
         if np.abs(expected - given).max() > 1e-3:
             found.append("Camera.fx, fy, cx, cy differ from LEFT.P")
-        if abs(camera.bf + settings.rectification.right.P[0, 3]) > 1e-3:
+        if abs(camera.bf + rectification.right.P[0, 3]) > 1e-3:
             found.append("Camera.bf differs from -RIGHT.P[0,3]")
     return found

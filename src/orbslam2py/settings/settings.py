@@ -1,11 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Settings of the camera, the features and the depth; ORB-SLAM's YAML files in and out.
+"""Everything the system must know about a camera, from a file, a built-in name or Python.
 
 >>> settings = Settings.load("my_camera.yaml", Sensor.RGBD)  # doctest: +SKIP
 >>> settings.close_depth  # doctest: +SKIP
 3.0929...
-
-The meaning of every key is described at the field it becomes.
 """
 
 from __future__ import annotations
@@ -13,213 +11,23 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from os import PathLike
-
-import numpy as np
-from numpy.typing import NDArray
+from pathlib import Path
 
 from orbslam2py._files import atomic_write
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings.keys import check_group
+from orbslam2py.settings.builtin import builtin_file, is_builtin_name
+from orbslam2py.settings.groups import (
+    CameraSettings,
+    DepthSettings,
+    OrbSettings,
+    SettingsGroups,
+    StereoRectification,
+    ViewerSettings,
+    raise_if_any,
+)
+from orbslam2py.settings.reader import read_groups
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.writer import format_settings
-
-Array = NDArray[np.float64]
-
-
-def _require(problems: list[str]) -> None:
-    if problems:
-        raise SettingsError("; ".join(problems))
-
-
-@dataclass(frozen=True)
-class CameraSettings:
-    """Pinhole camera with OpenCV's radial-tangential distortion.
-
-    Attributes
-    ----------
-    fx, fy, cx, cy
-        Focal lengths and principal point in pixels; the centre of the top-left pixel is (0, 0).
-    k1, k2, p1, p2, k3
-        Distortion in OpenCV's order; all 0 for rectified images.
-    width, height
-        Image size in pixels as far as known. Never enforced: the first image decides.
-    fps
-        Frames per second.
-    bf
-        Baseline times fx [pixel metres]; 0 for a single camera.
-    rgb
-        Whether colour images are RGB (True) or BGR.
-    """
-
-    fx: float
-    fy: float
-    cx: float
-    cy: float
-    k1: float = 0.0
-    k2: float = 0.0
-    p1: float = 0.0
-    p2: float = 0.0
-    k3: float = 0.0
-    width: int | None = None
-    height: int | None = None
-    fps: float = 30.0
-    bf: float = 0.0
-    rgb: bool = False
-
-    def __post_init__(self) -> None:
-        _require(check_group("camera", self))
-
-    @property
-    def matrix(self) -> Array:
-        """The camera matrix K, float64 (3, 3), pixels."""
-        return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
-
-    @property
-    def distortion(self) -> Array:
-        """Coefficients k1, k2, p1, p2 and, only if it is not 0, k3; float64 (4,) or (5,)."""
-        four = [self.k1, self.k2, self.p1, self.p2]
-        return np.array([*four, self.k3] if self.k3 else four)
-
-    @property
-    def is_distorted(self) -> bool:
-        """Whether any distortion coefficient is not 0."""
-        return bool(np.any(self.distortion))
-
-
-@dataclass(frozen=True)
-class OrbSettings:
-    """ORB extraction (ORB-SLAM2, section III).
-
-    Attributes
-    ----------
-    n_features
-        Keypoints wanted per image, all pyramid levels together.
-    scale_factor, n_levels
-        Ratio between neighbouring pyramid levels and their number.
-    ini_th_fast, min_th_fast
-        FAST thresholds in grey levels: the second serves cells where the first finds nothing.
-    """
-
-    n_features: int = 1000
-    scale_factor: float = 1.2
-    n_levels: int = 8
-    ini_th_fast: int = 20
-    min_th_fast: int = 7
-
-    def __post_init__(self) -> None:
-        problems = check_group("orb", self)
-        if not problems and self.min_th_fast > self.ini_th_fast:
-            problems = [thresholds_swapped(self.min_th_fast, self.ini_th_fast)]
-        _require(problems)
-
-
-def thresholds_swapped(min_th_fast: int, ini_th_fast: int) -> str:
-    """Say that the second FAST threshold lies above the first."""
-    return (
-        f"ORBextractor.minThFAST is {min_th_fast}; allowed: 1 to ORBextractor.iniThFAST, "
-        f"which is {ini_th_fast}"
-    )
-
-
-@dataclass(frozen=True)
-class DepthSettings:
-    """How depth is read and trusted (stereo and RGB-D).
-
-    Attributes
-    ----------
-    close_factor
-        Points nearer than this many baselines are trusted from one view (key ``ThDepth``).
-    raw_per_metre
-        Units of the depth image per metre (key ``DepthMapFactor``, RGB-D); 1 for metres.
-    """
-
-    close_factor: float
-    raw_per_metre: float = 1.0
-
-    def __post_init__(self) -> None:
-        _require(check_group("depth", self))
-
-
-@dataclass(frozen=True)
-class ViewerSettings:
-    """Sizes (world units) and line widths (pixels) of the map view, and where its eye stands."""
-
-    keyframe_size: float = 0.05
-    keyframe_line_width: float = 1.0
-    graph_line_width: float = 0.9
-    point_size: float = 2.0
-    camera_size: float = 0.08
-    camera_line_width: float = 3.0
-    viewpoint_x: float = 0.0
-    viewpoint_y: float = -0.7
-    viewpoint_z: float = -1.8
-    viewpoint_f: float = 500.0
-
-    def __post_init__(self) -> None:
-        _require(check_group("viewer", self))
-
-
-@dataclass(frozen=True, eq=False)
-class CameraRectification:
-    """How one raw camera of a stereo pair becomes a rectified one (OpenCV's conventions).
-
-    Attributes
-    ----------
-    K
-        Raw camera matrix (3, 3), pixels.
-    D
-        Raw distortion, 4, 5 or 8 coefficients.
-    R
-        Rotation (3, 3) from raw to rectified camera coordinates.
-    P
-        Rectified projection (3, 4), pixels; ``P[0, 3]`` of the right camera is -bf.
-    width, height
-        Size of the rectified images in pixels.
-    """
-
-    K: Array
-    D: Array
-    R: Array
-    P: Array
-    width: int
-    height: int
-
-    def __post_init__(self) -> None:
-        problems = []
-        for name, shape in (("K", (3, 3)), ("D", None), ("R", (3, 3)), ("P", (3, 4))):
-            value = np.array(getattr(self, name), dtype=np.float64)
-            value = value.reshape(-1) if name == "D" else value
-            value.setflags(write=False)
-            object.__setattr__(self, name, value)
-            if shape is not None and value.shape != shape:
-                problems.append(f"{name} must be {shape[0]} x {shape[1]}, not {value.shape}")
-            elif shape is None and value.size not in (4, 5, 8):
-                problems.append(f"{name} must have 4, 5 or 8 coefficients, not {value.size}")
-            elif not np.isfinite(value).all():
-                problems.append(f"{name} holds a number that is not finite")
-        if not problems and np.abs(self.R @ self.R.T - np.eye(3)).max() > 1e-3:
-            problems.append("R is not a rotation (rows not orthonormal to 1e-3)")
-        if min(self.width, self.height) < 1:
-            problems.append(f"width and height must be at least 1, not {self.width}, {self.height}")
-        _require(problems)
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, CameraRectification):
-            return NotImplemented
-        return (self.width, self.height) == (other.width, other.height) and all(
-            np.array_equal(getattr(self, name), getattr(other, name)) for name in "KDRP"
-        )
-
-    def __hash__(self) -> int:
-        return hash((self.width, self.height, self.K.tobytes(), self.P.tobytes()))
-
-
-@dataclass(frozen=True)
-class StereoRectification:
-    """Rectification of both cameras of a pair (keys ``LEFT.*`` and ``RIGHT.*``)."""
-
-    left: CameraRectification
-    right: CameraRectification
 
 
 @dataclass(frozen=True)
@@ -259,7 +67,7 @@ class Settings:
                 problems.append(f"Camera.bf is {self.camera.bf:g}; {self.sensor} needs it above 0")
             if self.depth is None:
                 problems.append(f"ThDepth (depth.close_factor) is missing; {self.sensor} needs it")
-        _require(problems)
+        raise_if_any(problems)
 
     @property
     def baseline(self) -> float:
@@ -274,8 +82,8 @@ class Settings:
         return self.camera.bf * self.depth.close_factor / self.camera.fx
 
     @property
-    def max_frames(self) -> int:
-        """Largest spacing of keyframes in frames: those of one second, at least 1."""
+    def max_keyframe_interval(self) -> int:
+        """Most frames from one keyframe to the next: those of one second, at least 1."""
         return max(1, math.trunc(self.camera.fps))
 
     @property
@@ -312,13 +120,15 @@ class Settings:
         SettingsError
             Listing everything that is wrong: file, line, key, allowed values, nearest key.
         """
-        # These build Settings, so they cannot be imported before the class exists.
-        from orbslam2py.settings.builtin import resolve_settings  # noqa: PLC0415
-
         return resolve_settings(path, sensor, allow_unknown=allow_unknown)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write an ORB-SLAM settings file that `load` turns into equal settings.
+
+        Parameters
+        ----------
+        path
+            The file; replaced only when everything was written.
 
         Raises
         ------
@@ -329,8 +139,15 @@ class Settings:
             stream.write(self.to_yaml())
 
     def to_yaml(self) -> str:
-        """Return the text of the settings file."""
-        return format_settings(self)
+        """Return the text of the settings file that `save` writes."""
+        groups = SettingsGroups(
+            camera=self.camera,
+            orb=self.orb,
+            depth=self.depth,
+            rectification=self.rectification,
+            viewer=self.viewer,
+        )
+        return format_settings(self.sensor, groups)
 
     def describe(self) -> list[str]:
         """Say line by line what a log should hold about these settings."""
@@ -350,3 +167,58 @@ class Settings:
                 f"baseline {self.baseline:.4g} m, points are close below {self.close_depth:.4g} m"
             )
         return lines
+
+
+def builtin_settings(name: str, sensor: Sensor) -> Settings:
+    """Make the settings of a data set, as published with ORB-SLAM2 for that sensor.
+
+    Parameters
+    ----------
+    name
+        One of `BUILTIN_NAMES`, or a single KITTI sequence (``kitti00`` ... ``kitti12``), in any
+        case.
+    sensor
+        The variant: stereo and monocular ones differ.
+
+    Raises
+    ------
+    SettingsError
+        If there is no such name, or none for that sensor.
+    """
+    return _settings_of_file(builtin_file(name, sensor), sensor)
+
+
+def resolve_settings(
+    choice: str | PathLike[str] | Settings, sensor: Sensor, *, allow_unknown: bool = False
+) -> Settings:
+    """Make settings of what a user gave: a built-in name, a file, or finished settings.
+
+    A name of built-in settings wins over a file of that name; anything else that looks like a
+    path (it exists, has a suffix or a folder) is read as a file.
+
+    Parameters
+    ----------
+    choice
+        The name, the path or the settings.
+    sensor
+        What they are wanted for.
+    allow_unknown
+        Log keys nobody knows as warnings instead of refusing the file.
+
+    Raises
+    ------
+    SettingsError
+        If it is neither a name nor a readable and correct file, or made for another sensor.
+    """
+    if isinstance(choice, Settings):
+        choice.check_for(sensor)
+        return choice
+    path = Path(choice)
+    looks_like_path = path.exists() or path.suffix or len(path.parts) > 1
+    if looks_like_path and not is_builtin_name(str(choice)):
+        return _settings_of_file(path, sensor, allow_unknown=allow_unknown)
+    return builtin_settings(str(choice), sensor)
+
+
+def _settings_of_file(path: Path, sensor: Sensor, *, allow_unknown: bool = False) -> Settings:
+    return Settings(sensor=sensor, **read_groups(path, sensor, allow_unknown=allow_unknown))

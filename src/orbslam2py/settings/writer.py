@@ -3,17 +3,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from orbslam2py._arrays import FloatArray
+from orbslam2py.settings.groups import SettingsGroups
 from orbslam2py.settings.keys import KEYS, Key
+from orbslam2py.settings.sensor import Sensor
 
-if TYPE_CHECKING:
-    from orbslam2py.settings.settings import Settings
-
-_TITLES = {
+_TITLES: dict[Literal["camera", "depth", "orb", "viewer"], str] = {
     "camera": "Camera: pixels, OpenCV's distortion order, bf = baseline [m] * fx",
     "depth": "Depth: close points are nearer than ThDepth baselines",
     "orb": "ORB features",
@@ -21,26 +20,26 @@ _TITLES = {
 }
 
 
-def format_settings(settings: Settings) -> str:
+def format_settings(sensor: Sensor, groups: SettingsGroups) -> str:
     """Make the text that reads back as equal settings; numbers keep all their digits."""
-    lines = ["%YAML:1.0", f"# Settings for sensor {settings.sensor}"]
+    lines = ["%YAML:1.0", f"# Settings for sensor {sensor}"]
     for group, title in _TITLES.items():
-        values = getattr(settings, group)
+        values = groups[group]
         if values is None:
             continue
         lines += ["", f"# {title}"]
         for key in KEYS:
             value = getattr(values, key.field) if key.group == group else None
-            if value is not None and settings.sensor in key.sensors:
+            if value is not None and sensor in key.sensors:
                 lines.append(f"{key.name}: {_number(key, value)}")
-    if settings.rectification is not None:
+    rectification = groups["rectification"]
+    if rectification is not None:
         lines += ["", "# Rectification of the raw stereo pair"]
-        for side in ("left", "right"):
-            camera = getattr(settings.rectification, side)
-            lines.append(f"{side.upper()}.width: {camera.width}")
-            lines.append(f"{side.upper()}.height: {camera.height}")
+        for side, camera in (("LEFT", rectification.left), ("RIGHT", rectification.right)):
+            lines.append(f"{side}.width: {camera.width}")
+            lines.append(f"{side}.height: {camera.height}")
             for name in "KDRP":
-                lines += _matrix(f"{side.upper()}.{name}", getattr(camera, name))
+                lines += _matrix(f"{side}.{name}", getattr(camera, name))
     return "\n".join(lines) + "\n"
 
 
@@ -48,7 +47,7 @@ def _number(key: Key, value: float) -> str:
     return repr(float(value)) if key.kind is float else str(int(value))
 
 
-def _matrix(name: str, values: NDArray[np.float64]) -> list[str]:
+def _matrix(name: str, values: FloatArray) -> list[str]:
     rows = np.atleast_2d(values)
     text = ",\n      ".join(", ".join(repr(float(item)) for item in row) for row in rows)
     return [

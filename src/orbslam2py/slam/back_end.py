@@ -16,13 +16,10 @@ from orbslam2py.slam.events import (
     MapChangeCause,
     MapChanged,
 )
-from orbslam2py.slam.full_bundle_adjustment import (
-    FullAdjustment,
-    FullAdjustmentOptions,
-    FullAdjustmentRecord,
-)
+from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord, FullBundleAdjustment
 from orbslam2py.slam.local_mapping import LocalMapping
 from orbslam2py.slam.loop_closing import LoopClosing
+from orbslam2py.slam.options import SystemOptions
 from orbslam2py.slam.worker import Worker
 
 
@@ -33,49 +30,33 @@ class BackEnd:
     ----------
     sensor : Sensor
         What the images come from.
-    loop_closing : bool
-        Whether loops are closed.
-    adjustment : FullAdjustmentOptions
-        About the full bundle adjustment after a loop.
+    options : SystemOptions
+        How to work.
     callbacks : Callbacks
         Who wants to know what happens.
-    seed : int
-        Seed of all random draws.
-    threaded : bool
-        Workers in threads of their own, or inline.
     """
 
-    def __init__(
-        self,
-        sensor: Sensor,
-        *,
-        loop_closing: bool,
-        adjustment: FullAdjustmentOptions,
-        callbacks: Callbacks,
-        seed: int,
-        threaded: bool,
-    ) -> None:
+    def __init__(self, sensor: Sensor, options: SystemOptions, callbacks: Callbacks) -> None:
+        threaded = not options.deterministic
         self.map = core.Map()
-        self.index = core.KeyFrameIndex()
+        self.keyframe_index = core.KeyFrameIndex()
         self.events = EventDispatcher(callbacks, threaded=threaded)
-        self.mapping = LocalMapping(self.map, sensor, self.index, threaded=threaded)
-        self.adjustment = FullAdjustment(
+        self.mapping = LocalMapping(self.map, sensor, self.keyframe_index, threaded=threaded)
+        self.adjustment = FullBundleAdjustment(
             self.map,
             self.mapping.worker,
-            adjustment,
+            time_limit=options.full_adjustment_time_limit,
             monocular=not sensor.has_depth,
             threaded=threaded,
             on_done=_announce_adjustment(self.events),
         )
         self.loop_closing = LoopClosing(
             self.map,
-            self.index,
+            self.keyframe_index,
             sensor,
             self.mapping.worker,
             self.adjustment,
-            enabled=loop_closing,
-            seed=seed,
-            threaded=threaded,
+            options,
             on_loop=_announce_loop(self.events),
         )
         self.mapping.on_done = _pass_on_keyframe(self.map, self.loop_closing, self.events)
@@ -87,7 +68,7 @@ class BackEnd:
 
     @property
     def workers(self) -> tuple[Worker[Any], ...]:
-        """All."""
+        """Those, and the one that delivers events."""
         return (*self.map_workers, self.events.worker)
 
     def reset(self, timeout: float, *, keep: Callable[[], None]) -> None:
@@ -110,12 +91,10 @@ class BackEnd:
         self.mapping.reset()
         self.loop_closing.reset()
         keep()
-        self.index.clear()
+        ended = self.map.epoch
+        self.keyframe_index.clear()
         self.map.clear()
-        ended = self.loop_closing.map_index
-        self.loop_closing.map_index = self.adjustment.map_index = ended + 1
-        change = MapChanged(ended, MapChangeCause.RESET)
-        self.events.post(self.events.callbacks.on_map_change, change)
+        self.events.post(MapChanged(ended, MapChangeCause.RESET))
 
     def wait_until_idle(self, timeout: float | None) -> bool:
         """Wait until every worker is idle.
@@ -152,20 +131,19 @@ class BackEnd:
 
 
 def _pass_on_keyframe(
-    world: core.Map, loop_closing: LoopClosing, events: EventDispatcher
+    slam_map: core.Map, loop_closing: LoopClosing, events: EventDispatcher
 ) -> Callable[[int], None]:
     def pass_on(keyframe: int) -> None:
-        callback = events.callbacks.on_keyframe
-        if callback is not None:
+        if events.wanted(KeyframeAdded):
             added = KeyframeAdded(
-                map_index=loop_closing.map_index,
+                map_index=slam_map.epoch,
                 keyframe=keyframe,
-                timestamp=world.keyframe_timestamp(keyframe),
-                T_wc=world.keyframe_pose(keyframe).inverse().matrix,
-                n_keyframes=world.n_keyframes,
-                n_map_points=world.n_points,
+                timestamp=slam_map.keyframe_timestamp(keyframe),
+                T_wc=slam_map.keyframe_pose(keyframe).inverse().matrix,
+                n_keyframes=slam_map.n_keyframes,
+                n_map_points=slam_map.n_points,
             )
-            events.post(callback, added)
+            events.post(added)
         loop_closing.insert_keyframe(keyframe)
 
     return pass_on
@@ -173,9 +151,8 @@ def _pass_on_keyframe(
 
 def _announce_loop(events: EventDispatcher) -> Callable[[LoopClosed], None]:
     def announce(closed: LoopClosed) -> None:
-        events.post(events.callbacks.on_loop, closed)
-        change = MapChanged(closed.map_index, MapChangeCause.LOOP)
-        events.post(events.callbacks.on_map_change, change)
+        events.post(closed)
+        events.post(MapChanged(closed.map_index, MapChangeCause.LOOP))
 
     return announce
 
@@ -183,7 +160,6 @@ def _announce_loop(events: EventDispatcher) -> Callable[[LoopClosed], None]:
 def _announce_adjustment(events: EventDispatcher) -> Callable[[FullAdjustmentRecord], None]:
     def announce(record: FullAdjustmentRecord) -> None:
         if record.used:
-            change = MapChanged(record.map_index, MapChangeCause.FULL_ADJUSTMENT)
-            events.post(events.callbacks.on_map_change, change)
+            events.post(MapChanged(record.map_index, MapChangeCause.FULL_ADJUSTMENT))
 
     return announce

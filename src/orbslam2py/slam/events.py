@@ -13,16 +13,12 @@ import enum
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
+from orbslam2py._arrays import FloatArray
 from orbslam2py.slam.worker import Worker
 
 _log = logging.getLogger(__name__)
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -129,7 +125,7 @@ class Callbacks:
     on_map_change: Callable[[MapChanged], None] | None = None
 
 
-Event = TypeVar("Event")
+Event = LoopClosed | KeyframeAdded | TrackingLost | Relocalized | MapChanged
 
 
 class EventDispatcher:
@@ -144,20 +140,31 @@ class EventDispatcher:
     """
 
     def __init__(self, callbacks: Callbacks, *, threaded: bool) -> None:
-        self.callbacks = callbacks
+        self._listeners: dict[type, Callable[[Any], None] | None] = {
+            LoopClosed: callbacks.on_loop,
+            KeyframeAdded: callbacks.on_keyframe,
+            TrackingLost: callbacks.on_lost,
+            Relocalized: callbacks.on_relocalized,
+            MapChanged: callbacks.on_map_change,
+        }
         self.worker: Worker[Callable[[], None]] = Worker(
             "callbacks", lambda deliver: deliver(), threaded=threaded
         )
 
-    def post(self, callback: Callable[[Event], None] | None, event: Event) -> None:
-        """Queue an event for a callback; nothing happens when there is none."""
-        if callback is None or self.worker.ended:
+    def wanted(self, kind: type[Event]) -> bool:
+        """Whether anybody listens to events of a type: others need not be made."""
+        return self._listeners[kind] is not None
+
+    def post(self, event: Event) -> None:
+        """Queue an event for the function that listens to its type; nothing if there is none."""
+        listener = self._listeners[type(event)]
+        if listener is None:
             return
 
         def deliver() -> None:
             try:
-                callback(event)
+                listener(event)
             except Exception:
                 _log.exception("a callback failed on %s", type(event).__name__)
 
-        self.worker.submit(deliver)
+        self.worker.offer(deliver)  # a shutdown ends the deliveries

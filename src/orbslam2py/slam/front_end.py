@@ -7,10 +7,11 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
+from orbslam2py._timing import StageTimer
 from orbslam2py.errors import ImageError
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
-from orbslam2py.slam.timing import StageTimer
+from orbslam2py.slam.thresholds import InitializationThresholds
 
 Mask = npt.NDArray[np.uint8]
 #: For a pair: one mask for both images, or (left, right), either of which may be None.
@@ -35,7 +36,9 @@ class FrontEnd:
         self._size: tuple[int, int] | None = None
         options = _orb_options(settings)
         self._extractor = core.OrbExtractor(options)
-        self._initial_extractor = core.OrbExtractor(_orb_options(settings, factor=2))
+        self._initial_extractor = core.OrbExtractor(
+            _orb_options(settings, factor=InitializationThresholds().feature_factor)
+        )
         self._pair_extractor = core.PairExtractor(options) if sensor is Sensor.STEREO else None
 
     def monocular(

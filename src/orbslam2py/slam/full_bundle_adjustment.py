@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Full bundle adjustment: all keyframes and points together, while the system goes on.
 
-Mur-Artal and Tardos, "ORB-SLAM2", 2017, section III-C.
+Mur-Artal and Tardos, "ORB-SLAM2", 2017, section III-D;
+``docs/method/adjustment.md#full-bundle-adjustment``.
 """
 
 from __future__ import annotations
@@ -9,29 +10,19 @@ from __future__ import annotations
 import contextlib
 import itertools
 import logging
-import math
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from orbslam2py import _core as core
-from orbslam2py.errors import SettingsError
-from orbslam2py.slam.timing import StageStatistics, StageTimer
+from orbslam2py._timing import StageStatistics, StageTimer
 from orbslam2py.slam.worker import Worker, WorkerState
 
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class FullAdjustmentOptions:
-    """Whether and how long."""
-
-    enabled: bool = True
-    """After every loop; `FullAdjustment.run` works in any case."""
-    iterations: int = 10
-    """Accepted steps at most."""
-    time_limit: float | None = None
-    """Seconds; what was reached by then is used."""
+#: Accepted steps at most.
+_ITERATIONS = 10
 
 
 @dataclass(frozen=True)
@@ -39,42 +30,25 @@ class FullAdjustmentRecord:
     """One full bundle adjustment."""
 
     map_index: int
+    """Which map: 0 for the first; grows with every reset."""
     n_keyframes: int
+    """Keyframes that took part."""
     n_points: int
     n_observations: int
+    """Keypoints of these keyframes that show these points."""
     iterations: int
     """Accepted steps."""
     initial_cost: float
     """Sum of squared residuals, each over its standard deviation, robustified."""
     final_cost: float
+    """The same at the end."""
     used: bool
     """False: given up because of another loop, a reset or the shutdown, or it gained nothing."""
     milliseconds: dict[str, float] = field(default_factory=dict)
     """Time per step: gather, solve, wait, commit, local (if there were new keyframes)."""
 
 
-def check_time_limit(seconds: float | None, *, deterministic: bool) -> None:
-    """See that a time limit makes sense.
-
-    Raises
-    ------
-    SettingsError
-        Saying what does not.
-    """
-    if seconds is None:
-        return
-    if not (math.isfinite(seconds) and seconds > 0):
-        raise SettingsError(
-            f"the time limit of the full adjustment must be more than 0 s, got {seconds}"
-        )
-    if deterministic:
-        raise SettingsError(
-            "deterministic mode takes no time limit for the full adjustment: what is reached in a "
-            "given time differs from run to run"
-        )
-
-
-class FullAdjustment:
+class FullBundleAdjustment:
     """Refines the whole map on demand; the fourth worker.
 
     Solving works on a copy and stops nobody. To write the result back, mapping stands still for a
@@ -82,12 +56,12 @@ class FullAdjustment:
 
     Parameters
     ----------
-    world : orbslam2py._core.Map
+    slam_map : orbslam2py._core.Map
         The map.
     mapping : Worker
         Stands still while the result is written.
-    options : FullAdjustmentOptions
-        Iterations and time limit.
+    time_limit : float, optional
+        Seconds after which it ends; what was reached by then is used.
     monocular : bool
         The map has no scale of its own.
     threaded : bool
@@ -98,23 +72,23 @@ class FullAdjustment:
 
     def __init__(
         self,
-        world: core.Map,
+        slam_map: core.Map,
         mapping: Worker[int],
-        options: FullAdjustmentOptions,
         *,
+        time_limit: float | None,
         monocular: bool,
         threaded: bool,
         on_done: Callable[[FullAdjustmentRecord], None],
     ) -> None:
-        self._map = world
+        self._map = slam_map
         self._mapping = mapping
         self._monocular = monocular
-        self.options = options
+        self._options = core.FullBundleOptions(
+            iterations=_ITERATIONS, max_seconds=time_limit or 0.0
+        )
         self._on_done = on_done
         #: One core is left for tracking; a single thread gives the same bytes in every run.
         self._n_threads = min(4, max(1, (os.cpu_count() or 1) // 2)) if threaded else 1
-        #: 0 for the first map; grows with every reset.
-        self.map_index = 0
         #: All that were begun, also those given up.
         self.records: list[FullAdjustmentRecord] = []
         #: Milliseconds per step.
@@ -155,7 +129,16 @@ class FullAdjustment:
         latest = self._latest
         if latest is not None and latest[0] == number:
             return latest[1]
-        return FullAdjustmentRecord(self.map_index, 0, 0, 0, 0, 0.0, 0.0, used=False)
+        return FullAdjustmentRecord(
+            map_index=self._map.epoch,
+            n_keyframes=0,
+            n_points=0,
+            n_observations=0,
+            iterations=0,
+            initial_cost=0.0,
+            final_cost=0.0,
+            used=False,
+        )
 
     @contextlib.contextmanager
     def kept_away(self) -> Iterator[None]:
@@ -173,7 +156,7 @@ class FullAdjustment:
 
     def run(self) -> FullAdjustmentRecord:
         """Do one now, in the caller's thread; for when the workers have ended."""
-        return self._adjust(self.map_index, core.StopFlag())
+        return self._adjust(core.StopFlag())
 
     def _refine_newest(self, cancelled: core.StopFlag) -> None:
         """Fit keyframes that were made meanwhile, and only moved along, to the refined map."""
@@ -181,25 +164,23 @@ class FullAdjustment:
         core.local_bundle_adjustment(self._map, newest, cancelled, self._monocular)
 
     def _process(self, number: int) -> None:
-        self._latest = number, self._adjust(self.map_index, self.worker.cancel_flag)
+        self._latest = number, self._adjust(self.worker.cancel_flag)
 
-    def _adjust(self, map_index: int, cancelled: core.StopFlag) -> FullAdjustmentRecord:
+    def _adjust(self, cancelled: core.StopFlag) -> FullAdjustmentRecord:
         timer = StageTimer()
-        options = core.GlobalBundleOptions(
-            iterations=self.options.iterations, max_seconds=self.options.time_limit or 0.0
-        )
+        map_index = self._map.epoch
         with self.worker.off_duty():
             with timer("gather"):
-                bundle = core.gather_global_bundle(self._map)
+                bundle = core.gather_full_bundle(self._map)
             with timer("solve"):
-                summary = core.solve_global_bundle(bundle, options, cancelled, self._n_threads)
+                summary = core.solve_full_bundle(bundle, self._options, cancelled, self._n_threads)
         used = False
         if not (summary.aborted or cancelled.is_set()):
             with self._mapping.pause(brief=True) as ticket:
                 with timer("wait"):
                     ticket.wait()
                 with timer("commit"):
-                    commit = core.commit_global_bundle(self._map, bundle)
+                    commit = core.commit_full_bundle(self._map, bundle)
                 used = commit.committed
                 if commit.n_followed_keyframes > 0:
                     with timer("local"):
@@ -219,7 +200,9 @@ class FullAdjustment:
         self.statistics.add({f"adjustment.{k}": v for k, v in timer.milliseconds.items()})
         _log.info(
             "full bundle adjustment of %d keyframes and %d points: %d steps, %s",
-            *(record.n_keyframes, record.n_points, record.iterations),
+            record.n_keyframes,
+            record.n_points,
+            record.iterations,
             "used" if used else "given up",
         )
         self._on_done(record)

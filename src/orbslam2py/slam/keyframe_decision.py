@@ -2,7 +2,7 @@
 """Which frames become keyframes.
 
 Mur-Artal, Montiel and Tardos, 2015, section V-E; close points: Mur-Artal and Tardos, 2017, section
-III-E.
+III-E; ``docs/method/tracking.md#new-keyframes``.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from orbslam2py import _core as core
 from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.tracking_types import TrackingThresholds
+from orbslam2py.slam.thresholds import KeyframeThresholds
 from orbslam2py.slam.worker import Worker
 
 
@@ -28,31 +28,31 @@ class KeyframeDecision:
 
     Parameters
     ----------
-    world : orbslam2py._core.Map
+    slam_map : orbslam2py._core.Map
         The map.
     mapping : Worker
         Takes the keyframes; asked to hurry when it is busy and one is wanted.
     sensor : Sensor
         What the images come from.
-    max_frames : int
+    max_keyframe_interval : int
         Largest spacing of keyframes in frames: one second.
-    thresholds : TrackingThresholds
+    thresholds : KeyframeThresholds, optional
         Limits.
     """
 
     def __init__(
         self,
-        world: core.Map,
+        slam_map: core.Map,
         mapping: Worker[int],
         sensor: Sensor,
-        max_frames: int,
-        thresholds: TrackingThresholds,
+        max_keyframe_interval: int,
+        thresholds: KeyframeThresholds | None = None,
     ) -> None:
-        self._map = world
+        self._map = slam_map
         self._mapping = mapping
         self._has_depth = sensor.has_depth
-        self._max_frames = max_frames
-        self.limits = thresholds
+        self._max_keyframe_interval = max_keyframe_interval
+        self.limits = thresholds or KeyframeThresholds()
 
     def wanted(
         self,
@@ -74,35 +74,41 @@ class KeyframeDecision:
         last : KeyframeClock
             When the last keyframe was made, and the last relocalization.
         """
-        n_keyframes = self._map.n_keyframes
         if self._mapping.pausing:
             return False
-        recently_relocalized = frame.id < last.last_relocalization + self._max_frames
-        if recently_relocalized and n_keyframes > self._max_frames:
+        limits = self.limits
+        interval = self._max_keyframe_interval
+        n_keyframes = self._map.n_keyframes
+        if frame.id < last.last_relocalization + interval and n_keyframes > interval:
             return False
 
-        min_observations = 2 if n_keyframes <= 2 else 3
-        n_reference = core.count_tracked_points(self._map, reference_keyframe, min_observations)
+        n_reference = self._points_of(reference_keyframe, n_keyframes)
         needs_close_points = self._has_depth and self._lacks_close_points(frame)
         idle = self._mapping.idle
-        ratio = 0.4 if n_keyframes < 2 else 0.75
-        if not self._has_depth:
-            ratio = 0.9
-
-        one_second_passed = frame.id >= last.last_keyframe + self._max_frames
+        one_second_passed = frame.id >= last.last_keyframe + interval
         tracking_is_weak = self._has_depth and (
-            n_inliers < 0.25 * n_reference or needs_close_points
+            n_inliers < limits.weak_share * n_reference or needs_close_points
         )
-        sees_new_things = n_inliers < ratio * n_reference or needs_close_points
+        sees_new_things = n_inliers < self._share(n_keyframes) * n_reference or needs_close_points
         wanted = (one_second_passed or idle or tracking_is_weak) and (
-            sees_new_things and n_inliers > self.limits.reference_matches
+            sees_new_things and n_inliers > limits.inliers
         )
         if not wanted or idle:
             return wanted
         self._mapping.interrupt()
         # A busy mapper gets no keyframes of a single camera: they would come at every frame.
-        queue = self.limits.keyframe_queue if self._has_depth else 0
+        queue = limits.queue if self._has_depth else 0
         return self._mapping.n_waiting < queue
+
+    def _points_of(self, keyframe: int, n_keyframes: int) -> int:
+        few = n_keyframes <= self.limits.few_keyframes
+        observations = self.limits.observations_of_few if few else self.limits.observations
+        return core.count_tracked_points(self._map, keyframe, observations)
+
+    def _share(self, n_keyframes: int) -> float:
+        if not self._has_depth:
+            return self.limits.share_monocular
+        return self.limits.share_of_first if n_keyframes < 2 else self.limits.share
 
     def _lacks_close_points(self, frame: core.TrackedFrame) -> bool:
         tracked, untracked = frame.n_close_tracked_untracked()

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Local mapping: what happens to the map for every new keyframe.
 
-Mur-Artal, Montiel and Tardos, 2015, section VI.
+Mur-Artal, Montiel and Tardos, 2015, section VI; ``docs/method/mapping.md``.
 """
 
 from __future__ import annotations
@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from orbslam2py import _core as core
+from orbslam2py._timing import StageStatistics, StageTimer
 from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.timing import StageStatistics, StageTimer
+from orbslam2py.slam.thresholds import MappingThresholds
 from orbslam2py.slam.worker import Worker
 
 
@@ -21,26 +22,30 @@ class LocalMapping:
 
     Parameters
     ----------
-    world : orbslam2py._core.Map
+    slam_map : orbslam2py._core.Map
         The map.
     sensor : Sensor
         Decides thresholds.
-    index : orbslam2py._core.KeyFrameIndex
+    keyframe_index : orbslam2py._core.KeyFrameIndex
         Forgets the keyframes that are culled.
     threaded : bool
         In a thread of its own, or inline at `start`.
+    thresholds : MappingThresholds, optional
+        Limits.
     """
 
     def __init__(
         self,
-        world: core.Map,
+        slam_map: core.Map,
         sensor: Sensor,
-        index: core.KeyFrameIndex,
+        keyframe_index: core.KeyFrameIndex,
         *,
         threaded: bool,
+        thresholds: MappingThresholds | None = None,
     ) -> None:
-        self._map = world
-        self._index = index
+        limits = thresholds or MappingThresholds()
+        self._map = slam_map
+        self._keyframe_index = keyframe_index
         self._monocular = sensor is Sensor.MONOCULAR
         #: ``on_done(keyframe_id)``: takes the finished keyframe (loop closing).
         self.on_done: Callable[[int], None] = lambda keyframe: None
@@ -48,8 +53,12 @@ class LocalMapping:
         self._recent_points = core.RecentPoints()
         self._point_options = core.NewPointOptions()
         self._point_options.monocular = self._monocular
-        self._point_options.n_neighbours = self._n_neighbours = 20 if self._monocular else 10
-        self._min_observations = 2 if self._monocular else 3
+        self._n_neighbours = limits.neighbours_monocular if self._monocular else limits.neighbours
+        self._point_options.n_neighbours = self._n_neighbours
+        self._min_observations = (
+            limits.observations_monocular if self._monocular else limits.observations
+        )
+        self._adjusted_keyframes = limits.adjusted_keyframes
         #: Milliseconds per part of the work, over all keyframes.
         self.statistics = StageStatistics()
         self.worker: Worker[int] = Worker("local mapping", self.process, threaded=threaded)
@@ -97,7 +106,7 @@ class LocalMapping:
         self.on_done(keyframe)
 
     def _refine(self, keyframe: int, timer: StageTimer) -> None:
-        if self._map.n_keyframes > 2:
+        if self._map.n_keyframes > self._adjusted_keyframes:
             with timer("mapping.local_bundle_adjustment"):
                 core.local_bundle_adjustment(
                     self._map, keyframe, self.worker.interrupt_flag, self._monocular
@@ -105,4 +114,4 @@ class LocalMapping:
         with timer("mapping.cull_keyframes"):
             culled = core.cull_keyframes(self._map, keyframe, only_close=not self._monocular)
             for dead in culled.tolist():
-                self._index.erase(dead)
+                self._keyframe_index.erase(dead)

@@ -1,16 +1,94 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Switching between mapping and localization mode."""
+"""Localization mode: poses in a map that stays as it is.
+
+Mur-Artal and Tardos, "ORB-SLAM2", 2017, section III-F;
+``docs/method/tracking.md#localization-mode``.
+"""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
 
 from orbslam2py import _core as core
-from orbslam2py.slam.tracking import Tracking
+from orbslam2py.slam.pose_search import PoseSearch
+from orbslam2py.slam.records import PoseEstimate, Reason
 from orbslam2py.slam.worker import PauseTicket, Worker
 
 _log = logging.getLogger(__name__)
+
+
+class FirstEstimateInFixedMap:
+    """By the motion model or the reference keyframe, also where the map ends.
+
+    There the pose hangs on the depths of the frame before (visual odometry), while every frame is
+    also searched in the map.
+
+    Parameters
+    ----------
+    search : PoseSearch
+        The ways to a pose.
+    has_depth : bool
+        Whether frames measure depths.
+    """
+
+    def __init__(self, search: PoseSearch, *, has_depth: bool) -> None:
+        self._search = search
+        self._has_depth = has_depth
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget that the last frame hung on depths more than on the map."""
+        self._beyond_the_map = False
+
+    def estimate(self, frame: core.TrackedFrame, *, lost: bool) -> PoseEstimate:
+        """See `FirstEstimate`."""
+        search = self._search
+        if lost:
+            return search.by_relocalization(frame)
+        search.follow_map()
+        if self._beyond_the_map:
+            estimate = self._back_into_the_map(frame)
+        elif search.motion.velocity is not None:
+            estimate = self._by_motion_model(frame)
+        else:
+            estimate = search.by_reference_keyframe(frame)
+        if estimate.found:
+            self._beyond_the_map = estimate.visual_odometry
+        return estimate
+
+    def _by_motion_model(self, frame: core.TrackedFrame) -> PoseEstimate:
+        limits = self._search.limits
+        estimate = self._search.by_motion_model(frame, beyond_the_map=self._has_depth)
+        if not estimate.found or estimate.n_inliers <= limits.localization_matches:
+            return estimate.failed(Reason.FEW_MATCHES_LAST_FRAME)
+        beyond = core.count_map_points(frame) < limits.map_matches
+        return replace(estimate, visual_odometry=beyond)
+
+    def _back_into_the_map(self, frame: core.TrackedFrame) -> PoseEstimate:
+        """Go on with visual odometry, unless the map is in view again."""
+        search, motion = self._search, self._search.motion
+        odometry = PoseEstimate(Reason.FEW_MATCHES_LAST_FRAME)
+        if motion.velocity is not None:
+            odometry = self._by_motion_model(frame)
+            if odometry.found and not odometry.visual_odometry:
+                return odometry
+        found = core.TrackedFrame(frame.features)
+        relocalized = search.by_relocalization(found)
+        if not relocalized.found or found.T_cw is None:
+            return odometry
+        # The odometry's drift ends here and is no motion: the last frame moves along.
+        if odometry.found and frame.T_cw is not None and motion.last.T_cw is not None:
+            motion.jump(motion.last.T_cw @ frame.T_cw.inverse() @ found.T_cw)
+        else:
+            motion.jump(None)
+        frame.copy_associations(found, np.ones(len(frame.features), bool))
+        frame.T_cw = found.T_cw
+        frame.share_anchor(found)
+        return relocalized
 
 
 class LocalizationSwitch:
@@ -18,35 +96,30 @@ class LocalizationSwitch:
 
     Parameters
     ----------
-    world : orbslam2py._core.Map
+    slam_map : orbslam2py._core.Map
         The map.
     min_keyframes : int
         How many keyframes begin a map; with fewer, mapping goes on until it has begun.
-    tracking : Tracking
-        Is told the mode.
     workers : iterable of Worker
         Stand still in localization mode; what waits for them is processed afterwards.
     """
 
     def __init__(
-        self,
-        world: core.Map,
-        min_keyframes: int,
-        tracking: Tracking,
-        workers: Iterable[Worker[int]],
+        self, slam_map: core.Map, min_keyframes: int, workers: Iterable[Worker[int]]
     ) -> None:
-        self._map = world
+        self._map = slam_map
         self._min_keyframes = min_keyframes
-        self._tracking = tracking
         self._workers = tuple(workers)
         self._tickets: list[PauseTicket] = []
-        #: The mode that the next track call will run in; the last assignment counts.
+        #: The mode that the next image will be tracked in; the last assignment counts.
         self.wanted = False
+        #: The mode in force.
+        self.on = False
 
     def apply(self) -> None:
         """Carry out the switch, between two frames."""
         wanted = self.wanted and self._map.n_keyframes >= self._min_keyframes
-        if wanted == self._tracking.localization_only:
+        if wanted == self.on:
             return
         if wanted:
             self._tickets = [worker.pause() for worker in self._workers]
@@ -54,7 +127,7 @@ class LocalizationSwitch:
                 ticket.wait()
         else:
             self.release()
-        self._tracking.localization_only = wanted
+        self.on = wanted
         _log.info("localization mode %s", "on" if wanted else "off")
 
     def release(self) -> None:

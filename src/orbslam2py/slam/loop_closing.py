@@ -2,8 +2,9 @@
 """Loop closing: recognises places seen before, and takes out the drift gathered meanwhile.
 
 Mur-Artal, Montiel and Tardos, 2015, section VII; for stereo and RGB-D the scale is known, Mur-Artal
-and Tardos, 2017, section III-C. Candidates that drift cannot explain, or that contradict each
-other, are refused: places that look alike make perfect matches.
+and Tardos, 2017, section III-D. Candidates that drift cannot explain, or that contradict each
+other, are refused: places that look alike make perfect matches. Step by step:
+``docs/method/loops.md``.
 """
 
 from __future__ import annotations
@@ -15,17 +16,16 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from orbslam2py import _core as core
+from orbslam2py._timing import StageStatistics, StageTimer
 from orbslam2py.errors import StateError
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.events import LoopClosed
-from orbslam2py.slam.full_bundle_adjustment import FullAdjustment
-from orbslam2py.slam.timing import StageStatistics, StageTimer
+from orbslam2py.slam.full_bundle_adjustment import FullBundleAdjustment
+from orbslam2py.slam.options import SystemOptions
+from orbslam2py.slam.thresholds import LoopThresholds
 from orbslam2py.slam.worker import Worker
 
 _log = logging.getLogger(__name__)
-
-#: Keyframes after a loop that are not searched for another one.
-_GAP = 10
 
 
 @dataclass(frozen=True)
@@ -42,62 +42,65 @@ class LoopClosing:
 
     Parameters
     ----------
-    world : orbslam2py._core.Map
+    slam_map : orbslam2py._core.Map
         The map.
-    index : orbslam2py._core.KeyFrameIndex
+    keyframe_index : orbslam2py._core.KeyFrameIndex
         Which keyframes contain which words.
     sensor : Sensor
         A single camera's scale drifts, others' is known.
     mapping : Worker
         Stands still while a loop is closed.
-    adjustment : FullAdjustment
-        Begun after every loop.
-    enabled : bool
-        False: keyframes are only entered into the index, by which lost frames are found again.
-    seed : int
-        Seed of the draws.
-    threaded : bool
-        In a thread of its own, or inline.
+    adjustment : FullBundleAdjustment
+        Kept away while a loop is closed.
+    options : SystemOptions
+        Whether loops are closed (otherwise keyframes are only entered into the index, by which lost
+        frames are found again), whether the whole map is adjusted afterwards, the seed of the
+        draws, and whether there is a thread.
     on_loop : callable
         ``on_loop(event)``, after each loop.
+    thresholds : LoopThresholds, optional
+        Limits.
     """
 
     def __init__(
         self,
-        world: core.Map,
-        index: core.KeyFrameIndex,
+        slam_map: core.Map,
+        keyframe_index: core.KeyFrameIndex,
         sensor: Sensor,
         mapping: Worker[int],
-        adjustment: FullAdjustment,
+        adjustment: FullBundleAdjustment,
+        options: SystemOptions,
         *,
-        enabled: bool,
-        seed: int,
-        threaded: bool,
         on_loop: Callable[[LoopClosed], None],
+        thresholds: LoopThresholds | None = None,
     ) -> None:
-        self._map = world
-        self._index = index
+        self._map = slam_map
+        self._keyframe_index = keyframe_index
         self._fix_scale = sensor.has_depth
         self._mapping = mapping
         self._adjustment = adjustment
-        self._enabled = enabled
-        self._options = core.LoopVerificationOptions(fix_scale=self._fix_scale, seed=seed % 2**64)
+        self._enabled = options.loop_closing
+        self._adjust = options.full_adjustment
+        self._limits = thresholds or LoopThresholds()
+        self._verification = core.LoopVerificationOptions(
+            fix_scale=self._fix_scale, seed=options.seed % 2**64
+        )
         self._on_loop = on_loop
         self._consistency = core.LoopConsistency()
         self._next_search = 1
-        #: 0 for the first map; grows with every reset.
-        self.map_index = 0
         #: Loops closed so far, over all maps.
         self.loops: list[LoopClosed] = []
         #: The last keyframe that arrived, -1 before the first.
         self.last_keyframe = -1
         #: Milliseconds per step.
         self.statistics = StageStatistics()
-        self.worker: Worker[int] = Worker("loop closing", self.process, threaded=threaded)
+        self.worker: Worker[int] = Worker(
+            "loop closing", self.process, threaded=not options.deterministic
+        )
 
     def insert_keyframe(self, keyframe: int) -> None:
-        """Queue a keyframe."""
-        self.worker.submit(keyframe)
+        """Queue a keyframe, unless a shutdown has begun: mapping may end after loop closing."""
+        self.worker.offer(keyframe)
 
     def reset(self) -> None:
         """Drop waiting keyframes and what the last ones proposed."""
@@ -129,13 +132,13 @@ class LoopClosing:
             yield True
         finally:
             if self._map.end_lease(keyframe):
-                self._index.erase(keyframe)
+                self._keyframe_index.erase(keyframe)
 
     # ---- is this a place seen before? ------------------------------------------------------------
     def _find_loop(self, keyframe: int, timer: StageTimer) -> core.Loop | None:
         with timer("detect"):
             proposals = self._detect(keyframe)
-            core.index_keyframe(self._index, self._map, keyframe)
+            core.index_keyframe(self._keyframe_index, self._map, keyframe)
         if not proposals.consistent:
             return None
         with timer("verify"):
@@ -146,7 +149,7 @@ class LoopClosing:
             self._consistency.clear()
             return _Proposals([], [])
         least_score = core.lowest_neighbour_score(self._map, keyframe)
-        found = core.find_loop_candidates(self._index, self._map, keyframe, least_score)
+        found = core.find_loop_candidates(self._keyframe_index, self._map, keyframe, least_score)
         candidates = [place.keyframe for place in found]
         consistent = list(self._consistency.update(self._map, candidates))
         return _Proposals(consistent, [c for c in candidates if c not in consistent])
@@ -156,7 +159,7 @@ class LoopClosing:
 
         def confirmed(candidates: list[int]) -> list[core.Loop]:
             loops = (
-                core.verify_loop_candidate(self._map, keyframe, candidate, self._options)
+                core.verify_loop_candidate(self._map, keyframe, candidate, self._verification)
                 for candidate in candidates
             )
             return [loop for loop in loops if loop is not None]
@@ -189,9 +192,9 @@ class LoopClosing:
         if not result.applied:
             return
         self._consistency.clear()
-        self._next_search = loop.current + _GAP
+        self._next_search = loop.current + self._limits.gap
         closed = LoopClosed(
-            map_index=self.map_index,
+            map_index=self._map.epoch,
             current_keyframe=loop.current,
             matched_keyframe=loop.matched,
             current_timestamp=self._map.keyframe_timestamp(loop.current),
@@ -208,8 +211,10 @@ class LoopClosing:
         self.loops.append(closed)
         _log.info(
             "loop closed: keyframe %d shows the place of %d; moved by %.3f m",
-            *(loop.current, loop.matched, result.translation),
+            loop.current,
+            loop.matched,
+            result.translation,
         )
         self._on_loop(closed)
-        if self._adjustment.options.enabled:
+        if self._adjust:
             self._adjustment.start()

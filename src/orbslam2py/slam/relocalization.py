@@ -1,36 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Relocalization: the pose of a frame in the map without a guess.
 
-Mur-Artal and Tardos, "Fast Relocalisation and Loop Closing in Keyframe-Based SLAM", ICRA 2014.
+Mur-Artal and Tardos, "Fast Relocalisation and Loop Closing in Keyframe-Based SLAM", ICRA 2014;
+``docs/method/relocalization.md``.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py.slam.front_end import intrinsics
-
-#: RANSAC iterations that each candidate gets per turn.
-_ITERATIONS_PER_TURN = 5
-
-
-@dataclass(frozen=True)
-class RelocalizationThresholds:
-    """The limits of relocalization; the defaults are the published system's."""
-
-    ratio: float = 0.75
-    """Best by second best descriptor distance, matching by words."""
-    matches: int = 15
-    """Fewest matches by words that make a candidate."""
-    inliers: int = 10
-    """Fewest inliers of the first pose that are worth widening."""
-    enough: int = 50
-    """Inliers that make a success."""
-    narrow: int = 30
-    """More inliers than this, but not enough, are widened once more with a narrow window."""
+from orbslam2py.slam.thresholds import RelocalizationThresholds
 
 
 class _Candidate:
@@ -40,12 +21,12 @@ class _Candidate:
         self.keyframe = keyframe
         self.matches = matches
         self.indices = np.flatnonzero(matches.map_points >= 0)
-        frame = matches.frame
+        features = matches.features
         self.ransac = core.PnpRansac(
             matches.positions[self.indices],
-            frame.keypoints[self.indices].astype(np.float64),
-            frame.sigma2[self.indices].astype(np.float64),
-            intrinsics(frame.camera),
+            features.keypoints[self.indices].astype(np.float64),
+            features.sigma2[self.indices].astype(np.float64),
+            intrinsics(features.camera),
             seed=seed,
         )
 
@@ -55,9 +36,9 @@ class Relocalizer:
 
     Parameters
     ----------
-    world : orbslam2py._core.Map
+    slam_map : orbslam2py._core.Map
         The map.
-    index : orbslam2py._core.KeyFrameIndex
+    keyframe_index : orbslam2py._core.KeyFrameIndex
         Which keyframes contain which words.
     seed : int
         Seed of the draws.
@@ -67,14 +48,14 @@ class Relocalizer:
 
     def __init__(
         self,
-        world: core.Map,
-        index: core.KeyFrameIndex,
+        slam_map: core.Map,
+        keyframe_index: core.KeyFrameIndex,
         seed: int,
         thresholds: RelocalizationThresholds | None = None,
     ) -> None:
-        self._map = world
-        self._index = index
-        self._seed = seed
+        self._map = slam_map
+        self._keyframe_index = keyframe_index
+        self._seed = seed % 2**64
         self._limits = thresholds or RelocalizationThresholds()
 
     def relocalize(self, frame: core.TrackedFrame) -> int:
@@ -89,7 +70,7 @@ class Relocalizer:
         while candidates:
             remaining = []
             for candidate in candidates:
-                pose = candidate.ransac.iterate(_ITERATIONS_PER_TURN)
+                pose = candidate.ransac.iterate(self._limits.iterations)
                 if pose is not None:
                     n_inliers = self._verify(frame, candidate, pose)
                     if n_inliers >= self._limits.enough:
@@ -102,22 +83,22 @@ class Relocalizer:
         return 0
 
     def _candidates(self, frame: core.TrackedFrame) -> list[_Candidate]:
-        found = core.find_relocalization_candidates(self._index, self._map, frame.frame)
+        found = core.find_relocalization_candidates(self._keyframe_index, self._map, frame.features)
         candidates = []
         for place in found:
-            matches = core.TrackedFrame(frame.frame)
+            matches = core.TrackedFrame(frame.features)
             n_matches = core.match_keyframe_by_words(
                 self._map, place.keyframe, matches, self._limits.ratio
             )
             if n_matches >= self._limits.matches:
-                seed = hash((self._seed, frame.id, place.keyframe)) & 0x7FFFFFFF
+                seed = core.seed_of(self._seed, frame.id, place.keyframe)
                 candidates.append(_Candidate(place.keyframe, matches, seed))
         return candidates
 
     def _verify(self, frame: core.TrackedFrame, candidate: _Candidate, pose: core.PnpPose) -> int:
         """Optimise the pose, add matches by projection; the number of inliers."""
         limits = self._limits
-        keep = np.zeros(len(frame.frame), bool)
+        keep = np.zeros(len(frame.features), bool)
         keep[candidate.indices[pose.inliers != 0]] = True
         frame.copy_associations(candidate.matches, keep)
         frame.T_cw = pose.T_cw
@@ -125,9 +106,13 @@ class Relocalizer:
         if n_inliers < limits.inliers or n_inliers >= limits.enough:
             return n_inliers
 
-        n_inliers = self._widen(frame, candidate, n_inliers, radius=10.0, max_distance=100)
+        n_inliers = self._widen(
+            frame, candidate, n_inliers, limits.wide_window, limits.wide_distance
+        )
         if limits.narrow < n_inliers < limits.enough:
-            n_inliers = self._widen(frame, candidate, n_inliers, radius=3.0, max_distance=64)
+            n_inliers = self._widen(
+                frame, candidate, n_inliers, limits.narrow_window, limits.narrow_distance
+            )
         return n_inliers
 
     def _widen(
@@ -135,14 +120,13 @@ class Relocalizer:
         frame: core.TrackedFrame,
         candidate: _Candidate,
         n_inliers: int,
-        *,
-        radius: float,
+        window: float,
         max_distance: int,
     ) -> int:
         ids = frame.map_points
         found = np.unique(ids[ids >= 0])
         added = core.match_keyframe_by_projection(
-            self._map, candidate.keyframe, frame, found, radius, max_distance
+            self._map, candidate.keyframe, frame, found, window, max_distance
         )
         if n_inliers + added < self._limits.enough:
             return n_inliers

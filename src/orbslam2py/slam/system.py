@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The system: images in, poses and a map out."""
+"""The system as a user sees it: images in, poses and a map out."""
 
 from __future__ import annotations
 
+import contextlib
 import logging
-import math
 import threading
 import weakref
-from collections.abc import Callable
+from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 
@@ -15,46 +15,24 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
-from orbslam2py.errors import ImageError, StateError, WorkerError
-from orbslam2py.maps.snapshot import (
-    frame_features,
-    frame_trajectory,
-)
-from orbslam2py.settings.builtin import resolve_settings
+from orbslam2py.errors import StateError, WorkerError
+from orbslam2py.maps.snapshot import MapSnapshot, keyframe_trajectory, take_snapshot
 from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import Settings
+from orbslam2py.settings.settings import Settings, resolve_settings
 from orbslam2py.slam.back_end import BackEnd
-from orbslam2py.slam.events import (
-    Callbacks,
-    Relocalized,
-    TrackingLost,
-)
-from orbslam2py.slam.front_end import FrontEnd, Mask, PairMask
-from orbslam2py.slam.full_bundle_adjustment import (
-    FullAdjustmentOptions,
-    FullAdjustmentRecord,
-    check_time_limit,
-)
-from orbslam2py.slam.initialization import DepthInitializer
-from orbslam2py.slam.localization_mode import LocalizationSwitch
-from orbslam2py.slam.monocular_initialization import MonocularInitializer
+from orbslam2py.slam.events import Callbacks, LoopClosed
+from orbslam2py.slam.front_end import Mask, PairMask
+from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
+from orbslam2py.slam.options import SystemOptions
+from orbslam2py.slam.pipeline import RESET_PATIENCE, BuildFrame, Pipeline
 from orbslam2py.slam.records import TrackingRecord, TrackingState
-from orbslam2py.slam.relocalization import Relocalizer
-from orbslam2py.slam.system_results import SystemResults
-from orbslam2py.slam.timing import StageStatistics, StageTimer
-from orbslam2py.slam.tracking import Tracking
-from orbslam2py.slam.tracking_types import TrackingOutcome
-from orbslam2py.slam.worker import CallGuard
 from orbslam2py.trajectory.trajectory import Trajectory
 from orbslam2py.vocabulary.vocabulary import load_vocabulary
 
 _log = logging.getLogger(__name__)
 
-#: Seconds that a reset or a shutdown waits for a worker before it says who is late.
-_PATIENCE = 60.0
 
-
-class System(SystemResults):
+class System:
     """Visual SLAM for one camera, a stereo pair or an RGB-D camera.
 
     Parameters
@@ -85,6 +63,14 @@ class System(SystemResults):
     seed : int
         Seed of all random draws.
 
+    Attributes
+    ----------
+    settings, sensor, vocabulary, options
+        What the system was made with.
+    pipeline : Pipeline
+        The parts that do the work, for those who study or extend the method. They may change from
+        version to version.
+
     Raises
     ------
     SettingsError, VocabularyError
@@ -111,56 +97,26 @@ class System(SystemResults):
         callbacks: Callbacks | None = None,
         seed: int = 0,
     ) -> None:
-        check_time_limit(full_adjustment_time_limit, deterministic=deterministic)
+        self.options = SystemOptions(
+            deterministic=deterministic,
+            wait_for_mapping=wait_for_mapping,
+            loop_closing=loop_closing,
+            full_adjustment=full_adjustment,
+            full_adjustment_time_limit=full_adjustment_time_limit,
+            seed=seed,
+        )
         self.sensor = Sensor(sensor)
-        self.settings = settings = resolve_settings(settings, self.sensor)
+        self.settings = resolve_settings(settings, self.sensor)
         if not isinstance(vocabulary, core.Vocabulary):
             vocabulary = load_vocabulary(vocabulary)
         self.vocabulary = vocabulary
-        self.deterministic = deterministic
-        self.seed = seed
-        self._wait_for_mapping = wait_for_mapping and not deterministic
-
-        self._front_end = FrontEnd(settings, self.sensor)
-        self._back_end = back_end = BackEnd(
-            self.sensor,
-            loop_closing=loop_closing,
-            adjustment=FullAdjustmentOptions(
-                enabled=full_adjustment, time_limit=full_adjustment_time_limit
-            ),
-            callbacks=callbacks or Callbacks(),
-            seed=seed,
-            threaded=not deterministic,
+        self.pipeline = Pipeline(
+            self.settings, self.sensor, vocabulary, self.options, callbacks or Callbacks()
         )
-        self._map, self._mapping = back_end.map, back_end.mapping
-        self._tracking = Tracking(
-            self._map,
-            vocabulary,
-            self._mapping,
-            self.sensor,
-            settings.max_frames,
-            initializer=self._initializer(),
-            relocalizer=Relocalizer(self._map, back_end.index, seed),
-        )
-        self._localization = LocalizationSwitch(
-            self._map, 1 if self.sensor.has_depth else 2, self._tracking, back_end.map_workers
-        )
-        self._recorder = core.TrajectoryRecorder()
-        # Trajectories may be asked for in any thread, also while a frame is recorded.
-        self._trajectory_lock = threading.Lock()
-        self._finished_trajectories: list[Trajectory] = []
-        self._statistics = StageStatistics()
         self._guard = CallGuard("tracking")
-        self._reset_requested = threading.Event()
-        self._next_frame_id = 0
-        self._last_timestamp = -math.inf
         self._shut_down = False
-        self.n_resets = 0
-
-        # Everything refers to everything it needs before the first thread runs.
-        for worker in back_end.workers:
-            worker.start()
-        self._finalizer = weakref.finalize(self, _abandon, back_end)
+        self.pipeline.start()
+        self._finalizer = weakref.finalize(self, _abandon, self.pipeline.back_end)
 
     # ---- tracking --------------------------------------------------------------------------------
     def track_stereo(
@@ -203,7 +159,7 @@ class System(SystemResults):
         return self._track(
             timestamp,
             details,
-            lambda i, timer: self._front_end.stereo(left, right, i, timestamp, timer, mask),
+            lambda i, timer: self.pipeline.front_end.stereo(left, right, i, timestamp, timer, mask),
         )
 
     def track_rgbd(
@@ -244,7 +200,7 @@ class System(SystemResults):
         return self._track(
             timestamp,
             details,
-            lambda i, timer: self._front_end.rgbd(image, depth, i, timestamp, timer, mask),
+            lambda i, timer: self.pipeline.front_end.rgbd(image, depth, i, timestamp, timer, mask),
         )
 
     def track_monocular(
@@ -284,15 +240,10 @@ class System(SystemResults):
         return self._track(
             timestamp,
             details,
-            lambda i, timer: self._front_end.monocular(
-                image, i, timestamp, timer, mask, initializing=self._tracking.initializing
+            lambda i, timer: self.pipeline.front_end.monocular(
+                image, i, timestamp, timer, mask, initializing=self.pipeline.tracking.initializing
             ),
         )
-
-    def _initializer(self) -> DepthInitializer | MonocularInitializer:
-        if self.sensor is Sensor.MONOCULAR:
-            return MonocularInitializer(self._map, self.vocabulary, self._mapping, self.seed)
-        return DepthInitializer(self._map, self.vocabulary, self._mapping)
 
     def _require(self, sensor: Sensor, call: str) -> None:
         if self.sensor is not sensor:
@@ -301,95 +252,11 @@ class System(SystemResults):
                 f"this one is for '{self.sensor.value}'"
             )
 
-    def _track(
-        self,
-        timestamp: float,
-        details: bool,
-        build: Callable[[int, StageTimer], core.Frame],
-    ) -> TrackingRecord:
+    def _track(self, timestamp: float, details: bool, build: BuildFrame) -> TrackingRecord:
         with self._guard():
             if self._shut_down:
                 raise StateError("the system has been shut down; make a new one")
-            for worker in self._back_end.workers:
-                worker.raise_if_failed()
-            if self._reset_requested.is_set():
-                self._reset_now()
-            self._check_timestamp(timestamp)
-            self._localization.apply()
-            timer = StageTimer()
-            if self._wait_for_mapping:
-                with timer("wait"):
-                    self._wait_for_mapper()
-            before = self._tracking.state
-            with timer("track"):
-                frame = core.TrackedFrame(build(self._next_frame_id, timer))
-                # From here on the image counts: every id is one image.
-                self._next_frame_id += 1
-                self._last_timestamp = timestamp
-                outcome = self._tracking.track(frame, timer)
-            self._statistics.add(timer.milliseconds)
-            record = self._record(frame, outcome, timer, details)
-            self._announce(before, record)
-            self._mapping.start()
-            return record
-
-    def _announce(self, before: TrackingState, record: TrackingRecord) -> None:
-        events = self._back_end.events
-        where = record.map_index, record.frame_id, record.timestamp
-        if before is TrackingState.OK and record.state is TrackingState.LOST:
-            events.post(events.callbacks.on_lost, TrackingLost(*where, str(record.reason)))
-        elif before is TrackingState.LOST and record.T_wc is not None:
-            events.post(events.callbacks.on_relocalized, Relocalized(*where, record.T_wc))
-
-    def _wait_for_mapper(self) -> None:
-        if self.sensor.has_depth:
-            self._mapping.worker.wait_until_waiting(at_most=1)
-        elif not self._mapping.worker.held:
-            self._mapping.worker.wait_until_waiting(at_most=0)
-            # New points of a single camera come from mapping alone, and a busy mapper takes no
-            # keyframes: on fast motion the map would end before the mapper is done.
-            self._mapping.worker.wait_until_idle()
-
-    def _check_timestamp(self, timestamp: float) -> None:
-        if not math.isfinite(timestamp):
-            raise ImageError(f"the time stamp must be a finite number of seconds, got {timestamp}")
-        if timestamp <= self._last_timestamp:
-            raise ImageError(
-                f"time stamps must grow: {timestamp!r} came after {self._last_timestamp!r}"
-            )
-
-    def _record(
-        self,
-        frame: core.TrackedFrame,
-        outcome: TrackingOutcome,
-        timer: StageTimer,
-        details: bool,
-    ) -> TrackingRecord:
-        ok = outcome.state is TrackingState.OK
-        initialized = outcome.state in (TrackingState.OK, TrackingState.LOST)
-        if outcome.reset_needed:
-            _log.info("lost soon after initialization; starting a new map")
-            self._reset_requested.set()
-        elif initialized:
-            with self._trajectory_lock:
-                self._recorder.record(self._map, frame, lost=not ok)
-        map_index = len(self._finished_trajectories)
-        return TrackingRecord(
-            frame_id=frame.id,
-            timestamp=frame.timestamp,
-            map_index=map_index,
-            state=outcome.state,
-            reason=outcome.reason,
-            T_cw=frame.T_cw.matrix if ok and frame.T_cw is not None else None,
-            covariance=outcome.covariance if ok else None,
-            n_matches=outcome.n_matches,
-            n_inliers=outcome.n_inliers if ok else 0,
-            is_keyframe=outcome.is_keyframe,
-            reference_keyframe=self._tracking.reference_keyframe,
-            visual_odometry=outcome.visual_odometry,
-            milliseconds=timer.milliseconds,
-            features=frame_features(frame) if details else None,
-        )
+            return self.pipeline.process(timestamp, build, details=details)
 
     # ---- control ---------------------------------------------------------------------------------
     @property
@@ -402,11 +269,11 @@ class System(SystemResults):
         for mapping are processed when it goes on. Without a map, also after a reset, the mode comes
         into force when one has begun.
         """
-        return self._localization.wanted
+        return self.pipeline.localization.wanted
 
     @localization_mode.setter
     def localization_mode(self, wanted: bool) -> None:
-        self._localization.wanted = bool(wanted)
+        self.pipeline.localization.wanted = bool(wanted)
 
     def reset(self) -> None:
         """Ask for a new map; carried out at the beginning of the next track call.
@@ -414,21 +281,7 @@ class System(SystemResults):
         Settings, vocabulary and mode stay. The trajectory of the present map is kept, see
         `trajectories`.
         """
-        self._reset_requested.set()
-
-    def _reset_now(self) -> None:
-        _log.info("resetting: map %d ends", len(self._finished_trajectories))
-        self._back_end.reset(_PATIENCE, keep=self._keep_trajectory)
-        self._tracking.reset()
-        self._next_frame_id = 0
-        self._last_timestamp = -math.inf
-        self._reset_requested.clear()
-        self.n_resets += 1
-
-    def _keep_trajectory(self) -> None:
-        with self._trajectory_lock:
-            self._finished_trajectories.append(frame_trajectory(self._recorder, self._map))
-            self._recorder.clear()
+        self.pipeline.reset_requested.set()
 
     def optimize(self) -> FullAdjustmentRecord:
         """Refine all keyframes and points together, now (full bundle adjustment).
@@ -449,9 +302,10 @@ class System(SystemResults):
         WorkerError
             If a worker has failed.
         """
-        if self._localization.wanted or self._tracking.localization_only:
+        localization = self.pipeline.localization
+        if localization.wanted or localization.on:
             raise StateError("optimize changes the map; switch localization mode off first")
-        adjustment = self._back_end.adjustment
+        adjustment = self.pipeline.back_end.adjustment
         if adjustment.worker.ended:
             return adjustment.run()
         return adjustment.start_and_wait()
@@ -465,7 +319,7 @@ class System(SystemResults):
             False when `timeout` seconds passed first, or keyframes wait for the end of localization
             mode.
         """
-        return self._back_end.wait_until_idle(timeout)
+        return self.pipeline.back_end.wait_until_idle(timeout)
 
     def shutdown(
         self,
@@ -497,16 +351,93 @@ class System(SystemResults):
         if not self._finalizer.alive:
             return
         if drain:
-            self._localization.release()
-        errors = self._back_end.finish(
+            self.pipeline.localization.release()
+        back_end = self.pipeline.back_end
+        errors = back_end.finish(
             drain=drain, wait_for_adjustment=wait_for_adjustment, timeout=timeout
         )
         # Only now: should a Ctrl-C come before, the threads are still ended with the interpreter.
-        if all(worker.ended for worker in self._back_end.workers):
+        if all(worker.ended for worker in back_end.workers):
             self._finalizer.detach()
         if errors:
             raise errors[0]
 
+    # ---- results ---------------------------------------------------------------------------------
+    @property
+    def state(self) -> TrackingState:
+        """State after the last track call."""
+        return self.pipeline.tracking.state
+
+    @property
+    def n_keyframes(self) -> int:
+        """Keyframes in the map."""
+        return int(self.pipeline.back_end.map.n_keyframes)
+
+    @property
+    def n_map_points(self) -> int:
+        """Points in the map."""
+        return int(self.pipeline.back_end.map.n_points)
+
+    @property
+    def n_loops_closed(self) -> int:
+        """Loops closed so far, over all maps."""
+        return len(self.pipeline.back_end.loop_closing.loops)
+
+    @property
+    def loops(self) -> list[LoopClosed]:
+        """The loops closed so far, over all maps."""
+        return list(self.pipeline.back_end.loop_closing.loops)
+
+    @property
+    def full_adjustments(self) -> list[FullAdjustmentRecord]:
+        """The full bundle adjustments so far, also those that were given up."""
+        return list(self.pipeline.back_end.adjustment.records)
+
+    @property
+    def n_resets(self) -> int:
+        """How often a new map was begun after the first."""
+        return self.pipeline.n_resets
+
+    @property
+    def n_relocalizations(self) -> int:
+        """How often tracking was found again after a loss."""
+        return self.pipeline.tracking.n_relocalizations
+
+    def trajectory(self) -> Trajectory:
+        """Poses of all images of the present map, after the latest optimisation.
+
+        Returns
+        -------
+        Trajectory
+            Time stamps, ``T_wc`` (n, 4, 4) relative to keyframe 0, and which frames were lost.
+        """
+        return self.trajectories()[-1]
+
+    def trajectories(self) -> list[Trajectory]:
+        """One trajectory per map: those ended by resets, then the present one."""
+        return self.pipeline.recorder.trajectories()
+
+    def keyframe_trajectory(self) -> Trajectory:
+        """Poses of the keyframes, relative to keyframe 0."""
+        return keyframe_trajectory(self.pipeline.back_end.map)
+
+    def map_snapshot(self) -> MapSnapshot:
+        """A copy of keyframe poses and points; may be called while the system runs."""
+        return take_snapshot(self.pipeline.back_end.map)
+
+    def map_hash(self) -> int:
+        """Hash over poses, points and observations: equal for equal maps."""
+        return int(self.pipeline.back_end.map.content_hash())
+
+    def check_map(self) -> list[str]:
+        """Violated invariants of the map, one sentence each; empty if it is consistent."""
+        return list(core.check_invariants(self.pipeline.back_end.map, require_words=True))
+
+    def stage_statistics(self) -> dict[str, dict[str, float]]:
+        """Median, mean and p99 milliseconds per stage of tracking, mapping and loop closing."""
+        return {**self.pipeline.statistics.summary(), **self.pipeline.back_end.statistics()}
+
+    # ---- a block that shuts down at its end --------------------------------------------------
     def __enter__(self) -> System:
         return self
 
@@ -525,7 +456,25 @@ class System(SystemResults):
                 _log.exception("shutdown after an error failed as well")
 
 
+class CallGuard:
+    """Allows one call at a time; a second one raises instead of waiting."""
+
+    def __init__(self, what: str) -> None:
+        self._what = what
+        self._lock = threading.Lock()
+
+    @contextlib.contextmanager
+    def __call__(self) -> Iterator[None]:
+        """Enter the guarded call."""
+        if not self._lock.acquire(blocking=False):
+            raise StateError(f"{self._what} is already running in another thread")
+        try:
+            yield
+        finally:
+            self._lock.release()
+
+
 def _abandon(back_end: BackEnd) -> None:
     """End the threads of a system that was dropped without shutdown."""
-    for error in back_end.finish(drain=False, wait_for_adjustment=False, timeout=_PATIENCE):
+    for error in back_end.finish(drain=False, wait_for_adjustment=False, timeout=RESET_PATIENCE):
         _log.error("while a system was dropped", exc_info=error)

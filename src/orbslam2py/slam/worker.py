@@ -4,10 +4,10 @@
 With counted pauses, a reset that is served in every state, bounded waits, and errors that reach
 the caller.
 
-The protocol follows section 6 of the thread specification: nobody waits for somebody who waits
-for him, because pauses are counted tickets, a reset is acknowledged while paused as well, and no
-lock of the map is held while waiting. A worker can also run inline (``threaded=False``): the same
-steps in the caller's thread, which makes two runs equal.
+Nobody waits for somebody who waits for him, because pauses are counted tickets, a reset is
+acknowledged while paused as well, and no lock of the map is held while waiting. A worker can also
+run inline (``threaded=False``): the same steps in the caller's thread, which makes two runs equal.
+The whole protocol: ``docs/method/threads.md#workers``.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from types import TracebackType
 from typing import Generic, TypeVar
 
 from orbslam2py._core import StopFlag
@@ -67,12 +66,7 @@ class PauseTicket:
     def __enter__(self) -> PauseTicket:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.release()
 
 
@@ -177,19 +171,32 @@ class Worker(Generic[Job]):
         """Append jobs, and ask a running step to end early; none begins before all are queued.
 
         Inline, all of them are done on return.
+
+        Raises
+        ------
+        StateError
+            After `finish`.
+        WorkerError
+            If a step has failed.
         """
-        self.raise_if_failed()
-        if self._finish_requested:
+        if not self.offer(*jobs):
             raise StateError(f"{self.name} has been shut down")
-        if not jobs:
-            return
+
+    def offer(self, *jobs: Job) -> bool:
+        """As `submit`, for work that nobody misses after the end: False, and nothing is queued."""
+        self.raise_if_failed()
         with self._condition:
+            if self._finish_requested:
+                return False
+            if not jobs:
+                return True
             self._queue.extend(jobs)
             self.waiting_flag.set()
             self.interrupt_flag.set()
             self._condition.notify_all()
         if not self._threaded:
             self._run_inline()
+        return True
 
     def _run_inline(self) -> None:
         try:
@@ -395,21 +402,3 @@ class Worker(Generic[Job]):
             with self._condition:
                 self._busy = False
                 self._condition.notify_all()
-
-
-class CallGuard:
-    """Allows one call at a time; a second one raises instead of waiting."""
-
-    def __init__(self, what: str) -> None:
-        self._what = what
-        self._lock = threading.Lock()
-
-    @contextlib.contextmanager
-    def __call__(self) -> Iterator[None]:
-        """Enter the guarded call."""
-        if not self._lock.acquire(blocking=False):
-            raise StateError(f"{self._what} is already running in another thread")
-        try:
-            yield
-        finally:
-            self._lock.release()

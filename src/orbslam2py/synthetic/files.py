@@ -3,33 +3,29 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import json
-import os
-import secrets
-import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from orbslam2py.datasets.base import Layout
+from orbslam2py._arrays import IntArray
+from orbslam2py._files import atomic_folder
+from orbslam2py.datasets import Layout, Sequence
 from orbslam2py.errors import DatasetError, SettingsError
-from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings import CameraSettings, Sensor
+from orbslam2py.synthetic.options import SyntheticOptions
+from orbslam2py.trajectory import Trajectory
 from orbslam2py.trajectory.rotations import quaternions_from_rotations
-
-if TYPE_CHECKING:
-    from orbslam2py.synthetic.sequence import SyntheticSequence
 
 Progress = Callable[[int, int], None]
 
 #: Holds the options; marks folders that may be replaced.
 MARKER = "synthetic.json"
-
 
 _SENSORS = {
     Layout.TUM: (Sensor.MONOCULAR, Sensor.RGBD),
@@ -38,8 +34,37 @@ _SENSORS = {
 }
 
 
+class WritableSequence(Sequence, Protocol):
+    """What a sequence must tell besides its images to be written as a data set.
+
+    Attributes
+    ----------
+    options
+        What was asked for.
+    camera
+        The camera; both cameras of a pair are alike.
+    baseline
+        Distance of the cameras of a pair [m].
+    nanoseconds
+        Time stamps, int64 (n,).
+    """
+
+    @property
+    def options(self) -> SyntheticOptions: ...  # noqa: D102
+    @property
+    def camera(self) -> CameraSettings: ...  # noqa: D102
+    @property
+    def baseline(self) -> float: ...  # noqa: D102
+    @property
+    def nanoseconds(self) -> IntArray: ...  # noqa: D102
+
+    def ground_truth(self) -> Trajectory:
+        """Return the true pose of every frame: there is one for all."""
+        ...
+
+
 def choose_layout(layout: Layout | str | None, sensor: Sensor) -> Layout:
-    """Return the layout, or the usual one of the sensor.
+    """Return the layout, or the usual one of the sensor if it is None.
 
     Raises
     ------
@@ -60,7 +85,7 @@ def choose_layout(layout: Layout | str | None, sensor: Sensor) -> Layout:
 
 
 def write_sequence(
-    sequence: SyntheticSequence,
+    sequence: WritableSequence,
     folder: Path,
     layout: Layout | str | None = None,
     *,
@@ -74,17 +99,19 @@ def write_sequence(
         Layout.KITTI: _write_kitti,
         Layout.EUROC: _write_euroc,
     }
-    with _replaced_at_the_end(folder, force=force) as temporary:
+    _check_replaceable(folder, force=force)
+    with atomic_folder(folder) as temporary:
         writers[chosen](sequence, temporary, progress or (lambda done, total: None))
         about: dict[str, Any] = dataclasses.asdict(sequence.options) | {"layout": str(chosen)}
         _write_text(temporary / MARKER, [json.dumps(about, indent=2, default=str)])
+        _check_replaceable(folder, force=force)  # writing takes long: it may have been filled
     return folder
 
 
 # ---- layouts -------------------------------------------------------------------------------------
 
 
-def _write_tum(sequence: SyntheticSequence, folder: Path, progress: Progress) -> None:
+def _write_tum(sequence: WritableSequence, folder: Path, progress: Progress) -> None:
     rgb, depth, pairs = ["# timestamp filename"], ["# timestamp filename"], []
     (folder / "rgb").mkdir()
     if sequence.sensor is Sensor.RGBD:
@@ -113,7 +140,7 @@ def _write_tum(sequence: SyntheticSequence, folder: Path, progress: Progress) ->
     sequence.default_settings().save(folder / "settings.yaml")
 
 
-def _write_kitti(sequence: SyntheticSequence, folder: Path, progress: Progress) -> None:
+def _write_kitti(sequence: WritableSequence, folder: Path, progress: Progress) -> None:
     stereo = sequence.sensor is Sensor.STEREO
     for name in ("image_0", "image_1")[: 1 + stereo]:
         (folder / name).mkdir()
@@ -134,7 +161,7 @@ def _write_kitti(sequence: SyntheticSequence, folder: Path, progress: Progress) 
     _write_text(folder / "poses.txt", poses)
 
 
-def _write_euroc(sequence: SyntheticSequence, folder: Path, progress: Progress) -> None:
+def _write_euroc(sequence: WritableSequence, folder: Path, progress: Progress) -> None:
     top = folder / "mav0"
     cameras = [top / "cam0", top / "cam1"][: 1 + (sequence.sensor is Sensor.STEREO)]
     for number, camera in enumerate(cameras):
@@ -163,7 +190,7 @@ def _write_euroc(sequence: SyntheticSequence, folder: Path, progress: Progress) 
     _write_text(truth / "data.csv", lines)
 
 
-def _sensor_yaml(sequence: SyntheticSequence, number: int) -> list[str]:
+def _sensor_yaml(sequence: WritableSequence, number: int) -> list[str]:
     """Describe a camera; the body frame of the rig is that of its left camera."""
     camera = sequence.camera
     T_BS = np.eye(4)
@@ -186,29 +213,6 @@ def _sensor_yaml(sequence: SyntheticSequence, number: int) -> list[str]:
 
 
 # ---- files ---------------------------------------------------------------------------------------
-
-
-@contextlib.contextmanager
-def _replaced_at_the_end(folder: Path, *, force: bool) -> Iterator[Path]:
-    """Yield a temporary folder that takes the place of `folder` if the block ends well."""
-    _check_replaceable(folder, force=force)
-    target = Path(os.path.realpath(folder))
-    token = secrets.token_hex(4)
-    temporary = target.with_name(f".{target.name}.{token}.tmp")
-    temporary.mkdir(parents=True)
-    try:
-        yield temporary
-        _check_replaceable(folder, force=force)
-        if target.exists() and any(target.iterdir()):
-            old = target.with_name(f".{target.name}.{token}.old")
-            target.replace(old)
-            temporary.replace(target)
-            shutil.rmtree(old)
-        else:
-            temporary.replace(target)
-    except BaseException:
-        shutil.rmtree(temporary, ignore_errors=True)
-        raise
 
 
 def _check_replaceable(folder: Path, *, force: bool) -> None:

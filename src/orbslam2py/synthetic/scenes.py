@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orbslam2py import _core as core
+from orbslam2py._arrays import FloatArray
 
 
 class SyntheticWorld(str, Enum):
@@ -58,10 +58,13 @@ class Scene:
     outdoors: bool = False
 
     def seconds(self, speed: float, laps: float) -> float:
-        """Time that going the whole way so often takes."""
+        """Return the time [s] that `laps` times the way take at a speed [m/s].
+
+        Looking around in the room takes its own time, whatever is asked for.
+        """
         return _LOOKING_AROUND if self.way is None else laps * self.way.length() / speed
 
-    def T_wc(self, seconds: float, speed: float, lateral: float, yaw: float) -> NDArray[np.float64]:
+    def T_wc(self, seconds: float, speed: float, lateral: float, yaw: float) -> FloatArray:
         """Camera to world (4, 4) at a time.
 
         Parameters
@@ -87,15 +90,16 @@ class Scene:
         return np.asarray(T_wc @ aside)
 
 
-_ROOM = (6.0, 3.0, 6.0)
+# Sizes in metres; length goes along z (forward), breadth along x (right).
+_ROOM = (6.0, 3.0, 6.0)  # along x (right), y (down), z (forward)
 _LOOKING_AROUND = 15.0  # seconds, for half a turn
-_CORRIDOR = (10.0, 8.0, 2.0)  # length, breadth, width
-_EIGHT = (10.0, 12.0, 2.0)
-_HEIGHT = 2.6
-_REPEAT = 4.0
-_STREET = (600.0, 12.0)  # length, width
-_STREETS = (208.0, 104.0, 14.0)  # length, breadth, width
-_PASSAGE = 3.0
+_CORRIDOR = {"length": 10.0, "breadth": 8.0, "width": 2.0}  # from outer wall to outer wall
+_EIGHT = {"length": 10.0, "breadth": 12.0, "width": 2.0}
+_HEIGHT = 2.6  # of corridors
+_REPEAT = 4.0  # after which the pictures of the repeating corridor come again
+_STREET_LENGTH, _STREET_WIDTH = 600.0, 12.0
+_BLOCK = {"length": 208.0, "breadth": 104.0, "width": 14.0}  # between middles of its streets
+_PASSAGE = 3.0  # between the two rooms
 
 
 #: Metres a camera can be moved to either side of the way without leaving the world.
@@ -119,36 +123,36 @@ LAPS = {
 
 
 def make_scene(world: SyntheticWorld) -> Scene:
-    """Choose world and way; the world itself is made later, from the seed."""
+    """Choose the world and the way; the world itself is made later, when the seed is known."""
     if world is SyntheticWorld.ROOM:
-        return Scene(lambda seed: core.make_room(_ROOM, seed, 10), None)
+        return Scene(lambda seed: core.make_room(_ROOM, seed, n_boxes=10), None)
     if world in (SyntheticWorld.CORRIDOR, SyntheticWorld.REPEATING_CORRIDOR):
         repeat = _REPEAT if world is SyntheticWorld.REPEATING_CORRIDOR else 0.0
         return Scene(
-            lambda seed: core.make_corridor(*_CORRIDOR, _HEIGHT, seed, repeat),
-            core.corridor_way(*_CORRIDOR),
+            lambda seed: core.make_corridor(**_CORRIDOR, height=_HEIGHT, seed=seed, repeat=repeat),
+            core.corridor_way(**_CORRIDOR),
         )
     if world is SyntheticWorld.FIGURE_EIGHT:
         return Scene(
-            lambda seed: core.make_figure_eight(*_EIGHT, _HEIGHT, seed),
-            core.figure_eight_way(*_EIGHT),
+            lambda seed: core.make_figure_eight(**_EIGHT, height=_HEIGHT, seed=seed),
+            core.figure_eight_way(**_EIGHT),
         )
     if world is SyntheticWorld.TWO_ROOMS:
         return Scene(
-            lambda seed: core.make_two_rooms(_ROOM, _PASSAGE, seed, 8),
+            lambda seed: core.make_two_rooms(_ROOM, _PASSAGE, seed, n_boxes=8),
             core.two_rooms_way(_ROOM, _PASSAGE),
             speed=0.4,
         )
     if world is SyntheticWorld.STREET_LAP:
         return Scene(
-            lambda seed: core.make_street_lap(*_STREETS, seed),
-            core.street_lap_way(*_STREETS),
+            lambda seed: core.make_street_lap(**_BLOCK, seed=seed),
+            core.street_lap_way(**_BLOCK),
             speed=10.0,
             outdoors=True,
         )
     return Scene(
-        lambda seed: core.make_street(*_STREET, seed),
-        core.street_way(_STREET[0]),
+        lambda seed: core.make_street(_STREET_LENGTH, _STREET_WIDTH, seed),
+        core.street_way(_STREET_LENGTH),
         speed=10.0,
         outdoors=True,
     )

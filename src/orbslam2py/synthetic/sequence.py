@@ -13,8 +13,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from enum import Enum
 from functools import cached_property
 from pathlib import Path
 
@@ -22,112 +20,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbslam2py import _core as core
-from orbslam2py.datasets.base import Images, Layout
-from orbslam2py.errors import SettingsError
-from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import CameraSettings, DepthSettings, OrbSettings, Settings
+from orbslam2py._arrays import ByteArray, FloatArray, IntArray
+from orbslam2py.datasets import Images, Layout
+from orbslam2py.settings import CameraSettings, DepthSettings, OrbSettings, Sensor, Settings
 from orbslam2py.synthetic.files import write_sequence
-from orbslam2py.synthetic.scenes import LAPS, ROOM_BESIDE, SyntheticWorld, make_scene
-from orbslam2py.trajectory.trajectory import Trajectory
-
-Array = NDArray[np.float64]
+from orbslam2py.synthetic.options import SyntheticOptions
+from orbslam2py.synthetic.scenes import LAPS, SyntheticWorld, make_scene
+from orbslam2py.trajectory import Trajectory
+from orbslam2py.trajectory.rotations import inverse_poses
 
 #: Units of the depth images per metre, as in the TUM RGB-D data sets.
 DEPTH_PER_METRE = 5000.0
-
-
-@dataclass(frozen=True)
-class SyntheticOptions:
-    """What to make. None stands for the world's own value.
-
-    Attributes
-    ----------
-    world
-        Where the camera moves.
-    sensor
-        What delivers the images.
-    frames
-        Number of images; by default the whole way.
-    laps
-        How often to go around, instead of `frames`; only where the way comes back to its start
-        (1.2 in corridors and around the block, 1.1 in the figure of eight).
-    fps
-        Frames per second (20 indoors, 10 in streets).
-    speed
-        Metres per second along the way (0.7 in corridors, 0.4 between the rooms, 10 in streets);
-        not for the room, where one turn takes 30 s.
-    size
-        Width and height in pixels (640 x 480, in streets 1241 x 376).
-    seed
-        Another seed, another wallpaper and furniture.
-    noise
-        Standard deviation of the grey values' noise, grey levels.
-    exposure
-        Factor on the grey values.
-    depth_noise
-        Standard deviation of the depth [m] at 1 m; it grows with the square of the depth (RGB-D).
-    lateral
-        Metres to the right of the way: the same places from other viewpoints. Limited by the
-        walls (0.6 m between the rooms, 3.5 m in the street, 3 m around the block).
-    yaw
-        Degrees to the right of the direction of travel.
-
-    Raises
-    ------
-    SettingsError
-        If a value is out of range.
-    """
-
-    world: SyntheticWorld | str = SyntheticWorld.ROOM
-    sensor: Sensor | str = Sensor.STEREO
-    frames: int | None = None
-    laps: float | None = None
-    fps: float | None = None
-    speed: float | None = None
-    size: tuple[int, int] | None = None
-    seed: int = 0
-    noise: float = 0.0
-    exposure: float = 1.0
-    depth_noise: float = 0.0
-    lateral: float = 0.0
-    yaw: float = 0.0
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "world", _member(SyntheticWorld, "world", self.world))
-        object.__setattr__(self, "sensor", _member(Sensor, "sensor", self.sensor))
-        _check_range("frames", self.frames, 1, 1_000_000)
-        _check_range("laps", self.laps, 0.01, 1000)
-        _check_range("fps", self.fps, 0.1, 1000)
-        _check_range("speed", self.speed, 0.001, 100)
-        for pixels in self.size or ():
-            _check_range("size", pixels, 64, 8192)
-        _check_range("seed", self.seed, 0, 2**31 - 1)
-        _check_range("noise", self.noise, 0, 100)
-        _check_range("exposure", self.exposure, 0.01, 100)
-        _check_range("depth_noise", self.depth_noise, 0, 1)
-        beside = ROOM_BESIDE[SyntheticWorld(self.world)]
-        _check_range("lateral", self.lateral, -beside, beside)
-        _check_range("yaw", self.yaw, -180, 180)
-        if self.speed is not None and self.world is SyntheticWorld.ROOM:
-            raise SettingsError("speed does not apply to the room: one turn takes 30 s")
-        if self.laps is not None and self.world not in LAPS:
-            names = ", ".join(map(str, LAPS))
-            raise SettingsError(f"laps apply to ways that come back to their start: {names}")
-        if self.laps is not None and self.frames is not None:
-            raise SettingsError("frames and laps exclude each other: both say how long the way is")
-
-
-def _member(kind: type[Enum], name: str, value: object) -> Enum:
-    try:
-        return kind(value)
-    except ValueError:
-        names = ", ".join(str(member) for member in kind)
-        raise SettingsError(f"{name} is '{value}'; there are {names}") from None
-
-
-def _check_range(name: str, value: float | None, low: float, high: float) -> None:
-    if value is not None and not (math.isfinite(value) and low <= value <= high):
-        raise SettingsError(f"{name} is {value}; allowed: {low:g} to {high:g}")
 
 
 class SyntheticSequence:
@@ -136,7 +39,7 @@ class SyntheticSequence:
     Parameters
     ----------
     options
-        What to make.
+        World, sensor, length and disturbances.
     threads
         Rendering threads; the images do not depend on it.
     """
@@ -151,7 +54,7 @@ class SyntheticSequence:
         self._n_frames = options.frames or self._frames_of_whole_way()
         nanoseconds = np.arange(self._n_frames, dtype=np.float64) * (1e9 / self._fps)
         #: Time stamps, int64 (n,), nanoseconds from the start.
-        self.nanoseconds: NDArray[np.int64] = np.rint(nanoseconds).astype(np.int64)
+        self.nanoseconds: IntArray = np.rint(nanoseconds).astype(np.int64)
 
     @property
     def _size(self) -> tuple[int, int]:
@@ -172,21 +75,21 @@ class SyntheticSequence:
 
     @property
     def layout(self) -> str:
-        """There are no files."""
+        """Always ``synthetic``: there are no files."""
         return "synthetic"
 
     @property
     def sensor(self) -> Sensor:
-        """What the images come from."""
+        """The kind of camera that delivers the images."""
         return Sensor(self.options.sensor)
 
     @cached_property
-    def timestamps(self) -> Array:
-        """Seconds from the start, (n,)."""
+    def timestamps(self) -> FloatArray:
+        """Time of every frame in seconds from the start, float64 (n,)."""
         return np.asarray(self.nanoseconds / 1e9)
 
     def timestamp_text(self, index: int, /) -> str:
-        """Seconds with nine decimals."""
+        """Return the time of a frame in seconds, with nine decimals."""
         nanoseconds = int(self.nanoseconds[index])
         return f"{nanoseconds // 10**9}.{nanoseconds % 10**9:09d}"
 
@@ -197,7 +100,10 @@ class SyntheticSequence:
         f = (0.58 if self._scene.outdoors else 0.625) * width
         baseline = 0.54 if self._scene.outdoors else 0.1
         return CameraSettings(
-            *(f, f, (width - 1) / 2, (height - 1) / 2),
+            fx=f,
+            fy=f,
+            cx=(width - 1) / 2,
+            cy=(height - 1) / 2,
             width=width,
             height=height,
             fps=self._fps,
@@ -214,13 +120,18 @@ class SyntheticSequence:
         depth = None
         if self.sensor.has_depth:
             raw_per_metre = DEPTH_PER_METRE if self.sensor is Sensor.RGBD else 1.0
-            depth = DepthSettings(40.0, raw_per_metre)
-        features = 2000 if self._scene.outdoors else 1000
-        return Settings(self.sensor, self.camera, OrbSettings(features), depth)
+            depth = DepthSettings(close_factor=40.0, raw_per_metre=raw_per_metre)
+        n_features = 2000 if self._scene.outdoors else 1000
+        return Settings(
+            sensor=self.sensor,
+            camera=self.camera,
+            orb=OrbSettings(n_features=n_features),
+            depth=depth,
+        )
 
     @cached_property
     def settings(self) -> Settings:
-        """The default settings."""
+        """The same as `default_settings`."""
         return self.default_settings()
 
     def ground_truth(self) -> Trajectory:
@@ -251,15 +162,21 @@ class SyntheticSequence:
         way = self._scene.way
         return way.length() if way is not None and self._world in LAPS else None
 
-    def T_wc(self, index: int) -> Array:
-        """Exact pose of the (left) camera, camera to world, (4, 4)."""
+    def T_wc(self, index: int) -> FloatArray:
+        """Return the exact pose of the (left) camera, camera to world, float64 (4, 4) [m].
+
+        Raises
+        ------
+        IndexError
+            If there is no such frame.
+        """
         if not 0 <= index < len(self):
             raise IndexError(f"frame {index} of {len(self)}")
         seconds = float(self.timestamps[index])
         yaw = math.radians(self.options.yaw)
         return self._scene.T_wc(seconds, self._speed, self.options.lateral, yaw)
 
-    def view(self, T_wc: Array, number: int = 0, *, exposure: float | None = None) -> Images:
+    def view(self, T_wc: FloatArray, number: int = 0, *, exposure: float | None = None) -> Images:
         """Render the images seen from anywhere.
 
         Parameters
@@ -327,17 +244,19 @@ class SyntheticSequence:
         return self._scene.make_world(self.options.seed)
 
     def _render(
-        self, T_wc: Array, number: int, exposure: float | None
-    ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        T_cw = np.eye(4)
-        T_cw[:3, :3] = T_wc[:3, :3].T
-        T_cw[:3, 3] = -T_wc[:3, :3].T @ T_wc[:3, 3]
+        self, T_wc: FloatArray, number: int, exposure: float | None
+    ) -> tuple[ByteArray, NDArray[np.float32]]:
         camera = self.camera
+        width, height = self._size
         grey, depth = core.render(
             self._built,
-            T_cw,
-            *(camera.fx, camera.fy, camera.cx, camera.cy),
-            *self._size,
+            inverse_poses(T_wc),
+            fx=camera.fx,
+            fy=camera.fy,
+            cx=camera.cx,
+            cy=camera.cy,
+            width=width,
+            height=height,
             noise=self.options.noise,
             exposure=self.options.exposure if exposure is None else exposure,
             noise_seed=(self.options.seed << 32) | number,
@@ -352,6 +271,3 @@ class SyntheticSequence:
             metres += self.options.depth_noise * metres**2 * random.standard_normal(depth.shape)
         raw = np.rint(metres * DEPTH_PER_METRE)
         return np.where((raw > 0) & (raw < 2**16), raw, 0).astype(np.uint16)
-
-
-__all__ = ["DEPTH_PER_METRE", "SyntheticOptions", "SyntheticSequence", "SyntheticWorld"]

@@ -2,8 +2,7 @@
 """Paths over time: poses with time stamps, their files, and which belong together."""
 
 from orbslam2py.trajectory.association import MAX_DIFFERENCE, associate
-from orbslam2py.trajectory.trajectory import (
-    Trajectory,
+from orbslam2py.trajectory.files import (
     TrajectoryFormat,
     read_euroc,
     read_kitti,
@@ -12,6 +11,7 @@ from orbslam2py.trajectory.trajectory import (
     write_kitti,
     write_tum,
 )
+from orbslam2py.trajectory.trajectory import Trajectory
 
 __all__ = [
     "MAX_DIFFERENCE",

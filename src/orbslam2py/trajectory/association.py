@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from orbslam2py._arrays import FloatArray, IntArray
 
 #: Largest difference of stamps that may belong together [s].
 MAX_DIFFERENCE = 0.02
@@ -13,10 +14,10 @@ _ROUNDS = 16
 
 
 def associate(
-    first: NDArray[np.float64],
-    second: NDArray[np.float64],
+    first: FloatArray,
+    second: FloatArray,
     max_difference: float = MAX_DIFFERENCE,
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+) -> tuple[IntArray, IntArray]:
     """Pair the time stamps of two lists, each used at most once.
 
     Of all pairs that differ by less than `max_difference` the nearest is taken, then the nearest
@@ -46,8 +47,8 @@ def associate(
 
 
 def _candidates(
-    first: NDArray[np.float64], second: NDArray[np.float64], max_difference: float
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    first: FloatArray, second: FloatArray, max_difference: float
+) -> tuple[IntArray, IntArray]:
     by_time = np.argsort(second, kind="stable")
     ordered = second[by_time]
     begin = np.searchsorted(ordered, first - max_difference, side="left")
@@ -60,9 +61,7 @@ def _candidates(
     return i[near].astype(np.int64), j[near].astype(np.int64)
 
 
-def _take_greedily(
-    i: NDArray[np.int64], j: NDArray[np.int64], n_first: int, n_second: int
-) -> NDArray[np.int64]:
+def _take_greedily(i: IntArray, j: IntArray, n_first: int, n_second: int) -> IntArray:
     """Positions in the list of candidates (best first) that the greedy walk takes."""
     remaining = np.arange(len(i))
     taken = []

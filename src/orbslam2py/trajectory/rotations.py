@@ -4,12 +4,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from orbslam2py._arrays import FloatArray
 
 
-def quaternions_from_rotations(R: Array) -> Array:
+def quaternions_from_rotations(R: FloatArray) -> FloatArray:
     """Convert rotation matrices to unit quaternions.
 
     Parameters
@@ -19,7 +18,7 @@ def quaternions_from_rotations(R: Array) -> Array:
 
     Returns
     -------
-    Array
+    FloatArray
         Quaternions x, y, z, w, float64 (n, 4). If the trace is positive w is positive, otherwise
         the component that belongs to the largest diagonal element (Shepperd 1978).
     """
@@ -41,7 +40,7 @@ def quaternions_from_rotations(R: Array) -> Array:
     return np.asarray(chosen / np.linalg.norm(chosen, axis=1, keepdims=True))
 
 
-def rotations_from_quaternions(q: Array) -> Array:
+def rotations_from_quaternions(q: FloatArray) -> FloatArray:
     """Convert quaternions x, y, z, w (n, 4), not zero, to rotation matrices (n, 3, 3)."""
     q = np.asarray(q, dtype=np.float64).reshape(-1, 4)
     x, y, z, w = (q / np.linalg.norm(q, axis=1, keepdims=True)).T
@@ -52,14 +51,17 @@ def rotations_from_quaternions(q: Array) -> Array:
     return R
 
 
-def nearest_rotations(M: Array) -> Array:
-    """Find the rotations (n, 3, 3) nearest to matrices read from rounded text."""
+def nearest_rotations(M: FloatArray) -> FloatArray:
+    """Find the rotations nearest to matrices (..., 3, 3), such as those read from rounded text.
+
+    Nearest in the Frobenius norm, by the singular value decomposition.
+    """
     U, _, Vt = np.linalg.svd(M)
     U[..., :, 2] *= np.sign(np.linalg.det(U @ Vt))[..., None]
     return np.asarray(U @ Vt)
 
 
-def rotation_angles(R: Array) -> Array:
+def rotation_angles(R: FloatArray) -> FloatArray:
     """Angles [rad], 0 to pi, of rotations (n, 3, 3); exact also for tiny ones."""
     axis = np.stack(
         [
@@ -73,7 +75,7 @@ def rotation_angles(R: Array) -> Array:
     return np.asarray(np.arctan2(np.linalg.norm(axis, axis=1), trace - 1.0))
 
 
-def poses_from(R: Array, t: Array) -> Array:
+def poses_from(R: FloatArray, t: FloatArray) -> FloatArray:
     """Put rotations (n, 3, 3) and translations (n, 3) together as transforms (n, 4, 4)."""
     T = np.zeros((len(R), 4, 4))
     T[:, :3, :3] = R
@@ -82,8 +84,8 @@ def poses_from(R: Array, t: Array) -> Array:
     return T
 
 
-def inverse_poses(T: Array) -> Array:
-    """Invert rigid transforms (..., 4, 4)."""
+def inverse_poses(T: FloatArray) -> FloatArray:
+    """Invert rigid transforms (..., 4, 4); exact for the rotation, which is transposed."""
     inverse = np.zeros_like(T)
     Rt = np.swapaxes(T[..., :3, :3], -1, -2)
     inverse[..., :3, :3] = Rt

@@ -14,44 +14,28 @@ import hashlib
 import logging
 import os
 import re
-import threading
-from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
-import cv2
 import numpy as np
-import numpy.typing as npt
 
 from orbslam2py import _core as core
-from orbslam2py.errors import ImageError, VocabularyError
+from orbslam2py._files import atomic_write
+from orbslam2py.errors import VocabularyError
 from orbslam2py.vocabulary import _textio
 from orbslam2py.vocabulary.files import Progress, VocabularyFormat, detect_format, read_nodes
 
-__all__ = [
-    "ENVIRONMENT_VARIABLE",
-    "VocabularyFormat",
-    "VocabularyInfo",
-    "convert_vocabulary",
-    "default_vocabulary_path",
-    "load_vocabulary",
-    "read_training_images",
-    "save_vocabulary",
-    "train_vocabulary",
-    "vocabulary_info",
-]
-
 ENVIRONMENT_VARIABLE = "ORBSLAM2PY_VOCABULARY"
-IMAGE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".pgm", ".ppm", ".bmp", ".tif", ".tiff"})
 _SUFFIXES_OF_TEXT = re.compile(r"(\.txt|\.ya?ml|\.tar|\.tgz|\.gz)+$", re.IGNORECASE)
 _log = logging.getLogger(__name__)
 
 
 # ---- load ----------------------------------------------------------------------------------------
 def default_vocabulary_path() -> Path:
-    """Path of the vocabulary that comes with the package."""
+    """Return the path of the vocabulary that comes with the package."""
     return Path(__file__).parent.parent / "data" / "default.bvoc"
 
 
@@ -178,9 +162,11 @@ def save_vocabulary(
     if target.suffix == ".bvoc":
         vocabulary.save(str(target), comment, core.VocabularySource())
     elif target.suffix == ".txt":
-        _write_text(vocabulary, target, Path.open, progress)
+        _write_text(vocabulary, target, contextlib.nullcontext, progress)
     elif target.name.endswith(".txt.gz"):
-        _write_text(vocabulary, target, gzip.GzipFile, progress)
+        _write_text(
+            vocabulary, target, lambda file: gzip.GzipFile(fileobj=file, mode="wb"), progress
+        )
     else:
         raise VocabularyError(f"{target}: the name must end with .bvoc, .txt or .txt.gz")
     if progress is not None:
@@ -190,7 +176,7 @@ def save_vocabulary(
 def _write_text(
     vocabulary: core.Vocabulary,
     target: Path,
-    opener: Callable[[Path, str], AbstractContextManager[_textio._Target]],
+    packed: Callable[[IO[bytes]], AbstractContextManager[_textio._Target]],
     progress: Progress | None,
 ) -> None:
     header = (
@@ -200,16 +186,12 @@ def _write_text(
         int(vocabulary.weighting),
     )
     report = None if progress is None else lambda n: progress(n / vocabulary.n_nodes)
-    part = target.with_name(f"{target.name}.part{os.getpid()}")
     try:
-        with opener(part, "wb") as file:
-            _textio.write_vocabulary_text(file, header, vocabulary.table(), report)
-        part.replace(target)
+        with atomic_write(target, binary=True) as file, packed(file) as text:
+            _textio.write_vocabulary_text(text, header, vocabulary.table(), report)
     except OSError as error:
-        raise VocabularyError(f"{target}: cannot be written: {error.strerror}") from error
-    finally:
-        with contextlib.suppress(OSError):
-            part.unlink()
+        reason = os.strerror(error.errno) if error.errno else str(error)
+        raise VocabularyError(f"{target}: cannot be written: {reason}") from error
 
 
 def convert_vocabulary(
@@ -218,7 +200,21 @@ def convert_vocabulary(
     *,
     progress: Progress | None = None,
 ) -> core.Vocabulary:
-    """Read any format, write another, see :func:`save_vocabulary`; returns what was read.
+    """Read a vocabulary in any format and write it in another.
+
+    Parameters
+    ----------
+    source : path
+        As for :func:`load_vocabulary`.
+    target : path
+        As for :func:`save_vocabulary`: the name decides the format.
+    progress : callable, optional
+        Called with the fraction done, 0 to 1.
+
+    Returns
+    -------
+    Vocabulary
+        What was read.
 
     Raises
     ------
@@ -260,6 +256,11 @@ class VocabularyInfo:
 def vocabulary_info(path: str | os.PathLike[str] | None = None) -> VocabularyInfo:
     """Read a vocabulary as a whole, check all of it, and say what it is.
 
+    Parameters
+    ----------
+    path : path, optional
+        Default: as for :func:`load_vocabulary`.
+
     Raises
     ------
     VocabularyError
@@ -283,95 +284,3 @@ def vocabulary_info(path: str | os.PathLike[str] | None = None) -> VocabularyInf
         hash=vocabulary.hash,
         comment=vocabulary.comment,
     )
-
-
-# ---- train ---------------------------------------------------------------------------------------
-def read_training_images(folder: str | os.PathLike[str]) -> list[Path]:
-    """All images below a folder, sorted by name.
-
-    Raises
-    ------
-    VocabularyError
-        If there are none.
-    """
-    root = Path(folder).expanduser()
-    images = sorted(p for p in root.rglob("*") if p.suffix.lower() in IMAGE_SUFFIXES)
-    if not images:
-        raise VocabularyError(f"{root}: no images ({', '.join(sorted(IMAGE_SUFFIXES))}) found")
-    return images
-
-
-def train_vocabulary(
-    images: Iterable[str | os.PathLike[str]],
-    options: core.TrainingOptions | None = None,
-    *,
-    features: core.OrbOptions | None = None,
-    progress: Callable[[str, float], object] | None = None,
-) -> core.Vocabulary | None:
-    """Train a vocabulary on the features of images.
-
-    Parameters
-    ----------
-    images : iterable of path
-        Photographs like those of the places to recognise, one of each place.
-    options : TrainingOptions, optional
-    features : OrbOptions, optional
-        How features are found; default: 2000 per image.
-    progress : callable, optional
-        Called with the name of the step and the fraction done; returning False cancels.
-
-    Returns
-    -------
-    Vocabulary or None
-        Equal for equal images, options and seed, whatever the number of threads. None when
-        cancelled.
-
-    Raises
-    ------
-    ImageError
-        If a file is not an image.
-    SettingsError, VocabularyError
-        If options are out of range or the images have no features.
-    """
-    options = options or core.TrainingOptions()
-    options.check()
-    features = features or core.OrbOptions(n_features=2000)
-    report = progress or (lambda step, fraction: None)
-
-    descriptors = _describe_images([Path(image) for image in images], features, options, report)
-    if descriptors is None:
-        return None
-    ends = np.cumsum([len(rows) for rows in descriptors]).tolist()
-    rows = np.concatenate([np.empty((0, 32), np.uint8), *descriptors])
-    descriptors.clear()
-    return core.train_vocabulary(rows, ends, options, lambda done: report("Clustering", done))
-
-
-def _describe_images(
-    paths: list[Path],
-    features: core.OrbOptions,
-    options: core.TrainingOptions,
-    report: Callable[[str, float], object],
-) -> list[npt.NDArray[np.uint8]] | None:
-    """Descriptors of every image, in order; None when cancelled."""
-    of_thread = threading.local()
-
-    def describe(path: Path) -> npt.NDArray[np.uint8]:
-        if not hasattr(of_thread, "extractor"):
-            of_thread.extractor = core.OrbExtractor(features)
-        image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
-        if image is None:
-            raise ImageError(f"{path}: cannot be read as an image")
-        descriptors: npt.NDArray[np.uint8] = of_thread.extractor.extract(image).descriptors
-        return descriptors
-
-    results: list[npt.NDArray[np.uint8]] = []
-    pool = ThreadPoolExecutor(options.n_threads or os.cpu_count() or 1)
-    try:
-        for descriptors in pool.map(describe, paths):
-            results.append(descriptors)
-            if report("Reading images", len(results) / len(paths)) is False:
-                return None
-    finally:
-        pool.shutdown(cancel_futures=True)
-    return results

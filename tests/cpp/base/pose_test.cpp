@@ -39,6 +39,7 @@ Eigen::Matrix4d series_exp(const Vector6d& xi) {
 
 constexpr double angles[] = {0, 1e-12, 1e-9, 1e-7, 9e-5, 1.1e-4, 9e-4, 1.1e-3, 0.1, 1, 2, 3, 3.14};
 
+// OD-113: also for tiny angles.
 TEST(Pose, ExpAgreesWithThePowerSeries) {
   std::mt19937_64 generator(1);
   for (const double angle : angles) {

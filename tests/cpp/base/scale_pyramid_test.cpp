@@ -70,6 +70,7 @@ TEST(ScalePyramid, LevelSizesComeFromLevelZero) {
   }
 }
 
+// OD-6: a factor of 1 would divide 0 by 0.
 TEST(ScalePyramid, RefusesWhatIsNoPyramid) {
   EXPECT_THROW(ScalePyramid(1.0F, 8), SettingsError);
   EXPECT_THROW(ScalePyramid(2.1F, 8), SettingsError);

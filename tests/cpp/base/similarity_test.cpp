@@ -54,6 +54,7 @@ constexpr double angles[] = {0,    1e-300, 1e-160, 1e-12, 1e-8, 1e-5, 1e-4, 1e-3
 constexpr double sigmas[] = {0,     1e-300, 1e-12, -1e-12, 1e-8, -1e-8, 1e-5, -1e-5, 1e-3,
                              -1e-3, 0.01,   0.1,   -0.1,   1,    -1,    2.5,  -2.5,  7};
 
+// OD-113: also for small rotations with a change of scale.
 TEST(Similarity, ExpAgreesWithThePowerSeriesOfTheMatrix) {
   std::mt19937_64 generator(1);
   for (const double angle : angles) {
@@ -86,6 +87,7 @@ TEST(Similarity, ExpInvertsLog) {
   }
 }
 
+// OD-113: a small rotation with a small change of scale keeps its translation.
 TEST(Similarity, LogKeepsSmallRotationsWithSmallScales) {
   // Here a translation of (1, 0.2, -0.1) must not come out as (-0.001, 0.024, 0.032).
   Eigen::Vector3d omega(0.3, -0.8, 0.5);

@@ -101,6 +101,7 @@ TEST(Camera, BoundsOfFramesAreClosedAndThoseOfKeyframesHalfOpen) {
   EXPECT_FALSE(bounds.contains_half_open(0, 480));
 }
 
+// OD-2: not the first coefficient alone.
 TEST(Camera, AnyCoefficientMakesALens) {
   for (std::size_t i = 0; i < 5; ++i) {
     CameraOptions options = rectified_options();
@@ -116,6 +117,7 @@ TEST(Camera, NoPointsToUndistortIsFine) {
   EXPECT_TRUE(none.empty());
 }
 
+// OD-4: a single camera has a limit of close points, too: infinity.
 TEST(Camera, BaselineAndCloseDepthFollowFromBf) {
   const Camera camera(rectified_options());
   EXPECT_DOUBLE_EQ(camera.baseline(), 0.08);

@@ -11,7 +11,7 @@
 #include "map/keyframe_insertion.hpp"
 #include "matching/for_triangulation.hpp"
 #include "matching/fuse.hpp"
-#include "optimize/global_bundle_adjustment.hpp"
+#include "optimize/full_bundle_adjustment.hpp"
 #include "optimize/local_bundle_adjustment.hpp"
 #include "places/place_recognition.hpp"
 
@@ -109,14 +109,14 @@ void FullAdjustment::process() {
   ++counts_.adjustments_begun;
   const std::atomic<bool>& cancelled = worker.cancel_flag.value();
   std::optional<Worker::OffDuty> off_duty(worker);
-  GatheredBundle bundle = gather_global_bundle(map_);
-  const BundleSummary summary = solve_global_bundle(bundle, GlobalBundleOptions{}, &cancelled, 2);
+  GatheredBundle bundle = gather_full_bundle(map_);
+  const BundleSummary summary = solve_full_bundle(bundle, FullBundleOptions{}, &cancelled, 2);
   off_duty.reset();
   bool committed = false;
   if (!summary.aborted && !cancelled) {
     Worker::Pause pause(mapping_.worker, true);
     pause.wait();
-    committed = commit_global_bundle(map_, bundle).committed;
+    committed = commit_full_bundle(map_, bundle).committed;
   }
   ++(committed ? counts_.adjustments_committed : counts_.adjustments_dropped);
 }

@@ -95,6 +95,7 @@ TEST(OrbExtractor, KeypointsKeepTheirDistanceAndTheirQuota) {
   }
 }
 
+// OD-22: levels with less than 30 pixels to search in give nothing.
 TEST(OrbExtractor, FlatAndTinyImagesGiveNothing) {
   OrbExtractor extractor(options_of(1000));
   EXPECT_EQ(extractor.extract(cv::Mat(480, 640, CV_8UC1, cv::Scalar(128))).features.size(), 0U);
@@ -186,6 +187,7 @@ TEST(OrbExtractorMask, FullMaskChangesNothingAndEmptyOneForbidsAll) {
   EXPECT_EQ(extractor.extract(image, cv::Mat::zeros(240, 320, CV_8UC1)).features.size(), 0U);
 }
 
+// OD-24: empty images and wrong types of pixels are errors.
 TEST(OrbExtractorErrors, BadImages) {
   OrbExtractor extractor(options_of(500));
   const cv::Mat good(100, 120, CV_8UC1, cv::Scalar(0));

@@ -27,6 +27,7 @@ std::vector<Corner> random_corners(int width, int height, int count, std::uint64
   return corners;
 }
 
+// OD-20: areas less than half as wide as high have a root, too.
 TEST(Quadtree, KeepsDistinctCornersUpToTheQuota) {
   Quadtree quadtree;
   for (const auto& [width, height] :
@@ -56,6 +57,7 @@ TEST(Quadtree, KeepsDistinctCornersUpToTheQuota) {
   }
 }
 
+// OD-23: a quota of 0 gives nothing.
 TEST(Quadtree, NothingWithoutQuotaOrCorners) {
   Quadtree quadtree;
   EXPECT_TRUE(quadtree.distribute(random_corners(50, 50, 20, 1), 50, 50, 0).empty());
@@ -75,6 +77,7 @@ TEST(Quadtree, StrongestOfABoxAndFirstOfEquals) {
   EXPECT_EQ(kept[3].x, 2);
 }
 
+// OD-21: the order of equal boxes does not depend on their addresses.
 TEST(Quadtree, AmongEqualBoxesTheLastCreatedIsDividedFirst) {
   Quadtree quadtree;
   // Four boxes of two corners each; a quota of five allows one further division, in the box

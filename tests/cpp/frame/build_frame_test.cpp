@@ -125,6 +125,7 @@ TEST(BuildFrame, RgbdDepthIsReadAtTheTruncatedRawPixel) {
   EXPECT_EQ(frame->right_u, (std::vector<float>{50.9F - 20.0F, -1.0F, -1.0F}));
 }
 
+// OD-34: the undistorted pixel is what is unprojected.
 TEST(BuildFrame, RgbdLooksUpRawButProjectsUndistortedCoordinates) {
   cv::Mat depth = constant_depth(-1);
   depth.at<float>(40, 30) = 4.0F;
@@ -138,6 +139,7 @@ TEST(BuildFrame, RgbdLooksUpRawButProjectsUndistortedCoordinates) {
   EXPECT_DOUBLE_EQ(point.z(), 4.0);
 }
 
+// OD-35: the depth alone is asked.
 TEST(BuildFrame, ANegativeVirtualRightColumnIsStillADepth) {
   const auto frame = build_rgbd_frame(context_of(rectified_options()), 0, 0,
                                       features_at({{20, 100}, {80, 100}}), constant_depth(0.8F));
@@ -188,6 +190,7 @@ TEST(BuildFrame, DepthNeedsABaseline) {
   EXPECT_THROW(build_stereo_frame(context, 0, 0, {}, {}), StateError);
 }
 
+// OD-37: they are not left half built.
 TEST(BuildFrame, FramesWithoutKeypointsAreComplete) {
   const ScalePyramid scales(1.2F, 8);
   Extraction empty;

@@ -72,6 +72,7 @@ TEST(KeypointGrid, PositionsGoToTheNearestGridLine) {
   EXPECT_EQ(grid.cell_of(0, 15.0F).row, 2);
 }
 
+// OD-32: no keypoint within the bounds is without a cell.
 TEST(KeypointGrid, TheLastHalfCellBelongsToTheLastCell) {
   const KeypointGrid grid({}, kImage);
   for (const float x : {634.9F, 635.0F, 639.0F, 640.0F}) EXPECT_EQ(grid.cell_of(x, 9).column, 63);
@@ -90,6 +91,7 @@ TEST(KeypointGrid, OutsideByMoreThanHalfACellIsInNoCell) {
   EXPECT_EQ(grid.cell_of(NAN, 9).column, -1);
 }
 
+// OD-32: searches find what lies in the last half cell.
 TEST(KeypointGrid, AKeypointInTheLastHalfCellIsFound) {
   const std::vector<Keypoint> keypoints = {keypoint_at(638, 478), keypoint_at(300, 200)};
   const KeypointGrid grid(keypoints, kImage);

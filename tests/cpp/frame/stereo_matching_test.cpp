@@ -106,6 +106,8 @@ TEST(StereoMatching, IntegerShiftsAreFoundToHalfAPixelOfTheLevel) {
   }
 }
 
+// OD-30: a limit of 0 removes no match. OD-31: the sliding window stays within the image on the
+// left.
 TEST(StereoMatching, EqualWindowsAreNeverAnOutlier) {
   // Without noise every window sum is 0, hence their median and with it the limit.
   const ShiftedPair pair = shifted_pair(16);
@@ -186,6 +188,7 @@ TEST(StereoMatching, DescriptorsMustDifferByLessThan75Bits) {
   EXPECT_EQ(count_matched(match_stereo(pair.left, pair.right, scales(), 40, 300)), 0);
 }
 
+// OD-28: rows outside of the image are clipped.
 TEST(StereoMatching, KeypointsAtTheBorderAndASmallerRightImageAreSafe) {
   ShiftedPair pair = shifted_pair(16);
   auto& keypoints = pair.left.features.keypoints;
@@ -211,6 +214,7 @@ TEST(StereoMatching, KeypointsAtTheBorderAndASmallerRightImageAreSafe) {
   EXPECT_GT(count_matched(matches), 0);
 }
 
+// OD-29: without any match there is no median.
 TEST(StereoMatching, NoKeypointsOnEitherSide) {
   ShiftedPair pair = shifted_pair(16);
   const std::size_t n = pair.left.features.size();

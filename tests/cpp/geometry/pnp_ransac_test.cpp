@@ -67,6 +67,7 @@ TEST(PnpRansac, InliersAreThoseWithinTheGateInFront) {
   EXPECT_GT(count, ransac.min_inliers());
 }
 
+// OD-83: poses are not accepted by points behind the camera.
 TEST(PnpRansac, PointsBehindTheCameraAreNoInliers) {
   auto synthetic = make_pnp_problem(PnpShape::general, 60, 0, 0, 4);
   // Mirrored through the camera centre a point keeps its pixel.
@@ -104,6 +105,7 @@ TEST(PnpRansac, SlicesDoNotChangeTheResultNorDoRepetitions) {
   EXPECT_GT(found, 10);
 }
 
+// OD-82: the first turn of a candidate does not use up all its iterations.
 TEST(PnpRansac, CallRunsAtMostTheIterationsAskedFor) {
   const auto synthetic = make_pnp_problem(PnpShape::general, 40, 0, 1.0, 1);  // nothing to find
   PnpRansac ransac(synthetic.problem, {}, 1);

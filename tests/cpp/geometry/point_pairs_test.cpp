@@ -52,6 +52,7 @@ TEST(Normalize, GivesMeanZeroAndDeviationOne) {
             1e-12);
 }
 
+// OD-67: points in one column or row would divide by 0.
 TEST(Normalize, RefusesPointsWithoutExtent) {
   Normalization normalization;
   EXPECT_FALSE(normalize({}, normalization));

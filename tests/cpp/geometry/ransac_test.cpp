@@ -62,6 +62,7 @@ TEST(MinimalSampler, RefusesTooLargeSamples) {
   EXPECT_THROW(sampler.draw<4>(), std::invalid_argument);
 }
 
+// OD-66, OD-102: draws come from a generator of their own, not from one of the process.
 TEST(MinimalSampler, RepeatsWithTheSeed) {
   MinimalSampler a(100, 9), b(100, 9), c(100, 10);
   bool differs = false;
@@ -90,6 +91,7 @@ TEST(RansacIterations, AreTheKnownFigures) {
   EXPECT_EQ(iterations(12, 10, 0.5), 6);
 }
 
+// OD-99: no logarithm of a negative number.
 TEST(RansacIterations, NoneWithTooFewCorrespondences) {
   EXPECT_EQ(iterations(9, 10, 0.5), 0);
   EXPECT_EQ(iterations(0, 0, 0.5), 0);

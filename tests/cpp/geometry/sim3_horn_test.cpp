@@ -31,6 +31,7 @@ double error(const Similarity& S, const Eigen::Matrix3Xd& to, const Eigen::Matri
   return (to - moved(S, from)).squaredNorm();
 }
 
+// OD-100: also where the rotation is exactly the identity.
 TEST(AlignSimilarity, RecoversExactMotions) {
   std::mt19937_64 random(1);
   constexpr double pi = 3.141592653589793;

@@ -69,6 +69,7 @@ TEST(Sim3Ransac, InliersAreThoseWithinTheGatesInFront) {
   EXPECT_GT(only_2, 0);
 }
 
+// OD-101: inliers lie in front of both cameras.
 TEST(Sim3Ransac, PointsBehindACameraAreNoInliers) {
   SyntheticSim3 synthetic = make_sim3_problem(60, 1, 0, 0, 4);
   // A point mirrored through the centre of its camera keeps its pixel there.
@@ -84,6 +85,7 @@ TEST(Sim3Ransac, PointsBehindACameraAreNoInliers) {
   for (std::size_t i = 0; i < 60; ++i) EXPECT_EQ(estimate.inliers[i], i < 30 ? 0 : 1) << i;
 }
 
+// OD-98: the gates are real numbers.
 TEST(Sim3Ransac, GatesAreNotRounded) {
   SyntheticSim3 synthetic = make_sim3_problem(60, 1, 0, 0, 5);
   Sim3Problem& p = synthetic.problem;
@@ -98,6 +100,7 @@ TEST(Sim3Ransac, GatesAreNotRounded) {
   EXPECT_EQ(Sim3Ransac(p, {}, 1).judge(Similarity()).n_inliers, 0U);
 }
 
+// OD-102: every candidate has its own seeded generator.
 TEST(Sim3Ransac, SlicesDoNotChangeTheResultNorDoRepetitions) {
   int found = 0;
   for (std::uint64_t seed = 0; seed < 50; ++seed) {

@@ -150,6 +150,7 @@ TEST(TwoViews, ResultsBelongToTheInitialKeypoints) {
   }
 }
 
+// OD-64: no score above 0 is no model. OD-67: keypoints in one column are degenerate.
 TEST(TwoViews, DegenerateInputsFailWithAReason) {
   auto scene = make_two_view_scene(SceneShape::general, sideways_motion(), 150, 0.3, 1);
   auto column = scene;
@@ -192,6 +193,7 @@ TEST(TwoViews, RefusesBadArguments) {
   EXPECT_THROW(reconstruct_two_views(input, {}, samples, nullptr), std::invalid_argument);
 }
 
+// OD-66: every reconstruction has its own seeded generator.
 TEST(TwoViews, TwoThreadsAndTheSameSeedGiveTheSameBytes) {
   WorkerThread helper;
   for (const SceneShape shape : {SceneShape::general, SceneShape::planar}) {

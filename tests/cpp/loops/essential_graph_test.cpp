@@ -105,6 +105,7 @@ TEST_F(EssentialGraph, LinksNeedHundredSharedPoints) {
   EXPECT_THAT(pairs(), ::testing::UnorderedElementsAreArray(with_tree({{7, 1}, {7, 0}})));
 }
 
+// OD-108: one edge per pair.
 TEST_F(EssentialGraph, StrongCovisibilityCountsOncePerPair) {
   share(100, 2, 4);
   share(99, 3, 5);
@@ -122,6 +123,7 @@ TEST_F(EssentialGraph, TheGroupsCovisibilityIsThatWithTheFusions) {
   EXPECT_THAT(pairs(), ::testing::UnorderedElementsAreArray(with_tree({{7, 1}, {7, 3}})));
 }
 
+// OD-108: one edge per pair.
 TEST_F(EssentialGraph, CovisibleMembersOfTheGroupGetOneEdge) {
   group.keyframes = kfs({7, 6, 5});
   group.corrected.push_back(Similarity(builder.map.T_cw(kf(5))) * kShift);
@@ -138,6 +140,7 @@ TEST_F(EssentialGraph, EarlierLoopsStay) {
   EXPECT_THAT(pairs(), ::testing::UnorderedElementsAreArray(with_tree({{7, 1}, {5, 0}})));
 }
 
+// OD-108: no vertices are empty.
 TEST_F(EssentialGraph, DeadAndUnpublishedKeyframesAreNoVertices) {
   const KeyFrameId waiting = builder.add_keyframe(false);
   ASSERT_TRUE(builder.erase_keyframe(kf(3)));

@@ -115,6 +115,7 @@ TEST_F(Draft, DeadAndUnknownPointsAreLeftAlone) {
   EXPECT_THAT(drafted.take_fusions(), IsEmpty());
 }
 
+// OD-107: in a stated order, not in that of addresses.
 TEST_F(Draft, PointsAreCarriedByTheFirstThatSeesThem) {
   const MapPointId both = builder.add_point(kfs({1, 3}));  // of the far side, seen from the group
   const MapPointId adopted = builder.add_point(kfs({3, 0}));  // the same, made by the group

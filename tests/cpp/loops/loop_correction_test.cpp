@@ -84,6 +84,7 @@ TEST(LoopCorrection, TrustsTheMatches) {
   }
 }
 
+// OD-107: in a stated order, not in that of addresses.
 TEST(LoopCorrection, PointsOfTheGroupMoveWithTheFirstThatSeesThem) {
   RingScene scene;
   const LoopCorrection correction = planned(scene);
@@ -267,6 +268,7 @@ TEST(LoopCorrection, IsTheSameInEveryRun) {
   }
 }
 
+// OD-106: the map before or the map after.
 TEST(LoopCorrection, NobodySeesAMixture) {
   RingScene scene(single_camera());
   const LoopCorrection correction = planned(scene);

@@ -52,6 +52,7 @@ TEST(LoopConsistency, AnotherPlaceBeginsAnew) {
   EXPECT_THAT(parts.update({6}), IsEmpty());
 }
 
+// OD-97: chains do not outlive a gap, a loop or a reset.
 TEST(LoopConsistency, ClearForgetsEverything) {
   Parts parts;
   for (int i = 0; i < 3; ++i) parts.update({6});

@@ -88,6 +88,7 @@ TEST(PreparedCorrection, PointsMayDieMeanwhile) {
   EXPECT_LT(scene.largest_reprojection_error(), 1.0);
 }
 
+// OD-105: what was replaced after planning is resolved when it is written.
 TEST(PreparedCorrection, ReplacedPointsAreFollowed) {
   RingScene scene;
   const LoopCorrection correction = planned(scene);

@@ -16,6 +16,7 @@
 namespace orbslam::testing {
 namespace {
 
+// OD-94: nobody sees the small steps of mapping.
 TEST(Concurrency, ReadersSeeConsistentMapsWhileAWriterWorks) {
   const PointCloud cloud = make_point_cloud(150, 2, 3, 6, 1);
   Map map;

@@ -44,6 +44,7 @@ TEST(Covisibility, EqualWeightsAreOrderedById) {
   EXPECT_EQ(builder.map.find(kf(3))->neighbours, kfs({1, 0, 2}));
 }
 
+// OD-51: both ends list each other or neither does.
 TEST(Covisibility, RecountingFollowsLostPointsOnBothEnds) {
   MapBuilder builder;
   builder.add_keyframes(3);
@@ -83,7 +84,7 @@ TEST(Covisibility, QueriesGivePrefixes) {
   EXPECT_EQ(builder.map.best_neighbours(kf(0), 10), kfs({2, 3, 1}));
   EXPECT_EQ(builder.map.neighbours_by_weight(kf(0), 30), kfs({2, 3}));
   EXPECT_EQ(builder.map.neighbours_by_weight(kf(0), 41), kfs({}));
-  // The whole list when all reach the weight, where the reference returned nothing.
+  // The whole list when all reach the weight, where the reference returned nothing. (OD-50)
   EXPECT_EQ(builder.map.neighbours_by_weight(kf(0), 15), kfs({2, 3, 1}));
   EXPECT_EQ(builder.map.weight(kf(1), kf(2)), 0);
   EXPECT_EQ(builder.map.weight(kf(9), kf(2)), 0);

@@ -8,8 +8,7 @@
 namespace orbslam::testing {
 namespace {
 
-// ---- recent points (spec 13, section 4)
-// ----------------------------------------------------------
+// ---- recent points -----------------------------------------------------------------------------
 
 struct RecentCase {
   int age;          ///< of the current keyframe against the point's first one
@@ -21,6 +20,7 @@ struct RecentCase {
 
 class RecentPoints : public ::testing::TestWithParam<RecentCase> {};
 
+// See docs/method/mapping.md#culling-of-points.
 TEST_P(RecentPoints, FollowTheTable) {
   const RecentCase& c = GetParam();
   MapBuilder builder;
@@ -62,8 +62,7 @@ TEST(RecentPoints, DeadOnesAreDroppedAndTheOrderStays) {
   EXPECT_EQ(recent, (std::vector<MapPointId>{points[0], points[2], points[3]}));
 }
 
-// ---- keyframes (spec 13, section 7)
-// --------------------------------------------------------------
+// ---- keyframes ---------------------------------------------------------------------------------
 
 constexpr int kPoints = 100;
 
@@ -89,6 +88,7 @@ struct Scene {
   bool died() const { return builder.map.find(kf(1)) == nullptr; }
 };
 
+// See docs/method/mapping.md#culling-of-keyframes.
 TEST(CullKeyframes, MoreThanNinetyPerCentIsStrict) {
   Scene at_limit(90);
   at_limit.cull();

@@ -31,6 +31,7 @@ TEST(SelectLocalMap, ATieOfVotesGoesToTheLowestId) {
   EXPECT_EQ(select_local_map(builder.map, frame).reference_keyframe, kf(2));
 }
 
+// OD-72: nothing of the frame before stays.
 TEST(SelectLocalMap, WithoutVotesItIsEmpty) {
   MapBuilder builder;
   builder.add_keyframes(2);
@@ -85,6 +86,7 @@ struct Family {
   }
 };
 
+// OD-71: adding a parent does not end the extension.
 TEST(SelectLocalMap, OneNeighbourOneChildAndTheParentAreAdded) {
   Family family;
   EXPECT_EQ(family.local(), kfs({5, 2, 6, 4}));
@@ -101,6 +103,7 @@ TEST(SelectLocalMap, WhatIsListedAlreadyIsPassedOver) {
   EXPECT_EQ(local, kfs({2, 4, 5, 6, 3, 1, 7}));
 }
 
+// OD-72: only living ones are added.
 TEST(SelectLocalMap, DeadRelativesAreSkipped) {
   Family family;
   family.builder.erase_keyframe(kf(2));
@@ -143,6 +146,7 @@ TEST(SelectLocalMap, TheExtensionStopsBeyondEightyAndNeverCutsTheVotes) {
   EXPECT_EQ(vote(90), 90U);
 }
 
+// OD-76: replaced points of a frame are always exchanged.
 TEST(RefreshAssociations, ExchangesReplacedPointsAndDropsTheDead) {
   MapBuilder builder;
   builder.add_keyframes(3);

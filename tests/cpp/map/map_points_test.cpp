@@ -88,6 +88,7 @@ TEST(MapPoints, DiesWithOneStereoObservationLeft) {
   EXPECT_FALSE(builder.map.find(id));
 }
 
+// OD-52: the reference always observes the point.
 TEST(MapPoints, ALostReferenceIsReplacedByTheLowestObserver) {
   MapBuilder builder;
   builder.add_keyframes(5);
@@ -106,6 +107,7 @@ TEST(MapPoints, ErasingAnotherObservationKeepsTheReference) {
   EXPECT_EQ(builder.map.find(id)->reference_keyframe, kf(3));
 }
 
+// OD-53: a replaced point is gone, its id leads to the successor.
 TEST(MapPoints, ReplacingMovesObservationsAndCounters) {
   MapBuilder builder;
   builder.add_keyframes(4);
@@ -128,6 +130,7 @@ TEST(MapPoints, ReplacingMovesObservationsAndCounters) {
   EXPECT_EQ(builder.violations(), "");
 }
 
+// OD-54: the direction does not stay behind.
 TEST(MapPoints, ReplacingRefreshesTheSurvivor) {
   MapBuilder builder;
   builder.add_keyframes(5);
@@ -139,6 +142,7 @@ TEST(MapPoints, ReplacingRefreshesTheSurvivor) {
   EXPECT_TRUE(builder.map.find(survivor)->mean_direction.isApprox(expected, 1e-12));
 }
 
+// OD-55: not one link only.
 TEST(MapPoints, ChainsOfReplacementsAreFollowedToTheEnd) {
   MapBuilder builder;
   builder.add_keyframes(4);
@@ -156,6 +160,7 @@ TEST(MapPoints, ChainsOfReplacementsAreFollowedToTheEnd) {
   EXPECT_FALSE(builder.map.resolve(MapPointId()).valid());
 }
 
+// OD-54: no point is replaced by a dead one.
 TEST(MapPoints, ReplacingByItselfOrByTheDeadDoesNothing) {
   MapBuilder builder;
   builder.add_keyframes(2);

@@ -26,6 +26,7 @@ TEST(IdTable, FindsErasesAndVisitsInOrder) {
   EXPECT_EQ(visited, (std::vector<int>{3, 256, 600}));
 }
 
+// OD-57: a dead keyframe does not keep its frame.
 TEST(Map, DeadObjectsAreFreed) {
   MapBuilder builder;
   builder.add_keyframes(2);

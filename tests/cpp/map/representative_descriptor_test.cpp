@@ -71,6 +71,7 @@ TEST(RepresentativeDescriptor, ATieKeepsTheLowestKeyframe) {
   EXPECT_EQ(representative(thermometers({40, 30, 20, 10})), thermometer_descriptor(40));
 }
 
+// OD-56: also beyond the observers whose distances lie on the stack.
 TEST(RepresentativeDescriptor, EqualsTheDefinitionForAnyNumberOfObservers) {
   std::mt19937_64 random(3);
   for (std::size_t n = 1; n <= 60; ++n) {

@@ -199,6 +199,7 @@ TEST(Leases, NobodyAskedNobodyDies) {
   EXPECT_THROW(builder.map.end_lease(kf(1)), StateError);
 }
 
+// OD-61: the request to cull is taken back.
 TEST(Leases, ALoopEdgeProtectsForEverAndClearsTheRequest) {
   MapBuilder builder;
   builder.add_keyframes(3);

@@ -27,6 +27,7 @@ TrackedFrame tracked(const Map& map, FrameId id, const Pose& T_cw, KeyFrameId re
   return frame;
 }
 
+// OD-19: relative to keyframe 0, wherever it has moved to.
 TEST(Trajectory, ReturnsWhatWasRecordedAnchoredAtKeyframeZero) {
   MapBuilder builder;
   builder.add_keyframes(3);
@@ -94,6 +95,7 @@ TEST(Trajectory, LengthsFollowAChangeOfScaleThroughCulledKeyframesToo) {
       matrix(recorder.rebuild(builder.map).T_wc[0]).isApprox((T_0w * expected).matrix(), 1e-12));
 }
 
+// OD-13: not with the time of the frame before.
 TEST(Trajectory, WithoutAPoseTheLastRelativeOneIsRepeatedWithItsOwnTime) {
   MapBuilder builder;
   builder.add_keyframes(2);

@@ -76,6 +76,7 @@ TEST(MatchKeyFrameByProjection, FoundPointsAndHeldKeypointsStay) {
   }
 }
 
+// OD-84: points behind the camera are skipped.
 TEST(MatchKeyFrameByProjection, PointsBehindAreNotMirroredIntoTheImage) {
   KeyFrameScene scene({feature(0)});
   scene.map.set_position(scene.id, {0, 0, -5});

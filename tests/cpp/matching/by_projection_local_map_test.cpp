@@ -66,6 +66,7 @@ TEST(ProjectInto, BordersBelongToTheImage) {
   EXPECT_FALSE(view_of(at(640.01)).visible);
 }
 
+// OD-36: a depth of 0 or NaN fails.
 TEST(ProjectInto, NothingBehindOrNowhere) {
   for (const Eigen::Vector3d& bad :
        {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(0, 0, -5), Eigen::Vector3d(0, 0, kNan),

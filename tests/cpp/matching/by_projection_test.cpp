@@ -80,6 +80,7 @@ TEST(MatchLastFrame, RightColumnMustAgree) {
   EXPECT_EQ(OnePoint({feature(0, 0, 320, 2)}, level_0).match(12.01F), 1);
 }
 
+// OD-35: the right column of a near point may be negative.
 TEST(MatchLastFrame, NegativeVirtualColumnsCountAsDepth) {
   const Eigen::Vector3d near(-0.75, 0, 1);  // u = 20, right column -20
   for (const float measured : {1.0F, 2.0F}) {
@@ -105,6 +106,7 @@ TEST(MatchLastFrame, BestDescriptorWinsAndTheFirstOfEquals) {
   EXPECT_EQ(equal.current.positions[0], Eigen::Vector3d(0, 0, 5));
 }
 
+// OD-36: a depth of 0 or NaN fails.
 TEST(MatchLastFrame, PointsBehindTheCameraOrNowhereAreSkipped) {
   for (const Eigen::Vector3d& bad :
        {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(0, 0, -5), Eigen::Vector3d(0, 0, kNan),
@@ -124,6 +126,7 @@ TEST(MatchLastFrame, FramesIncludeTheirUpperBounds) {
   }
 }
 
+// OD-77: dead points of the last frame are not matched.
 TEST(MatchLastFrame, OutliersAndDeadPointsAreSkipped) {
   OnePoint outlier({feature(3)});
   outlier.last.outlier[0] = 1;
@@ -144,6 +147,7 @@ TEST(MatchLastFrame, AMappedPointKeepsItsKeypointATemporaryOneDoesNot) {
   EXPECT_EQ(temporary.current.map_points[0], MapPointId(7));
 }
 
+// OD-78: it neither counts twice nor is judged by the match that was overwritten.
 TEST(MatchLastFrame, AKeypointTakenTwiceCountsOnceWithItsLastRotation) {
   // 30 points turned by 0 degrees; keypoint 0 is first taken by a temporary point that is turned
   // by 90 degrees, then by a point that is not turned.

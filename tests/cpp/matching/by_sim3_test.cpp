@@ -68,6 +68,7 @@ struct LoopScene : Scene {
   std::vector<MapPointId> points_of_b, matches;
 };
 
+// OD-103: distances are compared in the units of the point's own side.
 TEST(MatchBySimilarity, FindsWhatBothSeeWhateverTheScale) {
   for (const double drift : {0.4, 1.0, 2.5}) {
     LoopScene scene(drift);
@@ -97,6 +98,7 @@ TEST(MatchBySimilarity, KeepsAndDoesNotRepeatMatches) {
   EXPECT_EQ(match_by_similarity(wrong.map, wrong.a, wrong.b, wrong.S_ab, wrong.matches), 0);
 }
 
+// OD-103: not one keyframe's calibration for both images.
 TEST(MatchBySimilarity, UsesEachKeyframesOwnCamera) {
   CameraOptions options;
   options.pinhole = {300, 310, 330, 230};

@@ -144,6 +144,7 @@ TEST(MatchKeyFramesByWords, BothSidesNeedPoints) {
   EXPECT_THAT(match_keyframes_by_words(map, a, b, 0.75F), ElementsAre(Pair(0, 2)));
 }
 
+// OD-80: one limit in both searches by words.
 TEST(MatchKeyFramesByWords, LimitIsFiftyInclusiveAsForFrames) {
   Map map;
   const KeyFrameId a = add_full(map, frame_of({0}));

@@ -181,7 +181,7 @@ TEST(MatchForInitializationGolden, SearchIsIdenticalToTheOriginal) {
 }
 
 // Ours has 12 bins with wrap-around, so rotations near 0 degrees count together instead of as two
-// half bins. That may change which bins survive; with this pair it changes no match.
+// half bins. That may change which bins survive; with this pair it changes no match. (OD-79)
 TEST(MatchForInitializationGolden, WrapAroundKeepsTheSameMatches) {
   EXPECT_EQ(golden_matches(true), golden_output());
 }

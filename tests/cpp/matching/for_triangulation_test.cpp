@@ -69,6 +69,7 @@ TEST(MatchForTriangulation, LimitIsFiftyInclusiveAndTheLastOfEqualsWins) {
   EXPECT_THAT(match({50, 50}), ElementsAre(Pair(0, 1)));
 }
 
+// OD-87: pairs are one to one.
 TEST(MatchForTriangulation, AFeatureIsUsedOnce) {
   const TwoViews views({feature_at(400, 200, 9), feature_at(402, 200, 8)},
                        {feature_at(320, 200, 8), feature_at(330, 200, 30)});
@@ -97,6 +98,7 @@ TEST(MatchForTriangulation, OnlyUnderTheSameNode) {
   EXPECT_THAT(match_for_triangulation(views.map, id_a, id_b), IsEmpty());
 }
 
+// OD-90: the epipole excludes nothing where the other camera lies behind.
 TEST(MatchForTriangulation, NothingNearTheEpipoleOfSingleCameras) {
   // The second camera stands 1 m behind the first: the epipole is the image centre.
   const auto match = [](float u, float depth_a, float depth_b, double z) {
@@ -207,6 +209,7 @@ TEST(CreateNewPoints, PerfectPairsGiveTruePoints) {
   }
 }
 
+// OD-87: every observation is there in the slot, too.
 TEST(CreateNewPoints, EveryFeatureGetsAtMostOnePoint) {
   Scene scene(500, 8);
   const auto ids = add_row(scene, {0, 0.3, 0.6, 0.9}, true);

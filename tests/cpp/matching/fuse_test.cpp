@@ -94,6 +94,7 @@ TEST(FusePoints, ReprojectionGateWithDepth) {
   }
 }
 
+// OD-35: the right column of a near point may be negative.
 TEST(FusePoints, NegativeVirtualColumnsCountAsDepth) {
   // Moved so that the point appears at u = 4, where its right column is 4 - 8 = -4.
   const double x = 316.0 * 5 / 400;

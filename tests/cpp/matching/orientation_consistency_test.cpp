@@ -52,6 +52,7 @@ bool share_a_bin(float rotation, float other) {
   return histogram.inconsistent().empty();
 }
 
+// OD-79: rotations around 0 are not split.
 TEST(OrientationHistogram, BinsAreCentredOnMultiplesOfThirtyDegreesAndWrap) {
   EXPECT_TRUE(share_a_bin(0, 14.99F));
   EXPECT_FALSE(share_a_bin(0, 15));  // ties are rounded away from zero

@@ -82,6 +82,7 @@ TEST(PairTriangulation, MeasuredDepthIsBetterThanNarrowRays) {
   EXPECT_NEAR(found->z(), 5.03, 1e-6);
 }
 
+// OD-88: both parallaxes are asked, not only the first.
 TEST(PairTriangulation, OfTwoDepthsTheNearerDecides) {
   Pair pair;
   pair.T_2w = at(0, 0, 0.3);  // moved towards the point
@@ -139,6 +140,7 @@ TEST(PairTriangulation, ReprojectionGateWithDepth) {
   }
 }
 
+// OD-89: the second right column is not judged with the first camera's baseline.
 TEST(PairTriangulation, EachCameraHasItsOwnBaseline) {
   Pair pair;
   pair.camera_2 = synthetic_camera(80);

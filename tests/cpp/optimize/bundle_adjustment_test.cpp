@@ -290,6 +290,7 @@ TEST(SolveBundle, BrokenNumbersAndPointsBehindTheCamera) {
   EXPECT_TRUE(all_finite(problem));
 }
 
+// OD-109: observations are judged anew at the final estimate.
 TEST(SolveBundle, PointThatComesToTheFrontTakesPartInTheSecondStage) {
   BundleProblem problem = random_bundle(14, 6, 60, 2, false);
   // A fixed camera further ahead sees a point 0.5 m away, which starts 0.2 m behind it.

@@ -176,9 +176,11 @@ void check_pose_graph_edges(std::uint64_t seed) {
   }
 }
 
+// OD-114: derivatives of similarities are analytic.
 TEST(Jacobians, PoseGraphEdges) { check_pose_graph_edges<7>(2); }
 TEST(Jacobians, PoseGraphEdgesWithScalesKept) { check_pose_graph_edges<6>(3); }
 
+// OD-114: derivatives of similarities are analytic.
 TEST(Jacobians, Sim3Residuals) {
   std::mt19937_64 random(4);
   const Pinhole pinhole{500, 510, 320, 240};

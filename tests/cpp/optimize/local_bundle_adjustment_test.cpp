@@ -157,6 +157,7 @@ TEST(LocalBundleAdjustment, OuterKeyframesStay) {
   EXPECT_EQ(street.map.find(last)->T_cw.matrix(), before.matrix());
 }
 
+// OD-112: with one fixed pose the scale would be free.
 TEST(LocalBundleAdjustment, SingleCameraFixesASecondPoseForTheScale) {
   Street street(5, false, 0);
   const Pose second = street.map.find(KeyFrameId(1))->T_cw;
@@ -181,6 +182,7 @@ TEST(LocalBundleAdjustment, RaisedFlagChangesNothing) {
   EXPECT_EQ(street.numbers(), before);
 }
 
+// OD-93: an interrupted adjustment does not judge by what it has reached.
 TEST(LocalBundleAdjustment, FlagDuringTheWorkErasesNothingBeforeTheFirstStageIsDone) {
   for (int delay = 0; delay < 10; ++delay) {
     Street street(6);

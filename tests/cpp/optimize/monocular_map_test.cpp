@@ -122,6 +122,7 @@ TEST(CreateMonocularMap, TellsTheMedianBeforeScaling) {
   EXPECT_NEAR(length, TwoViews::kBaseline / median, 1e-3 * length);
 }
 
+// OD-62: scale ranges and directions follow the scaled positions.
 TEST(CreateMonocularMap, PointsAreReadyForTheFirstFrames) {
   TwoViews views;
   Map map;
@@ -202,6 +203,7 @@ TEST(CreateMonocularMap, FewPointsFail) {
   EXPECT_TRUE(views.create(map, n).ok);
 }
 
+// OD-63: without points there is no median depth to divide by.
 TEST(CreateMonocularMap, NoPointsFailEvenWithoutAMinimum) {
   TwoViews views;
   std::fill(views.matches.begin(), views.matches.end(), -1);

@@ -46,7 +46,7 @@ struct OracleResidual {
   }
 };
 
-/// Spec 16, section 3, with Ceres instead of our own solver.
+/// The rounds of optimize_pose() with Ceres instead of our own solver.
 PoseEstimate solve_with_ceres(const PoseProblem& problem) {
   PoseEstimate estimate;
   estimate.outlier.assign(problem.observations.size(), 0);
@@ -176,6 +176,7 @@ TEST(PoseOptimization, FewObservationsGetOneRound) {
   EXPECT_LE(estimate.iterations, 10);
 }
 
+// OD-110: points must lie in front of the camera.
 TEST(PoseOptimization, PointsBehindTheCameraAreOutliers) {
   PoseProblem problem = random_problem(3, 60, 0, true);
   const Pose T_wc = problem.T_cw_initial.inverse();
@@ -210,6 +211,7 @@ TEST(PoseOptimization, BrokenNumbersTakeNoPart) {
   for (std::size_t i = 50; i < 53; ++i) EXPECT_EQ(estimate.outlier[i], 1);
 }
 
+// OD-111: no further rounds with less than 3 inliers.
 TEST(PoseOptimization, HopelessProblemEndsWithoutInliers) {
   PoseProblem problem = random_problem(5, 30, 0, false);
   std::mt19937_64 random(9);

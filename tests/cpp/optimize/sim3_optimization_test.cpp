@@ -202,9 +202,9 @@ SimilarityProblem golden_problem() {
   return problem;
 }
 
-// With a free scale the reference stops short of the minimum: its exponential is wrong for steps
-// with a small rotation and a larger change of scale (spec 16, D16-10), so its last steps are
-// refused. The scale it stops at is 8e-5 away; ours must be at a smaller error.
+// With a free scale the reference stops short of the minimum: its exponential lacks a term for
+// steps with a small rotation and a larger change of scale, so its last steps are refused. The
+// scale it stops at is 8e-5 away; ours must be at a smaller error. (OD-113)
 constexpr double kReferenceScaleError = 1e-4;
 
 TEST(OptimizeSimilarity, AgreesWithTheReference) {

@@ -84,7 +84,8 @@ TEST(ClusterDescriptors, FewDescriptorsAreAClusterEach) {
 }
 
 TEST(ClusterDescriptors, NoClusterIsEverEmpty) {
-  // Majority centres can drift away from all members (D11-4); many small random problems meet it.
+  // Majority centres can drift away from all members; the original then goes on with an empty
+  // centre and crashes. Many small random problems meet it. (OD-43)
   std::mt19937_64 random(11);
   for (int round = 0; round < 300; ++round) {
     Problem problem;
@@ -116,6 +117,7 @@ TEST(ClusterDescriptors, MajorityCountsMultiplicitiesAndTiesGiveOne) {
   EXPECT_EQ(clustering.centres[clustering.cluster_of[2]], all);
 }
 
+// OD-45: k-means may swing for ever, so its iterations are limited.
 TEST(ClusterDescriptors, IterationCapAndCancelEndIt) {
   const Problem problem = groups(20, 150, 60);
   int n_asked = 0;

@@ -62,6 +62,7 @@ class WorkedExample : public ::testing::Test {
   std::map<KeyFrameId, std::vector<KeyFrameId>> neighbours_{{a, {b, c}}, {b, {a}}};
 };
 
+// OD-47: neighbours that were not scored add nothing.
 TEST_F(WorkedExample, OnlyAPasses) {
   fill(0.10, 0.05);
   const auto found = query(0.06);
@@ -139,6 +140,7 @@ TEST_F(WorkedExample, FramesWithoutWordsAreRefused) {
   EXPECT_THROW(index_.add(a, std::make_shared<Frame>()), StateError);
 }
 
+// OD-47, OD-48: queries leave nothing behind, no counters, scores or marks.
 TEST_F(WorkedExample, QueriesRunWhileKeyframesComeAndGo) {
   fill(0.10, 0.05);
   std::thread writer([this] {

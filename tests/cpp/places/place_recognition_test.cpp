@@ -74,6 +74,7 @@ TEST_F(PlaceRecognition, RelocalizationSeeksEverywhereAndGroupsNeighbours) {
   EXPECT_EQ(found[0].common_words, 4);
 }
 
+// OD-49: a keyframe that was culled while it waited is not indexed.
 TEST_F(PlaceRecognition, DeadKeyframesNeitherEnterNorAppear) {
   index_all();
   {

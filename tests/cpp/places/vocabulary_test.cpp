@@ -111,6 +111,7 @@ TEST(Vocabulary, CountsNodesWithTheRoot) {
   EXPECT_EQ(vocabulary->depth(), 3);
 }
 
+// OD-42: words whose branch ends early have a group, too.
 TEST(Vocabulary, ShallowLeafIsItsOwnGroup) {
   const auto vocabulary = build(uneven_tree());
   const Quantised shallow = vocabulary->quantise(ones(3));

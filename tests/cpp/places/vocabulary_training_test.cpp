@@ -111,6 +111,7 @@ TEST(TrainVocabulary, StopListAndOtherWeightings) {
   EXPECT_DOUBLE_EQ(train_vocabulary(set, options)->quantise(set.descriptors[0]).weight, 1.0);
 }
 
+// OD-44: equal descriptors are counted, not repeated.
 TEST(TrainVocabulary, EqualDescriptorsMakeNoChains) {
   TrainingSet set;
   std::mt19937_64 random(3);

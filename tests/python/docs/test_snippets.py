@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-
 from command_line import logging_restored
+
 from orbslam2py.cli import main
 from support.documentation_data import copy_data, make_data
 from support.documents import ROOT, SHELL, SHOWN, Block, blocks_of, documents

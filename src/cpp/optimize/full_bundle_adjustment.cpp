@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "optimize/full_bundle_adjustment.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace orbslam {
+namespace {
+
+/// Maps of few keyframes have begun just now: their points are where two views have put them, and
+/// their coordinates do as well.
+constexpr std::size_t kManyKeyframes = 30;
+
+bool is_finite(const BundleProblem& problem) {
+  const auto& cameras = problem.cameras;
+  const auto& points = problem.points;
+  return std::all_of(cameras.begin(), cameras.end(),
+                     [](const auto& camera) {
+                       return camera.T_cw.rotation().coeffs().allFinite() &&
+                              camera.T_cw.translation().allFinite();
+                     }) &&
+         std::all_of(points.begin(), points.end(),
+                     [](const Eigen::Vector3d& point) { return point.allFinite(); });
+}
+
+}  // namespace
+
+BundleSummary solve_full_bundle(GatheredBundle& bundle, const FullBundleOptions& options,
+                                const std::atomic<bool>* abort, int n_threads) {
+  BundleOptions solver;
+  solver.robust_iterations = options.iterations;
+  solver.final_iterations = 0;
+  solver.robust = options.robust;
+  solver.n_threads = n_threads;
+  solver.inverse_depth = bundle.keyframes.size() > kManyKeyframes;
+  solver.max_seconds = options.max_seconds;
+  const BundleSummary summary = solve_bundle(bundle.problem, solver, abort);
+  // A comparison with NaN is false.
+  bundle.solved = !summary.aborted && summary.iterations > 0 &&
+                  summary.final_cost <= summary.initial_cost && is_finite(bundle.problem);
+  return summary;
+}
+
+FullBundleResult full_bundle_adjustment(Map& map, const FullBundleOptions& options,
+                                        const std::atomic<bool>* abort, int n_threads) {
+  FullBundleResult result;
+  GatheredBundle bundle = gather_full_bundle(map);
+  result.n_keyframes = static_cast<int>(bundle.keyframes.size());
+  result.n_points = static_cast<int>(bundle.points.size());
+  result.n_observations = static_cast<int>(bundle.problem.observations.size());
+  result.summary = solve_full_bundle(bundle, options, abort, n_threads);
+  result.committed = commit_full_bundle(map, bundle).committed;
+  return result;
+}
+
+}  // namespace orbslam

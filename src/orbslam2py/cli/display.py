@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a person sees of a run: progress, warnings, and the figures at the end."""
+
+from __future__ import annotations
+
+import logging
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
+from rich.table import Table
+
+from orbslam2py.runs.result import FrameRow
+from orbslam2py.slam.system import System
+
+
+def print_error(console: Console, title: str, text: str) -> None:
+    """Print a message in one line: paths can be copied from it."""
+    console.print(f"[bold red]{title}:[/] {escape(text)}", highlight=False, soft_wrap=True)
+
+
+class _ConsoleHandler(logging.Handler):
+    """Prints warnings like errors, in one line each: paths can be copied from it."""
+
+    def __init__(self, console: Console) -> None:
+        super().__init__()
+        self._console = console
+
+    def emit(self, record: logging.LogRecord) -> None:
+        colour = "red" if record.levelno >= logging.ERROR else "yellow"
+        title = f"[bold {colour}]{record.levelname.capitalize()}:[/]"
+        text = escape(self.format(record))
+        self._console.print(f"{title} {text}", highlight=False, soft_wrap=True)
+
+
+def log_to(console: Console, *, quiet: bool) -> None:
+    """Print the package's warnings (errors, if quiet) on a console."""
+    logger = logging.getLogger("orbslam2py")
+    logger.handlers = [_ConsoleHandler(console)]
+    logger.propagate = False
+    logger.setLevel(logging.ERROR if quiet else logging.WARNING)
+
+
+def progress_bar(console: Console) -> Progress:
+    """A bar that leaves no trace when it is done."""
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[status]}"),
+        console=console,
+        transient=True,
+    )
+
+
+class Display:
+    """Keeps the progress bar up to date, at most ten times a second."""
+
+    def __init__(self, bar: Progress, total: int | None) -> None:
+        self._bar = bar
+        self._task: TaskID = bar.add_task("tracking", total=total, status="")
+        self._done = 0
+        self._shown_at = 0.0
+
+    def show(self, row: FrameRow, system: System) -> None:
+        """Called after every frame."""
+        self._done += 1
+        now = self._bar.get_time()
+        if now - self._shown_at < 0.1:
+            return
+        task = self._bar.tasks[self._task]
+        speed = self._done / task.elapsed if task.elapsed else 0.0
+        status = (
+            f"{speed:5.1f} frames/s  {row.state}  {system.n_keyframes} keyframes  "
+            f"{system.n_map_points} points"
+        )
+        if row.reason:
+            status += escape(f"  ({row.reason})")
+        self._bar.update(self._task, completed=self._done, status=status)
+        self._shown_at = now
+
+
+def _describe_loop(loop: dict[str, Any]) -> str:
+    matched, current = loop["keyframes"]
+    text = f"keyframe {current} at {matched}: {loop['correction_m']:.3f} m"
+    text += f", {loop['correction_deg']:.2f} deg"
+    if loop["scale"] != 1.0:
+        text += f", scale {loop['scale']:.4f}"
+    return text
+
+
+def report_table(report: dict[str, Any]) -> Table:
+    """The figures of report.json, for reading."""
+    title = escape(f"{report['sequence']} ({report['sensor']})")
+    table = Table(title=title, show_header=False)
+    table.add_column(justify="left")
+    table.add_column(justify="right")
+    for key, value in report.items():
+        if key in {"sequence", "sensor", "milliseconds", "settings"} or value is None:
+            continue
+        if key == "initialisation_reasons":
+            for reason, count in value.items():
+                table.add_row(f"no map yet: {escape(reason)}", str(count))
+            continue
+        if key == "loops":
+            for loop in value:
+                table.add_row("loop", _describe_loop(loop))
+            continue
+        if key == "full_adjustments":
+            used = sum(entry["used"] for entry in value)
+            if value:
+                table.add_row(key.replace("_", " "), f"{used} of {len(value)} used")
+            continue
+        text = f"{value:.4f}" if isinstance(value, float) else str(value)
+        table.add_row(key.replace("_", " "), escape(text))
+    table.add_section()
+    for stage, numbers in report["milliseconds"].items():
+        table.add_row(
+            f"{stage} [ms]",
+            f"median {numbers['median']:.2f}  mean {numbers['mean']:.2f}  p99 {numbers['p99']:.2f}",
+        )
+    return table

@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""From what a user names to images: a folder, a video or a camera."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from orbslam2py.datasets.base import LiveSource, Sequence
+from orbslam2py.datasets.choose_settings import SettingsChoice
+from orbslam2py.datasets.image_folder import ImageFolder, image_files
+from orbslam2py.datasets.live import LiveCamera
+from orbslam2py.datasets.masks import MaskedCamera, MaskedSequence
+from orbslam2py.datasets.recognise import has_layout, open_sequence
+from orbslam2py.datasets.video import VideoSequence
+from orbslam2py.errors import DatasetError
+from orbslam2py.settings import Sensor
+
+
+def open_input(
+    source: str | Path | int,
+    sensor: Sensor | None = None,
+    *,
+    settings: SettingsChoice = None,
+    fps: float | None = None,
+    times: str | Path | None = None,
+    mask: str | Path | None = None,
+) -> Sequence | LiveSource:
+    """Open a recorded sequence, a folder of images, a video or a camera.
+
+    Parameters
+    ----------
+    source
+        Folder of a TUM RGB-D, KITTI or EuRoC sequence, folder of images, video file, or number of
+        a camera (also as text, if there is no file of that name).
+    sensor
+        What to deliver images for; by default the richest there is.
+    settings
+        Settings, a file, a built-in name, or None to let the folder decide.
+    fps
+        Images per second of a folder of images or a video; the rate a camera is asked for.
+    times
+        File with one time stamp per image of a folder of images or a video: decimal seconds or
+        whole nanoseconds.
+    mask
+        An image file, 0 where no keypoint may lie, or a folder with one per image.
+
+    Returns
+    -------
+    Sequence or LiveSource
+        A `LiveSource`, opened already, for a camera.
+
+    Raises
+    ------
+    DatasetError
+        If there is nothing of that name, or it has no images for the sensor.
+    SettingsError
+        If there are no settings, or they are wrong.
+    ImageError
+        If the mask is no readable image.
+    """
+    named = Path(str(source))
+    if isinstance(source, int) or (str(source).isdecimal() and not named.exists()):
+        number = int(str(source))
+        if times is not None:
+            raise DatasetError("--times does not go with a camera: its images get their own times")
+        camera = LiveCamera(number, sensor, settings=settings, fps=fps)
+        live: LiveSource = camera if mask is None else MaskedCamera(camera, mask)
+        live.open()
+        return live
+    sequence = _open_recorded(named, sensor, settings, fps, times)
+    return sequence if mask is None else MaskedSequence(sequence, mask)
+
+
+def _open_recorded(
+    path: Path,
+    sensor: Sensor | None,
+    settings: SettingsChoice,
+    fps: float | None,
+    times: str | Path | None,
+) -> Sequence:
+    if path.is_file():
+        return VideoSequence(path, sensor, settings=settings, fps=fps, times=times)
+    if path.is_dir() and not has_layout(path):
+        if image_files(path):
+            return ImageFolder(path, sensor, settings=settings, fps=fps, times=times)
+        inner = sorted(child for child in path.iterdir() if child.is_dir() and image_files(child))
+        if inner and not any(has_layout(child) for child in path.iterdir()):
+            raise DatasetError(f"no images in {path} itself; did you mean {inner[0]}?")
+    sequence = open_sequence(path, sensor, settings=settings)
+    for name, value in (("--fps", fps), ("--times", times)):
+        if value is not None:
+            raise DatasetError(
+                f"{name} is for a folder of images or a video; {path} is {sequence.layout}, "
+                "which has its own time stamps"
+            )
+    return sequence

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Points of a map as a PLY file (Stanford polygon format)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from orbslam2py._arrays import FloatArray
+from orbslam2py._files import atomic_write
+
+
+def write_ply(path: str | Path, points: FloatArray) -> None:
+    """Write points as a binary PLY file that common viewers open.
+
+    Parameters
+    ----------
+    path
+        The file; replaced only when everything was written.
+    points
+        Positions (p, 3) in the frame of keyframe 0's camera [m] (one camera: its unit of length);
+        written as float32.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written; an existing file is kept then.
+    """
+    header = (
+        "ply\nformat binary_little_endian 1.0\ncomment camera frame of keyframe 0: "
+        f"x right, y down, z forward [m]\nelement vertex {len(points)}\n"
+        "property float x\nproperty float y\nproperty float z\nend_header\n"
+    )
+    with atomic_write(path, binary=True) as stream:
+        stream.write(header.encode())
+        stream.write(np.ascontiguousarray(points, dtype="<f4").tobytes())

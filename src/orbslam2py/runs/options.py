@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a run is asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from orbslam2py.datasets.base import LiveSource, Sequence
+from orbslam2py.errors import DatasetError
+from orbslam2py.runs.feeds import is_sequence
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.options import SystemOptions
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """What to run and how."""
+
+    sensor: Sensor
+    """What the images come from."""
+    system: SystemOptions = field(default_factory=SystemOptions)
+    """How the system works. Recorded images always wait for mapping, unless `realtime` is asked
+    for; a camera's never do."""
+    realtime: bool = False
+    """Follow the time stamps and drop frames as a camera would; otherwise every frame is tracked,
+    as fast as possible, waiting for mapping."""
+    start: int = 0
+    """Index of the first frame."""
+    stride: int = 1
+    """Take every so many frames."""
+    max_frames: int | None = None
+    """Take at most so many frames."""
+    localize_after: int | None = None
+    """Switch to localization mode after so many frames."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "sensor", Sensor(self.sensor))
+
+    def n_frames(self, source: Sequence | LiveSource) -> int | None:
+        """How many frames a run over the source will take; None for a camera without an end.
+
+        Raises
+        ------
+        DatasetError
+            If the options make no sense for the source.
+        """
+        if is_sequence(source):
+            return len(self.indices(len(source)))
+        self.check_for_camera()
+        return self.max_frames
+
+    def indices(self, n_frames: int) -> list[int]:
+        """Indices of the frames of a sequence that are used.
+
+        Raises
+        ------
+        DatasetError
+            If there are none, or the options contradict each other.
+        """
+        if self.system.deterministic and self.realtime:
+            raise DatasetError(
+                "--deterministic and --realtime exclude each other: dropping frames depends on time"
+            )
+        if (
+            self.start < 0
+            or self.stride < 1
+            or (self.max_frames is not None and self.max_frames < 1)
+        ):
+            raise DatasetError("--start must be 0 or more, --stride and --max-frames 1 or more")
+        indices = list(range(self.start, n_frames, self.stride))
+        if not indices:
+            raise DatasetError(f"--start {self.start} is past the end: {n_frames} frames")
+        return indices[: self.max_frames]
+
+    def check_for_camera(self) -> None:
+        """See that the options make sense for a camera.
+
+        Raises
+        ------
+        DatasetError
+            Naming the option that does not.
+        """
+        if self.system.deterministic or self.realtime:
+            name = "--deterministic" if self.system.deterministic else "--realtime"
+            raise DatasetError(f"{name} is for recorded images: a camera always goes in real time")
+        if self.start != 0 or self.stride != 1:
+            name = "--start" if self.start != 0 else "--stride"
+            raise DatasetError(f"{name} is for recorded images, not for a camera")
+        if self.max_frames is not None and self.max_frames < 1:
+            raise DatasetError("--max-frames must be 1 or more")

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A sequence in, a folder of results out: what the command does, for Python."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from orbslam2py import _core as core
+from orbslam2py.datasets.base import LiveSource, Sequence
+from orbslam2py.runs.options import RunOptions
+from orbslam2py.runs.outputs import OutputWriter, link_latest, prepare_output_folder
+from orbslam2py.runs.report import RunEvaluation, evaluate_run, make_report
+from orbslam2py.runs.result import RunResult
+from orbslam2py.runs.runner import Progress, SequenceRunner
+from orbslam2py.trajectory.trajectory import Trajectory
+from orbslam2py.vocabulary.vocabulary import load_vocabulary
+
+
+@dataclass(frozen=True)
+class FinishedRun:
+    """A run that has ended, for whatever reason, and what is to be said about it."""
+
+    result: RunResult
+    """Rows, trajectories and map; why it ended."""
+    evaluation: RunEvaluation | None
+    """Against ground truth, where there is one."""
+    report: dict[str, Any]
+    """All figures, as in ``report.json``."""
+    folder: Path | None
+    """Where the files are; None if none were asked for."""
+    problems: tuple[str, ...]
+    """Files that could not be written, and where their copies are."""
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """Frames of the last map that have a pose, after the last optimisation."""
+        return self.result.tracked_trajectory()
+
+
+def run_sequence(
+    sequence: Sequence | LiveSource,
+    options: RunOptions | None = None,
+    *,
+    vocabulary: core.Vocabulary | str | Path | None = None,
+    output: str | Path | None = None,
+    force: bool = False,
+    progress: Progress | None = None,
+    stop: threading.Event | None = None,
+) -> FinishedRun:
+    """Run the system over a sequence, judge the result and write its files.
+
+    Parameters
+    ----------
+    sequence : Sequence or LiveSource
+        Images, time stamps and settings, as from `orbslam2py.open_sequence`.
+    options : RunOptions, optional
+        Which frames, and how; all of them with the sequence's sensor if None.
+    vocabulary : Vocabulary or path, optional
+        Visual words; the one shipped with the package if None.
+    output : str or Path, optional
+        Folder for the results; nothing is written if None.
+    force : bool
+        Accept an output folder that holds files.
+    progress : callable, optional
+        ``progress(row, system)``, called after every frame.
+    stop : threading.Event, optional
+        Ends the run after the present frame when it is set; what was done is written.
+
+    Returns
+    -------
+    FinishedRun
+        Also when the run was stopped or failed on the way: see `RunResult.interrupted` and
+        `RunResult.error`.
+
+    Raises
+    ------
+    DatasetError
+        If the options make no sense for the sequence, or the folder cannot take results.
+    SettingsError, VocabularyError
+        If these cannot be used.
+
+    Examples
+    --------
+    >>> sequence = orb.open_sequence("rgbd_dataset_freiburg1_desk", "rgbd")  # doctest: +SKIP
+    >>> orb.run_sequence(sequence, output="runs/desk").report["ate_rmse_m"]  # doctest: +SKIP
+    0.0158
+    """
+    options = options or RunOptions(sequence.settings.sensor)
+    if not isinstance(vocabulary, core.Vocabulary):
+        vocabulary = load_vocabulary(vocabulary)
+    runner = SequenceRunner(sequence, sequence.settings, vocabulary, options)
+    folder = None
+    if output is not None:
+        folder = prepare_output_folder(Path(output), force=force)
+        link_latest(folder)
+    result = runner.run(progress, stop)
+    evaluation = evaluate_run(result)
+    report = make_report(result, evaluation)
+    problems: tuple[str, ...] = ()
+    if folder is not None:
+        writer = OutputWriter(folder)
+        writer.write_all(result, report, evaluation)
+        problems = tuple(writer.problems)
+    return FinishedRun(result, evaluation, report, folder, problems)

@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The groups of which settings are made: camera, features, depth, rectification, map view.
+
+Every group checks its values when it is made and names all that are wrong by the keys of the
+settings file. The meaning of a key is described at the field it becomes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypedDict
+
+import numpy as np
+
+from orbslam2py._arrays import FloatArray
+from orbslam2py.errors import SettingsError
+from orbslam2py.settings.keys import check_group
+
+
+def raise_if_any(problems: list[str]) -> None:
+    """Raise `SettingsError` with all problems in one message, if there are some."""
+    if problems:
+        raise SettingsError("; ".join(problems))
+
+
+@dataclass(frozen=True)
+class CameraSettings:
+    """Pinhole camera with OpenCV's radial-tangential distortion.
+
+    Attributes
+    ----------
+    fx, fy, cx, cy
+        Focal lengths and principal point in pixels; the centre of the top-left pixel is (0, 0).
+    k1, k2, p1, p2, k3
+        Distortion in OpenCV's order; all 0 for rectified images.
+    width, height
+        Image size in pixels as far as known. Never enforced: the first image decides.
+    fps
+        Frames per second.
+    bf
+        Baseline times fx [pixel metres]; 0 for a single camera.
+    rgb
+        Whether colour images are RGB (True) or BGR.
+    """
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    k1: float = 0.0
+    k2: float = 0.0
+    p1: float = 0.0
+    p2: float = 0.0
+    k3: float = 0.0
+    width: int | None = None
+    height: int | None = None
+    fps: float = 30.0
+    bf: float = 0.0
+    rgb: bool = False
+
+    def __post_init__(self) -> None:
+        raise_if_any(check_group("camera", self))
+
+    @property
+    def matrix(self) -> FloatArray:
+        """The camera matrix K, float64 (3, 3), pixels."""
+        return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
+
+    @property
+    def distortion(self) -> FloatArray:
+        """Coefficients k1, k2, p1, p2 and, only if it is not 0, k3; float64 (4,) or (5,)."""
+        four = [self.k1, self.k2, self.p1, self.p2]
+        return np.array([*four, self.k3] if self.k3 else four)
+
+    @property
+    def is_distorted(self) -> bool:
+        """Whether any distortion coefficient is not 0."""
+        return bool(np.any(self.distortion))
+
+
+@dataclass(frozen=True)
+class OrbSettings:
+    """ORB extraction (ORB-SLAM2, section III).
+
+    Attributes
+    ----------
+    n_features
+        Keypoints wanted per image, all pyramid levels together.
+    scale_factor, n_levels
+        Ratio between neighbouring pyramid levels and their number.
+    ini_th_fast, min_th_fast
+        FAST thresholds in grey levels: the second serves cells where the first finds nothing.
+    """
+
+    n_features: int = 1000
+    scale_factor: float = 1.2
+    n_levels: int = 8
+    ini_th_fast: int = 20
+    min_th_fast: int = 7
+
+    def __post_init__(self) -> None:
+        problems = check_group("orb", self)
+        if not problems and self.min_th_fast > self.ini_th_fast:
+            problems = [thresholds_swapped(self.min_th_fast, self.ini_th_fast)]
+        raise_if_any(problems)
+
+
+def thresholds_swapped(min_th_fast: int, ini_th_fast: int) -> str:
+    """Say that the second FAST threshold lies above the first."""
+    return (
+        f"ORBextractor.minThFAST is {min_th_fast}; allowed: 1 to ORBextractor.iniThFAST, "
+        f"which is {ini_th_fast}"
+    )
+
+
+@dataclass(frozen=True)
+class DepthSettings:
+    """How depth is read and trusted (stereo and RGB-D).
+
+    Attributes
+    ----------
+    close_factor
+        Points nearer than this many baselines are trusted from one view (key ``ThDepth``).
+    raw_per_metre
+        Units of the depth image per metre (key ``DepthMapFactor``, RGB-D); 1 for metres.
+    """
+
+    close_factor: float
+    raw_per_metre: float = 1.0
+
+    def __post_init__(self) -> None:
+        raise_if_any(check_group("depth", self))
+
+
+@dataclass(frozen=True)
+class ViewerSettings:
+    """Sizes of things in the map view, and where its eye stands.
+
+    Attributes
+    ----------
+    keyframe_size, camera_size
+        Length of the drawn cameras in units of the world [m].
+    keyframe_line_width, graph_line_width, camera_line_width, point_size
+        Widths of lines and points in pixels.
+    viewpoint_x, viewpoint_y, viewpoint_z
+        Where the eye stands, seen from the present camera (x right, y down, z forward) [m].
+    viewpoint_f
+        Focal length of the view in pixels.
+    """
+
+    keyframe_size: float = 0.05
+    keyframe_line_width: float = 1.0
+    graph_line_width: float = 0.9
+    point_size: float = 2.0
+    camera_size: float = 0.08
+    camera_line_width: float = 3.0
+    viewpoint_x: float = 0.0
+    viewpoint_y: float = -0.7
+    viewpoint_z: float = -1.8
+    viewpoint_f: float = 500.0
+
+    def __post_init__(self) -> None:
+        raise_if_any(check_group("viewer", self))
+
+
+@dataclass(frozen=True, eq=False)
+class CameraRectification:
+    """How one raw camera of a stereo pair becomes a rectified one (OpenCV's conventions).
+
+    Attributes
+    ----------
+    K
+        Raw camera matrix (3, 3), pixels.
+    D
+        Raw distortion, 4, 5 or 8 coefficients.
+    R
+        Rotation (3, 3) from raw to rectified camera coordinates.
+    P
+        Rectified projection (3, 4), pixels; ``P[0, 3]`` of the right camera is -bf.
+    width, height
+        Size of the rectified images in pixels.
+    """
+
+    K: FloatArray
+    D: FloatArray
+    R: FloatArray
+    P: FloatArray
+    width: int
+    height: int
+
+    def __post_init__(self) -> None:
+        problems = []
+        for name, shape in (("K", (3, 3)), ("D", None), ("R", (3, 3)), ("P", (3, 4))):
+            value = np.array(getattr(self, name), dtype=np.float64)
+            value = value.reshape(-1) if name == "D" else value
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+            if shape is not None and value.shape != shape:
+                problems.append(f"{name} must be {shape[0]} x {shape[1]}, not {value.shape}")
+            elif shape is None and value.size not in (4, 5, 8):
+                problems.append(f"{name} must have 4, 5 or 8 coefficients, not {value.size}")
+            elif not np.isfinite(value).all():
+                problems.append(f"{name} holds a number that is not finite")
+        if not problems and np.abs(self.R @ self.R.T - np.eye(3)).max() > 1e-3:
+            problems.append("R is not a rotation (rows not orthonormal to 1e-3)")
+        if min(self.width, self.height) < 1:
+            problems.append(f"width and height must be at least 1, not {self.width}, {self.height}")
+        raise_if_any(problems)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, CameraRectification):
+            return NotImplemented
+        return (self.width, self.height) == (other.width, other.height) and all(
+            np.array_equal(getattr(self, name), getattr(other, name)) for name in "KDRP"
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.width, self.height, self.K.tobytes(), self.P.tobytes()))
+
+
+@dataclass(frozen=True)
+class StereoRectification:
+    """Rectification of both cameras of a pair (keys ``LEFT.*`` and ``RIGHT.*``)."""
+
+    left: CameraRectification
+    right: CameraRectification
+
+
+class SettingsGroups(TypedDict):
+    """All groups of one settings file, by the names of the fields of `Settings`.
+
+    The reader gives them and the writer takes them, so that neither needs to know `Settings`.
+    """
+
+    camera: CameraSettings
+    orb: OrbSettings
+    depth: DepthSettings | None
+    rectification: StereoRectification | None
+    viewer: ViewerSettings

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Keeps where every frame was, so that trajectories follow what becomes of the map."""
+
+from __future__ import annotations
+
+import threading
+
+from orbslam2py import _core as core
+from orbslam2py.slam.records import FrameFeatures
+from orbslam2py.trajectory.trajectory import Trajectory
+
+
+class FrameRecorder:
+    """The path of the camera through the present map, and through those before it.
+
+    A frame is kept relative to its reference keyframe, so its pose moves with whatever refines the
+    map later. May be used from any thread, also while a frame is recorded.
+
+    Parameters
+    ----------
+    slam_map : orbslam2py._core.Map
+        The map that the frames were tracked in.
+    """
+
+    def __init__(self, slam_map: core.Map) -> None:
+        self._map = slam_map
+        self._recorder = core.TrajectoryRecorder()
+        self._ended: list[Trajectory] = []
+        self._lock = threading.Lock()
+
+    def record(self, frame: core.TrackedFrame, *, lost: bool) -> None:
+        """Keep a frame; a lost one is noted without a pose of its own."""
+        with self._lock:
+            self._recorder.record(self._map, frame, lost=lost)
+
+    def end_map(self) -> None:
+        """Keep the trajectory of the map as it is now: it is about to be dropped."""
+        with self._lock:
+            self._ended.append(self._present())
+            self._recorder.clear()
+
+    def trajectories(self) -> list[Trajectory]:
+        """One trajectory a map, relative to its keyframe 0: those ended, then the present one."""
+        with self._lock:
+            return [*self._ended, self._present()]
+
+    def _present(self) -> Trajectory:
+        poses = self._recorder.rebuild(self._map)
+        return Trajectory(
+            timestamps=poses.timestamps, T_wc=poses.T_wc, lost=poses.lost, indices=poses.frames
+        )
+
+
+def frame_features(frame: core.TrackedFrame) -> FrameFeatures:
+    """Copy the keypoints of a frame and what they were matched to."""
+    ids = frame.map_points
+    features = frame.features
+    return FrameFeatures(
+        keypoints=features.keypoints,
+        levels=features.levels,
+        depths=features.depth,
+        map_point_ids=ids,
+        inliers=(ids >= 0) & (frame.outlier == 0),
+    )

@@ -1,0 +1,255 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What one image does, top to bottom: the block diagram of the method.
+
+Mur-Artal and Tardos, "ORB-SLAM2", 2017, figure 2; ``docs/method/index.md``.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import threading
+from collections.abc import Callable
+
+from orbslam2py import _core as core
+from orbslam2py._timing import StageStatistics, StageTimer
+from orbslam2py.errors import ImageError
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings.settings import Settings
+from orbslam2py.slam.back_end import BackEnd
+from orbslam2py.slam.events import Callbacks, Relocalized, TrackingLost
+from orbslam2py.slam.frame_recorder import FrameRecorder, frame_features
+from orbslam2py.slam.front_end import FrontEnd
+from orbslam2py.slam.initialization import DepthInitializer, Initializer, MonocularInitializer
+from orbslam2py.slam.keyframe_decision import KeyframeDecision
+from orbslam2py.slam.localization_mode import LocalizationSwitch
+from orbslam2py.slam.options import SystemOptions
+from orbslam2py.slam.pose_search import PoseSearch
+from orbslam2py.slam.records import TrackingOutcome, TrackingRecord, TrackingState
+from orbslam2py.slam.relocalization import Relocalizer
+from orbslam2py.slam.thresholds import TrackingThresholds
+from orbslam2py.slam.tracking import Tracking
+
+_log = logging.getLogger(__name__)
+
+#: Seconds that a reset waits for a worker before it says who is late.
+RESET_PATIENCE = 60.0
+
+#: Makes a frame of images: takes its id and a timer.
+BuildFrame = Callable[[int, StageTimer], core.Frame]
+
+
+class Pipeline:
+    """All parts of the method, and the way of an image through them.
+
+    One thread at a time delivers images; everything else may be looked at from any thread.
+
+    Parameters
+    ----------
+    settings : Settings
+        Calibration and extractor settings.
+    sensor : Sensor
+        What the images come from.
+    vocabulary : orbslam2py._core.Vocabulary
+        Visual words.
+    options : SystemOptions
+        How to work.
+    callbacks : Callbacks
+        Who wants to know what happens.
+
+    Attributes
+    ----------
+    front_end, tracking, back_end
+        The stages: images to frames, frames to poses, keyframes to a map.
+    localization : LocalizationSwitch
+        Whether the map stays as it is.
+    recorder : FrameRecorder
+        Where every frame was.
+    reset_requested : threading.Event
+        When set, the next image begins a new map.
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        sensor: Sensor,
+        vocabulary: core.Vocabulary,
+        options: SystemOptions,
+        callbacks: Callbacks,
+    ) -> None:
+        self._sensor = sensor
+        self._waits_for_mapping = options.wait_for_mapping and not options.deterministic
+        self.front_end = FrontEnd(settings, sensor)
+        self.back_end = back_end = BackEnd(sensor, options, callbacks)
+        self.tracking = _make_tracking(settings, sensor, vocabulary, back_end, options.seed)
+        self.localization = LocalizationSwitch(
+            back_end.map, 1 if sensor.has_depth else 2, back_end.map_workers
+        )
+        self.recorder = FrameRecorder(back_end.map)
+        self.statistics = StageStatistics()
+        self.reset_requested = threading.Event()
+        self.n_resets = 0
+        self._next_frame_id = 0
+        self._last_timestamp = -math.inf
+
+    def start(self) -> None:
+        """Start the workers' threads, now that everything refers to everything it needs."""
+        for worker in self.back_end.workers:
+            worker.start()
+
+    # ---- one image -------------------------------------------------------------------------------
+    def process(self, timestamp: float, build: BuildFrame, *, details: bool) -> TrackingRecord:
+        """Take one image from its pixels to its record.
+
+        Parameters
+        ----------
+        timestamp : float
+            Seconds.
+        build : callable
+            Makes the frame: ``build(frame_id, timer)``.
+        details : bool
+            The record is to hold keypoints and matches.
+        """
+        back_end, tracking = self.back_end, self.tracking
+        for worker in back_end.workers:
+            worker.raise_if_failed()
+        if self.reset_requested.is_set():
+            self._reset()
+        self._check_timestamp(timestamp)
+        self.localization.apply()
+
+        timer = StageTimer()
+        if self._waits_for_mapping:
+            with timer("wait"):
+                self._wait_for_mapping()
+        state_before = tracking.state
+        with timer("track"):
+            frame = core.TrackedFrame(build(self._next_frame_id, timer))
+            # From here on the image counts: every id is one image.
+            self._next_frame_id += 1
+            self._last_timestamp = timestamp
+            outcome = tracking.track(frame, timer, localize=self.localization.on)
+        self.statistics.add(timer.milliseconds)
+
+        self._keep(frame, outcome)
+        record = self._record(frame, outcome, timer, details=details)
+        self._announce(state_before, record)
+        back_end.mapping.start()
+        return record
+
+    def _check_timestamp(self, timestamp: float) -> None:
+        if not math.isfinite(timestamp):
+            raise ImageError(f"the time stamp must be a finite number of seconds, got {timestamp}")
+        if timestamp <= self._last_timestamp:
+            raise ImageError(
+                f"time stamps must grow: {timestamp!r} came after {self._last_timestamp!r}"
+            )
+
+    def _wait_for_mapping(self) -> None:
+        worker = self.back_end.mapping.worker
+        if self._sensor.has_depth:
+            worker.wait_until_waiting(at_most=1)
+        elif not worker.held:
+            worker.wait_until_waiting(at_most=0)
+            # New points of a single camera come from mapping alone, and a busy mapper takes no
+            # keyframes: on fast motion the map would end before the mapper is done.
+            worker.wait_until_idle()
+
+    def _keep(self, frame: core.TrackedFrame, outcome: TrackingOutcome) -> None:
+        if outcome.reset_needed:
+            _log.info("lost soon after initialization; starting a new map")
+            self.reset_requested.set()
+        elif outcome.state in (TrackingState.OK, TrackingState.LOST):
+            self.recorder.record(frame, lost=outcome.state is TrackingState.LOST)
+
+    def _record(
+        self,
+        frame: core.TrackedFrame,
+        outcome: TrackingOutcome,
+        timer: StageTimer,
+        *,
+        details: bool,
+    ) -> TrackingRecord:
+        ok = outcome.state is TrackingState.OK
+        estimate = outcome.estimate
+        return TrackingRecord(
+            frame_id=frame.id,
+            timestamp=frame.timestamp,
+            map_index=self.back_end.map.epoch,
+            state=outcome.state,
+            reason=estimate.reason,
+            T_cw=frame.T_cw.matrix if ok and frame.T_cw is not None else None,
+            covariance=estimate.covariance if ok else None,
+            n_matches=estimate.n_matches,
+            n_inliers=estimate.n_inliers if ok else 0,
+            is_keyframe=outcome.is_keyframe,
+            reference_keyframe=self.tracking.reference_keyframe,
+            visual_odometry=ok and estimate.visual_odometry,
+            milliseconds=timer.milliseconds,
+            features=frame_features(frame) if details else None,
+        )
+
+    def _announce(self, before: TrackingState, record: TrackingRecord) -> None:
+        events = self.back_end.events
+        if before is TrackingState.OK and record.state is TrackingState.LOST:
+            events.post(
+                TrackingLost(
+                    map_index=record.map_index,
+                    frame_id=record.frame_id,
+                    timestamp=record.timestamp,
+                    reason=str(record.reason),
+                )
+            )
+        elif before is TrackingState.LOST and record.T_wc is not None:
+            events.post(
+                Relocalized(
+                    map_index=record.map_index,
+                    frame_id=record.frame_id,
+                    timestamp=record.timestamp,
+                    T_wc=record.T_wc,
+                )
+            )
+
+    # ---- a new map -------------------------------------------------------------------------------
+    def _reset(self) -> None:
+        _log.info("resetting: map %d ends", self.back_end.map.epoch)
+        self.back_end.reset(RESET_PATIENCE, keep=self.recorder.end_map)
+        self.tracking.reset()
+        self._next_frame_id = 0
+        self._last_timestamp = -math.inf
+        self.reset_requested.clear()
+        self.n_resets += 1
+
+
+def _make_tracking(
+    settings: Settings,
+    sensor: Sensor,
+    vocabulary: core.Vocabulary,
+    back_end: BackEnd,
+    seed: int,
+) -> Tracking:
+    slam_map, mapping = back_end.map, back_end.mapping
+    initializer: Initializer
+    if sensor is Sensor.MONOCULAR:
+        initializer = MonocularInitializer(slam_map, vocabulary, mapping, seed)
+    else:
+        initializer = DepthInitializer(slam_map, vocabulary, mapping)
+    search = PoseSearch(
+        slam_map,
+        vocabulary,
+        sensor,
+        settings.max_keyframe_interval,
+        Relocalizer(slam_map, back_end.keyframe_index, seed),
+        TrackingThresholds(),
+    )
+    return Tracking(
+        slam_map,
+        vocabulary,
+        mapping,
+        initializer=initializer,
+        search=search,
+        keyframe_decision=KeyframeDecision(
+            slam_map, mapping.worker, sensor, settings.max_keyframe_interval
+        ),
+        has_depth=sensor.has_depth,
+    )

@@ -1,0 +1,247 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The ways to a frame's pose: each takes a frame and returns one estimate.
+
+The motion model knows where the camera should be, from the last frame and its speed.
+
+Mur-Artal, Montiel and Tardos, 2015, sections V-B to V-D; ``docs/method/tracking.md``.
+"""
+
+from __future__ import annotations
+
+from orbslam2py import _core as core
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.records import PoseEstimate, Reason
+from orbslam2py.slam.relocalization import Relocalizer
+from orbslam2py.slam.thresholds import TrackingThresholds
+
+
+class MotionModel:
+    """The last frame that had a pose, and the motion since the one before it.
+
+    Attributes
+    ----------
+    velocity : Pose or None
+        Motion from the last frame to the next, ``T_cl``; None where none is known.
+    last_points : PointBatch
+        Copies of the points that the last frame saw, as of the last `follow_map`.
+    """
+
+    def __init__(self) -> None:
+        self.velocity: core.Pose | None = None
+        self.last_points = core.PointBatch()
+        self._last: core.TrackedFrame | None = None
+        self._last_tracked = False
+
+    @property
+    def last(self) -> core.TrackedFrame:
+        """The last frame that had a pose; stays where tracking was lost."""
+        assert self._last is not None
+        return self._last
+
+    def follow_map(self, slam_map: core.Map) -> None:
+        """Bring the last frame up to date with the map, which mapping and loop closing move."""
+        self.last_points, stretched = core.follow_map(slam_map, self.last)
+        if self.velocity is not None and stretched != 1.0:
+            # A single camera's loop took out a drift of scale, in which the speed was measured.
+            self.velocity = core.Pose(
+                self.velocity.quaternion_xyzw, stretched * self.velocity.translation
+            )
+
+    def predict(self, frame: core.TrackedFrame) -> None:
+        """Give a frame the pose that the speed leads to, or the last frame's without a speed."""
+        T_lw = self.last.T_cw
+        assert T_lw is not None
+        frame.T_cw = T_lw if self.velocity is None else self.velocity @ T_lw
+        frame.share_anchor(self.last)
+
+    def stand_still(self, frame: core.TrackedFrame) -> None:
+        """Give a frame the last frame's pose."""
+        frame.T_cw = self.last.T_cw
+        frame.share_anchor(self.last)
+
+    def jump(self, T_lw: core.Pose | None) -> None:
+        """The last frame was elsewhere than it seemed; None: nobody knows where."""
+        if T_lw is None:
+            self._last_tracked = False
+        else:
+            self.last.T_cw = T_lw
+
+    def remember(self, frame: core.TrackedFrame) -> None:
+        """Make a tracked frame the last one."""
+        self._last = frame
+        self._last_tracked = True
+
+    def update_velocity(self, frame: core.TrackedFrame) -> None:
+        """Measure the motion from the last frame to this one, if they follow each other."""
+        last = self._last
+        self.velocity = None
+        if last is None or last.T_cw is None or frame.T_cw is None or not self._last_tracked:
+            return
+        if frame.id == last.id + 1 and frame.big_change == last.big_change:
+            self.velocity = frame.T_cw @ last.T_cw.inverse()
+
+    def lose(self) -> None:
+        """Tracking was lost: the speed is unknown."""
+        self.velocity = None
+        self._last_tracked = False
+
+
+class PoseSearch:
+    """Finds a frame's pose from the last frame, a keyframe, the whole map or the local map.
+
+    Parameters
+    ----------
+    slam_map : orbslam2py._core.Map
+        The map.
+    vocabulary : orbslam2py._core.Vocabulary
+        Visual words for matching with keyframes.
+    sensor : Sensor
+        What the images come from.
+    max_keyframe_interval : int
+        Frames of one second, during which a relocalization has to prove itself.
+    relocalizer : Relocalizer, optional
+        Finds lost frames in the map; without it none is found there.
+    thresholds : TrackingThresholds
+        Limits.
+
+    Attributes
+    ----------
+    motion : MotionModel
+        The last frame and the speed.
+    reference_keyframe : int
+        Shares most points with the last frame that had a pose, -1 before the first.
+    last_relocalization : int
+        Id of the frame in which the camera was last found again. 0 at the beginning, as if the
+        first frame had been: a young map has to prove itself.
+    """
+
+    def __init__(
+        self,
+        slam_map: core.Map,
+        vocabulary: core.Vocabulary,
+        sensor: Sensor,
+        max_keyframe_interval: int,
+        relocalizer: Relocalizer | None,
+        thresholds: TrackingThresholds,
+    ) -> None:
+        self._map = slam_map
+        self._vocabulary = vocabulary
+        self._sensor = sensor
+        self._max_keyframe_interval = max_keyframe_interval
+        self._relocalizer = relocalizer
+        self.limits = thresholds
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the frames before."""
+        self.motion = MotionModel()
+        self.reference_keyframe = -1
+        self.last_relocalization = 0
+
+    def follow_map(self) -> None:
+        """Bring the last frame and the reference keyframe up to date with the map."""
+        self.motion.follow_map(self._map)
+        self.reference_keyframe = self._map.living(self.reference_keyframe)
+
+    def just_relocalized(self, frame: core.TrackedFrame) -> bool:
+        """Whether the camera was found again in this frame or right before it."""
+        return frame.id < self.last_relocalization + self.limits.frames_after_relocalization
+
+    # ---- first estimate --------------------------------------------------------------------------
+    def by_motion_model(
+        self, frame: core.TrackedFrame, *, beyond_the_map: bool = False
+    ) -> PoseEstimate:
+        """From the points that the last frame saw, searched where its speed puts them.
+
+        Parameters
+        ----------
+        frame : orbslam2py._core.TrackedFrame
+            The frame.
+        beyond_the_map : bool
+            Also from depths that the last frame measured and the map does not hold.
+        """
+        limits, motion = self.limits, self.motion
+        motion.predict(frame)
+        if beyond_the_map:
+            core.add_temporary_points(motion.last, motion.last_points)
+        stereo = self._sensor is Sensor.STEREO
+        narrow = limits.motion_model_window_stereo if stereo else limits.motion_model_window
+        n_matches = 0
+        for window in (narrow, limits.motion_model_widening * narrow):
+            frame.clear_associations()
+            n_matches = core.match_last_frame(
+                frame, motion.last, motion.last_points, window, self._sensor.has_depth
+            )
+            if n_matches >= limits.motion_model_matches:
+                return self._optimize(frame, n_matches, Reason.FEW_MATCHES_LAST_FRAME)
+        return PoseEstimate(Reason.FEW_MATCHES_LAST_FRAME, n_matches)
+
+    def by_reference_keyframe(self, frame: core.TrackedFrame) -> PoseEstimate:
+        """From the reference keyframe's points, matched by words, beginning at the last pose."""
+        self.motion.stand_still(frame)
+        core.describe(frame.features, self._vocabulary)
+        n_matches = core.match_keyframe_by_words(
+            self._map, self.reference_keyframe, frame, self.limits.reference_ratio
+        )
+        if n_matches < self.limits.reference_matches:
+            return PoseEstimate(Reason.FEW_MATCHES_REFERENCE, n_matches)
+        return self._optimize(frame, n_matches, Reason.FEW_INLIERS_REFERENCE)
+
+    def by_relocalization(self, frame: core.TrackedFrame) -> PoseEstimate:
+        """From any keyframe that looks like the frame, without a guess."""
+        if self._relocalizer is None:
+            return PoseEstimate(Reason.NOT_FOUND_IN_MAP)
+        core.describe(frame.features, self._vocabulary)
+        n_inliers = self._relocalizer.relocalize(frame)
+        if n_inliers == 0:
+            return PoseEstimate(Reason.NOT_FOUND_IN_MAP)
+        core.anchor_frame(self._map, frame, self.reference_keyframe)
+        return PoseEstimate(n_matches=n_inliers, n_inliers=n_inliers, relocalized=True)
+
+    def _optimize(self, frame: core.TrackedFrame, n_matches: int, too_few: Reason) -> PoseEstimate:
+        optimized = core.optimize_pose(frame)
+        estimate = PoseEstimate(
+            n_matches=n_matches,
+            n_inliers=optimized.n_inliers,
+            covariance=optimized.covariance,
+            discarded=frame.discard_outliers(),
+        )
+        enough = estimate.n_inliers >= self.limits.map_matches
+        return estimate if enough else estimate.failed(too_few)
+
+    # ---- local map -------------------------------------------------------------------------------
+    def in_local_map(self, frame: core.TrackedFrame, first: PoseEstimate) -> PoseEstimate:
+        """Refine a first estimate with all points around it; the final verdict on the pose."""
+        local_map = core.select_local_map(self._map, frame)
+        if local_map.reference_keyframe >= 0:
+            self.reference_keyframe = local_map.reference_keyframe
+        matches = core.match_local_map(
+            frame, local_map.points, first.discarded, self._local_map_window(frame)
+        )
+        n_matches = frame.n_associated()
+        optimized = core.optimize_pose(frame)
+        core.count_sightings(self._map, frame, matches.visible)
+        if self._sensor is Sensor.STEREO:
+            frame.discard_outliers()
+        estimate = PoseEstimate(
+            n_matches=n_matches,
+            n_inliers=optimized.n_inliers,
+            covariance=optimized.covariance,
+            discarded=first.discarded,
+            relocalized=first.relocalized,
+        )
+        enough = estimate.n_inliers >= self._local_map_inliers(frame)
+        return estimate if enough else estimate.failed(Reason.FEW_INLIERS_LOCAL_MAP)
+
+    def _local_map_inliers(self, frame: core.TrackedFrame) -> int:
+        if frame.id < self.last_relocalization + self._max_keyframe_interval:
+            return self.limits.local_map_inliers_after_relocalization
+        return self.limits.local_map_inliers
+
+    def _local_map_window(self, frame: core.TrackedFrame) -> float:
+        limits = self.limits
+        if self.just_relocalized(frame):
+            return limits.local_map_window_after_relocalization
+        if self._sensor is Sensor.RGBD:
+            return limits.local_map_window_rgbd
+        return limits.local_map_window

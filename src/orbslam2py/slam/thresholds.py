@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The limits of the method that Python decides by; those of single steps stand beside them in C++.
+
+The defaults are the published system's unless a field says otherwise; ``docs/method`` says chapter
+by chapter where each comes from.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class InitializationThresholds:
+    """How a map may begin."""
+
+    keypoints_with_depth_sensor: int = 500
+    """A stereo or RGB-D frame must have more keypoints than this to begin a map ..."""
+    depths: int = 100
+    """... and at least this many with depth, or the map would be lost at once."""
+    keypoints: int = 100
+    """Each of a single camera's two views must have more keypoints than this."""
+    matches: int = 100
+    """Fewest matches between the two views."""
+    window: float = 100.0
+    """Half width of the search window around the position in the first view, pixels."""
+    ratio: float = 0.9
+    """Best by second best descriptor distance between the two views."""
+    feature_factor: int = 2
+    """Extracted features while a single camera starts, in multiples of the settings' number."""
+
+
+@dataclass(frozen=True)
+class TrackingThresholds:
+    """When a pose is believed, and how far around a prediction is searched."""
+
+    motion_model_window: float = 15.0
+    """Half width of the search window around a predicted keypoint, pixels at level 0 ..."""
+    motion_model_window_stereo: float = 7.0
+    """... and for a stereo pair, whose points are predicted better."""
+    motion_model_widening: float = 2.0
+    """Factor on the window when it holds too few matches; it is widened once."""
+    motion_model_matches: int = 20
+    """Fewest matches with the last frame."""
+    reference_ratio: float = 0.7
+    """Best by second best descriptor distance, matching with the reference keyframe by words."""
+    reference_matches: int = 15
+    """Fewest matches with the reference keyframe."""
+    map_matches: int = 10
+    """Fewest inliers of the first pose estimate; in localization mode: of these on map points."""
+    localization_matches: int = 20
+    """In localization mode the motion model needs more inliers than this."""
+    local_map_window: float = 1.0
+    """Factor on the search radius around projected points of the local map ..."""
+    local_map_window_rgbd: float = 3.0
+    """... with an RGB-D camera ..."""
+    local_map_window_after_relocalization: float = 5.0
+    """... and in the frames right after a relocalization, with any sensor."""
+    frames_after_relocalization: int = 2
+    """How many frames that is; meanwhile there is no motion model either."""
+    local_map_inliers: int = 30
+    """Fewest inliers in the local map."""
+    local_map_inliers_after_relocalization: int = 50
+    """The same for the first second after a relocalization."""
+    small_map: int = 5
+    """A map with so few keyframes is given up when tracking is lost, and a new one is begun."""
+
+
+@dataclass(frozen=True)
+class KeyframeThresholds:
+    """Which frames become keyframes."""
+
+    few_keyframes: int = 2
+    """In a map of up to so many keyframes ..."""
+    observations_of_few: int = 2
+    """... a point of the reference keyframe counts when so many keyframes see it ..."""
+    observations: int = 3
+    """... and so many in a larger one."""
+    share: float = 0.75
+    """A frame that tracks less than this share of its reference's points sees new things ..."""
+    share_of_first: float = 0.4
+    """... while there is one keyframe only ..."""
+    share_monocular: float = 0.9
+    """... and with a single camera."""
+    weak_share: float = 0.25
+    """Below this share tracking is weak, and the mapper is not waited for (stereo, RGB-D)."""
+    few_close_points: int = 100
+    """With fewer close points tracked than this ..."""
+    many_untracked_close_points: int = 70
+    """... and more close points than this not in the map, a keyframe is needed."""
+    inliers: int = 15
+    """A keyframe needs more inliers than this."""
+    queue: int = 3
+    """A busy mapper is given a keyframe only if fewer than this wait (stereo, RGB-D)."""
+
+
+@dataclass(frozen=True)
+class RelocalizationThresholds:
+    """When a lost frame counts as found."""
+
+    ratio: float = 0.75
+    """Best by second best descriptor distance, matching by words."""
+    matches: int = 15
+    """Fewest matches by words that make a candidate."""
+    iterations: int = 5
+    """RANSAC iterations that each candidate gets per turn."""
+    inliers: int = 10
+    """Fewest inliers of the first pose that are worth widening."""
+    enough: int = 50
+    """Inliers that make a success."""
+    narrow: int = 30
+    """More inliers than this, but not enough, are widened once more with a narrow window."""
+    wide_window: float = 10.0
+    """Search radius of the first widening, pixels at level 0 ..."""
+    wide_distance: int = 100
+    """... and the most bits in which descriptors may differ there."""
+    narrow_window: float = 3.0
+    """Search radius of the second widening ..."""
+    narrow_distance: int = 64
+    """... and its most differing bits."""
+
+
+@dataclass(frozen=True)
+class MappingThresholds:
+    """What local mapping looks at around a new keyframe."""
+
+    neighbours: int = 10
+    """Best covisible keyframes with which points are triangulated and fused ..."""
+    neighbours_monocular: int = 20
+    """... and with a single camera, all of whose points come from there."""
+    observations: int = 3
+    """A recent point seen by so many keyframes or fewer is dropped two keyframes later ..."""
+    observations_monocular: int = 2
+    """... and with a single camera."""
+    adjusted_keyframes: int = 2
+    """Local bundle adjustment begins with more keyframes than this."""
+
+
+@dataclass(frozen=True)
+class LoopThresholds:
+    """Where loops are looked for."""
+
+    gap: int = 10
+    """Keyframes after a loop that are not searched for another one."""

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a synthetic sequence shall be: world, sensor, length, disturbances."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+from orbslam2py.errors import SettingsError
+from orbslam2py.settings import Sensor
+from orbslam2py.synthetic.scenes import LAPS, ROOM_BESIDE, SyntheticWorld
+
+
+@dataclass(frozen=True)
+class SyntheticOptions:
+    """What a synthetic sequence shall be. None stands for the world's own value.
+
+    Attributes
+    ----------
+    world
+        Where the camera moves.
+    sensor
+        What delivers the images.
+    frames
+        Number of images; by default the whole way.
+    laps
+        How often to go around, instead of `frames`; only where the way comes back to its start
+        (1.2 in corridors and around the block, 1.1 in the figure of eight).
+    fps
+        Frames per second (20 indoors, 10 in streets).
+    speed
+        Metres per second along the way (0.7 in corridors, 0.4 between the rooms, 10 in streets);
+        not for the room, where one turn takes 30 s.
+    size
+        Width and height in pixels (640 x 480, in streets 1241 x 376).
+    seed
+        Another seed, another wallpaper and furniture.
+    noise
+        Standard deviation of the grey values' noise, grey levels.
+    exposure
+        Factor on the grey values.
+    depth_noise
+        Standard deviation of the depth [m] at 1 m; it grows with the square of the depth (RGB-D).
+    lateral
+        Metres to the right of the way: the same places from other viewpoints. Limited by the
+        walls (0.6 m between the rooms, 3.5 m in the street, 3 m around the block).
+    yaw
+        Degrees to the right of the direction of travel.
+
+    Raises
+    ------
+    SettingsError
+        If a value is out of range.
+    """
+
+    world: SyntheticWorld | str = SyntheticWorld.ROOM
+    sensor: Sensor | str = Sensor.STEREO
+    frames: int | None = None
+    laps: float | None = None
+    fps: float | None = None
+    speed: float | None = None
+    size: tuple[int, int] | None = None
+    seed: int = 0
+    noise: float = 0.0
+    exposure: float = 1.0
+    depth_noise: float = 0.0
+    lateral: float = 0.0
+    yaw: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "world", _member(SyntheticWorld, "world", self.world))
+        object.__setattr__(self, "sensor", _member(Sensor, "sensor", self.sensor))
+        _check_range("frames", self.frames, 1, 1_000_000)
+        _check_range("laps", self.laps, 0.01, 1000)
+        _check_range("fps", self.fps, 0.1, 1000)
+        _check_range("speed", self.speed, 0.001, 100)
+        for pixels in self.size or ():
+            _check_range("size", pixels, 64, 8192)
+        _check_range("seed", self.seed, 0, 2**31 - 1)
+        _check_range("noise", self.noise, 0, 100)
+        _check_range("exposure", self.exposure, 0.01, 100)
+        _check_range("depth_noise", self.depth_noise, 0, 1)
+        beside = ROOM_BESIDE[SyntheticWorld(self.world)]
+        _check_range("lateral", self.lateral, -beside, beside)
+        _check_range("yaw", self.yaw, -180, 180)
+        if self.speed is not None and self.world is SyntheticWorld.ROOM:
+            raise SettingsError("speed does not apply to the room: one turn takes 30 s")
+        if self.laps is not None and self.world not in LAPS:
+            names = ", ".join(map(str, LAPS))
+            raise SettingsError(f"laps apply to ways that come back to their start: {names}")
+        if self.laps is not None and self.frames is not None:
+            raise SettingsError("frames and laps exclude each other: both say how long the way is")
+
+
+def _member(kind: type[Enum], name: str, value: object) -> Enum:
+    try:
+        return kind(value)
+    except ValueError:
+        names = ", ".join(str(member) for member in kind)
+        raise SettingsError(f"{name} is '{value}'; there are {names}") from None
+
+
+def _check_range(name: str, value: float | None, low: float, high: float) -> None:
+    if value is not None and not (math.isfinite(value) and low <= value <= high):
+        raise SettingsError(f"{name} is {value}; allowed: {low:g} to {high:g}")

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Vocabularies trained on the features of images."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from orbslam2py import _core as core
+from orbslam2py._arrays import ByteArray
+from orbslam2py._files import IMAGE_SUFFIXES
+from orbslam2py.errors import ImageError, VocabularyError
+
+
+def read_training_images(folder: str | os.PathLike[str]) -> list[Path]:
+    """Find all images below a folder, sorted by path.
+
+    Parameters
+    ----------
+    folder : path
+        Searched with its subfolders.
+
+    Raises
+    ------
+    VocabularyError
+        If there are none.
+    """
+    root = Path(folder).expanduser()
+    images = sorted(p for p in root.rglob("*") if p.suffix.lower() in IMAGE_SUFFIXES)
+    if not images:
+        raise VocabularyError(f"{root}: no images ({', '.join(sorted(IMAGE_SUFFIXES))}) found")
+    return images
+
+
+def train_vocabulary(
+    images: Iterable[str | os.PathLike[str]],
+    options: core.TrainingOptions | None = None,
+    *,
+    features: core.OrbOptions | None = None,
+    progress: Callable[[str, float], object] | None = None,
+) -> core.Vocabulary | None:
+    """Train a vocabulary on the features of images.
+
+    Parameters
+    ----------
+    images : iterable of path
+        Photographs like those of the places to recognise, one of each place.
+    options : TrainingOptions, optional
+    features : OrbOptions, optional
+        How features are found; default: 2000 per image.
+    progress : callable, optional
+        Called with the name of the step and the fraction done, 0 to 1; returning False cancels.
+
+    Returns
+    -------
+    Vocabulary or None
+        Equal for equal images, options and seed, whatever the number of threads. None when
+        cancelled.
+
+    Raises
+    ------
+    ImageError
+        If a file is not an image.
+    SettingsError, VocabularyError
+        If options are out of range or the images have no features.
+    """
+    options = options or core.TrainingOptions()
+    options.check()
+    features = features or core.OrbOptions(n_features=2000)
+    report = progress or (lambda step, fraction: None)
+
+    descriptors = _describe_images([Path(image) for image in images], features, options, report)
+    if descriptors is None:
+        return None
+    ends = np.cumsum([len(rows) for rows in descriptors]).tolist()
+    rows = np.concatenate([np.empty((0, 32), np.uint8), *descriptors])
+    descriptors.clear()
+    return core.train_vocabulary(rows, ends, options, lambda done: report("Clustering", done))
+
+
+def _describe_images(
+    paths: list[Path],
+    features: core.OrbOptions,
+    options: core.TrainingOptions,
+    report: Callable[[str, float], object],
+) -> list[ByteArray] | None:
+    """Descriptors of every image, in order; None when cancelled."""
+    of_thread = threading.local()
+
+    def describe(path: Path) -> ByteArray:
+        if not hasattr(of_thread, "extractor"):
+            of_thread.extractor = core.OrbExtractor(features)
+        image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        if image is None:
+            raise ImageError(f"{path}: cannot be read as an image")
+        descriptors: ByteArray = of_thread.extractor.extract(image).descriptors
+        return descriptors
+
+    results: list[ByteArray] = []
+    pool = ThreadPoolExecutor(options.n_threads or os.cpu_count() or 1)
+    try:
+        for descriptors in pool.map(describe, paths):
+            results.append(descriptors)
+            if report("Reading images", len(results) / len(paths)) is False:
+                return None
+    finally:
+        pool.shutdown(cancel_futures=True)
+    return results

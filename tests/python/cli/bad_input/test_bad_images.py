@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Images that cannot be used: the frame is skipped, and said so."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from support.command_line import CommandLine, Results
+from support.spoilt_runs import N, expect_skipped, nth, run
+
+pytestmark = pytest.mark.watchdog(40)
+
+
+def spoil_empty(path: Path) -> None:
+    path.write_bytes(b"")
+
+
+def spoil_truncated(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-200])
+
+
+def spoil_text(path: Path) -> None:
+    path.write_text("this is no picture\n" * 50)
+
+
+def spoil_size(path: Path) -> None:
+    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    cv2.imwrite(str(path), image[:200, :300])
+
+
+def spoil_folder(path: Path) -> None:
+    path.unlink()
+    path.mkdir()
+
+
+def spoil_channels(path: Path) -> None:
+    cv2.imwrite(str(path), np.zeros((240, 320, 3), np.uint8))
+
+
+def spoil_16_bits(path: Path) -> None:
+    cv2.imwrite(str(path), np.zeros((240, 320), np.uint16))
+
+
+EITHER: list[tuple[Callable[[Path], None], str]] = [
+    (Path.unlink, "missing"),
+    (spoil_empty, "no readable image"),
+    (spoil_truncated, "truncated"),
+    (spoil_text, "no readable image"),
+    (spoil_size, "size"),
+    (spoil_folder, "cannot read image"),
+]
+
+CASES = [
+    *((part, spoil, message) for spoil, message in EITHER for part in ("rgb", "depth")),
+    ("rgb", spoil_16_bits, "8 bits"),
+    ("depth", spoil_channels, "channels"),
+]
+
+
+@pytest.mark.parametrize(("part", "spoil", "message"), CASES)
+def test_one_bad_image(
+    command: CommandLine, rgbd: Path, part: str, spoil: Callable[[Path], None], message: str
+) -> None:
+    spoil(nth(rgbd / part))
+    expect_skipped(run(command, rgbd), "r", message)
+
+
+@pytest.mark.parametrize("part", ["image_0", "image_1"])
+@pytest.mark.parametrize(
+    ("spoil", "message"), [(spoil_truncated, "truncated"), (spoil_size, "size")]
+)
+def test_one_bad_image_of_a_pair(
+    command: CommandLine, stereo: Path, part: str, spoil: Callable[[Path], None], message: str
+) -> None:
+    spoil(nth(stereo / part))
+    expect_skipped(run(command, stereo, "stereo"), "r", message)
+
+
+def test_first_image_bad(command: CommandLine, rgbd: Path) -> None:
+    spoil_truncated(nth(rgbd / "rgb", 0))
+    expect_skipped(run(command, rgbd), "r", "truncated", index=0)
+
+
+def test_all_images_bad(command: CommandLine, rgbd: Path) -> None:
+    shutil.rmtree(rgbd / "depth")
+    done = run(command, rgbd)
+    assert done.code == 3
+    assert "Nothing could be tracked: image " in done.err
+    assert Results(Path("r")).report["skipped_frames"] == N
+
+
+@pytest.mark.parametrize("value", [0, 65535])
+def test_depth_without_information_in_the_middle(
+    command: CommandLine, rgbd: Path, value: int
+) -> None:
+    cv2.imwrite(str(nth(rgbd / "depth")), np.full((240, 320), value, np.uint16))
+    done = run(command, rgbd)
+    assert (done.code, done.err) == (0, "")
+    assert Results(Path("r")).report["tracked"] >= N - 1

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The command ``orbslam2py evaluate``."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+from scipy.spatial.transform import Rotation
+from typer.testing import CliRunner
+
+from orbslam2py import DatasetError, Trajectory
+from orbslam2py.cli import main
+from orbslam2py.cli.evaluate import evaluate
+from orbslam2py.evaluation import Alignment, evaluate_trajectory
+from orbslam2py.trajectory import write_kitti, write_tum
+from support.made_up_paths import straight, wander
+
+
+def shrunk(truth: Trajectory) -> Trajectory:
+    """The same walk at half its size, with noise."""
+    T_wc = truth.T_wc.copy()
+    T_wc[:, :3, 3] += np.random.default_rng(1).normal(scale=0.05, size=(len(truth), 3))
+    T_wc[:, :3, 3] *= 0.5
+    return Trajectory(truth.timestamps, T_wc)
+
+
+app = typer.Typer()
+app.command()(evaluate)
+
+
+def test_command(tmp_path: Path) -> None:
+    truth = wander(100)
+    estimate = shrunk(truth)
+    write_tum(tmp_path / "a.txt", estimate)
+    write_tum(tmp_path / "b.txt", truth)
+    arguments = [str(tmp_path / "a.txt"), str(tmp_path / "b.txt"), "--alignment", "sim3"]
+    result = CliRunner().invoke(app, [*arguments, "--json", str(tmp_path / "c.json")])
+    assert result.exit_code == 0, result.output
+    figures = json.loads((tmp_path / "c.json").read_text())
+    expected = evaluate_trajectory(estimate, truth, Alignment.SIM3).as_dict()
+    assert figures["ate_rmse_m"] == pytest.approx(expected["ate_rmse_m"], rel=1e-4)
+    assert figures["ate_alignment"] == "sim3"
+    assert figures["t_rel_percent"] is None
+    assert f"{figures['ate_rmse_m']:.6f}" in result.output
+    assert "rpe rotation rmse over 1 s" in result.output
+
+
+def test_command_on_kitti_files(tmp_path: Path) -> None:
+    truth, estimate = straight(251, 1.0), straight(251, 1.01)
+    write_kitti(tmp_path / "a.txt", estimate)
+    write_kitti(tmp_path / "b.txt", truth)
+    path = tmp_path / "c.json"
+    arguments = [str(tmp_path / "a.txt"), str(tmp_path / "b.txt"), "--json", str(path)]
+    assert CliRunner().invoke(app, arguments).exit_code == 0
+    figures = json.loads(path.read_text())
+    assert figures["t_rel_percent"] == pytest.approx((15 * 1.01 + 5 * 1.005) / 20)
+    assert figures["rpe_translation_rmse_m_1s"] is None
+    write_tum(tmp_path / "b.txt", truth)
+    result = CliRunner().invoke(app, arguments)
+    assert isinstance(result.exception, DatasetError)
+    assert "no time stamps" in str(result.exception)
+
+
+@pytest.mark.parametrize("file_format", ["tum", "kitti"])
+def test_command_on_a_folder(tmp_path: Path, file_format: str) -> None:
+    folder = tmp_path / "09"
+    (folder / "image_0").mkdir(parents=True)
+    truth = wander(30)
+    (folder / "times.txt").write_text("".join(f"{t}\n" for t in truth.timestamps))
+    write_kitti(folder / "poses.txt", truth)
+    writer = write_tum if file_format == "tum" else write_kitti
+    writer(tmp_path / "a.txt", truth)
+    result = CliRunner().invoke(app, [str(tmp_path / "a.txt"), str(folder)])
+    assert result.exit_code == 0, result.output
+    assert "matched poses" in result.output
+    (folder / "poses.txt").unlink()
+    result = CliRunner().invoke(app, [str(tmp_path / "a.txt"), str(folder)])
+    assert "without ground truth" in str(result.exception)
+
+
+def test_command_moves_the_body_to_the_camera(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    truth = wander(40, rate=20.0)
+    T_BS = np.eye(4)
+    T_BS[:3, :3] = Rotation.from_rotvec([0, 0, np.pi / 2]).as_matrix().round(12)
+    T_BS[:3, 3] = [0.07, -0.02, 0.01]
+    body = truth.T_wc @ np.linalg.inv(T_BS)
+    rows = []
+    for stamp, T in zip(truth.timestamps, body, strict=True):
+        x, y, z, w = Rotation.from_matrix(T[:3, :3]).as_quat()
+        values = [*T[:3, 3], w, x, y, z]
+        rows.append(",".join([str(round(stamp * 1e9)), *(f"{v:.12f}" for v in values)]))
+    csv = tmp_path / "mav0" / "state_groundtruth_estimate0" / "data.csv"
+    csv.parent.mkdir(parents=True)
+    csv.write_text("#t\n" + "\n".join(rows) + "\n")
+    write_tum(tmp_path / "a.txt", truth)
+    arguments = [str(tmp_path / "a.txt"), str(csv), "--json", str(tmp_path / "c.json")]
+
+    assert CliRunner().invoke(app, arguments).exit_code == 0
+    assert "poses of the body" in caplog.text
+    without = json.loads((tmp_path / "c.json").read_text())["ate_rmse_m"]
+    calibration = tmp_path / "mav0" / "cam0" / "sensor.yaml"
+    calibration.parent.mkdir()
+    data = ", ".join(str(value) for value in T_BS.ravel())
+    calibration.write_text(
+        f"T_BS:\n  rows: 4\n  cols: 4\n  data: [{data}]\nresolution: [752, 480]\n"
+        "intrinsics: [450, 450, 376, 240]\ndistortion_coefficients: [0, 0, 0, 0]\n"
+    )
+    assert CliRunner().invoke(app, arguments).exit_code == 0
+    assert json.loads((tmp_path / "c.json").read_text())["ate_rmse_m"] < 1e-6 < without
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [(["none.txt", "none.txt"], "cannot open none.txt"), ([], "Missing argument")],
+)
+def test_command_on_bad_input(arguments: list[str], expected: str) -> None:
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code != 0
+    assert expected in result.output + str(result.exception)
+
+
+def test_bad_input_ends_with_status_2(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_tum(tmp_path / "a.txt", wander(5))
+    (tmp_path / "b.txt").write_text("1 2 3 4 5 6 7 x\n")
+    paths = [str(tmp_path / "a.txt"), str(tmp_path / "b.txt")]
+    monkeypatch.setattr(sys, "argv", ["orbslam2py", "evaluate", *paths])
+    with pytest.raises(SystemExit) as caught:
+        main()
+    assert caught.value.code == 2
+    assert "b.txt:1: 'x' is not a number" in capsys.readouterr().err

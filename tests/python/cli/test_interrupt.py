@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Ctrl-C at any moment: exit code 130, results written, no hang, no traceback."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+from orbslam2py.trajectory import read_tum
+from support.command_line import RUN_FILES, Results
+
+pytestmark = pytest.mark.watchdog(60)
+
+N = 30
+
+# Runs the command; sends Ctrl-C to itself when a function is called for the n-th time.
+_DRIVER = """
+import importlib, os, signal, sys
+
+module, name, n, times, *arguments = sys.argv[1:]
+owner = importlib.import_module(module)
+for part in name.split(".")[:-1]:
+    owner = getattr(owner, part)
+name = name.split(".")[-1]
+original = getattr(owner, name)
+left = int(n)
+
+def interrupting(*arguments, **named):
+    global left
+    left -= 1
+    if left == 0:
+        for _ in range(int(times)):
+            os.kill(os.getpid(), signal.SIGINT)
+    return original(*arguments, **named)
+
+setattr(owner, name, interrupting)
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.argv = ["orbslam2py", *arguments]
+print("ready", flush=True)
+from orbslam2py.cli import main
+main()
+"""
+
+
+@pytest.fixture(scope="module")
+def original(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    options = SyntheticOptions(world="corridor", sensor="rgbd", frames=N, size=(320, 240), speed=2)
+    return SyntheticSequence(options).write(tmp_path_factory.mktemp("sequences") / "lap")
+
+
+@pytest.fixture
+def lap(original: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(original, tmp_path / "lap"))
+
+
+def start(
+    folder: Path, module: str, name: str, n: int, times: int, *options: str
+) -> subprocess.Popen[str]:
+    arguments = ["run", "lap", "--sensor", "rgbd", "--output", "r", *options]
+    return subprocess.Popen(
+        [sys.executable, "-c", _DRIVER, module, name, str(n), str(times), *arguments],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def finish(process: subprocess.Popen[str]) -> tuple[int, str]:
+    try:
+        _, err = process.communicate(timeout=40)
+    finally:
+        process.kill()
+        process.wait()
+    assert "Traceback" not in err, err
+    assert "terminate" not in err, err
+    return process.returncode, err
+
+
+MOMENTS = [
+    # In the thread that reads images, in tracking, in mapping, at the end, while writing.
+    ("orbslam2py.datasets.tum", "read_depth", 9, ()),
+    ("orbslam2py._core", "match_local_map", 10, ()),
+    ("orbslam2py._core", "local_bundle_adjustment", 1, ()),
+    ("orbslam2py._core", "process_new_keyframe", 2, ("--deterministic",)),
+    ("orbslam2py", "System.wait_until_idle", 1, ()),
+    ("orbslam2py", "System.shutdown", 1, ()),
+    ("orbslam2py.runs.report", "evaluate_trajectory", 1, ()),
+    ("orbslam2py.runs.outputs", "draw_trajectory", 1, ()),
+    ("orbslam2py.runs.outputs", "OutputWriter._remove_stale", 1, ()),
+]
+
+
+@pytest.mark.parametrize(
+    ("module", "name", "n", "options"), MOMENTS, ids=[moment[1] for moment in MOMENTS]
+)
+def test_once(lap: Path, module: str, name: str, n: int, options: tuple[str, ...]) -> None:
+    code, err = finish(start(lap.parent, module, name, n, 1, *options))
+    assert code == 130, err
+    results = Results(lap.parent / "r")
+    assert {path.name for path in results.folder.iterdir()} == RUN_FILES
+    report = results.report
+    rows = results.frames
+    assert report["tracked"] == len(rows) == len(read_tum(results.folder / "trajectory.txt"))
+    assert 1 <= len(rows) <= N
+    if report["interrupted"]:
+        assert "interrupted; saving what was done so far" in err
+    else:
+        assert len(rows) == N
+    if module == "orbslam2py._core" and name == "match_local_map":
+        assert len(rows) <= 11, "the run ends with the present frame"
+
+
+def test_while_the_vocabulary_is_loaded(lap: Path) -> None:
+    code, err = finish(
+        start(lap.parent, "orbslam2py.vocabulary.vocabulary", "load_vocabulary", 1, 1)
+    )
+    assert (code, err) == (130, "")
+    assert not (lap.parent / "r").exists(), "nothing was computed"
+
+
+def test_while_libraries_are_loaded(lap: Path) -> None:
+    code, err = finish(start(lap.parent, "importlib.metadata", "version", 1, 1))
+    assert (code, err.strip()) == (130, "")
+
+
+def open_for_a_reader(pipe: Path) -> int:
+    """Open a pipe for writing once somebody reads from it."""
+    end = time.monotonic() + 30
+    while True:
+        try:
+            return os.open(pipe, os.O_WRONLY | os.O_NONBLOCK)
+        except OSError as error:
+            if error.errno != errno.ENXIO or time.monotonic() > end:
+                raise
+        time.sleep(0.01)
+
+
+def test_while_an_image_does_not_come(lap: Path) -> None:
+    """A network drive that hangs: here a pipe into which nobody writes."""
+    path = sorted((lap / "rgb").iterdir())[12]
+    path.unlink()
+    os.mkfifo(path)
+    process = start(lap.parent, "time", "ctime", 1, 1)
+    pipe = open_for_a_reader(path)
+    try:
+        time.sleep(2)  # the images before it are tracked meanwhile
+        process.send_signal(signal.SIGINT)
+        code, err = finish(process)
+    finally:
+        os.close(pipe)
+    assert code == 130
+    assert "an image is still being read" in err
+    assert Results(lap.parent / "r").report["tracked"] == 12
+    assert {path.name for path in (lap.parent / "r").iterdir()} == RUN_FILES
+
+
+def test_twice_while_writing_gives_up(lap: Path) -> None:
+    code, _ = finish(start(lap.parent, "orbslam2py.runs.outputs", "draw_trajectory", 1, 2))
+    assert code == 130
+    names = {path.name for path in (lap.parent / "r").iterdir()}
+    assert "trajectory.txt" in names
+    assert not any(name.endswith(".tmp") for name in names)
+
+
+@pytest.mark.parametrize("delay", [0.05, 0.5, 1.2])
+def test_any_moment(lap: Path, delay: float) -> None:
+    process = start(lap.parent, "time", "ctime", 1, 1, "--realtime")
+    assert process.stdout is not None
+    assert process.stdout.readline() == "ready\n"
+    time.sleep(delay)
+    process.send_signal(signal.SIGINT)
+    code, err = finish(process)
+    assert code == 130, err
+    report = lap.parent / "r" / "report.json"
+    assert report.is_file() == (lap.parent / "r").is_dir()
+
+
+def test_ignored_in_the_background(lap: Path) -> None:
+    """Where a shell has made a job deaf to Ctrl-C it stays deaf."""
+    code = (
+        "import os, signal, sys\n"
+        "signal.signal(signal.SIGINT, signal.SIG_IGN)\n"
+        "print('ready', flush=True)\n"
+        "os.execv(sys.executable, [sys.executable, '-m', 'orbslam2py', *sys.argv[1:]])\n"
+    )
+    arguments = ["run", "lap", "--sensor", "rgbd", "--output", "r", "--realtime", "--quiet"]
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, *arguments],
+        cwd=lap.parent,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "ready\n"
+    time.sleep(1.0)
+    process.send_signal(signal.SIGINT)
+    code_at_end, err = finish(process)
+    assert (code_at_end, err) == (0, "")
+    assert Results(lap.parent / "r").report["tracked"] == N

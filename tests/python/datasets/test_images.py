@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Image files of sequences, good and bad."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from orbslam2py import DatasetError, ImageError, Sensor
+from orbslam2py.datasets import open_sequence
+from support.small_folders import SIZE, image, save
+
+
+def test_missing_image(tum: Path) -> None:
+    (tum / "depth" / "100.105000.png").unlink()
+    sequence = open_sequence(tum)
+    sequence.load(0)
+    with pytest.raises(DatasetError, match=r"100\.105000\.png is listed but missing"):
+        sequence.load(1)
+
+
+@pytest.mark.parametrize("kind", ["rgb/100.100000.png", "depth/100.105000.png"])
+@pytest.mark.parametrize("fraction", [0.0, 0.01, 0.5, 0.99])
+def test_truncated_image(tum: Path, kind: str, fraction: float) -> None:
+    path = tum / kind
+    content = path.read_bytes()
+    path.write_bytes(content[: int(len(content) * fraction)])
+    with pytest.raises(ImageError, match=path.name):
+        open_sequence(tum).load(1)
+
+
+@pytest.mark.parametrize("fraction", [0.3, 0.99])
+def test_truncated_jpeg(tum: Path, fraction: float) -> None:
+    save(tum / "rgb" / "a.jpg", image(0, (*SIZE, 3)))
+    content = (tum / "rgb" / "a.jpg").read_bytes()
+    (tum / "rgb.txt").write_text("1.0 rgb/a.jpg\n")
+    sequence = open_sequence(tum, Sensor.MONOCULAR)
+    assert sequence.load(0).image.shape == (*SIZE, 3)
+    (tum / "rgb" / "a.jpg").write_bytes(content[: int(len(content) * fraction)])
+    with pytest.raises(ImageError, match=r"a\.jpg"):
+        sequence.load(0)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".jpg"])
+def test_truncated_image_that_the_decoder_completes(
+    tum: Path, suffix: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Older versions of OpenCV fill the rest with grey."""
+    path = tum / "rgb" / f"a{suffix}"
+    save(path, image(0, (*SIZE, 3)))
+    (tum / "rgb.txt").write_text(f"1.0 rgb/{path.name}\n")
+    monkeypatch.setattr(cv2, "imdecode", lambda *_: image(0, (*SIZE, 3)))
+    sequence = open_sequence(tum, Sensor.MONOCULAR)
+    assert sequence.load(0).image.shape == (*SIZE, 3)
+    path.write_bytes(path.read_bytes()[:-20])
+    with pytest.raises(ImageError, match="is truncated"):
+        sequence.load(0)
+
+
+def test_file_that_is_no_image(tum: Path) -> None:
+    (tum / "rgb" / "100.100000.png").write_text("no image at all")
+    with pytest.raises(ImageError, match=r"100\.100000\.png is no readable image"):
+        open_sequence(tum).load(1)
+
+
+def test_folder_in_place_of_an_image(tum: Path) -> None:
+    (tum / "rgb" / "100.100000.png").unlink()
+    (tum / "rgb" / "100.100000.png").mkdir()
+    with pytest.raises(ImageError, match="cannot read image"):
+        open_sequence(tum).load(1)
+
+
+def test_wrong_kinds_of_pixels(tum: Path) -> None:
+    save(tum / "rgb" / "100.100000.png", image(0, dtype=np.uint16))
+    save(tum / "depth" / "100.005000.png", image(0, (*SIZE, 3)))
+    sequence = open_sequence(tum)
+    with pytest.raises(ImageError, match="8 bits per channel"):
+        sequence.load(1)
+    with pytest.raises(ImageError, match="has 3 channels; depth images have one"):
+        sequence.load(0)

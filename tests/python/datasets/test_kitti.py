@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""KITTI odometry sequences: small made-up folders, good and bad."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orbslam2py import DatasetError, Sensor
+from orbslam2py.datasets import Layout, Sequence, open_sequence
+from orbslam2py.settings import builtin_settings
+from support.small_folders import P0, P1, SIZE, image
+
+
+def poses_text(n: int) -> str:
+    return "".join(f"1 0 0 {k} 0 1 0 0 0 0 1 {2 * k}\n" for k in range(n))
+
+
+def test_kitti_stereo(kitti: Path) -> None:
+    sequence: Sequence = open_sequence(kitti)
+    assert sequence.layout is Layout.KITTI
+    assert sequence.sensor is Sensor.STEREO
+    assert len(sequence) == 3
+    assert sequence.timestamp_text(1) == "1.036224e-01"
+    images = sequence.load(2)
+    np.testing.assert_array_equal(images.image, image(2))
+    np.testing.assert_array_equal(images.right, image(12))
+    settings = sequence.settings
+    camera = settings.camera
+    assert (camera.fx, camera.cx, camera.cy, camera.bf) == (700, 600, 180, 350)
+    assert camera.fps == pytest.approx(9.651, abs=1e-3)
+    assert settings.close_depth == 20.0
+    assert (settings.orb.n_features, settings.orb.ini_th_fast, settings.orb.min_th_fast) == (
+        2000,
+        20,
+        7,
+    )
+
+
+def test_kitti_left_camera_only(kitti: Path) -> None:
+    shutil.rmtree(kitti / "image_1")
+    (kitti / "calib.txt").write_text(P0 + "\nTr: 1 0 0 0 0 1 0 0 0 0 1 0\n")
+    sequence = open_sequence(kitti)
+    assert sequence.sensor is Sensor.MONOCULAR
+    assert sequence.load(0).right is None
+    assert sequence.settings.camera.bf == 0.0
+    with pytest.raises(DatasetError, match="no stereo images"):
+        open_sequence(kitti, Sensor.STEREO)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (P1, "no line 'P0:'"),
+        (P0, "no line 'P1:'"),
+        (f"{P0} 5\n{P1}", "calib.txt:1: P0 has 13 numbers instead of 12"),
+        (f"{P0}\n{P1}".replace("-350", "x"), "calib.txt:2: 'x' is not a number"),
+        (f"{P0}\n{P1}".replace("-350", "0"), "calib.txt: Camera.bf"),
+        (f"{P0}\n{P1}".replace("700", "0"), "calib.txt: Camera.fx"),
+    ],
+)
+def test_kitti_bad_calibration(kitti: Path, text: str, expected: str) -> None:
+    (kitti / "calib.txt").write_text(text + "\n")
+    with pytest.raises(DatasetError) as caught:
+        _ = open_sequence(kitti).settings
+    assert expected in str(caught.value)
+
+
+def test_kitti_without_calibration(kitti: Path) -> None:
+    (kitti / "calib.txt").unlink()
+    with pytest.raises(DatasetError, match="kitti04-12"):
+        _ = open_sequence(kitti).settings
+    sequence = open_sequence(kitti, settings="kitti07")
+    assert sequence.settings == builtin_settings("kitti04-12", Sensor.STEREO)
+    assert len(sequence.load(0).image) == SIZE[0]
+
+
+def test_kitti_missing_right_image(kitti: Path) -> None:
+    (kitti / "image_1" / "000001.png").unlink()
+    sequence = open_sequence(kitti)
+    with pytest.raises(DatasetError, match=r"image_1/000001\.png"):
+        sequence.load(1)
+    assert sequence.load(2).right is not None
+
+
+def test_kitti_index_out_of_range(kitti: Path) -> None:
+    for index in (-1, 3):
+        with pytest.raises(IndexError):
+            open_sequence(kitti).load(index)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"), [("0\nx\n", "times.txt:2: 'x'"), ("0 1\n", "times.txt:1: expected one")]
+)
+def test_kitti_bad_times(kitti: Path, text: str, expected: str) -> None:
+    (kitti / "times.txt").write_text(text)
+    with pytest.raises(DatasetError) as caught:
+        open_sequence(kitti)
+    assert expected in str(caught.value)
+
+
+@pytest.mark.parametrize("place", ["poses.txt", "07.txt", "../../poses/07.txt", "03.txt"])
+def test_kitti_ground_truth_is_found(kitti: Path, place: str) -> None:
+    assert open_sequence(kitti).ground_truth() is None
+    (kitti / place).parent.mkdir(exist_ok=True)
+    (kitti / place).write_text(poses_text(3))
+    truth = open_sequence(kitti).ground_truth()
+    assert truth is not None
+    np.testing.assert_allclose(truth.timestamps, [0.0, 0.1036224, 0.2072343])
+    np.testing.assert_array_equal(truth.positions[2], [2, 0, 4])
+
+
+@pytest.mark.parametrize(("n_poses", "n_expected"), [(5, 3), (2, 2)])
+def test_kitti_ground_truth_of_another_length(
+    kitti: Path, n_poses: int, n_expected: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    (kitti / "poses.txt").write_text(poses_text(n_poses))
+    truth = open_sequence(kitti).ground_truth()
+    assert truth is not None
+    assert len(truth) == n_expected
+    assert f"{n_poses} poses for 3 frames" in caplog.text
+
+
+def test_kitti_bad_ground_truth(kitti: Path) -> None:
+    (kitti / "poses.txt").write_text("1 0 0\n")
+    with pytest.raises(DatasetError, match=r"poses\.txt:1: expected 12"):
+        open_sequence(kitti).ground_truth()

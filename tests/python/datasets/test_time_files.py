@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Files of time stamps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orbslam2py import DatasetError
+from orbslam2py.datasets.time_files import read_time_file
+
+
+def times_file(tmp_path: Path, *lines: str) -> Path:
+    path = tmp_path / "times.txt"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_times_keep_their_text(tmp_path: Path) -> None:
+    stamps = read_time_file(times_file(tmp_path, "1.50", "", "2.25000001"), 2)
+    assert stamps.texts == ("1.50", "2.25000001")
+    np.testing.assert_array_equal(stamps.seconds, [1.5, 2.25000001])
+
+
+def test_whole_numbers_are_nanoseconds_if_seconds_make_no_sense(tmp_path: Path) -> None:
+    stamps = read_time_file(times_file(tmp_path, "1403636579763555584", "1403636579813555456"), 2)
+    assert stamps.texts == ("1403636579.763555584", "1403636579.813555456")
+    assert stamps.seconds[1] - stamps.seconds[0] == pytest.approx(0.05, abs=1e-6)
+    assert read_time_file(times_file(tmp_path, "0", "33000000"), 2).texts[1] == "0.033000000"
+    assert read_time_file(times_file(tmp_path, "0", "1", "2"), 3).seconds.tolist() == [0, 1, 2]
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        (["1", "2"], "holds 2 time stamps, but there are 3 images"),
+        (["1", "2", "3", "4"], "holds 4 time stamps, but there are 3 images"),
+        (["1.0", "2.0", "2.0"], r"times\.txt:3: time stamp 2\.0 is not after"),
+        (["1.0", "x", "2.0"], r"times\.txt:2: 'x' is not a number"),
+        (["1.0", "nan", "2.0"], r"times\.txt:2: nan is not finite"),
+        (["1.0 a.png", "2", "3"], r"times\.txt:1: expected one time stamp, found 2"),
+    ],
+)
+def test_bad_times(tmp_path: Path, lines: list[str], message: str) -> None:
+    with pytest.raises(DatasetError, match=message):
+        read_time_file(times_file(tmp_path, *lines), 3)
+
+
+def test_missing_times(tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match=r"cannot open .*times\.txt"):
+        read_time_file(tmp_path / "times.txt", 3)

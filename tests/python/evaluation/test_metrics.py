@@ -1,0 +1,287 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Errors of trajectories, against evo and against paths computed by hand."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from evo.core import metrics, sync
+from evo.core.trajectory import PoseTrajectory3D
+from scipy.spatial.transform import Rotation
+
+from orbslam2py import DatasetError, Trajectory
+from orbslam2py.evaluation import (
+    Alignment,
+    Similarity,
+    align,
+    evaluate_trajectory,
+    one_second_pairs,
+    segment_errors,
+)
+from support.made_up_paths import straight, wander
+
+
+def disturbed(truth: Trajectory, scale: float = 1.0, seed: int = 1) -> Trajectory:
+    """The same walk with noise, in another world, with jitter in its time stamps."""
+    generator = np.random.default_rng(seed)
+    n = len(truth)
+    T_wc = truth.T_wc.copy()
+    T_wc[:, :3, 3] += generator.normal(scale=0.05, size=(n, 3))
+    T_wc[:, :3, 3] *= scale
+    noise = Rotation.from_rotvec(generator.normal(scale=0.01, size=(n, 3))).as_matrix()
+    T_wc[:, :3, :3] = T_wc[:, :3, :3] @ noise
+    world = np.eye(4)
+    world[:3, :3] = Rotation.from_rotvec([0.3, -0.8, 1.9]).as_matrix()
+    world[:3, 3] = [3, -2, 7]
+    stamps = truth.timestamps + generator.uniform(-0.004, 0.004, n)
+    return Trajectory(stamps, world @ T_wc)
+
+
+def evo_trajectory(trajectory: Trajectory) -> PoseTrajectory3D:
+    return PoseTrajectory3D(
+        poses_se3=list(trajectory.T_wc), timestamps=np.array(trajectory.timestamps)
+    )
+
+
+def evo_pair(
+    estimate: Trajectory, truth: Trajectory, alignment: Alignment
+) -> tuple[PoseTrajectory3D, PoseTrajectory3D]:
+    reference, moved = sync.associate_trajectories(
+        evo_trajectory(truth), evo_trajectory(estimate), max_diff=0.02
+    )
+    if alignment is not Alignment.NONE:
+        moved.align(reference, correct_scale=alignment is Alignment.SIM3)
+    return reference, moved
+
+
+def evo_rpe(
+    pair: tuple[PoseTrajectory3D, PoseTrajectory3D],
+    relation: metrics.PoseRelation,
+    delta: int,
+    all_pairs: bool,
+) -> dict[str, float]:
+    metric = metrics.RPE(relation, delta, metrics.Unit.frames, all_pairs=all_pairs)
+    metric.process_data(pair)
+    return dict(metric.get_all_statistics())
+
+
+# ---- against evo ---------------------------------------------------------------------------------
+@pytest.mark.parametrize("alignment", list(Alignment))
+@pytest.mark.parametrize("scale", [1.0, 0.2])
+def test_equals_evo(alignment: Alignment, scale: float) -> None:
+    truth = wander(300)
+    estimate = disturbed(truth, scale)
+    ours = evaluate_trajectory(estimate, truth, alignment)
+    pair = evo_pair(estimate, truth, alignment)
+
+    ape = metrics.APE(metrics.PoseRelation.translation_part)
+    ape.process_data(pair)
+    expected = ape.get_all_statistics()
+    assert ours.matched_poses == 300
+    for name in ("rmse", "mean", "median", "max"):
+        assert getattr(ours.ate, name) == pytest.approx(expected[name], rel=1e-9)
+
+    translation, rotation = (
+        metrics.PoseRelation.translation_part,
+        metrics.PoseRelation.rotation_angle_deg,
+    )
+    figures = ours.as_dict()
+    for key, relation, delta, all_pairs in (
+        ("rpe_translation_rmse_m", translation, 1, False),
+        ("rpe_rotation_rmse_deg", rotation, 1, False),
+        ("rpe_translation_rmse_m_1s", translation, 10, True),
+        ("rpe_rotation_rmse_deg_1s", rotation, 10, True),
+    ):
+        expected = evo_rpe(pair, relation, delta, all_pairs)
+        assert figures[key] == pytest.approx(expected["rmse"], rel=1e-9), key
+
+
+def test_equals_evo_with_gaps_and_denser_truth() -> None:
+    truth = wander(2000, rate=200.0)
+    estimate = disturbed(truth.select(np.arange(0, 2000, 10)))
+    estimate = estimate.select(np.flatnonzero(np.random.default_rng(3).uniform(size=200) > 0.3))
+    # A few frames far outside the truth have no partner.
+    stamps = estimate.timestamps.copy()
+    stamps[-5:] += 50
+    estimate = Trajectory(stamps, estimate.T_wc)
+    ours = evaluate_trajectory(estimate, truth)
+    pair = evo_pair(estimate, truth, Alignment.SE3)
+    ape = metrics.APE(metrics.PoseRelation.translation_part)
+    ape.process_data(pair)
+    assert ours.matched_poses == len(estimate) - 5
+    assert ours.ate.rmse == pytest.approx(ape.get_all_statistics()["rmse"], rel=1e-9)
+    expected = evo_rpe(pair, metrics.PoseRelation.translation_part, 1, False)["rmse"]
+    assert ours.rpe_translation is not None
+    assert ours.rpe_translation.rmse == pytest.approx(expected, rel=1e-9)
+
+
+def test_lost_poses_do_not_count() -> None:
+    truth = wander(100)
+    T_wc = truth.T_wc.copy()
+    T_wc[40:50, :3, 3] += 100
+    lost = np.zeros(100, bool)
+    lost[40:50] = True
+    result = evaluate_trajectory(Trajectory(truth.timestamps, T_wc, lost), truth)
+    assert result.matched_poses == 90
+    assert result.ate.rmse < 1e-9
+
+
+# ---- alignment -----------------------------------------------------------------------------------
+def test_alignment_finds_the_transform() -> None:
+    points = np.random.default_rng(0).normal(size=(50, 3))
+    known = Similarity(2.5, Rotation.from_rotvec([1, 2, 0.5]).as_matrix(), np.array([1.0, 2, 3]))
+    found = align(points, known.apply(points), with_scale=True)
+    assert found.scale == pytest.approx(2.5)
+    np.testing.assert_allclose(found.R, known.R, atol=1e-12)
+    np.testing.assert_allclose(found.t, known.t, atol=1e-12)
+    np.testing.assert_allclose(found.inverse().apply(known.apply(points)), points, atol=1e-12)
+
+
+def test_alignment_of_a_mirrored_path_stays_a_rotation() -> None:
+    points = np.random.default_rng(0).normal(size=(50, 3))
+    found = align(points, points * [1, 1, -1])
+    assert np.linalg.det(found.R) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("alignment", list(Alignment))
+@pytest.mark.parametrize("still", ["estimate", "truth", "both"])
+def test_standing_still(alignment: Alignment, still: str) -> None:
+    truth = wander(50)
+    estimate = disturbed(truth)
+    if still in ("truth", "both"):
+        truth = Trajectory(truth.timestamps, np.tile(truth.T_wc[:1], (50, 1, 1)))
+    if still in ("estimate", "both"):
+        estimate = Trajectory(estimate.timestamps, np.tile(estimate.T_wc[:1], (50, 1, 1)))
+    result = evaluate_trajectory(estimate, truth, alignment)
+    values = [value for value in result.as_dict().values() if isinstance(value, float)]
+    assert np.isfinite(values).all()
+    if still == "both":
+        assert result.transform.scale == 1.0
+        assert result.rpe_translation is not None
+        assert result.rpe_translation.rmse < 1e-12
+        if alignment is not Alignment.NONE:
+            assert result.ate.rmse < 1e-12
+
+
+@pytest.mark.parametrize("with_scale", [False, True])
+@pytest.mark.parametrize("n", [1, 2, 30])
+def test_straight_lines_and_single_points(n: int, with_scale: bool) -> None:
+    points = np.arange(n)[:, None] * np.array([[1.0, 2.0, 0.5]])
+    turned = points @ Rotation.from_rotvec([0.4, 1.0, -2.0]).as_matrix().T + [5, 6, 7]
+    found = align(points, turned, with_scale=with_scale)
+    np.testing.assert_allclose(found.apply(points), turned, atol=1e-9)
+    np.testing.assert_allclose(found.R @ found.R.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(found.R) == pytest.approx(1.0)
+
+
+def test_paths_that_have_nothing_in_common_keep_their_scale() -> None:
+    points = np.array([[-1.0, 0, 0], [1, 0, 0], [-1, 0, 0], [1, 0, 0]])
+    targets = np.array([[-1.0, 0, 0], [-1, 0, 0], [1, 0, 0], [1, 0, 0]])
+    assert align(points, targets, with_scale=True).scale == 1.0
+
+
+# ---- one second ----------------------------------------------------------------------------------
+def test_pairs_of_one_second() -> None:
+    first, second = one_second_pairs(np.array([0.0, 0.5, 0.95, 1.04, 1.5, 2.2, 3.31]))
+    pairs = list(zip(first.tolist(), second.tolist(), strict=True))
+    assert pairs == [(0, 3), (1, 4)]
+    assert len(one_second_pairs(np.zeros(0))[0]) == 0
+
+
+def test_no_figures_over_a_second_without_one() -> None:
+    truth = wander(8)
+    assert evaluate_trajectory(truth, truth).rpe_translation_1s is None
+    numbered = Trajectory(np.arange(8), truth.T_wc)
+    assert evaluate_trajectory(numbered, numbered, timed=False).rpe_rotation_1s is None
+
+
+def test_single_pose() -> None:
+    truth = wander(1)
+    figures = evaluate_trajectory(truth, truth).as_dict()
+    assert figures["ate_rmse_m"] == 0
+    assert figures["rpe_translation_rmse_m"] is None
+    assert figures["t_rel_percent"] is None
+
+
+# ---- KITTI's segments by hand --------------------------------------------------------------------
+def test_segments_of_a_line_that_is_too_long() -> None:
+    """251 poses 1 m apart, the estimate 1 % too long.
+
+    A segment ends at the first pose MORE than its length away: 100 m ends after 101 m, 200 m after
+    201 m. Segments of 100 m start at poses 0, 10, ... 140 (15 of them, the last one ends at 241;
+    150 + 101 = 251 does not exist), those of 200 m at 0, 10, ... 40 (5 of them).
+    """
+    truth, estimate = straight(251, 1.0), straight(251, 1.01)
+    errors = segment_errors(estimate.T_wc, truth.T_wc)
+    assert errors.shape == (20, 2)
+    np.testing.assert_allclose(errors[:15, 0], 0.01 * 101 / 100)
+    np.testing.assert_allclose(errors[15:, 0], 0.01 * 201 / 200)
+    result = evaluate_trajectory(estimate, truth)
+    expected = (15 * 1.01 + 5 * 1.005) / 20
+    assert result.t_rel_percent == pytest.approx(expected, rel=1e-12)
+    assert result.r_rel_deg_per_100m == pytest.approx(0.0, abs=1e-12)
+
+
+def test_segments_of_a_line_that_turns_slowly() -> None:
+    """Straight truth, 0.75 m between poses; the estimate's orientation turns 0.01 deg per pose.
+
+    It stays in place, so a motion of n poses is seen rotated by the heading at its start, and its
+    own turn is n times 0.01 deg. Segments of 100 m take n = 134 poses (100.5 m): the distance of
+    the two end points differs by the chord 2 * 100.5 * sin(heading / 2), heading being k * 0.01 deg
+    at the start k. With 171 poses they start at k = 0, 10, 20, 30.
+    """
+    n, turn = 171, math.radians(0.01)
+    truth = straight(n, 0.75)
+    T_wc = truth.T_wc.copy()
+    T_wc[:, :3, :3] = Rotation.from_rotvec(
+        np.arange(n)[:, None] * turn * np.array([[0.0, 1.0, 0.0]])
+    ).as_matrix()
+    errors = segment_errors(T_wc, truth.T_wc)
+    chords = [2 * 100.5 * math.sin(k * turn / 2) / 100 for k in (0, 10, 20, 30)]
+    np.testing.assert_allclose(errors[:, 0], chords, atol=1e-14)
+    np.testing.assert_allclose(errors[:, 1], 134 * turn / 100)
+    result = evaluate_trajectory(Trajectory(truth.timestamps, T_wc), truth)
+    assert result.r_rel_deg_per_100m == pytest.approx(134 * 0.01)
+    assert result.t_rel_percent == pytest.approx(100 * sum(chords) / 4)
+
+
+def test_segments_do_not_depend_on_the_world() -> None:
+    truth = straight(1000, 1.0)
+    estimate = straight(1000, 0.98)
+    world = np.eye(4)
+    world[:3, :3] = Rotation.from_rotvec([1, 2, 3]).as_matrix()
+    world[:3, 3] = [10, 20, 30]
+    np.testing.assert_allclose(
+        segment_errors(world @ estimate.T_wc, truth.T_wc),
+        segment_errors(estimate.T_wc, truth.T_wc),
+        atol=1e-12,
+    )
+    assert len(segment_errors(estimate.T_wc, truth.T_wc)) == sum(
+        len(range(0, 1000 - length - 1, 10)) for length in range(100, 900, 100)
+    )
+
+
+def test_segments_of_one_camera_are_scaled() -> None:
+    truth = straight(300, 1.0)
+    result = evaluate_trajectory(straight(300, 0.1), truth, Alignment.SIM3)
+    assert result.t_rel_percent == pytest.approx(0.0, abs=1e-9)
+
+
+def test_no_segments_on_short_paths() -> None:
+    truth = straight(101, 1.0)
+    result = evaluate_trajectory(truth, truth)
+    assert result.t_rel_percent is None
+    assert result.r_rel_deg_per_100m is None
+
+
+# ---- bad input -----------------------------------------------------------------------------------
+def test_no_common_time() -> None:
+    truth = wander(10)
+    later = Trajectory(truth.timestamps + 1000, truth.T_wc)
+    with pytest.raises(DatasetError, match=r"10 poses from 1100\.000 to 1100\.900 s"):
+        evaluate_trajectory(later, truth)
+    empty = Trajectory(np.zeros(0), np.zeros((0, 4, 4)))
+    with pytest.raises(DatasetError, match="no poses"):
+        evaluate_trajectory(empty, truth)

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Settings made in Python."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from orbslam2py import SettingsError
+from orbslam2py.settings import (
+    CameraSettings,
+    DepthSettings,
+    OrbSettings,
+    Sensor,
+    Settings,
+    builtin_settings,
+)
+
+
+def test_values_are_checked_without_a_file_too() -> None:
+    with pytest.raises(SettingsError, match=r"Camera\.fx is -1.*Camera\.fy is not finite"):
+        CameraSettings(-1.0, math.nan, 0.0, 0.0)
+    with pytest.raises(SettingsError, match="which is 5"):
+        OrbSettings(ini_th_fast=5)
+    with pytest.raises(SettingsError, match="not a number"):
+        OrbSettings(n_levels="eight")  # type: ignore[arg-type]
+    with pytest.raises(SettingsError, match="ThDepth"):
+        DepthSettings(0.0)
+    camera = CameraSettings(500.0, 500.0, 320.0, 240.0)
+    with pytest.raises(SettingsError, match=r"Camera\.bf.*ThDepth"):
+        Settings(Sensor.RGBD, camera)
+
+
+def test_numpy_numbers_become_plain_ones() -> None:
+    camera = CameraSettings(np.float64(500), np.float32(500), np.int64(320), 240)
+    assert type(camera.fx) is float
+    assert type(camera.cx) is float
+
+
+def test_settings_cannot_change() -> None:
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        builtin_settings("tum1", Sensor.RGBD).camera.fx = 1.0  # type: ignore[misc]
+
+
+def test_distortion_vector() -> None:
+    camera = CameraSettings(500, 500, 320, 240, p2=0.1)
+    np.testing.assert_array_equal(camera.distortion, [0, 0, 0, 0.1])
+    assert camera.is_distorted
+    assert dataclasses.replace(camera, k3=0.5).distortion.shape == (5,)
+    assert not CameraSettings(500, 500, 320, 240).is_distorted
+
+
+def test_description_names_the_figures() -> None:
+    text = "\n".join(builtin_settings("tum1", Sensor.RGBD).describe())
+    for figure in ("517.306", "0.262383", "1000 features", "20 and 7", "3.093 m"):
+        assert figure in text

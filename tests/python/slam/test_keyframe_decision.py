@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""When the tracker makes a keyframe, with the verbs of the core replaced."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pytest
+
+from orbslam2py import Sensor, TrackingState
+from orbslam2py.slam.thresholds import TrackingThresholds
+from support.tracking_scene import (
+    MAX_FRAMES,
+    FakeCore,
+    Scene,
+    lose,
+)
+
+
+@dataclass(frozen=True)
+class Case:
+    """One row of the table; the defaults alone give a keyframe."""
+
+    keyframe: bool
+    why: str
+    idle: bool = True
+    n_waiting: int = 0
+    n_inliers: int = 100
+    n_reference: int = 200
+    close: tuple[int, int] = (200, 0)
+    frames_since: int = 5
+    n_keyframes: int = 10
+    pausing: bool = False
+    interrupts: int = 0
+
+
+TABLE = [
+    Case(True, "mapper idle, half of the reference's points"),
+    Case(True, "just below 0.75", n_inliers=149),
+    Case(False, "0.75 is not below 0.75", n_inliers=150),
+    Case(False, "nothing new", n_inliers=200),
+    Case(True, "few close points, many that could be added", n_inliers=200, close=(99, 71)),
+    Case(False, "enough close points", n_inliers=200, close=(100, 71)),
+    Case(False, "too few to add", n_inliers=200, close=(99, 70)),
+    Case(False, "15 inliers are too few", n_inliers=15, frames_since=5),
+    Case(True, "16 inliers", n_inliers=16),
+    Case(True, "one keyframe: below 0.4", n_keyframes=1, n_inliers=79),
+    Case(False, "one keyframe: 0.4", n_keyframes=1, n_inliers=80),
+    Case(True, "two keyframes: 0.75", n_keyframes=2, n_inliers=149),
+    Case(False, "paused", pausing=True),
+    Case(False, "busy, neither a second passed nor weak", idle=False),
+    Case(True, "busy, but below 0.25", idle=False, n_inliers=49, interrupts=1),
+    Case(False, "busy, 0.25 is not below 0.25", idle=False, n_inliers=50),
+    Case(True, "busy, needs close points", idle=False, close=(99, 71), interrupts=1),
+    Case(True, "busy, a second passed", idle=False, frames_since=MAX_FRAMES, interrupts=1),
+    Case(False, "busy, nearly a second", idle=False, frames_since=MAX_FRAMES - 1),
+    Case(False, "busy, a second passed, nothing new", idle=False, frames_since=99, n_inliers=150),
+    Case(True, "2 wait", idle=False, n_waiting=2, frames_since=MAX_FRAMES, interrupts=1),
+    Case(False, "3 wait", idle=False, n_waiting=3, frames_since=MAX_FRAMES, interrupts=1),
+    Case(False, "3 wait, weak", idle=False, n_waiting=3, n_inliers=20, interrupts=1),
+]
+
+
+@pytest.mark.parametrize("case", TABLE, ids=lambda case: case.why)
+def test_keyframe_decision(sensor: Sensor, core: FakeCore, case: Case) -> None:
+    # Too few inliers to go on tracking are enough for a decision.
+    limits = TrackingThresholds(
+        local_map_inliers=1, local_map_inliers_after_relocalization=1, map_matches=1
+    )
+    scene = Scene(sensor, core, limits)
+    scene.run(1)
+    scene.core.inliers.extend([100, 100])
+    scene.core.n_reference = 10_000
+    first = 2 * MAX_FRAMES
+    assert scene.track(frame_id=first).is_keyframe  # the last one before the frame in question
+    inserted = list(scene.mapping.inserted)
+
+    scene.map.n_keyframes = case.n_keyframes
+    scene.core.n_reference = case.n_reference
+    worker = scene.mapping.worker
+    worker.idle, worker.n_waiting, worker.pausing = case.idle, case.n_waiting, case.pausing
+    scene.core.inliers.extend([100, case.n_inliers])
+    frame_id = first + case.frames_since
+    outcome = scene.track(frame_id=frame_id, close_counts=case.close)
+    assert outcome.state is TrackingState.OK
+    assert outcome.is_keyframe == case.keyframe
+    assert worker.n_interrupts == case.interrupts
+    assert len(scene.mapping.inserted) - len(inserted) == int(case.keyframe)
+    if not case.pausing:
+        assert scene.core.min_observations[-1] == (2 if case.n_keyframes <= 2 else 3)
+    if case.keyframe:
+        keyframe = scene.mapping.inserted[-1]
+        assert scene.tracking.reference_keyframe == scene.last.reference_keyframe == keyframe
+        assert scene.last.features.described
+
+
+@pytest.mark.parametrize(
+    ("since", "n_keyframes", "keyframe"),
+    [
+        (MAX_FRAMES - 1, MAX_FRAMES + 1, False),
+        (MAX_FRAMES - 1, MAX_FRAMES, True),
+        (MAX_FRAMES, MAX_FRAMES + 1, True),
+    ],
+)
+def test_no_keyframe_soon_after_a_recovery_in_a_large_map(
+    scene: Scene, since: int, n_keyframes: int, keyframe: bool
+) -> None:
+    scene.run(40)
+    lose(scene)
+    scene.run(1)
+    recovered = scene.last.id
+    scene.map.n_keyframes = n_keyframes
+    scene.core.n_reference = 1000
+    assert scene.track(frame_id=recovered + since).is_keyframe == keyframe

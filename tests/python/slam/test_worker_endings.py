@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Workers: resets, and the end in every state."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+from orbslam2py import StateError, WorkerError
+from orbslam2py.slam.worker import Worker, WorkerState
+from support.worker_steps import NAME, Gate, eventually
+
+pytestmark = pytest.mark.watchdog(10)
+
+
+# ---- reset ---------------------------------------------------------------------------------------
+def test_reset_while_idle(worker: Worker[int], gate: Gate) -> None:
+    worker.reset(10)
+    gate.open()
+    worker.submit(0)
+    assert worker.wait_until_idle(10)
+    assert gate.done == [0]
+
+
+def test_reset_while_busy_waits_for_the_job_and_drops_the_others(
+    worker: Worker[int], gate: Gate
+) -> None:
+    for job in range(3):
+        worker.submit(job)
+    gate.wait_begun()
+    threading.Timer(0.05, gate.open).start()
+    worker.reset(10)
+    assert gate.done == [0]
+    assert worker.idle
+    assert not worker.waiting_flag.is_set()
+    worker.submit(7)
+    assert worker.wait_until_idle(10)
+    assert gate.done == [0, 7]
+
+
+def test_reset_while_paused(worker: Worker[int], gate: Gate) -> None:
+    gate.open()
+    with worker.pause():
+        worker.submit(0)
+        worker.reset(10)
+        assert worker.n_waiting == 0
+        worker.submit(1)
+    assert worker.wait_until_idle(10)
+    assert gate.done == [1]
+
+
+def test_reset_names_a_worker_that_does_not_answer(worker: Worker[int], gate: Gate) -> None:
+    worker.submit(0)
+    gate.wait_begun()
+    with pytest.raises(WorkerError, match=f"{NAME} did not acknowledge the reset"):
+        worker.reset(0.05)
+
+
+# ---- the end in every state ----------------------------------------------------------------------
+@pytest.mark.parametrize("drain", [False, True])
+def test_finish_before_start(drain: bool) -> None:
+    worker = Worker(NAME, lambda _: None, threaded=True)
+    worker.submit(0)
+    worker.finish(drain=drain)
+    assert worker.state is WorkerState.FINISHED
+
+
+@pytest.mark.parametrize("drain", [False, True])
+def test_finish_while_paused_does_not_wait_for_the_ticket(gate: Gate, drain: bool) -> None:
+    gate.open()
+    worker = Worker(NAME, gate, threaded=True)
+    worker.start()
+    ticket = worker.pause()
+    worker.submit(0)
+    worker.finish(drain=drain)
+    assert gate.done == []
+    ticket.release()
+
+
+@pytest.mark.parametrize("drain", [False, True])
+def test_finish_twice(worker: Worker[int], gate: Gate, drain: bool) -> None:
+    gate.open()
+    worker.submit(0)
+    worker.finish(drain=drain, timeout=10)
+    worker.finish(drain=drain, timeout=10)
+    with pytest.raises(StateError, match="shut down"):
+        worker.submit(1)
+
+
+def test_finish_says_who_is_late_and_can_be_repeated(gate: Gate) -> None:
+    worker = Worker(NAME, gate, threaded=True)
+    worker.start()
+    worker.submit(0)
+    gate.wait_begun()
+    with pytest.raises(WorkerError, match=f"{NAME} did not end within"):
+        worker.finish(timeout=0.05)
+    assert not worker.ended
+    gate.open()
+    worker.finish(timeout=10)
+    assert worker.ended
+
+
+def test_drain_gives_up_at_its_time_limit(gate: Gate) -> None:
+    worker = Worker(NAME, gate, threaded=True)
+    worker.start()
+    worker.submit(0)
+    worker.submit(1)
+    gate.wait_begun()
+    with pytest.raises(WorkerError, match="did not end"):
+        worker.finish(drain=True, timeout=0.05)
+    gate.open()
+    worker.finish(timeout=10)
+    assert gate.done == [0]
+
+
+def test_finish_from_inside_the_step() -> None:
+    worker: Worker[int] = Worker(NAME, lambda _: worker.finish(), threaded=True)
+    worker.start()
+    worker.submit(0)
+    eventually(lambda: worker.state is WorkerState.FINISHED)
+    worker.finish(timeout=10)

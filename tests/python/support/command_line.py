@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The command line, called in this process or as a process of its own."""
+
+from __future__ import annotations
+
+import csv
+import json
+import logging
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from orbslam2py.cli import main
+
+#: What a run leaves in its folder.
+RUN_FILES = frozenset(
+    [
+        "trajectory.txt",
+        "trajectory_online.txt",
+        "keyframes.txt",
+        "trajectory_kitti.txt",
+        "frames.csv",
+        "points.ply",
+        "trajectory.png",
+        "report.json",
+        "settings.yaml",
+    ]
+)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    code: int
+    out: str
+    err: str
+
+
+@contextmanager
+def logging_restored() -> Iterator[None]:
+    """The command directs the package's log to its own console."""
+    logger = logging.getLogger("orbslam2py")
+    before = logger.handlers, logger.propagate, logger.level
+    try:
+        yield
+    finally:
+        logger.handlers, logger.propagate, level = before
+        logger.setLevel(level)
+
+
+class CommandLine:
+    """Calls ``orbslam2py`` in the folder of the test."""
+
+    def __init__(
+        self, patch: pytest.MonkeyPatch, capture: pytest.CaptureFixture[str], folder: Path
+    ) -> None:
+        self._patch = patch
+        self._capture = capture
+        patch.chdir(folder)
+
+    def __call__(self, *arguments: object) -> Outcome:
+        self._patch.setattr(sys, "argv", ["orbslam2py", *map(str, arguments)])
+        self._capture.readouterr()
+        with logging_restored(), pytest.raises(SystemExit) as end:
+            main()
+        printed = self._capture.readouterr()
+        code = end.value.code
+        return Outcome(code if isinstance(code, int) else int(code or 0), printed.out, printed.err)
+
+
+@dataclass(frozen=True)
+class Results:
+    """What a run left in its folder."""
+
+    folder: Path
+
+    @property
+    def report(self) -> dict[str, Any]:
+        return dict(json.loads((self.folder / "report.json").read_text()))
+
+    @property
+    def frames(self) -> list[dict[str, str]]:
+        with (self.folder / "frames.csv").open(newline="") as stream:
+            return list(csv.DictReader(stream))
+
+    def lines(self, name: str) -> list[str]:
+        return (self.folder / name).read_text().splitlines()

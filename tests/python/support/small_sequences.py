@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Short synthetic sequences of small images, rendered once per test run."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+from orbslam2py import Sensor, System, TrackingRecord
+from orbslam2py.datasets import Images
+from orbslam2py.evaluation import evaluate_trajectory
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+from support.feeding import blackened, feed
+
+SIZE = (320, 240)
+
+
+@lru_cache
+def sequence(sensor: Sensor, frames: int = 80) -> SyntheticSequence:
+    return SyntheticSequence(
+        SyntheticOptions(world="corridor", sensor=sensor, frames=frames, size=SIZE)
+    )
+
+
+@lru_cache
+def images(sensor: Sensor, index: int) -> Images:
+    return sequence(sensor).load(index)
+
+
+def new_system(sensor: Sensor, **options: object) -> System:
+    return System(sequence(sensor).settings, sensor, **options)  # type: ignore[arg-type]
+
+
+def track(
+    system: System,
+    index: int,
+    *,
+    timestamp: float | None = None,
+    shown: Images | None = None,
+    details: bool = False,
+) -> TrackingRecord:
+    """Track a frame, or other images in its place."""
+    sensor = system.sensor
+    seconds = float(sequence(sensor).timestamps[index]) if timestamp is None else timestamp
+    return feed(system, shown or images(sensor, index), seconds, details=details)
+
+
+def play(system: System, n_frames: int, first: int = 0) -> list[TrackingRecord]:
+    return [track(system, i) for i in range(first, first + n_frames)]
+
+
+def black(sensor: Sensor) -> Images:
+    """Images in which nothing can be seen."""
+    return blackened(images(sensor, 0))
+
+
+def ate(system: System) -> float:
+    truth = sequence(system.sensor).ground_truth()
+    return float(evaluate_trajectory(system.trajectory(), truth).as_dict()["ate_rmse_m"])

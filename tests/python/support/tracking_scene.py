@@ -1,0 +1,267 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A tracker among fakes."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from orbslam2py import Reason, Sensor, TrackingState, _core
+from orbslam2py._timing import StageTimer
+from orbslam2py.slam.keyframe_decision import KeyframeDecision
+from orbslam2py.slam.pose_search import PoseSearch
+from orbslam2py.slam.records import TrackingOutcome
+from orbslam2py.slam.thresholds import TrackingThresholds
+from orbslam2py.slam.tracking import Tracking
+
+MAX_FRAMES = 30
+OUTLIERS = np.array([7, 9])
+
+
+def pose(x: float) -> _core.Pose:
+    return _core.Pose([0, 0, 0, 1], [x, 0, 0])
+
+
+class FakeFrame:
+    """Counts what is done to it."""
+
+    def __init__(self, frame_id: int) -> None:
+        self.id = frame_id
+        self.timestamp = frame_id / 30
+        self.features = SimpleNamespace(size=1000, depth=np.ones(1000, np.float32), described=False)
+        self.T_cw: _core.Pose | None = None
+        self.reference_keyframe = -1
+        self.map_points = np.arange(100)
+        self.close_counts = (200, 0)
+        self.n_cleared = 0
+        self.n_discards = 0
+        self.anchor_x = 0.0
+        self.big_change = 0
+
+    def share_anchor(self, other: FakeFrame) -> None:
+        self.anchor_x, self.big_change = other.anchor_x, other.big_change
+        self.reference_keyframe = other.reference_keyframe
+
+    def clear_associations(self) -> None:
+        self.n_cleared += 1
+
+    def discard_outliers(self) -> np.ndarray:
+        self.n_discards += 1
+        return OUTLIERS
+
+    def n_associated(self) -> int:
+        return 321
+
+    def n_close_tracked_untracked(self) -> tuple[int, int]:
+        return self.close_counts
+
+
+class FakeMap:
+    def __init__(self) -> None:
+        self.n_keyframes = 10
+        self.n_points = 1000
+        self.keyframe_x = 0.0
+        self.stretched = 1.0
+        self.big_change_index = 0
+        self.culled: dict[int, int] = {}
+
+    def living(self, keyframe: int) -> int:
+        return self.culled.get(keyframe, keyframe)
+
+
+class FakeWorker:
+    def __init__(self) -> None:
+        self.pausing = False
+        self.idle = True
+        self.n_waiting = 0
+        self.n_interrupts = 0
+
+    def interrupt(self) -> None:
+        self.n_interrupts += 1
+
+
+class FakeMapping:
+    def __init__(self) -> None:
+        self.worker = FakeWorker()
+        self.inserted: list[int] = []
+
+    def insert_keyframe(self, keyframe: int) -> None:
+        self.inserted.append(keyframe)
+
+
+@dataclass
+class FakeCore:
+    """The verbs tracking calls; each takes its next answer from a list, or its usual one."""
+
+    Pose = _core.Pose
+    motion: deque[int] = field(default_factory=deque)
+    words: deque[int] = field(default_factory=deque)
+    inliers: deque[int] = field(default_factory=deque)
+    n_reference: int = 100
+    local_reference: int = 4
+    calls: list[str] = field(default_factory=list)
+    windows: list[float] = field(default_factory=list)
+    forward: list[bool] = field(default_factory=list)
+    reference_keyframes: list[int] = field(default_factory=list)
+    radius_factors: list[float] = field(default_factory=list)
+    discarded: list[np.ndarray] = field(default_factory=list)
+    min_observations: list[int] = field(default_factory=list)
+    start_poses: list[float] = field(default_factory=list)
+    n_inserted: int = 0
+
+    def PointBatch(self) -> str:
+        return "no points"
+
+    def follow_map(self, world: FakeMap, frame: FakeFrame) -> tuple[str, float]:
+        assert frame.T_cw is not None
+        frame.T_cw = frame.T_cw @ pose(world.keyframe_x - frame.anchor_x)
+        frame.anchor_x = world.keyframe_x
+        frame.big_change = world.big_change_index
+        return "points", world.stretched
+
+    def anchor_frame(self, world: FakeMap, frame: FakeFrame, keyframe: int) -> None:
+        frame.anchor_x = world.keyframe_x
+        frame.reference_keyframe = keyframe
+
+    def add_temporary_points(self, last: FakeFrame, points: str) -> int:
+        return 0
+
+    def match_last_frame(
+        self, frame: FakeFrame, last: FakeFrame, points: str, window: float, has_depth: bool
+    ) -> int:
+        assert points == "points"
+        assert frame.T_cw is not None
+        self.calls.append("motion")
+        self.windows.append(window)
+        self.start_poses.append(float(frame.T_cw.matrix[0, 3]))
+        return self.motion.popleft() if self.motion else 50
+
+    def match_keyframe_by_words(
+        self, world: FakeMap, keyframe: int, frame: FakeFrame, ratio: float
+    ) -> int:
+        assert frame.features.described
+        assert ratio == 0.7
+        assert frame.T_cw is not None
+        self.calls.append("words")
+        self.reference_keyframes.append(keyframe)
+        self.start_poses.append(float(frame.T_cw.matrix[0, 3]))
+        return self.words.popleft() if self.words else 50
+
+    def describe(self, frame: Any, vocabulary: str) -> None:
+        assert vocabulary == "vocabulary"
+        frame.described = True
+
+    def optimize_pose(self, frame: FakeFrame) -> SimpleNamespace:
+        self.calls.append("optimize")
+        n = self.inliers.popleft() if self.inliers else 100
+        return SimpleNamespace(n_inliers=n, covariance=np.eye(6) * n)
+
+    def select_local_map(self, world: FakeMap, frame: FakeFrame) -> SimpleNamespace:
+        self.calls.append("local map")
+        if self.local_reference >= 0:
+            frame.reference_keyframe = self.local_reference
+            frame.big_change = world.big_change_index
+        return SimpleNamespace(reference_keyframe=self.local_reference, points="local points")
+
+    def match_local_map(
+        self, frame: FakeFrame, points: str, discarded: np.ndarray, factor: float
+    ) -> SimpleNamespace:
+        assert points == "local points"
+        self.radius_factors.append(factor)
+        self.discarded.append(discarded)
+        return SimpleNamespace(visible=np.arange(3))
+
+    def count_sightings(self, world: FakeMap, frame: FakeFrame, visible: np.ndarray) -> None:
+        assert len(visible) == 3
+        self.calls.append("sightings")
+
+    def count_tracked_points(self, world: FakeMap, keyframe: int, min_observations: int) -> int:
+        self.min_observations.append(min_observations)
+        return self.n_reference
+
+    def insert_keyframe(self, world: FakeMap, frame: FakeFrame, create_points: bool) -> int:
+        assert frame.features.described
+        assert create_points
+        self.n_inserted += 1
+        frame.reference_keyframe = 100 + self.n_inserted
+        return 100 + self.n_inserted
+
+
+class FakeInitializer:
+    """Refuses a given number of frames."""
+
+    def __init__(self, refusals: int = 0) -> None:
+        self.refusals = refusals
+
+    def reset(self) -> None:
+        self.refusals = 0
+
+    def try_initialize(self, frame: FakeFrame) -> Reason:
+        if self.refusals:
+            self.refusals -= 1
+            return Reason.TOO_FEW_KEYPOINTS
+        frame.T_cw = pose(0)
+        frame.reference_keyframe = 0
+        return Reason.NONE
+
+
+class Scene:
+    """A tracker among fakes."""
+
+    def __init__(
+        self, sensor: Sensor, core: FakeCore, thresholds: TrackingThresholds | None = None
+    ) -> None:
+        self.core = core
+        self.map = FakeMap()
+        self.mapping = FakeMapping()
+        self.initializer = FakeInitializer()
+        #: Track in localization mode.
+        self.localize = False
+        fakes: Any = self
+        vocabulary: Any = "vocabulary"
+        self.tracking = Tracking(
+            fakes.map,
+            vocabulary,
+            fakes.mapping,
+            initializer=fakes.initializer,
+            search=PoseSearch(
+                fakes.map,
+                vocabulary,
+                sensor,
+                MAX_FRAMES,
+                relocalizer=None,
+                thresholds=thresholds or TrackingThresholds(),
+            ),
+            keyframe_decision=KeyframeDecision(fakes.map, fakes.mapping.worker, sensor, MAX_FRAMES),
+            has_depth=sensor.has_depth,
+        )
+        self.frames: list[FakeFrame] = []
+
+    def track(self, frame_id: int | None = None, **attributes: Any) -> TrackingOutcome:
+        frame = FakeFrame(len(self.frames) if frame_id is None else frame_id)
+        for name, value in attributes.items():
+            setattr(frame, name, value)
+        self.frames.append(frame)
+        image: Any = frame
+        return self.tracking.track(image, StageTimer(), localize=self.localize)
+
+    def run(self, n: int) -> None:
+        """So many frames that make no keyframe."""
+        self.core.n_reference, before = 0, self.core.n_reference
+        for _ in range(n):
+            assert self.track().state is TrackingState.OK
+        self.core.n_reference = before
+
+    @property
+    def last(self) -> FakeFrame:
+        return self.frames[-1]
+
+
+def lose(scene: Scene) -> TrackingOutcome:
+    scene.core.motion.extend([0, 0])
+    scene.core.words.append(0)
+    return scene.track()
