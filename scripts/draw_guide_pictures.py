@@ -22,10 +22,9 @@ from matplotlib.figure import Figure
 
 from orbslam2py.calibration import Board, calibrate, find_views
 from orbslam2py.calibration.plot import draw_residuals
-from orbslam2py.runs import RunOptions, RunResult, SequenceRunner
+from orbslam2py.runs import RunOptions, RunResult, SystemOptions, run_sequence
 from orbslam2py.settings import Sensor
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
-from orbslam2py.vocabulary import load_vocabulary
 
 ROOT = Path(__file__).resolve().parents[1]
 Image = npt.NDArray[np.uint8]
@@ -93,8 +92,8 @@ def race(stride: int) -> RunResult:
         world="corridor", sensor="rgbd", frames=60, size=(320, 240), speed=6.0
     )
     sequence = SyntheticSequence(options)
-    wanted = RunOptions(Sensor.RGBD, deterministic=True, stride=stride)
-    result = SequenceRunner(sequence, sequence.settings, load_vocabulary(), wanted).run()
+    wanted = RunOptions(Sensor.RGBD, SystemOptions(deterministic=True), stride=stride)
+    result = run_sequence(sequence, wanted).result
     if result.error is not None:
         sys.exit(f"the run failed: {result.error}")
     return result

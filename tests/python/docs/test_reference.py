@@ -191,3 +191,19 @@ def test_every_command_has_a_section_with_an_example(monkeypatch: pytest.MonkeyP
         assert all(line.startswith("orbslam2py ") for line in example)
     for option in ("--sensor", "--no-loop-closing", "--output`, `-o", "--format"):
         assert f"`{option}`" in text
+
+
+# ---- architecture.md -----------------------------------------------------------------------------
+def test_picture_of_the_rooms_is_the_contract() -> None:
+    settings = read(ROOT / "pyproject.toml")
+    contract = re.search(r"^layers = \[(.*?)\]", settings, re.MULTILINE | re.DOTALL)
+    assert contract is not None
+    layers = [re.findall(r"\w+", layer) for layer in re.findall(r'"([^"]+)"', contract[1])]
+    page = read(ROOT / "docs/architecture.md")
+    picture = page.split("```text\n")[1].split("\n```")[0].splitlines()
+    for floor, line in zip(layers, picture, strict=False):
+        assert line.split()[: len(floor)] == floor
+    assert "_core" in picture[len(layers)]
+    rooms = {row[0] for row in table_below(page, "Floors")}
+    packages = {path.parent.name for path in (ROOT / "src/orbslam2py").glob("*/__init__.py")}
+    assert rooms == {f"`{name}/`" for name in packages} | {"ground"}

@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from command_line import logging_restored
 
 from orbslam2py.cli import main
+from support.command_line import logging_restored
 from support.documentation_data import copy_data, make_data
 from support.documents import ROOT, SHELL, SHOWN, Block, blocks_of, documents
 
