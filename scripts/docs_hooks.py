@@ -7,6 +7,7 @@ formulas or diagrams, and nothing from other hosts.
 
 from __future__ import annotations
 
+import logging
 import re
 import sys
 from pathlib import Path
@@ -16,12 +17,17 @@ from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
 from mkdocs.utils import get_relative_url
 
+_log = logging.getLogger("mkdocs.hooks.docs")
+
 ROOT = Path(__file__).resolve().parents[1]
 KATEX = Path("/usr/share/javascript/katex")
 COMMANDS = "<!-- all commands -->"
 
 #: Pages that are files of the checkout, and where they stand in the site.
 PAGES = {"CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
+
+#: What a browser would load from another host when it shows the page.
+FOREIGN = re.compile(r"<(?:script|img|iframe|link)\b[^>]*\b(?:src|href)=.(?:https?:)?//[^>]*>")
 
 FORMULAS = ("assets/katex/katex.min.css", "assets/katex/katex.js", "assets/formulas.js")
 DIAGRAMS = ("assets/mermaid.min.js",)
@@ -65,6 +71,8 @@ def on_page_content(html: str, **_: Any) -> str:
 
 def on_post_page(output: str, page: Any, **_: Any) -> str:
     """Load KaTeX and mermaid where they are needed, before the theme's own scripts."""
+    for tag in FOREIGN.findall(output):
+        _log.warning("%s loads something from another host: %s", page.file.src_uri, tag)
     wanted = [
         *(FORMULAS if 'class="arithmatex"' in output else ()),
         *(DIAGRAMS if 'class="mermaid"' in output else ()),
