@@ -62,7 +62,7 @@ test-python: install
 lint: $(VENV)/.requirements
 	@$(BIN)/ruff check src tests examples benchmarks scripts
 	@$(BIN)/ruff format --check src tests examples benchmarks scripts
-	@PYTHONPATH=src $(BIN)/lint-imports >build/lint-imports.log || { cat build/lint-imports.log; exit 1; }
+	@PYTHONPATH=src $(BIN)/lint-imports --no-cache >build/lint-imports.log || { cat build/lint-imports.log; exit 1; }
 	@find src/cpp tests/cpp benchmarks -name '*.cpp' -o -name '*.hpp' | xargs clang-format --dry-run -Werror
 
 types: install

@@ -151,7 +151,8 @@ class System:
         StateError
             For another sensor, after shutdown, or while another call runs.
         ImageError
-            For bad images or time stamps; the frame is not counted and nothing has changed.
+            For bad images or time stamps; the frame is not counted and nothing has changed, but
+            for a reset that had been asked for.
         WorkerError
             If a worker has failed; the original exception is its cause.
         """

@@ -66,6 +66,7 @@ def test_portable_kernels_by_environment() -> None:
 
 
 def test_one_extractor_refuses_a_second_thread() -> None:
+    """Another image would overwrite what the first is working on (OD-26)."""
     extractor = _core.OrbExtractor()
     large, small = noise(3000, 4000), noise(100, 100)
     refused = threading.Event()
@@ -117,6 +118,7 @@ def test_mask() -> None:
     ],
 )
 def test_bad_images(image: NDArray[np.generic]) -> None:
+    """The original keeps the keypoints of the image before, or does not notice (OD-24)."""
     with pytest.raises(ImageError, match="image"):
         _core.OrbExtractor().extract(image)
 

@@ -177,6 +177,7 @@ def test_temporary_points() -> None:
 
 
 def test_scene_depth_of_a_keyframe_without_points() -> None:
+    """The original reads before the start of a list (OD-59)."""
     world = core.Map()
     keyframe = world.add_keyframe(view(0).features, core.Pose())
     assert core.median_scene_depth(world, keyframe) is None

@@ -37,6 +37,7 @@ def test_tum_mono_uses_every_colour_image(tum: Path) -> None:
 
 
 def test_colour_order_is_the_one_of_the_settings(tum: Path, tmp_path: Path) -> None:
+    """The original's examples exchange red and blue (OD-3)."""
     np.testing.assert_array_equal(
         open_sequence(tum).load(0).image, image(0, (*SIZE, 3))[:, :, ::-1]
     )
@@ -78,6 +79,7 @@ def test_tum_with_only_an_association(tum: Path) -> None:
 
 
 def test_comments_anywhere_in_a_list(tum: Path) -> None:
+    """The original takes one in the middle for an image without a name (OD-10)."""
     text = (tum / "rgb.txt").read_text()
     (tum / "rgb.txt").write_text(text.replace("100.2", "# pause\n\n   # more\n100.2", 1))
     assert len(open_sequence(tum, Sensor.MONOCULAR)) == 4
@@ -110,6 +112,7 @@ def test_time_that_goes_back_is_a_warning(tum: Path, caplog: pytest.LogCaptureFi
 
 
 def test_list_without_images(tum: Path) -> None:
+    """The original reads out of range or divides by zero (OD-9)."""
     (tum / "rgb.txt").write_text("# nothing\n")
     for sensor in (Sensor.MONOCULAR, Sensor.RGBD):
         with pytest.raises(DatasetError, match="no images"):
@@ -128,6 +131,7 @@ def test_colour_without_partner_is_told(tum: Path, caplog: pytest.LogCaptureFixt
 
 
 def test_missing_list_file(tum: Path) -> None:
+    """The original reads it in an endless loop (OD-8)."""
     (tum / "rgb.txt").unlink()
     with pytest.raises(DatasetError, match=r"cannot open .*rgb\.txt"):
         TumSequence(tum, Sensor.RGBD)

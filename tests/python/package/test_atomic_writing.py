@@ -45,6 +45,7 @@ def test_old_file_stays_when_writing_fails(tmp_path: Path, error: BaseException)
 
 
 def test_missing_folder_is_named(tmp_path: Path) -> None:
+    """The original does not look whether the file could be opened (OD-18)."""
     with (
         pytest.raises(FileNotFoundError, match=r"cannot write .*none/a\.txt: No such file"),
         atomic_write(tmp_path / "none" / "a.txt"),

@@ -42,6 +42,7 @@ def test_depth_factor_of_zero_means_metres(tmp_path: Path, factor: str, expected
 
 
 def test_rates_below_one_still_allow_a_frame(tmp_path: Path) -> None:
+    """The original's largest spacing of keyframes becomes 0 (OD-5)."""
     path = write(tmp_path / "a.yaml", {**MONO, "Camera.fps": "0.5"})
     assert Settings.load(path, Sensor.MONOCULAR).max_keyframe_interval == 1
 

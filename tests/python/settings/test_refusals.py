@@ -26,6 +26,7 @@ def test_empty_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", sorted(MONO))
 def test_missing_key(tmp_path: Path, name: str) -> None:
+    """The original silently reads 0 or a huge number (OD-1)."""
     values = {key: value for key, value in MONO.items() if key != name}
     message = refusal(write(tmp_path / "a.yaml", values))
     assert f"{name} is missing" in message
@@ -96,6 +97,7 @@ def test_bad_value(tmp_path: Path, key: str, value: str, expected: str) -> None:
     ],
 )
 def test_unknown_key(tmp_path: Path, key: str, nearest: str) -> None:
+    """The original silently reads 0 for a key that is misspelt (OD-1)."""
     path = write(tmp_path / "a.yaml", MONO, f"{key}: 1\n")
     assert refusal(path) == f"{path}:13: unknown key {key.strip()}; did you mean {nearest}?"
 
@@ -180,6 +182,7 @@ def test_bad_matrix(tmp_path: Path, old: str, new: str, expected: str) -> None:
 def test_doubts_are_warnings(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, change: dict[str, str], expected: str
 ) -> None:
+    """Among them that stereo images are not rectified, which the original accepts (OD-7)."""
     with caplog.at_level(logging.WARNING):
         Settings.load(write(tmp_path / "a.yaml", {**MONO, **DEPTH, **change}), Sensor.STEREO)
     assert expected in caplog.text

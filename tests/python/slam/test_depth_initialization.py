@@ -30,6 +30,7 @@ from support.tracking_scene import (
 def test_depth_initializer(
     monkeypatch: pytest.MonkeyPatch, size: int, n_depths: int, reason: Reason
 ) -> None:
+    """The original begins a map with 500 keypoints even if none has depth (OD-68)."""
     inserted: list[dict[str, Any]] = []
 
     def insert(_map: FakeMap, frame: FakeFrame, **options: Any) -> int:

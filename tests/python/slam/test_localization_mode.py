@@ -110,7 +110,7 @@ def test_switched_off_outside_the_map(sensor: Sensor) -> None:
 
 
 def test_a_small_map_is_kept(sensor: Sensor) -> None:
-    """Lost with so few keyframes, mapping would start anew; here the map is the user's."""
+    """Lost with so few keyframes, mapping would start anew; here the map is the user's (OD-75)."""
     world = MappedWorld(turning(sensor), _MAPPED[:4])
     assert world.system.n_keyframes <= 5
     before = world.system.map_hash()
@@ -208,6 +208,7 @@ def slow_mapping(monkeypatch: pytest.MonkeyPatch) -> threading.Event:
 def test_waiting_keyframes_are_processed_afterwards(
     sensor: Sensor, slow_mapping: threading.Event
 ) -> None:
+    """The original deletes them when the mode ends (OD-126)."""
     with new_system(sensor) as system:
         play(system, 1)
         assert system.pipeline.back_end.mapping.worker.wait_until(
@@ -247,6 +248,7 @@ def test_shutdown_in_localization_mode(sensor: Sensor) -> None:
 
 @pytest.mark.parametrize("deterministic", [True, False])
 def test_reset_in_localization_mode(sensor: Sensor, deterministic: bool) -> None:
+    """The original's reset waits for ever for the stopped mapper (OD-121)."""
     with new_system(sensor, deterministic=deterministic) as system:
         play(system, 20)
         system.localization_mode = True

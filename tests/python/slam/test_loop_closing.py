@@ -185,6 +185,7 @@ def scene(monkeypatch: pytest.MonkeyPatch) -> Scene:
 
 
 def test_every_keyframe_enters_the_index(scene: Scene) -> None:
+    """The original's keyframe 0 never does (OD-46)."""
     scene.process(0, 1, 2)
     assert scene.index.added == [0, 1, 2]
     assert scene.closing.last_keyframe == 2
@@ -215,6 +216,7 @@ def test_a_confirmed_loop_is_closed_and_told(scene: Scene) -> None:
 
 
 def test_no_search_for_ten_keyframes_after_a_loop(scene: Scene) -> None:
+    """In the original, chains of consistency outlive the loop and the gap (OD-97)."""
     scene.consistency.consistent.extend([[4], [4]])
     scene.process(20, 21, 29)
     assert len(scene.events) == 1
@@ -282,6 +284,7 @@ def test_switched_off_keyframes_are_indexed_only(monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_keyframe_that_died_in_the_queue_is_left_out(scene: Scene) -> None:
+    """The original treats it like a living one (OD-96)."""
     scene.map.dead.add(20)
     scene.process(20)
     assert scene.index.added == []

@@ -163,6 +163,7 @@ def test_found_frame_has_pose_and_matches(world: MappedWorld) -> None:
 
 
 def test_what_is_not_found_has_neither(world: MappedWorld) -> None:
+    """The original keeps the pose of the failed attempt (OD-73)."""
     frame = described(world, next(foreign_views(world.sequence.sensor)))
     frame.T_cw = core.Pose()
     assert relocalizer(world).relocalize(frame) == 0

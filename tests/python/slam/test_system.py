@@ -112,6 +112,7 @@ print(system.map_hash(), system.n_keyframes, system.n_map_points)
 
 
 def test_deterministic_runs_are_equal(sensor: Sensor, tmp_path: Path) -> None:
+    """The original's results differ from run to run (OD-131)."""
     results = []
     for name in ("a", "b"):
         with new_system(sensor, deterministic=True) as system:
@@ -227,6 +228,7 @@ def test_covariance_tells_the_spread_of_the_pose() -> None:
 
 # ---- wrong calls ---------------------------------------------------------------------------------
 def test_wrong_sensor(sensor: Sensor) -> None:
+    """The original ends the process (OD-134)."""
     shown = images(Sensor.STEREO, 0)
     depth = np.ones(shown.image.shape, np.uint16)
     with new_system(sensor) as system:

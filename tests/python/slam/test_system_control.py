@@ -64,6 +64,7 @@ def test_interrupted_shutdown_can_be_repeated(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_dropped_system_ends_its_threads() -> None:
+    """The original's are never joined (OD-133)."""
     system = new_system(Sensor.RGBD)
     play(system, 10)
     assert {"local mapping", "loop closing"} <= set(worker_threads())
@@ -194,6 +195,7 @@ def breaks(*_: object, **__: object) -> None:
 def test_failed_mapping_reaches_the_caller(
     monkeypatch: pytest.MonkeyPatch, deterministic: bool, verb: str
 ) -> None:
+    """As an exception of the next call, not as the end of the process (OD-134)."""
     system = new_system(Sensor.RGBD, deterministic=deterministic)
     play(system, 10)
     system.wait_until_idle(20)

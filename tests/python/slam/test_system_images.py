@@ -44,6 +44,7 @@ BAD_IMAGES = {
 @pytest.mark.parametrize("place", ["image", "second"])
 @pytest.mark.parametrize("kind", BAD_IMAGES)
 def test_bad_images_change_nothing(sensor: Sensor, kind: str, place: str) -> None:
+    """The original notices neither empty images nor another type or size (OD-24, OD-25)."""
     bad, message = BAD_IMAGES[kind]
     if sensor is Sensor.RGBD and place == "second":
         if kind in {"float", "16 bits", "another size"}:

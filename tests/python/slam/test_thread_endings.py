@@ -23,7 +23,7 @@ pytestmark = pytest.mark.watchdog(60)
     "verb", ["plan_loop_correction", "optimize_essential_graph", "apply_loop_correction"]
 )
 def test_shutdown_during_a_correction(slam: System, stage: Stage, verb: str, drain: bool) -> None:
-    """The original's correction waits for the mapper without looking whether all is to end."""
+    """The original's correction waits for the mapper, whether or not all is to end (OD-138)."""
     close = stage.loops(slam)
     gate = stage.gate(verb)
     apply = stage.gate("apply_loop_correction", opened=True) if "apply" not in verb else gate
@@ -60,7 +60,7 @@ def test_shutdown_while_a_correction_waits_for_the_mapper(slam: System, stage: S
 
 
 def test_shutdown_gives_up_an_adjustment(slam: System, stage: Stage) -> None:
-    """The original waits until it has been solved."""
+    """The original waits until it has been solved (OD-140)."""
     stage.waitable_cancel(slam.pipeline.back_end.adjustment.worker)
     solve = stage.endless_solve()
     refine(slam)

@@ -35,7 +35,7 @@ def busy_mapping(stage: Stage) -> tuple[System, Callable[[], None], int]:
 
 
 def test_waiting_keyframes_outlive_localization_mode(stage: Stage) -> None:
-    """In the original the mapper's release deletes the keyframes that wait for it."""
+    """In the original the mapper's release deletes the keyframes that wait for it (OD-126)."""
     system, go_on, frame = busy_mapping(stage)
     with system:
         inserted = len(system.pipeline.back_end.map.keyframe_ids())
@@ -55,7 +55,7 @@ def test_waiting_keyframes_outlive_localization_mode(stage: Stage) -> None:
 def test_a_new_keyframe_interrupts_local_bundle_adjustment(
     slam: System, stage: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By a flag that the original writes from three threads without a lock."""
+    """By a flag that the original writes from three threads without a lock (OD-127)."""
     mapping = slam.pipeline.back_end.mapping.worker
     gate = stage.gate("local_bundle_adjustment")
     monkeypatch.setattr(_core, "process_new_keyframe", lambda *_: None)
@@ -69,7 +69,7 @@ def test_a_new_keyframe_interrupts_local_bundle_adjustment(
 
 
 def test_an_idle_mapper_says_so_at_once(slam: System) -> None:
-    """The original's looks busy for a part of every three milliseconds."""
+    """The original's looks busy for a part of every three milliseconds (OD-130)."""
     mapping = slam.pipeline.back_end.mapping.worker
     assert all(mapping.idle for _ in range(10000))
 
@@ -84,7 +84,7 @@ def test_no_keyframe_is_made_while_the_mapper_is_to_stand_still(slam: System) ->
 
 
 def test_keyframes_have_their_words_before_others_see_them(stage: Stage) -> None:
-    """The original's tracker reads words while the mapper computes them."""
+    """The original's tracker reads words while the mapper computes them (OD-128)."""
     real, described = _core.insert_keyframe, []
 
     def insert(world: _core.Map, frame: _core.TrackedFrame, **options: bool) -> int:
@@ -102,7 +102,7 @@ def test_keyframes_have_their_words_before_others_see_them(stage: Stage) -> None
 
 # ---- localization mode ---------------------------------------------------------------------------
 def test_a_reset_is_served_while_localization_mode_holds_the_workers(slam: System) -> None:
-    """The original's mapper does not look at reset requests while it stands: all wait for ever."""
+    """The original's mapper does not look at resets while it stands: all wait for ever (OD-121)."""
     slam.localization_mode = True
     assert track(slam, 30).state is TrackingState.OK
     assert slam.pipeline.back_end.mapping.worker.held
@@ -141,7 +141,7 @@ def test_localization_mode_waits_for_no_adjustment_that_is_being_solved(
 def test_a_loop_closed_at_the_switch_does_not_end_localization_mode(
     slam: System, stage: Stage, verb: str
 ) -> None:
-    """In the original any release of the mapper cancels the mode."""
+    """In the original any release of the mapper cancels the mode (OD-129, OD-137)."""
     close = stage.loops(slam)
     gate = stage.gate(verb)
     close(last_keyframe(slam))
@@ -163,6 +163,7 @@ def test_a_loop_closed_at_the_switch_does_not_end_localization_mode(
 def test_an_adjustment_written_at_the_switch_does_not_end_localization_mode(
     slam: System, stage: Stage
 ) -> None:
+    """In the original its end starts the mapper again, whatever the mode (OD-129, OD-137)."""
     commit = stage.gate("commit_full_bundle")
     refine(slam)
     commit.wait_entered()
@@ -226,7 +227,7 @@ def test_who_waits_for_the_workers_is_told_when_localization_mode_comes_on(
 
 # ---- loops and full adjustments ------------------------------------------------------------------
 def test_a_second_loop_gives_up_the_running_adjustment(slam: System, stage: Stage) -> None:
-    """In the original it clears the flag that stops the first, whose stale result is written."""
+    """The original's clears the flag that stops the first: its stale result is written (OD-136)."""
     close = stage.loops(slam)
     solve = stage.gate("solve_full_bundle")
     close(last_keyframe(slam) - 1)
@@ -242,7 +243,7 @@ def test_a_second_loop_gives_up_the_running_adjustment(slam: System, stage: Stag
 
 
 def test_a_loop_begins_while_an_adjustment_is_written(slam: System, stage: Stage) -> None:
-    """The original's adjustment lets the mapper go, whom the loop then waits for for ever."""
+    """The original's adjustment lets the mapper go, and the loop waits for it for ever (OD-122)."""
     close = stage.loops(slam)
     commit, plan = stage.gate("commit_full_bundle"), stage.gate("plan_loop_correction")
     plan.open()
@@ -283,7 +284,7 @@ def test_no_adjustment_is_written_in_the_middle_of_a_correction(slam: System, st
 def test_an_adjustment_that_a_loop_overtook_is_not_written(
     slam: System, stage: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Even if nobody told it: the map has moved as a whole since."""
+    """Even if nobody told it: the map has moved as a whole since, its result is stale (OD-136)."""
     solve = stage.gate("solve_full_bundle")
     refine(slam)
     solve.wait_entered()

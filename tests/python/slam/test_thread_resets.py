@@ -16,7 +16,7 @@ pytestmark = pytest.mark.watchdog(60)
 def test_a_reset_gives_up_an_adjustment_without_waiting_for_its_solver(
     slam: System, stage: Stage
 ) -> None:
-    """The original's goes on in the destroyed map."""
+    """The original's goes on in the destroyed map (OD-139)."""
     solve, commit = stage.gate("solve_full_bundle"), stage.gate("commit_full_bundle")
     refine(slam)
     solve.wait_entered()
@@ -49,7 +49,7 @@ def test_a_reset_gives_up_an_adjustment_that_localization_mode_holds(
     "verb", ["plan_loop_correction", "optimize_essential_graph", "apply_loop_correction"]
 )
 def test_a_reset_during_a_correction(slam: System, stage: Stage, verb: str) -> None:
-    """The original's loop closer keeps keyframes of the old map."""
+    """The original's loop closer keeps keyframes of the old map (OD-139)."""
     close = stage.loops(slam)
     closing = slam.pipeline.back_end.loop_closing
     gate = stage.gate(verb)
@@ -70,7 +70,7 @@ def test_a_reset_during_a_correction(slam: System, stage: Stage, verb: str) -> N
 
 
 def test_a_reset_of_a_spoilt_beginning_while_an_adjustment_is_written(stage: Stage) -> None:
-    """The original resets inside a frame, holding the lock that the adjustment waits for."""
+    """The original resets inside a frame, with the lock that the adjustment waits for (OD-123)."""
     with new_system(Sensor.RGBD) as system:
         play(system, 5)
         assert system.wait_until_idle(LIMIT)
@@ -113,7 +113,7 @@ def test_optimize_ends_when_a_reset_drops_it(slam: System) -> None:
 
 
 def test_nobody_waits_for_those_who_look(slam: System, stage: Stage) -> None:
-    """The original's reset waits for its viewer, for ever if that has ended."""
+    """The original's reset waits for its viewer, for ever if that has ended (OD-125)."""
     close = stage.loops(slam)
     plan = stage.gate("plan_loop_correction")
     close(last_keyframe(slam))
@@ -129,7 +129,7 @@ def test_nobody_waits_for_those_who_look(slam: System, stage: Stage) -> None:
 
 
 def test_every_system_counts_its_own_changes(slam: System) -> None:
-    """The original counts in one variable for all systems of a process."""
+    """The original counts in one variable for all systems of a process (OD-132)."""
     with new_system(Sensor.RGBD) as other:
         play(other, 5)
         assert slam.optimize().used
@@ -142,7 +142,7 @@ def test_every_system_counts_its_own_changes(slam: System) -> None:
 
 # ---- keyframes that die --------------------------------------------------------------------------
 def test_a_keyframe_that_dies_in_the_loop_closers_queue_is_passed_over(slam: System) -> None:
-    """The original does not look whether it is still alive."""
+    """The original does not look whether it is still alive (OD-49, OD-96)."""
     closing = slam.pipeline.back_end.loop_closing
     dies = last_keyframe(slam)
     slam.pipeline.back_end.keyframe_index.erase(dies)
@@ -173,7 +173,7 @@ def test_a_keyframe_culled_while_the_loop_closer_looks_at_it_dies_afterwards(
 
 
 def test_related_keyframes_die_in_two_threads_at_once(slam: System) -> None:
-    """The original takes their two locks in opposite order."""
+    """The original takes their two locks in opposite order (OD-124)."""
     keyframes = slam.pipeline.back_end.map.keyframe_ids()[1:].tolist()
 
     def erase(order: list[int]) -> None:

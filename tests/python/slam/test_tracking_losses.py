@@ -25,6 +25,7 @@ def test_lost(scene: Scene) -> None:
 
 
 def test_no_pose_when_the_local_map_fails(scene: Scene) -> None:
+    """The original hands out the pose of the failed attempt (OD-73)."""
     scene.run(3)
     scene.core.inliers.extend([100, 0])
     assert scene.track().state is TrackingState.LOST
@@ -39,6 +40,7 @@ def test_a_small_map_is_given_up(scene: Scene, n_keyframes: int, reset: bool) ->
 
 
 def test_a_small_map_that_was_used_for_localization_is_kept(scene: Scene) -> None:
+    """The original destroys it by a loss (OD-75)."""
     scene.run(3)
     scene.map.n_keyframes = 3
     scene.localize = True
@@ -86,6 +88,7 @@ def test_lost_keeps_trying_the_reference_keyframe_and_recovers(scene: Scene) -> 
 
 
 def test_velocity_does_not_survive_a_loss(scene: Scene) -> None:
+    """The original's does (OD-74)."""
     scene.run(40)
     lose(scene)
     scene.run(2)
@@ -100,6 +103,7 @@ def test_velocity_does_not_survive_a_loss(scene: Scene) -> None:
 
 
 def test_no_velocity_across_a_gap(scene: Scene) -> None:
+    """The original takes it there, too (OD-74)."""
     scene.run(3)
     scene.core.n_reference = 0
     scene.track(frame_id=10)  # frames in between were refused
@@ -111,6 +115,7 @@ def test_no_velocity_across_a_gap(scene: Scene) -> None:
 
 
 def test_reset_forgets_all_but_the_counts(scene: Scene) -> None:
+    """The original keeps the velocity and the id of the last relocalization (OD-70)."""
     scene.run(40)
     lose(scene)
     scene.run(1)

@@ -129,6 +129,7 @@ def test_tries_again_when_the_map_moved_while_a_frame_was_tracked(
 
 
 def test_a_culled_reference_keyframe_gives_way_to_its_parent(scene: Scene) -> None:
+    """The original's tracker goes on with the culled one (OD-81)."""
     scene.run(2)
     scene.map.culled[4] = 2
     scene.core.local_reference = -1

@@ -40,6 +40,7 @@ def test_reset_while_busy_waits_for_the_job_and_drops_the_others(
 
 
 def test_reset_while_paused(worker: Worker[int], gate: Gate) -> None:
+    """The original's reset of a stopped mapper waits for ever (OD-121)."""
     gate.open()
     with worker.pause():
         worker.submit(0)

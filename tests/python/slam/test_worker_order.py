@@ -99,6 +99,7 @@ def test_lower_interrupt_lowers_a_stale_request(worker: Worker[int], gate: Gate)
 
 
 def test_lower_interrupt_refuses_while_a_job_waits(worker: Worker[int], gate: Gate) -> None:
+    """The original's mapper may erase an interrupt just before it would be read (OD-127)."""
     worker.submit(0)
     gate.wait_begun()
     worker.submit(1)

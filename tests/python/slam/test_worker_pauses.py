@@ -17,6 +17,7 @@ pytestmark = pytest.mark.watchdog(10)
 
 # ---- pauses --------------------------------------------------------------------------------------
 def test_pauses_are_counted(worker: Worker[int], gate: Gate) -> None:
+    """In the original one release cancels the stops that others asked for (OD-122, OD-137)."""
     gate.open()
     first, second = worker.pause(), worker.pause()
     assert first.wait(10)

@@ -84,6 +84,7 @@ def test_quaternions_of_other_lengths_are_accepted(tmp_path: Path) -> None:
 
 # ---- KITTI ---------------------------------------------------------------------------------------
 def test_kitti_has_a_line_for_every_frame(tmp_path: Path) -> None:
+    """The original's file lacks the frames before the map begins (OD-14)."""
     T_wc = np.tile(np.eye(4), (2, 1, 1))
     T_wc[:, 2, 3] = [5, 7]
     trajectory = Trajectory(np.array([0.2, 0.4]), T_wc, indices=np.array([2, 4]))
@@ -96,6 +97,7 @@ def test_kitti_has_a_line_for_every_frame(tmp_path: Path) -> None:
 
 
 def test_kitti_of_nothing(tmp_path: Path) -> None:
+    """The original reads the first keyframe of the empty map (OD-15)."""
     empty = Trajectory(np.zeros(0), np.zeros((0, 4, 4)))
     write_kitti(tmp_path / "a.txt", empty)
     assert (tmp_path / "a.txt").read_text() == ""

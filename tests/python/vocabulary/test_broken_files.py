@@ -18,7 +18,7 @@ from support.vocabularies import BYTES, TEXT, error_of, golden, packed, to_yaml,
 # ---- broken text ---------------------------------------------------------------------------------
 @pytest.mark.parametrize("header", ["1 3 0 0", "0 3 0 0", "21 3 0 0", "10 0 0 0", "10 11 0 0"])
 def test_header_out_of_range(text, header):
-    """With less than two branches the original divides by zero."""
+    """With less than two branches the original divides by zero (OD-41)."""
     assert "line 1: not a vocabulary file" in error_of(with_line(text, 1, header))
 
 
@@ -88,7 +88,7 @@ def test_other_files_are_refused(tmp_path, content):
 
 
 def test_missing_file_and_folder_are_named(tmp_path):
-    """The original reads on in a file that it could not open."""
+    """The original reads on in a file that it could not open (OD-40)."""
     assert "No such file" in error_of(tmp_path / "nothing.txt")
     error_of(tmp_path)
 

@@ -20,7 +20,7 @@ from support.vocabularies import TEXT, packed, to_yaml
 
 
 def test_trailing_newline_makes_no_extra_word(vocabulary, text):
-    """The original reads one line too many, and makes a word of it."""
+    """The original reads one line too many, and makes a word of it (OD-39)."""
     assert (vocabulary.n_words, vocabulary.n_nodes) == (1000, 1111)
     text.write_bytes(text.read_bytes().rstrip(b"\n"))
     assert load_vocabulary(text, cache=False).hash == vocabulary.hash

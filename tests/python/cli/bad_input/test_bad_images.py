@@ -67,6 +67,7 @@ CASES = [
 def test_one_bad_image(
     command: CommandLine, rgbd: Path, part: str, spoil: Callable[[Path], None], message: str
 ) -> None:
+    """The original ends at once, or crashes if it is a depth image (OD-12)."""
     spoil(nth(rgbd / part))
     expect_skipped(run(command, rgbd), "r", message)
 
