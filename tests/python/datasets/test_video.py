@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import logging
 from pathlib import Path
 
 import cv2
@@ -75,10 +74,8 @@ def test_frame_past_the_end_of_a_video(video: Path) -> None:
 
 
 def test_first_image_tells_that_the_settings_do_not_fit(
-    video: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+    video: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    # The command line, if it was used before, keeps messages from other handlers.
-    monkeypatch.setattr(logging.getLogger("orbslam2py"), "propagate", True)
     sequence = VideoSequence(video, settings=with_size("tum1"))
     sequence.load(0)
     sequence.load(1)
