@@ -20,6 +20,7 @@ from orbslam2py.runs.outputs import new_output_folder
 from orbslam2py.runs.run import FinishedRun, run_sequence
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.options import SystemOptions
+from orbslam2py.vocabulary.vocabulary import load_vocabulary
 
 EXAMPLE = """
 **Example**
@@ -164,11 +165,12 @@ def run_and_show(
     errors = Console(stderr=True)
     log_to(errors, quiet=quiet)
     n_frames = options.n_frames(sequence)
+    words = load_vocabulary(vocabulary)  # until here a Ctrl-C leaves nothing behind
     with StopOnInterrupt() as interrupt, progress_bar(console) as bar:
         done = run_sequence(
             sequence,
             options,
-            vocabulary=vocabulary,
+            vocabulary=words,
             output=output or new_output_folder(sequence.name),
             force=force,
             progress=Display(bar, n_frames).show,
