@@ -133,7 +133,7 @@ def test_work_that_nobody_misses_is_refused_quietly_after_the_end(worker: Worker
 
 
 def test_mapping_may_end_after_loop_closing() -> None:
-    """A shutdown that ran out of time is repeated: the last keyframe finds nobody to close loops."""
+    """A shutdown that ran out of time is repeated: the last keyframe finds loops closed no more."""
     system = new_system(Sensor.RGBD, wait_for_mapping=True)
     play(system, 5)
     back_end = system.pipeline.back_end
