@@ -17,24 +17,25 @@ from orbslam2py.vocabulary import read_training_images, save_vocabulary, train_v
 
 FRAMES, SIZE = 40, (320, 240)
 
+#: The pair that took the images of `mypair`.
 CAMCHAIN = """\
 cam0:
   camera_model: pinhole
-  distortion_coeffs: [-0.28, 0.07, 0.0002, 0.00002]
+  distortion_coeffs: [0.0, 0.0, 0.0, 0.0]
   distortion_model: radtan
-  intrinsics: [458.6, 457.3, 367.2, 248.4]
-  resolution: [752, 480]
+  intrinsics: [200.0, 200.0, 159.5, 119.5]
+  resolution: [320, 240]
 cam1:
   T_cn_cnm1:
-  - [1.0, 0.0, 0.0, -0.11]
+  - [1.0, 0.0, 0.0, -0.1]
   - [0.0, 1.0, 0.0, 0.0]
   - [0.0, 0.0, 1.0, 0.0]
   - [0.0, 0.0, 0.0, 1.0]
   camera_model: pinhole
-  distortion_coeffs: [-0.28, 0.07, -0.0001, -0.00003]
+  distortion_coeffs: [0.0, 0.0, 0.0, 0.0]
   distortion_model: radtan
-  intrinsics: [457.6, 456.1, 380.0, 255.2]
-  resolution: [752, 480]
+  intrinsics: [200.0, 200.0, 159.5, 119.5]
+  resolution: [320, 240]
 """
 
 
@@ -47,6 +48,7 @@ def make_data(folder: Path) -> None:
     }
     for name, (sensor, layout) in sequences.items():
         _walk(sensor).write(folder / name, layout)
+    (folder / "mypair").symlink_to(folder / "V1_01_easy")
     single = _walk("mono")
     images = [single.load(i).image for i in range(FRAMES)]
     single.settings.save(folder / "my.yaml")
