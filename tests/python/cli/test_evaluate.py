@@ -63,7 +63,7 @@ def test_command_on_kitti_files(tmp_path: Path) -> None:
     write_tum(tmp_path / "b.txt", truth)
     result = CliRunner().invoke(app, arguments)
     assert isinstance(result.exception, DatasetError)
-    assert "no time stamps" in str(result.exception)
+    assert "251 rows without time stamps" in str(result.exception)
 
 
 @pytest.mark.parametrize("file_format", ["tum", "kitti"])
@@ -83,9 +83,7 @@ def test_command_on_a_folder(tmp_path: Path, file_format: str) -> None:
     assert "without ground truth" in str(result.exception)
 
 
-def test_command_moves_the_body_to_the_camera(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_command_moves_the_body_to_the_camera(tmp_path: Path) -> None:
     truth = wander(40, rate=20.0)
     T_BS = np.eye(4)
     T_BS[:3, :3] = Rotation.from_rotvec([0, 0, np.pi / 2]).as_matrix().round(12)
@@ -102,8 +100,10 @@ def test_command_moves_the_body_to_the_camera(
     write_tum(tmp_path / "a.txt", truth)
     arguments = [str(tmp_path / "a.txt"), str(csv), "--json", str(tmp_path / "c.json")]
 
-    assert CliRunner().invoke(app, arguments).exit_code == 0
-    assert "poses of the body" in caplog.text
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0
+    assert "poses of the body" in result.stderr
+    assert "--extrinsics" in result.stderr
     without = json.loads((tmp_path / "c.json").read_text())["ate_rmse_m"]
     calibration = tmp_path / "mav0" / "cam0" / "sensor.yaml"
     calibration.parent.mkdir()
@@ -114,6 +114,61 @@ def test_command_moves_the_body_to_the_camera(
     )
     assert CliRunner().invoke(app, arguments).exit_code == 0
     assert json.loads((tmp_path / "c.json").read_text())["ate_rmse_m"] < 1e-6 < without
+    other = tmp_path / "elsewhere.yaml"
+    calibration.rename(other)
+    numbers = tmp_path / "matrix.txt"
+    np.savetxt(numbers, T_BS[:3])
+    for given in (other, numbers):
+        result = CliRunner().invoke(app, [*arguments, "--extrinsics", str(given)])
+        assert result.exit_code == 0, result.output
+        assert result.stderr == ""
+        assert json.loads((tmp_path / "c.json").read_text())["ate_rmse_m"] < 1e-6
+    write_tum(tmp_path / "body.txt", Trajectory(truth.timestamps, body))
+    result = CliRunner().invoke(
+        app, [arguments[0], str(tmp_path / "body.txt"), *arguments[2:], "--extrinsics", str(other)]
+    )
+    assert result.exit_code == 0, result.output
+    assert json.loads((tmp_path / "c.json").read_text())["ate_rmse_m"] < 1e-6
+
+
+def test_offset_between_the_clocks(tmp_path: Path) -> None:
+    truth = wander(40)
+    write_tum(tmp_path / "a.txt", truth.shifted(-3.25))
+    write_tum(tmp_path / "b.txt", truth)
+    arguments = [str(tmp_path / "a.txt"), str(tmp_path / "b.txt"), "--offset", "3.25"]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0, result.output
+    assert "40 of 40 poses matched" in result.output
+    assert "differ by 0.00 ms (median)" in result.output
+
+
+@pytest.mark.parametrize("sensor", ["mono", "rgbd", None])
+def test_hint_and_choice_for_one_camera(tmp_path: Path, sensor: str | None) -> None:
+    truth = wander(100)
+    write_tum(tmp_path / "a.txt", shrunk(truth))
+    write_tum(tmp_path / "b.txt", truth)
+    if sensor is not None:
+        (tmp_path / "report.json").write_text(json.dumps({"sensor": sensor}))
+    arguments = [str(tmp_path / "a.txt"), str(tmp_path / "b.txt")]
+    chosen = CliRunner().invoke(app, arguments)
+    assert f"Alignment: {'se3' if sensor == 'rgbd' else 'sim3'}" in chosen.stdout
+    assert chosen.stderr == ""
+    rigid = CliRunner().invoke(app, [*arguments, "--alignment", "se3"])
+    assert rigid.exit_code == 0
+    assert ("give --alignment sim3" in rigid.stderr) == (sensor != "rgbd")
+
+
+def test_single_matched_pose(tmp_path: Path) -> None:
+    truth = wander(20)
+    write_tum(tmp_path / "a.txt", truth.select(np.array([4])))
+    write_tum(tmp_path / "b.txt", truth)
+    path = tmp_path / "c.json"
+    arguments = [str(tmp_path / "a.txt"), str(tmp_path / "b.txt"), "--json", str(path)]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0, result.output
+    assert "no absolute error of 1 matched pose" in result.stderr
+    assert "ate rmse" not in result.stdout
+    assert json.loads(path.read_text())["ate_rmse_m"] is None
 
 
 @pytest.mark.parametrize(
