@@ -28,6 +28,7 @@ from orbslam2py.evaluation import (
     Evaluation,
     Paired,
     Poses,
+    ends_early,
     evaluate_trajectory,
     pair,
     read_estimate,
@@ -164,12 +165,19 @@ def _read_both(
         truth = _of_camera(ground_truth, truth, T_body_camera)
     if times is not None:
         _see_that_they_fit(times_file, times, (estimate, truth))
+    n = len(truth.trajectory)
+    if truth.file_format is TrajectoryFormat.KITTI and ends_early(truth, truth.frame_times):
+        assert truth.frame_times is not None
+        _log.warning(
+            "%s has %d poses for %d times; frames after these are not compared",
+            *(truth.source, n, len(truth.frame_times)),
+        )
     return pair(estimate, truth)
 
 
 def _see_that_they_fit(path: Path | None, times: FloatArray, files: tuple[Poses, ...]) -> None:
     rows = [poses for poses in files if poses.file_format is TrajectoryFormat.KITTI]
-    if any(len(poses.trajectory) == len(times) for poses in rows):
+    if any(len(poses.trajectory) == len(times) for poses in rows) or ends_early(files[1], times):
         return
     if not rows:
         raise DatasetError(f"{path} is not needed: both files have time stamps; leave out --times")

@@ -27,7 +27,7 @@ from orbslam2py.evaluation.metrics import (
     relative_errors,
     segment_errors,
 )
-from orbslam2py.evaluation.pairing import Paired, Poses, pair, read_estimate, read_truth
+from orbslam2py.evaluation.pairing import Paired, Poses, ends_early, pair, read_estimate, read_truth
 
 __all__ = [
     "SEGMENT_LENGTHS",
@@ -46,6 +46,7 @@ __all__ = [
     "closed_revisits",
     "describe_match",
     "differ_in_unit",
+    "ends_early",
     "errors_through_keyframes",
     "evaluate_trajectory",
     "find_revisits",

@@ -26,6 +26,7 @@ from orbslam2py.trajectory import (
 )
 
 _SAME_TIME = 1e-6  # [s]
+_END = 0.02  # part of a sequence that may be without a true pose at its end
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,9 +109,8 @@ def read_estimate(
     if file_format is not TrajectoryFormat.KITTI:
         return Poses(str(path), trajectory, file_format, frames=frames)
     if frames is not None and len(frames) == len(trajectory):
-        trajectory = Trajectory(
-            frames.timestamps, trajectory.T_wc, ~frames.has_pose, frames.indices
-        )
+        lost = ~frames.has_pose | _before_the_map(trajectory.T_wc)
+        trajectory = Trajectory(frames.timestamps, trajectory.T_wc, lost, frames.indices)
         return Poses(str(path), trajectory, file_format, frames=frames)
     lost = rows_without_pose(trajectory.T_wc)
     trajectory = Trajectory(trajectory.timestamps, trajectory.T_wc, lost)
@@ -139,7 +139,8 @@ def read_truth(
     """
     trajectory, file_format = read_trajectory(path, file_format)
     timed = file_format is not TrajectoryFormat.KITTI
-    return _with_times(Poses(str(path), trajectory, file_format, timed), path, times)
+    poses = Poses(str(path), trajectory, file_format, timed)
+    return _with_times(poses, path, times, may_end_early=True)
 
 
 def pair(estimate: Poses, truth: Poses) -> Paired:
@@ -189,23 +190,31 @@ def rows_without_pose(T_wc: FloatArray) -> NDArray[np.bool_]:
     return repeats
 
 
+def _before_the_map(T_wc: FloatArray) -> NDArray[np.bool_]:
+    """Leading rows with the identity, but for the last, which may be the first pose."""
+    is_identity = (T_wc == np.eye(4)).all(axis=(1, 2))
+    leading = np.logical_and.accumulate(is_identity)
+    leading[max(0, int(leading.sum()) - 1) :] = False
+    return leading
+
+
 def _by_frame_number(estimate: Poses, truth: Poses) -> Paired:
     """Pair the frames of a run with the rows of a truth that has one for every frame."""
     frames, n = estimate.frames, len(truth.trajectory)
-    known = frames is not None and _all_listed(estimate.trajectory, frames)
-    if frames is None or not known:
+    if frames is None or not _all_listed(estimate.trajectory, frames):
         raise DatasetError(
             f"{truth.source} has {n} poses without time stamps; give the time of each with "
             "--times, put times.txt beside it, or give the folder of the sequence instead"
         )
     last, step = _last_and_step(frames.indices)
-    if not last < n <= last + step:
+    if not last + 1 - _end(last + 1) <= n <= last + step:
         raise DatasetError(
             f"{truth.source} has {n} poses without time stamps, but the run has ended with frame "
             f"{last} of its sequence: whether there is a pose for every frame is not known; give "
             "the time of each with --times, or the folder of the sequence instead"
         )
-    rows = Trajectory(frames.timestamps, truth.trajectory.T_wc[frames.indices])
+    known = frames.indices < n
+    rows = Trajectory(frames.timestamps[known], truth.trajectory.T_wc[frames.indices[known]])
     by = "number of the frame, as frames.csv tells it"
     return Paired(estimate.trajectory, rows, by, on_clocks=False)
 
@@ -228,15 +237,28 @@ def _all_listed(trajectory: Trajectory, frames: FrameTable) -> bool:
     return bool((nearest < _SAME_TIME).all())
 
 
-def _with_times(poses: Poses, path: Path, times: FloatArray | None) -> Poses:
+def _with_times(
+    poses: Poses, path: Path, times: FloatArray | None, *, may_end_early: bool = False
+) -> Poses:
     """Give the rows of KITTI's format their times, if there are as many of them."""
     if poses.is_timed:
         return poses
-    if not _as_many(poses.trajectory, times):
-        times = _times_beside(path)
-    if not _as_many(poses.trajectory, times):
-        return poses
-    return replace(poses, trajectory=_at(poses, times), is_timed=True, frame_times=times)
+    for known in (times, _times_beside(path)):
+        if _as_many(poses.trajectory, known) or (may_end_early and ends_early(poses, known)):
+            trajectory = _at(poses, known)
+            return replace(poses, trajectory=trajectory, is_timed=True, frame_times=known)
+    return poses
+
+
+def ends_early(poses: Poses, times: FloatArray | None) -> bool:
+    """Whether only a few frames at the end of a sequence are without a true pose."""
+    n = len(poses.trajectory)
+    return times is not None and len(times) - _end(len(times)) <= n < len(times)
+
+
+def _end(n: int) -> int:
+    """How many frames at the end of a sequence may be without a true pose."""
+    return max(1, int(_END * n))
 
 
 def _as_many(trajectory: Trajectory, times: FloatArray | None) -> bool:
@@ -245,7 +267,8 @@ def _as_many(trajectory: Trajectory, times: FloatArray | None) -> bool:
 
 def _at(poses: Poses, times: FloatArray | None) -> Trajectory:
     assert times is not None
-    return Trajectory(times, poses.trajectory.T_wc, poses.trajectory.lost)
+    n = len(poses.trajectory)
+    return Trajectory(times[:n], poses.trajectory.T_wc, poses.trajectory.lost)
 
 
 def _frames_beside(path: Path) -> FrameTable | None:

@@ -176,7 +176,38 @@ def test_times_of_the_truth(command: CommandLine, tmp_path: Path, place: str) ->
     )
 
 
-@pytest.mark.parametrize("n", [N - 1, N + 1])
+def test_truth_that_ends_a_frame_early(command: CommandLine, tmp_path: Path) -> None:
+    """As KITTI's sequences that were cut."""
+    truth = wander(N)
+    leave_run(tmp_path / "run", truth)
+    write_kitti(tmp_path / "poses.txt", truth.select(np.arange(N - 1)))
+    for name in ("trajectory_kitti.txt", "trajectory.txt"):
+        expect_right(compared(command, f"run/{name}", "poses.txt")[0], N - 13)
+    write_times(tmp_path / "times.txt", truth)
+    for name in ("trajectory_kitti.txt", "trajectory.txt"):
+        figures, done = compared(command, f"run/{name}", "poses.txt")
+        expect_right(figures, N - 13)
+        assert "poses.txt has 119 poses for 120 times" in done.err
+
+
+def test_only_frames_of_the_last_map_are_compared(command: CommandLine, tmp_path: Path) -> None:
+    truth = wander(N)
+    leave_run(tmp_path / "run", truth, without=40)
+    write_kitti(tmp_path / "poses.txt", truth)
+    table = tmp_path / "run" / "frames.csv"
+    lines = table.read_text().splitlines()
+    lines[5:30] = [line.replace(",0,NOT_INITIALIZED", ",0,OK") for line in lines[5:30]]
+    lines[30:] = [line.replace(",0,", ",1,") for line in lines[30:]]
+    table.write_text("\n".join(lines) + "\n")
+    expect_right(compared(command, "run/trajectory_kitti.txt", "poses.txt")[0], N - 40)
+    # A map that ended with the last frame: the file holds nothing but the identity.
+    write_kitti(tmp_path / "run" / "trajectory_kitti.txt", truth.select(np.zeros(0, int)), N)
+    table.write_text("\n".join(line.replace(",1,", ",0,") for line in lines) + "\n")
+    figures, _ = compared(command, "run/trajectory_kitti.txt", "poses.txt")
+    assert figures["ate_rmse_m"] is None
+
+
+@pytest.mark.parametrize("n", [N - 10, N - 1, N + 10])
 def test_times_that_are_not_those_of_the_rows(command: CommandLine, tmp_path: Path, n: int) -> None:
     truth = wander(N)
     write_kitti(tmp_path / "poses.txt", truth)
