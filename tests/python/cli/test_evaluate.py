@@ -13,12 +13,14 @@ import typer
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
-from orbslam2py import DatasetError, Trajectory
+from orbslam2py import DatasetError, Sensor, Trajectory
 from orbslam2py.cli import main
 from orbslam2py.cli.evaluate import evaluate
+from orbslam2py.datasets import open_sequence
 from orbslam2py.evaluation import Alignment, evaluate_trajectory
 from orbslam2py.trajectory import write_kitti, write_tum
 from support.made_up_paths import straight, wander
+from support.small_folders import STAMPS, write_euroc
 
 
 def shrunk(truth: Trajectory) -> Trajectory:
@@ -129,6 +131,50 @@ def test_command_moves_the_body_to_the_camera(tmp_path: Path) -> None:
     )
     assert result.exit_code == 0, result.output
     assert json.loads((tmp_path / "c.json").read_text())["ate_rmse_m"] < 1e-6
+
+
+def test_folder_of_euroc(tmp_path: Path) -> None:
+    """The raw left camera of a run of one camera, the rectified one of stereo; extrinsics given."""
+    root = write_euroc(tmp_path / "V9_01") / "mav0"
+    right = root / "cam1" / "sensor.yaml"
+    c, s = np.cos(0.1), np.sin(0.1)  # nods, and with it the rectification
+    text = right.read_text().replace("[0.0, -1.0, 0.0,", f"[0.0, {-c}, {s},")
+    right.write_text(text.replace("0.0, 0.0, 1.0, 0.03", f"0.0, {s}, {c}, 0.03"))
+    (root / "state_groundtruth_estimate0").mkdir()
+    rows = []
+    for k, stamp in enumerate(STAMPS):
+        x, y, z, w = Rotation.from_rotvec([0.0, 0.0, 0.8 * k]).as_quat()
+        rows.append(f"{stamp},{k},0,{0.5 * k * k},{w},{x},{y},{z}\n")
+    (root / "state_groundtruth_estimate0" / "data.csv").write_text("#t\n" + "".join(rows))
+    truth = open_sequence(tmp_path / "V9_01", Sensor.MONOCULAR).ground_truth()
+    assert truth is not None
+    estimate = tmp_path / "a.txt"
+    estimate.write_text("".join(f"{line}\n" for line in tum_lines(truth)))
+
+    def figures(*options: object) -> dict[str, float]:
+        path = tmp_path / "c.json"
+        arguments = [estimate, tmp_path / "V9_01", "--alignment", "se3", "--json", path, *options]
+        result = CliRunner().invoke(app, list(map(str, arguments)))
+        assert result.exit_code == 0, result.output + str(result.exception)
+        return dict(json.loads(path.read_text()))
+
+    assert figures()["rpe_rotation_rmse_deg"] > 1, "rectified"
+    (tmp_path / "report.json").write_text('{"sensor": "mono"}')
+    assert figures()["rpe_rotation_rmse_deg"] < 1e-4
+    calibration = tmp_path / "elsewhere.yaml"
+    (root / "cam0" / "sensor.yaml").rename(calibration)
+    assert figures("--extrinsics", calibration)["ate_rmse_m"] < 1e-6
+    result = CliRunner().invoke(app, [str(estimate), str(tmp_path / "V9_01")])
+    assert "without ground truth" in str(result.exception)
+
+
+def tum_lines(path: Trajectory) -> list[str]:
+    lines = []
+    for stamp, T in zip(STAMPS, path.T_wc, strict=True):
+        values = [*T[:3, 3], *Rotation.from_matrix(T[:3, :3]).as_quat()]
+        seconds = f"{stamp // 10**9}.{stamp % 10**9:09d}"
+        lines.append(" ".join([seconds, *(f"{value:.9f}" for value in values)]))
+    return lines
 
 
 def test_offset_between_the_clocks(tmp_path: Path) -> None:
