@@ -127,18 +127,25 @@ def _say_what_was_compared(both: Paired, result: Evaluation, *, asked: Alignment
     say(f"Compared: {matched}, by {escape(both.by)}.", highlight=False, soft_wrap=True)
     lost = int(both.estimate.lost.sum())
     if lost:
-        say(f"Left out: {lost} rows of frames without a pose.", highlight=False, soft_wrap=True)
+        rows = "1 row" if lost == 1 else f"{lost} rows"
+        say(f"Left out: {rows} of frames without a pose.", highlight=False, soft_wrap=True)
     if asked is Alignment.AUTO:
-        why = {True: "a single camera", False: "metric", None: "told by the lengths"}
+        why = {
+            True: "a single camera",
+            False: "the run's sensor sees metres",
+            None: "told by the lengths",
+        }
         reason = why[result.single_camera]
         say(f"Alignment: {result.alignment} ({reason}).", highlight=False, soft_wrap=True)
     if result.hint:
         _log.warning("%s", result.hint)
-    if result.ate is None:
+    if matched.poses < result.alignment.fewest_poses:
         _log.warning(
-            "no absolute error of %d matched pose(s) aligned by %s: it takes at least %d",
+            "no absolute error: %d matched, and %s takes at least %d poses; compare a longer part",
             *(matched.poses, result.alignment, result.alignment.fewest_poses),
         )
+    elif result.ate is None:
+        _log.warning("no absolute error: positions are too large to reckon with; check the files")
     if matched.poses < _FEW * matched.estimate_poses:
         _log.warning(
             "only %d of %d poses have a true one at their time: the figures are of a part of the "

@@ -212,7 +212,7 @@ def test_single_matched_pose(tmp_path: Path) -> None:
     arguments = [str(tmp_path / "a.txt"), str(tmp_path / "b.txt"), "--json", str(path)]
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 0, result.output
-    assert "no absolute error of 1 matched pose" in result.stderr
+    assert "no absolute error: 1 matched, and se3 takes at least 2 poses" in result.stderr
     assert "ate rmse" not in result.stdout
     assert json.loads(path.read_text())["ate_rmse_m"] is None
 
@@ -238,3 +238,14 @@ def test_bad_input_ends_with_status_2(
         main()
     assert caught.value.code == 2
     assert "b.txt:1: 'x' is not a number" in capsys.readouterr().err
+
+
+def test_positions_that_overflow(tmp_path: Path) -> None:
+    truth = wander(20)
+    write_tum(tmp_path / "b.txt", truth)
+    truth.T_wc[3, :3, 3] = 1e200
+    write_tum(tmp_path / "a.txt", truth)
+    result = CliRunner().invoke(app, [str(tmp_path / "a.txt"), str(tmp_path / "b.txt")])
+    assert result.exit_code == 0, result.output
+    assert "positions are too large" in result.stderr
+    assert "rpe rotation rmse" in result.stdout
