@@ -122,7 +122,8 @@ class DepthSettings:
     close_factor
         Points nearer than this many baselines are trusted from one view (key ``ThDepth``).
     raw_per_metre
-        Units of the depth image per metre (key ``DepthMapFactor``, RGB-D); 1 for metres.
+        Units of the depth image per metre (key ``DepthMapFactor``, RGB-D): 1000 for millimetres,
+        1 for metres. A file for RGB-D must say it.
     """
 
     close_factor: float

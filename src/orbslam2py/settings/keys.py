@@ -45,6 +45,8 @@ class Key:
         Who uses the key; for other sensors it may stand in the file and is not looked at.
     required
         Whether those sensors cannot do without it.
+    usual
+        Values that most have, for messages.
     """
 
     name: str
@@ -54,6 +56,12 @@ class Key:
     rule: Rule
     sensors: frozenset[Sensor] = _ALL
     required: bool = False
+    usual: str = ""
+
+    @property
+    def allowed(self) -> str:
+        """The values allowed, and those that are usual, for a message."""
+        return f"{self.rule.text} (usual: {self.usual})" if self.usual else self.rule.text
 
 
 def _above_zero(limit: float, unit: str = "") -> Rule:
@@ -109,8 +117,11 @@ KEYS: tuple[Key, ...] = (
         "depth",
         "raw_per_metre",
         float,
-        _between(0, 1e9, "raw units per metre"),
+        # What lies below counts as 1 in the core: "already metres" in the files of ORB-SLAM.
+        _between(1e-5, 1e9, "raw units per metre"),
         _RGBD,
+        True,
+        "1000 for millimetres, 5000 for TUM, 1 for metres",
     ),
     Key("ORBextractor.nFeatures", "orb", "n_features", int, _between(1, 1e6), required=True),
     Key(
@@ -187,11 +198,11 @@ def convert(key: Key, value: float) -> float | int | bool:
         With a sentence for the user.
     """
     if not math.isfinite(value):
-        raise ValueError(f"{key.name} is not finite; allowed: {key.rule.text}")
+        raise ValueError(f"{key.name} is not finite; allowed: {key.allowed}")
     if key.kind is not float and not float(value).is_integer():
-        raise ValueError(f"{key.name} is {value:g}, but must be a whole number: {key.rule.text}")
+        raise ValueError(f"{key.name} is {value:g}, but must be a whole number: {key.allowed}")
     if not key.rule.allows(value):
-        raise ValueError(f"{key.name} is {value:g}; allowed: {key.rule.text}")
+        raise ValueError(f"{key.name} is {value:g}; allowed: {key.allowed}")
     return key.kind(value)
 
 

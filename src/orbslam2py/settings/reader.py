@@ -146,7 +146,7 @@ def _read_values(document: Document, sensor: Sensor) -> dict[str, dict[str, Any]
 
 
 def _missing(document: Document, key: schema.Key, sensor: Sensor) -> Problem:
-    text = f"{key.name} is missing; {sensor} needs it: {key.rule.text}"
+    text = f"{key.name} is missing; {sensor} needs it: {key.allowed}"
     successor = key.name.replace("Camera.", "Camera1.")
     if successor != key.name and successor in document.entries:
         text += f" (rename {successor}, the name of ORB-SLAM3)"
@@ -157,7 +157,7 @@ def _number(key: schema.Key, entry: Entry) -> float:
     try:
         return read_number(entry)
     except ValueError as error:
-        raise ValueError(f"{error}; allowed: {key.rule.text}") from None
+        raise ValueError(f"{error}; allowed: {key.allowed}") from None
 
 
 def _read_rectification(document: Document) -> StereoRectification | None:

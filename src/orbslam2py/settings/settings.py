@@ -89,10 +89,7 @@ class Settings:
     @property
     def depth_factor(self) -> float:
         """Raw units of the depth image per metre; 1 if it is in metres."""
-        # A factor of (nearly) zero stands for "already metres" in the files of ORB-SLAM.
-        if self.depth is None or self.depth.raw_per_metre < 1e-5:
-            return 1.0
-        return self.depth.raw_per_metre
+        return 1.0 if self.depth is None else self.depth.raw_per_metre
 
     def check_for(self, sensor: Sensor) -> None:
         """Raise `SettingsError` unless these settings were made for the sensor."""

@@ -29,6 +29,8 @@ def test_values_are_checked_without_a_file_too() -> None:
         OrbSettings(n_levels="eight")  # type: ignore[arg-type]
     with pytest.raises(SettingsError, match="ThDepth"):
         DepthSettings(0.0)
+    with pytest.raises(SettingsError, match=r"DepthMapFactor is 0; .*1000 for millimetres"):
+        DepthSettings(40.0, 0.0)
     camera = CameraSettings(500.0, 500.0, 320.0, 240.0)
     with pytest.raises(SettingsError, match=r"Camera\.bf.*ThDepth"):
         Settings(Sensor.RGBD, camera)
