@@ -41,7 +41,7 @@ CAMERAS = st.builds(
     rgb=st.booleans(),
 )
 
-ORBS = st.integers(1, 255).flatmap(
+ORBS = st.integers(1, 254).flatmap(
     lambda first: st.builds(
         OrbSettings,
         st.integers(1, 10**6),

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from orbslam2py import SettingsError
+from orbslam2py import _core as core
 from orbslam2py.settings import (
     CameraSettings,
     DepthSettings,
@@ -59,3 +60,13 @@ def test_description_names_the_figures() -> None:
     text = "\n".join(builtin_settings("tum1", Sensor.RGBD).describe())
     for figure in ("517.306", "0.262383", "1000 features", "20 and 7", "3.093 m"):
         assert figure in text
+
+
+@pytest.mark.parametrize("threshold", [1, 254])
+def test_the_extractor_takes_every_threshold_that_settings_take(threshold: int) -> None:
+    orb = OrbSettings(ini_th_fast=threshold, min_th_fast=threshold)
+    core.OrbExtractor(
+        core.OrbOptions(initial_threshold=orb.ini_th_fast, minimum_threshold=orb.min_th_fast)
+    )
+    with pytest.raises(SettingsError, match="1 to 254"):
+        core.OrbExtractor(core.OrbOptions(initial_threshold=255, minimum_threshold=7))
