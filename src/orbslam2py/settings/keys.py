@@ -73,6 +73,13 @@ def _between(low: float, high: float, unit: str = "") -> Rule:
     return Rule(f"{low:g} to {high:g}{unit and ' '}{unit}", lambda value: low <= value <= high)
 
 
+def _key(
+    name: str, group: str, field: str, kind: type[float] | type[int], rule: Rule, usual: str
+) -> Key:
+    """A key that every sensor needs."""
+    return Key(name, group, field, kind, rule, required=True, usual=usual)
+
+
 _FOCAL = _above_zero(1e5, "pixels")
 _CENTRE = _between(-1e5, 1e5, "pixels")
 _COEFFICIENT = _between(-1e4, 1e4)
@@ -81,10 +88,10 @@ _WIDTH = _above_zero(1e6)
 _PLACE = _between(-1e6, 1e6)
 
 KEYS: tuple[Key, ...] = (
-    Key("Camera.fx", "camera", "fx", float, _FOCAL, required=True),
-    Key("Camera.fy", "camera", "fy", float, _FOCAL, required=True),
-    Key("Camera.cx", "camera", "cx", float, _CENTRE, required=True),
-    Key("Camera.cy", "camera", "cy", float, _CENTRE, required=True),
+    _key("Camera.fx", "camera", "fx", float, _FOCAL, "0.5 to 1.5 times the image's width"),
+    _key("Camera.fy", "camera", "fy", float, _FOCAL, "nearly Camera.fx"),
+    _key("Camera.cx", "camera", "cx", float, _CENTRE, "near half the image's width"),
+    _key("Camera.cy", "camera", "cy", float, _CENTRE, "near half the image's height"),
     Key("Camera.k1", "camera", "k1", float, _COEFFICIENT),
     Key("Camera.k2", "camera", "k2", float, _COEFFICIENT),
     Key("Camera.p1", "camera", "p1", float, _COEFFICIENT),
@@ -101,6 +108,7 @@ KEYS: tuple[Key, ...] = (
         _above_zero(1e6, "pixel metres (baseline times fx)"),
         _DEPTH_SENSORS,
         True,
+        "40 for rgbd",
     ),
     Key("Camera.RGB", "camera", "rgb", bool, Rule("0 (BGR) or 1 (RGB)", lambda v: v in (0, 1))),
     Key(
@@ -111,6 +119,7 @@ KEYS: tuple[Key, ...] = (
         _above_zero(1e6, "baselines"),
         _DEPTH_SENSORS,
         True,
+        "35 to 40",
     ),
     Key(
         "DepthMapFactor",
@@ -123,18 +132,25 @@ KEYS: tuple[Key, ...] = (
         True,
         "1000 for millimetres, 5000 for TUM, 1 for metres",
     ),
-    Key("ORBextractor.nFeatures", "orb", "n_features", int, _between(1, 1e6), required=True),
-    Key(
+    _key(
+        "ORBextractor.nFeatures",
+        "orb",
+        "n_features",
+        int,
+        _between(1, 1e6),
+        "1000, or 2000 for large images",
+    ),
+    _key(
         "ORBextractor.scaleFactor",
         "orb",
         "scale_factor",
         float,
         Rule("greater than 1 and at most 2", lambda value: 1 < value <= 2),
-        required=True,
+        "1.2",
     ),
-    Key("ORBextractor.nLevels", "orb", "n_levels", int, _between(1, 16), required=True),
-    Key("ORBextractor.iniThFAST", "orb", "ini_th_fast", int, _between(1, 254), required=True),
-    Key("ORBextractor.minThFAST", "orb", "min_th_fast", int, _between(1, 254), required=True),
+    _key("ORBextractor.nLevels", "orb", "n_levels", int, _between(1, 16), "8"),
+    _key("ORBextractor.iniThFAST", "orb", "ini_th_fast", int, _between(1, 254), "20"),
+    _key("ORBextractor.minThFAST", "orb", "min_th_fast", int, _between(1, 254), "7"),
     Key("Viewer.KeyFrameSize", "viewer", "keyframe_size", float, _WIDTH),
     Key("Viewer.KeyFrameLineWidth", "viewer", "keyframe_line_width", float, _WIDTH),
     Key("Viewer.GraphLineWidth", "viewer", "graph_line_width", float, _WIDTH),
@@ -180,6 +196,25 @@ _KNOWN = frozenset(key.name for key in KEYS) | frozenset(RECTIFICATION_KEYS) | _
 def is_known(name: str) -> bool:
     """Whether a settings file may hold this key."""
     return name in _KNOWN or name.startswith(_IGNORED_PREFIXES)
+
+
+#: What others call a key, without the signs between words.
+_OTHER_NAMES = {
+    "baseline": "Camera.bf",
+    "depthfactor": "DepthMapFactor",
+    "depthscale": "DepthMapFactor",
+    "pngdepthscale": "DepthMapFactor",
+    "framerate": "Camera.fps",
+    "imagewidth": "Camera.width",
+    "imageheight": "Camera.height",
+    "features": "ORBextractor.nFeatures",
+} | {key.name.rpartition(".")[2].lower(): key.name for key in KEYS}
+
+
+def nearest_key(name: str) -> str | None:
+    """Find the key that was meant: ``fx`` is ``Camera.fx``; None if nothing comes close."""
+    plain = name.rpartition(".")[2].replace("_", "").replace("-", "").lower()
+    return _OTHER_NAMES.get(plain) or nearest(name)
 
 
 def nearest(name: str, candidates: Iterable[str] = _KNOWN) -> str | None:

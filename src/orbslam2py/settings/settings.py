@@ -210,11 +210,15 @@ def resolve_settings(
     if isinstance(choice, Settings):
         choice.check_for(sensor)
         return choice
-    path = Path(choice)
-    looks_like_path = path.exists() or path.suffix or len(path.parts) > 1
-    if looks_like_path and not is_builtin_name(str(choice)):
-        return _settings_of_file(path, sensor, allow_unknown=allow_unknown)
+    if looks_like_path(choice) and not is_builtin_name(str(choice)):
+        return _settings_of_file(Path(choice), sensor, allow_unknown=allow_unknown)
     return builtin_settings(str(choice), sensor)
+
+
+def looks_like_path(choice: str | PathLike[str]) -> bool:
+    """Whether a choice exists, or has a suffix or a folder."""
+    path = Path(choice)
+    return path.exists() or bool(path.suffix) or len(path.parts) > 1
 
 
 def _settings_of_file(path: Path, sensor: Sensor, *, allow_unknown: bool = False) -> Settings:
