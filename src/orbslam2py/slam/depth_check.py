@@ -14,8 +14,10 @@ import numpy.typing as npt
 
 _log = logging.getLogger(__name__)
 
-#: So many images with depth are looked at.
-N_CHECKED = 5
+#: So many images with depth are looked at, and so many at all: a camera may begin without.
+N_CHECKED, N_LOOKED_AT = 5, 100
+#: Every so many pixels count. No divisor of a usual width, so that all columns take part.
+_STEP = 7
 #: Medians of depth images that a camera for which RGB-D is meant may have [m].
 _LEAST, _MOST = 0.05, 200.0
 #: Factors in use, the commonest first: millimetres, TUM, metres, centimetres, 0.1 mm.
@@ -36,16 +38,20 @@ class DepthCheck:
     def __init__(self, factor: float) -> None:
         self._factor = factor
         self._left = N_CHECKED
+        self._chances = N_LOOKED_AT
 
     @property
     def done(self) -> bool:
         """Whether nothing further needs to be looked at."""
-        return self._left == 0
+        return self._left == 0 or self._chances == 0
 
     def look(self, depth: npt.NDArray[np.generic]) -> None:
         """Judge a raw depth image (height, width); one without depth does not count."""
-        median = _median_of_known(depth)
-        if self.done or median is None:
+        if self.done:
+            return
+        self._chances -= 1
+        median = _median_of_known(depth.reshape(-1)[::_STEP])
+        if median is None:
             return
         self._left -= 1
         if _LEAST <= median / self._factor <= _MOST:
@@ -64,7 +70,7 @@ class DepthCheck:
 
 def _median_of_known(depth: npt.NDArray[np.generic]) -> float | None:
     """Median of what is above 0 and finite [raw]; the largest integer stands for unknown, too."""
-    known = np.asarray(depth)[np.isfinite(depth) & (depth > 0)]  # type: ignore[operator]
+    known = depth[np.isfinite(depth) & (depth > 0)]  # type: ignore[operator]
     if depth.dtype.kind in "ui":
         known = known[known != np.iinfo(depth.dtype).max]  # type: ignore[type-var]
     return float(np.median(known.astype(np.float64))) if len(known) else None

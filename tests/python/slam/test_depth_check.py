@@ -14,7 +14,7 @@ from orbslam2py import Sensor
 from orbslam2py._timing import StageTimer
 from orbslam2py.settings import DepthSettings, Settings, builtin_settings
 from orbslam2py.slam import front_end
-from orbslam2py.slam.depth_check import N_CHECKED, DepthCheck
+from orbslam2py.slam.depth_check import N_CHECKED, N_LOOKED_AT, DepthCheck
 from orbslam2py.slam.front_end import FrontEnd
 from support.small_sequences import images, sequence
 
@@ -95,6 +95,22 @@ def test_it_is_over_after_a_few_images() -> None:
         assert not check.done, i
         check.look(depths(1430))
     assert check.done
+
+
+def test_a_camera_without_depth_is_not_looked_at_for_ever() -> None:
+    check = DepthCheck(1000.0)
+    for i in range(N_LOOKED_AT):
+        assert not check.done, i
+        check.look(np.zeros((60, 80), np.uint16))
+    assert check.done
+
+
+def test_sparse_depth_is_seen(caplog: pytest.LogCaptureFixture) -> None:
+    """As of a laser: a column in 8, a row in 4."""
+    sparse = np.zeros((480, 640), np.uint16)
+    sparse[::4, ::8] = 1430
+    (message,) = told(1, sparse, log=caplog)
+    assert "DepthMapFactor: 1000" in message
 
 
 def without_factor() -> Settings:
