@@ -67,6 +67,11 @@ class Settings:
                 problems.append(f"Camera.bf is {self.camera.bf:g}; {self.sensor} needs it above 0")
             if self.depth is None:
                 problems.append(f"ThDepth (depth.close_factor) is missing; {self.sensor} needs it")
+            elif self.sensor is Sensor.RGBD and self.depth.raw_per_metre is None:
+                problems.append(
+                    "DepthMapFactor (depth.raw_per_metre) is missing; rgbd needs it: 1000 for "
+                    "millimetres, 5000 for TUM, 1 for metres"
+                )
         raise_if_any(problems)
 
     @property
@@ -89,7 +94,9 @@ class Settings:
     @property
     def depth_factor(self) -> float:
         """Raw units of the depth image per metre; 1 if it is in metres."""
-        return 1.0 if self.depth is None else self.depth.raw_per_metre
+        if self.depth is None or self.depth.raw_per_metre is None:
+            return 1.0
+        return self.depth.raw_per_metre
 
     def check_for(self, sensor: Sensor) -> None:
         """Raise `SettingsError` unless these settings were made for the sensor."""

@@ -72,7 +72,7 @@ def rectified_cameras(draw: st.DrawFn) -> CameraRectification:
 def any_settings(draw: st.DrawFn) -> Settings:
     sensor = draw(st.sampled_from(Sensor))
     camera = draw(CAMERAS)
-    factor = draw(number(1e-5, 1e9)) if sensor is Sensor.RGBD else 1.0
+    factor = draw(number(1e-5, 1e9)) if sensor is Sensor.RGBD else None
     rectified = sensor is Sensor.STEREO and draw(st.booleans())
     return Settings(
         sensor=sensor,

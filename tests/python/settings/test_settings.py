@@ -37,6 +37,14 @@ def test_values_are_checked_without_a_file_too() -> None:
         Settings(Sensor.RGBD, camera)
 
 
+def test_a_depth_camera_must_say_the_unit_of_its_depth_in_python_too() -> None:
+    camera = CameraSettings(500.0, 500.0, 320.0, 240.0, bf=40.0)
+    with pytest.raises(SettingsError, match=r"DepthMapFactor \(depth\.raw_per_metre\) is missing"):
+        Settings(Sensor.RGBD, camera, depth=DepthSettings(40.0))
+    assert Settings(Sensor.RGBD, camera, depth=DepthSettings(40.0, 1.0)).depth_factor == 1.0
+    assert Settings(Sensor.STEREO, camera, depth=DepthSettings(40.0)).depth_factor == 1.0
+
+
 def test_numpy_numbers_become_plain_ones() -> None:
     camera = CameraSettings(np.float64(500), np.float32(500), np.int64(320), 240)
     assert type(camera.fx) is float

@@ -12,7 +12,7 @@ import pytest
 
 from orbslam2py import Sensor
 from orbslam2py._timing import StageTimer
-from orbslam2py.settings import DepthSettings, Settings, builtin_settings
+from orbslam2py.settings import builtin_settings
 from orbslam2py.slam import front_end
 from orbslam2py.slam.depth_check import N_CHECKED, N_LOOKED_AT, DepthCheck
 from orbslam2py.slam.front_end import FrontEnd
@@ -111,11 +111,6 @@ def test_sparse_depth_is_seen(caplog: pytest.LogCaptureFixture) -> None:
     sparse[::4, ::8] = 1430
     (message,) = told(1, sparse, log=caplog)
     assert "DepthMapFactor: 1000" in message
-
-
-def without_factor() -> Settings:
-    settings = builtin_settings("tum1", Sensor.RGBD)
-    return replace(settings, depth=DepthSettings(40.0))
 
 
 def test_front_end_looks_at_the_first_images_only(monkeypatch: pytest.MonkeyPatch) -> None:
