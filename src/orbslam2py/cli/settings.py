@@ -86,6 +86,8 @@ def new(
         return
     with atomic_write(output) as stream:
         stream.write(settings.to_yaml())
+    log_to(Console(stderr=True), quiet=quiet)
+    Settings.load(output, sensor)  # warns of what is doubtful
     console = Console(quiet=quiet, highlight=False, soft_wrap=True)
     _describe(console, settings)
     if sensor is Sensor.RGBD and depth_factor is None:

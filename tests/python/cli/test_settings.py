@@ -48,6 +48,13 @@ def test_without_a_file_it_is_printed(
     assert Settings.load("a.yaml", Sensor(sensor)).camera.fx == 525
 
 
+def test_doubts_about_new_settings_are_told(command: CommandLine) -> None:
+    line = ("settings", "new", "--sensor", "mono", *NUMBERS, "--size", "300x480", "-o", "a.yaml")
+    done = command(*line)
+    assert done.code == 0
+    assert "Warning: a.yaml: Camera.cx 319.5 lies outside the image (300 wide)" in done.err
+
+
 def test_new_settings_replace_nothing(command: CommandLine) -> None:
     Path("a.yaml").write_text("mine")
     line = ("settings", "new", "--sensor", "mono", *NUMBERS, "-o", "a.yaml")
