@@ -67,6 +67,11 @@ class Settings:
                 problems.append(f"Camera.bf is {self.camera.bf:g}; {self.sensor} needs it above 0")
             if self.depth is None:
                 problems.append(f"ThDepth (depth.close_factor) is missing; {self.sensor} needs it")
+            elif self.sensor is Sensor.RGBD and self.depth.raw_per_metre is None:
+                problems.append(
+                    "DepthMapFactor (depth.raw_per_metre) is missing; rgbd needs it: 1000 for "
+                    "millimetres, 5000 for TUM, 1 for metres"
+                )
         raise_if_any(problems)
 
     @property
@@ -89,8 +94,7 @@ class Settings:
     @property
     def depth_factor(self) -> float:
         """Raw units of the depth image per metre; 1 if it is in metres."""
-        # A factor of (nearly) zero stands for "already metres" in the files of ORB-SLAM.
-        if self.depth is None or self.depth.raw_per_metre < 1e-5:
+        if self.depth is None or self.depth.raw_per_metre is None:
             return 1.0
         return self.depth.raw_per_metre
 
@@ -213,11 +217,15 @@ def resolve_settings(
     if isinstance(choice, Settings):
         choice.check_for(sensor)
         return choice
-    path = Path(choice)
-    looks_like_path = path.exists() or path.suffix or len(path.parts) > 1
-    if looks_like_path and not is_builtin_name(str(choice)):
-        return _settings_of_file(path, sensor, allow_unknown=allow_unknown)
+    if looks_like_path(choice) and not is_builtin_name(str(choice)):
+        return _settings_of_file(Path(choice), sensor, allow_unknown=allow_unknown)
     return builtin_settings(str(choice), sensor)
+
+
+def looks_like_path(choice: str | PathLike[str]) -> bool:
+    """Whether a choice exists, or has a suffix or a folder."""
+    path = Path(choice)
+    return path.exists() or bool(path.suffix) or len(path.parts) > 1
 
 
 def _settings_of_file(path: Path, sensor: Sensor, *, allow_unknown: bool = False) -> Settings:

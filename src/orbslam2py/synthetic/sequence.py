@@ -119,7 +119,7 @@ class SyntheticSequence:
         """Return settings with the exact calibration."""
         depth = None
         if self.sensor.has_depth:
-            raw_per_metre = DEPTH_PER_METRE if self.sensor is Sensor.RGBD else 1.0
+            raw_per_metre = DEPTH_PER_METRE if self.sensor is Sensor.RGBD else None
             depth = DepthSettings(close_factor=40.0, raw_per_metre=raw_per_metre)
         n_features = 2000 if self._scene.outdoors else 1000
         return Settings(

@@ -49,6 +49,7 @@ def make_data(folder: Path) -> None:
     for name, (sensor, layout) in sequences.items():
         _walk(sensor).write(folder / name, layout)
     (folder / "mypair").symlink_to(folder / "V1_01_easy")
+    _write_phone(folder / "phone")
     single = _walk("mono")
     images = [single.load(i).image for i in range(FRAMES)]
     single.settings.save(folder / "my.yaml")
@@ -69,6 +70,18 @@ def _walk(sensor: str) -> SyntheticSequence:
     return SyntheticSequence(
         SyntheticOptions(world="corridor", sensor=sensor, frames=FRAMES, size=SIZE)
     )
+
+
+def _write_phone(folder: Path) -> None:
+    """Images, and depth images in millimetres, without lists."""
+    walk = _walk("rgbd")
+    for part in ("rgb", "depth"):
+        (folder / part).mkdir(parents=True)
+    for i in range(FRAMES):
+        shown = walk.load(i)
+        assert shown.depth is not None
+        write_image(folder / f"rgb/{i:03d}.png", shown.image)
+        write_image(folder / f"depth/{i:03d}.png", shown.depth // 5)
 
 
 def _write_vocabulary(folder: Path) -> None:
