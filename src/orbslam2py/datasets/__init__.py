@@ -3,6 +3,7 @@
 
 from orbslam2py.datasets.base import Images, Layout, LiveFrame, LiveSource, Sequence, Source
 from orbslam2py.datasets.euroc import EurocSequence
+from orbslam2py.datasets.frames import Frame, FramesInOrder
 from orbslam2py.datasets.image_folder import ImageFolder
 from orbslam2py.datasets.kitti import KittiSequence
 from orbslam2py.datasets.live import LiveCamera
@@ -14,6 +15,8 @@ from orbslam2py.datasets.video import VideoReader, VideoSequence
 
 __all__ = [
     "EurocSequence",
+    "Frame",
+    "FramesInOrder",
     "ImageFolder",
     "Images",
     "KittiSequence",

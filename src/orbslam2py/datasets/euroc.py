@@ -75,7 +75,7 @@ class EurocSequence(RecordedSequence):
     def __init__(
         self,
         folder: str | Path,
-        sensor: Sensor | None = None,
+        sensor: Sensor | str | None = None,
         *,
         settings: SettingsChoice = None,
     ) -> None:

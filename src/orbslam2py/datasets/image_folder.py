@@ -10,6 +10,7 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.datasets.base import Images
 from orbslam2py.datasets.choose_settings import SettingsChoice
+from orbslam2py.datasets.frames import FramesInOrder
 from orbslam2py.datasets.images import read_image
 from orbslam2py.datasets.unposed import UnposedSource, chosen_stamps
 from orbslam2py.errors import DatasetError
@@ -43,7 +44,7 @@ def image_files(folder: Path) -> list[Path]:
     return sorted(found, key=lambda path: (natural_key(path.name), path.name))
 
 
-class ImageFolder(UnposedSource):
+class ImageFolder(FramesInOrder, UnposedSource):
     """The images of a folder; see `datasets.base.Sequence`.
 
     Parameters
@@ -72,7 +73,7 @@ class ImageFolder(UnposedSource):
     def __init__(
         self,
         folder: str | Path,
-        sensor: Sensor | None = None,
+        sensor: Sensor | str | None = None,
         *,
         settings: SettingsChoice = None,
         fps: float | None = None,

@@ -63,11 +63,12 @@ class KittiSequence(RecordedSequence):
     def __init__(
         self,
         folder: str | Path,
-        sensor: Sensor | None = None,
+        sensor: Sensor | str | None = None,
         *,
         settings: SettingsChoice = None,
     ) -> None:
         folder = Path(folder)
+        sensor = None if sensor is None else Sensor(sensor)
         self._left, self._right, has_right = _choose_cameras(folder, sensor)
         available = (Sensor.STEREO, Sensor.MONOCULAR) if has_right else (Sensor.MONOCULAR,)
         super().__init__(folder, available, sensor, settings)

@@ -18,7 +18,7 @@ from orbslam2py.settings import Sensor
 
 def open_input(
     source: str | Path | int,
-    sensor: Sensor | None = None,
+    sensor: Sensor | str | None = None,
     *,
     settings: SettingsChoice = None,
     fps: float | None = None,
@@ -73,7 +73,7 @@ def open_input(
 
 def _open_recorded(
     path: Path,
-    sensor: Sensor | None,
+    sensor: Sensor | str | None,
     settings: SettingsChoice,
     fps: float | None,
     times: str | Path | None,

@@ -58,11 +58,11 @@ def has_layout(folder: Path) -> bool:
 
 def open_sequence(
     folder: str | Path,
-    sensor: Sensor | None = None,
+    sensor: Sensor | str | None = None,
     *,
     settings: SettingsChoice = None,
     association: str | Path | None = None,
-    layout: Layout | None = None,
+    layout: Layout | str | None = None,
 ) -> RecordedSequence:
     """Open the sequence in a folder, recognised by its files.
 
@@ -91,7 +91,7 @@ def open_sequence(
     SettingsError
         If the settings given are wrong.
     """
-    layout = recognise(folder) if layout is None else layout
+    layout = recognise(folder) if layout is None else Layout(layout)
     if layout is Layout.TUM:
         return TumSequence(folder, sensor, settings=settings, association=association)
     if association is not None:

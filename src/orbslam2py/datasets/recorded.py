@@ -17,11 +17,12 @@ from orbslam2py.datasets.base import (
     choose_sensor,
 )
 from orbslam2py.datasets.choose_settings import SettingsChoice, choose_settings
+from orbslam2py.datasets.frames import FramesInOrder
 from orbslam2py.settings import Sensor, Settings, resolve_settings
 from orbslam2py.trajectory import Trajectory
 
 
-class RecordedSequence(ABC):
+class RecordedSequence(FramesInOrder, ABC):
     """A folder of images, opened for one sensor; see `datasets.base.Sequence`.
 
     Parameters
@@ -49,7 +50,7 @@ class RecordedSequence(ABC):
         self,
         folder: Path,
         available: tuple[Sensor, ...],
-        sensor: Sensor | None,
+        sensor: Sensor | str | None,
         settings: SettingsChoice,
     ) -> None:
         self.folder = folder

@@ -58,7 +58,7 @@ class TumSequence(RecordedSequence):
     def __init__(
         self,
         folder: str | Path,
-        sensor: Sensor | None = None,
+        sensor: Sensor | str | None = None,
         *,
         settings: SettingsChoice = None,
         association: str | Path | None = None,

@@ -49,7 +49,7 @@ class UnposedSource:
         self,
         what: str | Path,
         name: str,
-        sensor: Sensor | None,
+        sensor: Sensor | str | None,
         settings: SettingsChoice,
         fps: float | None,
     ) -> None:
