@@ -103,6 +103,7 @@ class EurocSequence(RecordedSequence):
             if not kept and left.paths:
                 raise DatasetError(f"{root}: cam0 and cam1 have no time stamp in common")
         require_frames(left.source, len(kept))
+        self._list_path = left.source
         self._nanoseconds, self._left = kept, left.paths
         self._stamps = Stamps(
             np.array([stamp / 1e9 for stamp in kept], dtype=np.float64),
@@ -117,16 +118,21 @@ class EurocSequence(RecordedSequence):
 
     def load(self, index: int, /) -> Images:
         """Read and rectify the images of a frame; see `datasets.base.Sequence.load`."""
-        stamp = self._nanoseconds[index]
-        left = self._read(self._left[stamp])
+        paths = self._files(index)
+        raw = [self._read(path) for path in paths]
         if self.sensor is Sensor.MONOCULAR:
-            return Images(left)
-        right = self._read(self._right[stamp])
-        rectify_left, rectify_right = self._rectifiers
-        return Images(
-            rectify_left.rectify(left, self._left[stamp]),
-            right=rectify_right.rectify(right, self._right[stamp]),
+            return Images(raw[0])
+        left, right = (
+            rectifier.rectify(image, path)
+            for rectifier, image, path in zip(self._rectifiers, raw, paths, strict=True)
         )
+        return Images(left, right=right)
+
+    def _files(self, index: int) -> tuple[Path, ...]:
+        stamp = self._nanoseconds[index]
+        if self.sensor is Sensor.MONOCULAR:
+            return (self._left[stamp],)
+        return self._left[stamp], self._right[stamp]
 
     def ground_truth(self) -> Trajectory | None:
         """Read the body's poses and move them to the (rectified) left camera.

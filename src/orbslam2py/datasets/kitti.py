@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from orbslam2py._arrays import ByteArray, FloatArray
+from orbslam2py._arrays import FloatArray
 from orbslam2py._text_lines import content_lines, number_of
 from orbslam2py.datasets.base import Images, Layout, Stamps, require_frames
 from orbslam2py.datasets.choose_settings import SettingsChoice
@@ -73,6 +73,7 @@ class KittiSequence(RecordedSequence):
         available = (Sensor.STEREO, Sensor.MONOCULAR) if has_right else (Sensor.MONOCULAR,)
         super().__init__(folder, available, sensor, settings)
         times = self.folder / "times.txt"
+        self._list_path = times
         self._stamps = _read_times(times)
         require_frames(times, len(self))
         self._stamps.warn_unless_increasing(times)
@@ -83,10 +84,9 @@ class KittiSequence(RecordedSequence):
 
     def load(self, index: int, /) -> Images:
         """Read the images of a frame; see `datasets.base.Sequence.load`."""
-        image = self._read(self._left, index)
-        if self.sensor is Sensor.MONOCULAR:
-            return Images(image)
-        return Images(image, right=self._read(self._right, index))
+        rgb = self.settings.camera.rgb
+        image, *right = (read_image(path, rgb=rgb) for path in self._files(index))
+        return Images(image, right=right[0]) if right else Images(image)
 
     def ground_truth(self) -> Trajectory | None:
         """Read ``poses.txt``, ``NN.txt`` or ``../../poses/NN.txt``.
@@ -104,8 +104,9 @@ class KittiSequence(RecordedSequence):
             _log.warning("%s holds %d poses for %d frames", path, len(poses), len(self))
         return Trajectory(self.timestamps[:n], poses.T_wc[:n] @ self._T_grey_camera())
 
-    def _read(self, camera: int, index: int) -> ByteArray:
-        return read_image(self._path(camera, index), rgb=self.settings.camera.rgb)
+    def _files(self, index: int) -> tuple[Path, ...]:
+        cameras = (self._left, self._right)[: 1 + (self.sensor is Sensor.STEREO)]
+        return tuple(self._path(camera, index) for camera in cameras)
 
     def _path(self, camera: int, index: int) -> Path:
         if not 0 <= index < len(self):

@@ -87,6 +87,7 @@ def _open_recorded(
         if inner and not any(has_layout(child) for child in path.iterdir()):
             raise DatasetError(f"no images in {path} itself; did you mean {inner[0]}?")
     sequence = open_sequence(path, sensor, settings=settings)
+    sequence.require_images()
     for name, value in (("--fps", fps), ("--times", times)):
         if value is not None:
             raise DatasetError(
