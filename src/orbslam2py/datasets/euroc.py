@@ -71,6 +71,10 @@ class EurocSequence(RecordedSequence):
     """
 
     layout = Layout.EUROC
+    _missing_calibration = (
+        "sensor.yaml is missing in cam0, or for stereo in cam1; copy it there from the data set, "
+        "or for EuRoC's own cameras give --settings euroc"
+    )
 
     def __init__(
         self,
@@ -137,8 +141,8 @@ class EurocSequence(RecordedSequence):
     def ground_truth(self) -> Trajectory | None:
         """Read the body's poses and move them to the (rectified) left camera.
 
-        See `datasets.base.Sequence.ground_truth`. None as well if ``cam0/sensor.yaml`` is missing:
-        without ``T_BS`` the camera's place on the vehicle is unknown.
+        See `datasets.base.Sequence.ground_truth`. None as well if ``cam0/sensor.yaml`` is missing
+        or has no ``T_BS``: the camera's place on the vehicle is unknown then.
         """
         path = self._root / "state_groundtruth_estimate0" / "data.csv"
         if not path.is_file():
@@ -147,8 +151,12 @@ class EurocSequence(RecordedSequence):
         if not calibration.is_file():
             _log.warning("%s is not used: %s with T_BS is missing", path, calibration)
             return None
+        sensor = read_sensor_yaml(calibration)
+        if sensor.T_body_camera is None:
+            _log.warning("%s is not used: %s has no T_BS", path, calibration)
+            return None
         body = read_euroc(path)
-        T_body_camera = read_sensor_yaml(calibration).T_BS.copy()
+        T_body_camera = sensor.T_BS.copy()
         if self.sensor is Sensor.STEREO:
             rectification = self._rectification
             # R of the rectification turns raw into rectified coordinates.
@@ -174,7 +182,7 @@ class EurocSequence(RecordedSequence):
         return read_image(path, rgb=self.settings.camera.rgb)
 
     def _settings_folders(self) -> tuple[Path, ...]:
-        return (self.folder.resolve(), self._root.resolve())
+        return (self.folder, self._root)
 
     def _from_calibration(self) -> Settings | None:
         paths = [self._root / "cam0" / "sensor.yaml"]

@@ -59,6 +59,10 @@ class KittiSequence(RecordedSequence):
     """
 
     layout = Layout.KITTI
+    _missing_calibration = (
+        "calib.txt is missing; copy it there from the data set, or give --settings kitti00-02, "
+        "kitti03 or kitti04-12, by the number of the sequence"
+    )
 
     def __init__(
         self,

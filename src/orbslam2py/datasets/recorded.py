@@ -50,6 +50,8 @@ class RecordedSequence(FramesInOrder, ABC):
     """
 
     layout: Layout
+    #: Why there are no settings if none were found, and which of the built-in ones to give.
+    _missing_calibration: str
 
     def __init__(
         self,
@@ -74,7 +76,9 @@ class RecordedSequence(FramesInOrder, ABC):
 
     def default_settings(self) -> Settings:
         """Choose by what is in the folder; see `choose_settings`."""
-        return choose_settings(self.sensor, self._settings_folders(), self._from_calibration)
+        return choose_settings(
+            self.sensor, self._settings_folders(), self._from_calibration, self._missing_calibration
+        )
 
     def __len__(self) -> int:
         return len(self._stamps.texts)
@@ -118,7 +122,7 @@ class RecordedSequence(FramesInOrder, ABC):
         """Read the true poses; see `datasets.base.Sequence.ground_truth`."""
 
     def _settings_folders(self) -> tuple[Path, ...]:
-        return (self.folder.resolve(),)
+        return (self.folder,)
 
     def _from_calibration(self) -> Settings | None:
         return None

@@ -54,6 +54,10 @@ class TumSequence(RecordedSequence):
     """
 
     layout = Layout.TUM
+    _missing_calibration = (
+        "its name does not tell the camera; for TUM RGB-D give --settings tum1 (if the sequence "
+        "was named freiburg1 there), tum2 (freiburg2) or tum3 (freiburg3)"
+    )
 
     def __init__(
         self,
