@@ -80,7 +80,7 @@ def run(
         Path | None,
         typer.Option(
             help="File with a time stamp per image of a folder or video: decimal seconds or whole "
-            "nanoseconds."
+            "nanoseconds, with the images' file names or without (rgb.txt, data.csv)."
         ),
     ] = None,
     mask: Annotated[

@@ -58,7 +58,8 @@ class ImageFolder(FramesInOrder, UnposedSource):
     fps
         Images per second; by default that of the settings.
     times
-        File with one time stamp per image, in the order of the images.
+        File with one time stamp per image, in the order of the images; or a list of images with
+        their time stamps, such as ``rgb.txt`` of TUM RGB-D.
 
     Raises
     ------
@@ -89,7 +90,8 @@ class ImageFolder(FramesInOrder, UnposedSource):
         if settings is None and own.is_file():
             settings = own
         super().__init__(self.folder, self.folder.resolve().name, sensor, settings, fps)
-        self._stamps = chosen_stamps(len(self.paths), fps, times, self.settings.camera.fps)
+        names = [path.name for path in self.paths]
+        self._stamps = chosen_stamps(len(names), fps, times, self.settings.camera.fps, names)
 
     def __len__(self) -> int:
         return len(self.paths)

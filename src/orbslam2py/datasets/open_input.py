@@ -40,7 +40,7 @@ def open_input(
         Images per second of a folder of images or a video; the rate a camera is asked for.
     times
         File with one time stamp per image of a folder of images or a video: decimal seconds or
-        whole nanoseconds.
+        whole nanoseconds, with the images' file names or without.
     mask
         An image file, 0 where no keypoint may lie, or a folder with one per image.
 
