@@ -99,7 +99,10 @@ class Settings:
         """Raise `SettingsError` unless these settings were made for the sensor."""
         sensor = Sensor(sensor)
         if self.sensor is not sensor:
-            raise SettingsError(f"these settings are for {self.sensor}, not for {sensor}")
+            raise SettingsError(
+                f"these settings are for {self.sensor}, not for {sensor}; make or load them for "
+                f"{sensor}, or open the images for {self.sensor}"
+            )
 
     @classmethod
     def load(
