@@ -42,7 +42,10 @@ def run(
             "video file; number of a camera (ends with Ctrl-C)."
         ),
     ],
-    sensor: Annotated[Sensor, typer.Option(help="What the images come from.")],
+    sensor: Annotated[
+        Sensor | None,
+        typer.Option(help="What the images come from [the richest there are images for]."),
+    ] = None,
     settings: Annotated[
         str | None,
         typer.Option(
@@ -127,7 +130,7 @@ def run(
     log_to(Console(stderr=True), quiet=quiet)  # opening warns already
     images = open_input(sequence, sensor, settings=settings, fps=fps, times=times, mask=mask)
     options = RunOptions(
-        sensor,
+        images.sensor,
         SystemOptions(
             deterministic=deterministic,
             loop_closing=loop_closing,
