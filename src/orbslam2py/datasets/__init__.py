@@ -10,6 +10,7 @@ from orbslam2py.datasets.live import LiveCamera
 from orbslam2py.datasets.masks import MaskedCamera, MaskedSequence
 from orbslam2py.datasets.open_input import open_input
 from orbslam2py.datasets.recognise import open_sequence, recognise
+from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.datasets.tum import TumSequence
 from orbslam2py.datasets.video import VideoReader, VideoSequence
 
@@ -26,6 +27,7 @@ __all__ = [
     "LiveSource",
     "MaskedCamera",
     "MaskedSequence",
+    "RecordedSequence",
     "Sequence",
     "Source",
     "TumSequence",

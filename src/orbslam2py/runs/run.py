@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from orbslam2py import _core as core
+from orbslam2py.datasets import RecordedSequence
 from orbslam2py.datasets.base import LiveSource, Sequence
-from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.outputs import OutputWriter, link_latest, prepare_output_folder
 from orbslam2py.runs.report import RunEvaluation, evaluate_run, make_report
