@@ -43,7 +43,10 @@ def run(
             "video file; number of a camera (ends with Ctrl-C)."
         ),
     ],
-    sensor: Annotated[Sensor, typer.Option(help="What the images come from.")],
+    sensor: Annotated[
+        Sensor | None,
+        typer.Option(help="What the images come from [the richest there are images for]."),
+    ] = None,
     settings: Annotated[
         str | None,
         typer.Option(
@@ -81,7 +84,7 @@ def run(
         Path | None,
         typer.Option(
             help="File with a time stamp per image of a folder or video: decimal seconds or whole "
-            "nanoseconds."
+            "nanoseconds, with the images' file names or without (rgb.txt, data.csv)."
         ),
     ] = None,
     mask: Annotated[
@@ -128,7 +131,7 @@ def run(
     log_to(Console(stderr=True), quiet=quiet)  # opening warns already
     images = open_input(sequence, sensor, settings=settings, fps=fps, times=times, mask=mask)
     options = RunOptions(
-        sensor,
+        images.sensor,
         SystemOptions(
             deterministic=deterministic,
             loop_closing=loop_closing,

@@ -61,6 +61,7 @@ class Settings:
     viewer: ViewerSettings = field(default_factory=ViewerSettings)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "sensor", Sensor(self.sensor))
         problems = []
         if self.sensor.has_depth:
             if not self.camera.bf > 0:
@@ -98,14 +99,18 @@ class Settings:
             return 1.0
         return self.depth.raw_per_metre
 
-    def check_for(self, sensor: Sensor) -> None:
+    def check_for(self, sensor: Sensor | str) -> None:
         """Raise `SettingsError` unless these settings were made for the sensor."""
+        sensor = Sensor(sensor)
         if self.sensor is not sensor:
-            raise SettingsError(f"these settings are for {self.sensor}, not for {sensor}")
+            raise SettingsError(
+                f"these settings are for {self.sensor}, not for {sensor}; make or load them for "
+                f"{sensor}, or open the images for {self.sensor}"
+            )
 
     @classmethod
     def load(
-        cls, path: str | PathLike[str], sensor: Sensor, *, allow_unknown: bool = False
+        cls, path: str | PathLike[str], sensor: Sensor | str, *, allow_unknown: bool = False
     ) -> Settings:
         """Read an ORB-SLAM settings file, or take built-in settings by name.
 
@@ -173,7 +178,7 @@ class Settings:
         return lines
 
 
-def builtin_settings(name: str, sensor: Sensor) -> Settings:
+def builtin_settings(name: str, sensor: Sensor | str) -> Settings:
     """Make the settings of a data set, as published with ORB-SLAM2 for that sensor.
 
     Parameters
@@ -189,11 +194,12 @@ def builtin_settings(name: str, sensor: Sensor) -> Settings:
     SettingsError
         If there is no such name, or none for that sensor.
     """
+    sensor = Sensor(sensor)
     return _settings_of_file(builtin_file(name, sensor), sensor)
 
 
 def resolve_settings(
-    choice: str | PathLike[str] | Settings, sensor: Sensor, *, allow_unknown: bool = False
+    choice: str | PathLike[str] | Settings, sensor: Sensor | str, *, allow_unknown: bool = False
 ) -> Settings:
     """Make settings of what a user gave: a built-in name, a file, or finished settings.
 
@@ -214,6 +220,7 @@ def resolve_settings(
     SettingsError
         If it is neither a name nor a readable and correct file, or made for another sensor.
     """
+    sensor = Sensor(sensor)
     if isinstance(choice, Settings):
         choice.check_for(sensor)
         return choice
