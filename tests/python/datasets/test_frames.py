@@ -77,7 +77,7 @@ def test_sensors_as_text(tum: Path, kitti: Path, euroc: Path, folder: Path, name
 
 def test_settings_made_with_text_as_sensor() -> None:
     camera = CameraSettings(fx=500, fy=500, cx=320, cy=240, fps=30, bf=40)
-    settings = Settings(sensor="RGB-D", camera=camera, depth=DepthSettings(40))  # type: ignore[arg-type]
+    settings = Settings(sensor="RGB-D", camera=camera, depth=DepthSettings(40, 1000))  # type: ignore[arg-type]
     assert settings.sensor is Sensor.RGBD
     with pytest.raises(SettingsError, match="these settings are for rgbd, not for mono"):
         settings.check_for("mono")
