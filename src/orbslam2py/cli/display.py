@@ -90,6 +90,44 @@ def _describe_loop(loop: dict[str, Any]) -> str:
     return text
 
 
+#: Keys of report.json that the table leaves out: they are its title, or told by another row.
+_UNTOLD = {
+    *("sequence", "sensor", "milliseconds", "settings", "losses"),
+    *("lost_frames", "lost_seconds", "longest_loss_seconds"),
+}
+
+#: Keys that hold frames by reason, and how the table calls them.
+_COUNTED = {"initialisation_reasons": "no map yet", "lost_reasons": "lost"}
+
+
+def _rows_of(key: str, value: Any, report: dict[str, Any]) -> list[tuple[str, str]]:
+    """What the table says about one key of report.json: names and texts."""
+    if key in _UNTOLD or value is None:
+        return []
+    if key in _COUNTED:
+        return [(f"{_COUNTED[key]}: {reason}", str(count)) for reason, count in value.items()]
+    if key == "loops":
+        return [("loop", _describe_loop(loop)) for loop in value]
+    text = f"{value:.4f}" if isinstance(value, float) else str(value)
+    if key == "lost":
+        text = _describe_losses(report)
+    elif key == "lost_at_end":
+        text = "yes" if value else ""
+    elif key == "full_adjustments":
+        text = f"{sum(entry['used'] for entry in value)} of {len(value)} used" if value else ""
+    return [(key.replace("_", " "), text)] if text else []
+
+
+def _describe_losses(report: dict[str, Any]) -> str:
+    if not report["lost"]:
+        return "never"
+    times = "once" if report["lost"] == 1 else f"{report['lost']} times"
+    return (
+        f"{times}, {report['lost_frames']} frames, {report['lost_seconds']:.1f} s in all, "
+        f"{report['longest_loss_seconds']:.1f} s at the longest"
+    )
+
+
 def report_table(report: dict[str, Any]) -> Table:
     """The figures of report.json, for reading."""
     title = escape(f"{report['sequence']} ({report['sensor']})")
@@ -97,23 +135,8 @@ def report_table(report: dict[str, Any]) -> Table:
     table.add_column(justify="left")
     table.add_column(justify="right")
     for key, value in report.items():
-        if key in {"sequence", "sensor", "milliseconds", "settings"} or value is None:
-            continue
-        if key == "initialisation_reasons":
-            for reason, count in value.items():
-                table.add_row(f"no map yet: {escape(reason)}", str(count))
-            continue
-        if key == "loops":
-            for loop in value:
-                table.add_row("loop", _describe_loop(loop))
-            continue
-        if key == "full_adjustments":
-            used = sum(entry["used"] for entry in value)
-            if value:
-                table.add_row(key.replace("_", " "), f"{used} of {len(value)} used")
-            continue
-        text = f"{value:.4f}" if isinstance(value, float) else str(value)
-        table.add_row(key.replace("_", " "), escape(text))
+        for name, text in _rows_of(key, value, report):
+            table.add_row(escape(name), escape(text))
     table.add_section()
     for stage, numbers in report["milliseconds"].items():
         table.add_row(

@@ -17,6 +17,7 @@ from orbslam2py.datasets import open_input
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.outputs import new_output_folder
+from orbslam2py.runs.remedies import why_nothing_was_tracked
 from orbslam2py.runs.run import FinishedRun, run_sequence
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.options import SystemOptions
@@ -194,6 +195,6 @@ def _conclude(done: FinishedRun, errors: Console) -> ExitCode:
     if result.error is not None or done.problems:
         return ExitCode.FAILED
     if result.n_tracked == 0 and not result.interrupted:
-        print_error(errors, "Nothing could be tracked", result.why_nothing_was_tracked())
+        print_error(errors, "Nothing could be tracked", why_nothing_was_tracked(result.rows))
         return ExitCode.NOTHING_TRACKED
     return ExitCode.OK

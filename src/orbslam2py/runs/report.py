@@ -14,6 +14,7 @@ from typing import Any
 from orbslam2py._version import __version__
 from orbslam2py.errors import OrbSlamError
 from orbslam2py.evaluation import Alignment, Evaluation, evaluate_trajectory
+from orbslam2py.runs.losses import losses_report
 from orbslam2py.runs.result import RunResult
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.events import LoopClosed
@@ -69,6 +70,8 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
     n_done = len(result.rows)
     n_tracked = result.n_tracked
     n_frames = n_done if result.n_frames is None else result.n_frames
+    losses = losses_report(result.rows)
+    each_loss = losses.pop("losses")
     report: dict[str, Any] = {
         "version": __version__,
         "sequence": result.sequence.name,
@@ -88,6 +91,7 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "loops_closed": len(result.loops),
         "relocalisations": result.n_relocalizations,
         "resets": result.n_resets,
+        **losses,
         "initialisation_reasons": initialization_reasons(result),
         "interrupted": result.interrupted,
         "seconds": result.seconds,
@@ -95,6 +99,7 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "slam_frames_per_second": _rate(n_done, result.slam_seconds),
         "peak_memory_mb": peak_memory_mb(),
         "milliseconds": result.stages,
+        "losses": each_loss,
         "loops": [loop_entry(loop) for loop in result.loops],
         "full_adjustments": [adjustment_entry(a) for a in result.full_adjustments],
     }
