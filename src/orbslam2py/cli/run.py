@@ -10,7 +10,15 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from orbslam2py.cli.display import Display, log_to, print_error, progress_bar, report_table
+from orbslam2py._files import describe_error
+from orbslam2py.cli.display import (
+    Display,
+    log_to,
+    print_error,
+    progress_bar,
+    report_table,
+    tell_repeated,
+)
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.interrupts import StopOnInterrupt
 from orbslam2py.datasets import open_input
@@ -175,6 +183,7 @@ def run_and_show(
             progress=Display(bar, n_frames).show,
             stop=interrupt.event,
         )
+    tell_repeated()
     console.print(report_table(done.report))
     folder = escape(str(done.folder))
     console.print(f"Results are in [bold]{folder}[/]", highlight=False, soft_wrap=True)
@@ -190,7 +199,7 @@ def _conclude(done: FinishedRun, errors: Console) -> ExitCode:
     for problem in done.problems:
         print_error(errors, "Error", problem)
     if result.error is not None:
-        what = str(result.error) or type(result.error).__name__
+        what = describe_error(result.error)
         print_error(errors, "Error", f"{what} (what was done until then is saved)")
     if result.error is not None or done.problems:
         return ExitCode.FAILED

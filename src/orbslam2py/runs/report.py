@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from orbslam2py._files import describe_error
 from orbslam2py._version import __version__
 from orbslam2py.errors import OrbSlamError
 from orbslam2py.evaluation import Alignment, Evaluation, evaluate_trajectory
@@ -56,7 +57,7 @@ def evaluate_run(result: RunResult) -> RunEvaluation | None:
         figures = evaluate_trajectory(estimate, truth, alignment)
         keyframes = evaluate_trajectory(result.keyframes, truth, alignment)
     except (OrbSlamError, OSError) as error:
-        _log.warning("no comparison with ground truth: %s", error)
+        _log.warning("no comparison with ground truth: %s", describe_error(error))
         return None
     begin, end = estimate.timestamps[0] - 0.02, estimate.timestamps[-1] + 0.02
     during = truth.select((truth.timestamps >= begin) & (truth.timestamps <= end))
@@ -82,6 +83,7 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "realtime": options.realtime,
         "seed": options.system.seed,
         "frames": n_frames,
+        "seen_frames": n_done,
         "tracked": n_tracked,
         "tracked_fraction": n_tracked / n_frames if n_frames else 0.0,
         "skipped_frames": result.n_skipped,
