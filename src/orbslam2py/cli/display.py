@@ -118,9 +118,9 @@ class Display:
         self._shown_at = now
 
 
-def _describe_loop(loop: dict[str, Any]) -> str:
+def _describe_loop(loop: dict[str, Any], unit: str) -> str:
     matched, current = loop["keyframes"]
-    text = f"keyframe {current} at {matched}: {loop['correction_m']:.3f} m"
+    text = f"keyframe {current} at {matched}: {loop['correction_m']:.3f} {unit}"
     text += f", {loop['correction_deg']:.2f} deg"
     if loop["scale"] != 1.0:
         text += f", scale {loop['scale']:.4f}"
@@ -144,7 +144,8 @@ def _rows_of(key: str, value: Any, report: dict[str, Any]) -> list[tuple[str, st
     if key in _COUNTED:
         return [(f"{_COUNTED[key]}: {reason}", str(count)) for reason, count in value.items()]
     if key == "loops":
-        return [("loop", _describe_loop(loop)) for loop in value]
+        unit = "units" if report["sensor"] == "mono" else "m"
+        return [("loop", _describe_loop(loop, unit)) for loop in value]
     text = f"{value:.4f}" if isinstance(value, float) else str(value)
     if key == "lost":
         text = _describe_losses(report)

@@ -78,8 +78,8 @@ def losses_report(rows: Sequence[FrameRow]) -> dict[str, Any]:
     return {
         "lost": len(losses),
         "lost_frames": sum(loss.n_frames for loss in losses),
-        "lost_seconds": sum(loss.seconds for loss in losses),
-        "longest_loss_seconds": max((loss.seconds for loss in losses), default=0.0),
+        "lost_seconds": round(sum(loss.seconds for loss in losses), 6),
+        "longest_loss_seconds": round(max((loss.seconds for loss in losses), default=0.0), 6),
         "lost_at_end": bool(losses) and not losses[-1].found_again,
         "lost_reasons": dict(reasons.most_common()),
         "losses": [loss_entry(loss) for loss in losses],
@@ -93,7 +93,7 @@ def loss_entry(loss: Loss) -> dict[str, Any]:
         "frame": loss.index,
         "timestamp": loss.timestamp,
         "frames": loss.n_frames,
-        "seconds": loss.seconds,
+        "seconds": round(loss.seconds, 6),
         "reason": loss.reason,
         "found_again": loss.found_again,
     }

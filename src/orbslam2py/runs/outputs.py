@@ -18,15 +18,20 @@ import numpy.typing as npt
 
 from orbslam2py._files import atomic_write, reason_of
 from orbslam2py.errors import DatasetError
+from orbslam2py.evaluation import Alignment
 from orbslam2py.maps.ply import write_ply
 from orbslam2py.runs.frame_table import write_frames
 from orbslam2py.runs.plots import draw_trajectory
 from orbslam2py.runs.report import RunEvaluation
 from orbslam2py.runs.result import RunResult
+from orbslam2py.runs.timeline import Timeline
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.trajectory import Trajectory, write_kitti, write_tum
 
 _log = logging.getLogger(__name__)
+
+#: So many poses must have a true one at their time before they tell how long a unit is.
+_POSES_FOR_SCALE = 3
 
 #: Files that a run may have no content for.
 _NOT_ALWAYS = (
@@ -116,7 +121,8 @@ class OutputWriter:
         self._write_trajectories(result)
         self._write("frames.csv", lambda path: write_frames(path, result.rows))
         points = anchored_points(result)
-        self._write("points.ply", lambda path: write_ply(path, points))
+        unit = "units" if result.options.sensor is Sensor.MONOCULAR else "m"
+        self._write("points.ply", lambda path: write_ply(path, points, unit=unit))
         if len(result.tracked_trajectory()):
             self._write("trajectory.png", lambda path: _draw(path, result, evaluation, report))
         self._write(
@@ -202,24 +208,43 @@ def _draw(
     path: Path, result: RunResult, evaluation: RunEvaluation | None, report: dict[str, Any]
 ) -> None:
     last = result.tracked_trajectory()
-    begin = float(last.timestamps[0])
+    timeline = Timeline.of(result.rows, len(result.trajectories) - 1)
+    begin = float(result.rows[0].timestamp)
     truth = None
     subtitle = (
         f"{report['tracked']} of {report['frames']} frames tracked, "
         f"{report['keyframes']} keyframes, {report['map_points']} points"
     )
+    scale, unit = metres_per_unit(result, evaluation), "m"
+    if scale is None:
+        scale, unit = 1.0, "units"
     if evaluation is not None:
-        truth = (evaluation.truth.timestamps - begin, evaluation.truth.positions)
+        truth = (evaluation.truth.timestamps - begin, scale * evaluation.truth.positions)
         subtitle += f", ATE {report['ate_rmse_m']:.4f} m"
     draw_trajectory(
         path,
         title=f"{report['sequence']} ({report['sensor']})",
         subtitle=subtitle,
-        positions=last.positions,
+        positions=scale * last.positions,
         seconds=last.timestamps - begin,
-        keyframes=result.keyframes.positions,
-        points=anchored_points(result),
+        keyframes=scale * result.keyframes.positions,
+        points=scale * anchored_points(result),
         truth=truth,
-        loops=_loop_positions(result),
-        unit="units" if result.options.sensor is Sensor.MONOCULAR else "m",
+        loops=scale * _loop_positions(result),
+        gaps=timeline.gaps_before(last.indices),
+        timeline=timeline,
+        unit=unit,
     )
+
+
+def metres_per_unit(result: RunResult, evaluation: RunEvaluation | None) -> float | None:
+    """Tell what lengths of the map are multiplied by for metres; None where nobody knows.
+
+    A single camera's unit of length is its own: only ground truth tells how long it is.
+    """
+    if result.options.sensor is not Sensor.MONOCULAR:
+        return 1.0
+    if evaluation is None or evaluation.figures.alignment is not Alignment.SIM3:
+        return None
+    enough = evaluation.figures.matched_poses >= _POSES_FOR_SCALE
+    return evaluation.figures.transform.scale if enough else None

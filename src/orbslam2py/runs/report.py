@@ -35,7 +35,7 @@ class RunEvaluation:
     keyframes_ate_rmse: float
     """Of the keyframes alone [m]."""
     truth: Trajectory
-    """Ground truth over the time of the run, in the estimate's frame."""
+    """Ground truth over the time of the whole run, in the estimate's frame and unit."""
 
 
 def evaluate_run(result: RunResult) -> RunEvaluation | None:
@@ -59,7 +59,7 @@ def evaluate_run(result: RunResult) -> RunEvaluation | None:
     except (OrbSlamError, OSError) as error:
         _log.warning("no comparison with ground truth: %s", describe_error(error))
         return None
-    begin, end = estimate.timestamps[0] - 0.02, estimate.timestamps[-1] + 0.02
+    begin, end = float(result.rows[0].timestamp) - 0.02, float(result.rows[-1].timestamp) + 0.02
     during = truth.select((truth.timestamps >= begin) & (truth.timestamps <= end))
     T_wc = figures.transform.inverse().apply_to_poses(during.T_wc)
     return RunEvaluation(figures, keyframes.ate.rmse, Trajectory(during.timestamps, T_wc))

@@ -77,8 +77,8 @@ class TrackingRecord:
     T_cw: FloatArray | None
     """(4, 4) world to camera, None unless the state is OK."""
     covariance: FloatArray | None
-    """(6, 6) covariance of the pose: rotation [rad], then translation [m], left perturbation in the
-    camera frame, scaled by the residual variance."""
+    """(6, 6) covariance of the pose: rotation [rad], then translation [m] (one camera: the map's
+    own units), left perturbation in the camera frame, scaled by the residual variance."""
     n_matches: int
     """Keypoints matched to map points before the last pose optimisation."""
     n_inliers: int

@@ -44,6 +44,13 @@ def test_losses_are_one_line_and_one_for_every_reason() -> None:
     ]
 
 
+@pytest.mark.parametrize(("sensor", "unit"), [("rgbd", "m"), ("mono", "units")])
+def test_loops_are_in_the_unit_of_the_map(sensor: str, unit: str) -> None:
+    loop = {"keyframes": [3, 40], "correction_m": 0.5, "correction_deg": 1.0, "scale": 1.0}
+    line = line_with("loop", printed("k", sensor=sensor, loops=[loop]))
+    assert line == f"loop │ keyframe 40 at 3: 0.500 {unit}, 1.00 deg"
+
+
 def test_once() -> None:
     line = line_with("in all", printed("kkrlk"))
     assert line == "lost │ once, 2 frames, 0.2 s in all, 0.2 s at the longest"
