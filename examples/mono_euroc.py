@@ -10,12 +10,12 @@ import sys
 
 import orbslam2py as orb
 
-sequence = orb.open_sequence(sys.argv[1], orb.Sensor.MONOCULAR)
+sequence = orb.open_sequence(sys.argv[1], "mono")
 
 with orb.System(sequence.settings, "mono", wait_for_mapping=True) as slam:
-    for i, timestamp in enumerate(sequence.timestamps):
-        image = sequence.load(i).image
-        record = slam.track_monocular(image, timestamp, details=True)
+    for frame in sequence:
+        timestamp = frame.timestamp
+        record = slam.track_monocular(frame.images.image, timestamp, details=True)
         if record.T_wc is None or record.features is None:
             print(f"{timestamp:.3f}  {record.state.name}: {record.reason}")
             continue

@@ -22,5 +22,6 @@ truth = sequence.ground_truth()
 if truth is not None:
     # One camera sees no metres: rotation, translation and scale are fitted.
     result = evaluate_trajectory(trajectory.select(~trajectory.lost), truth, Alignment.SIM3)
-    print(f"absolute error {result.ate.rmse:.3f} m")
+    if result.ate is not None:
+        print(f"absolute error {result.ate.rmse:.3f} m")
     print(f"one unit is {result.transform.scale:.2f} m")

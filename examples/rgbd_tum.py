@@ -9,11 +9,11 @@ import sys
 import orbslam2py as orb
 from orbslam2py.trajectory import write_tum
 
-sequence = orb.open_sequence(sys.argv[1], orb.Sensor.RGBD)
+sequence = orb.open_sequence(sys.argv[1], "rgbd")
 
 with orb.System(sequence.settings, "rgbd", wait_for_mapping=True) as slam:
-    for i, timestamp in enumerate(sequence.timestamps):
-        images = sequence.load(i)
+    for frame in sequence:
+        images, timestamp = frame.images, frame.timestamp
         record = slam.track_rgbd(images.image, images.depth, timestamp)
         if record.T_wc is None:
             print(f"{timestamp:.3f}  {record.state.name}: {record.reason}")

@@ -12,11 +12,11 @@ import numpy as np
 
 import orbslam2py as orb
 
-sequence = orb.open_sequence(sys.argv[1], orb.Sensor.STEREO)
+sequence = orb.open_sequence(sys.argv[1], "stereo")
 
 with orb.System(sequence.settings, "stereo", wait_for_mapping=True) as slam:
-    for i, timestamp in enumerate(sequence.timestamps):
-        images = sequence.load(i)
+    for frame in sequence:
+        images, timestamp = frame.images, frame.timestamp
         record = slam.track_stereo(images.image, images.right, timestamp)
         if record.T_wc is None or record.covariance is None:
             print(f"{timestamp:.3f}  {record.state.name}: {record.reason}")

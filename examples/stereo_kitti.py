@@ -26,6 +26,7 @@ write_kitti("trajectory_kitti.txt", trajectory, len(sequence))
 truth = sequence.ground_truth()
 if truth is not None:
     result = evaluate_trajectory(trajectory, truth)
-    print(f"absolute error {result.ate.rmse:.3f} m")
+    if result.ate is not None:
+        print(f"absolute error {result.ate.rmse:.3f} m")
     if result.t_rel_percent is not None:  # needs at least 100 m
         print(f"drift over 100 to 800 m: {result.t_rel_percent:.2f} %")

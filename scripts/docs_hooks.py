@@ -55,7 +55,9 @@ def _moved_into_docs(path: Path) -> str:
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Put in the reference of the command line."""
+    """Put in the reference of the command line; lead links out of docs/ to where pages stand."""
+    for name, place in PAGES.items():
+        markdown = markdown.replace(f"](../{name}", f"]({place}")
     if COMMANDS not in markdown:
         return markdown
     sys.path.insert(0, str(ROOT / "scripts"))

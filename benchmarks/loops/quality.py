@@ -149,7 +149,7 @@ def _judge_lap(
         evaluation = evaluate_trajectory(
             estimate, truth, Alignment.SIM3 if single else Alignment.SE3
         )
-        outcome.ate = evaluation.ate.rmse
+        outcome.ate = None if evaluation.ate is None else evaluation.ate.rmse
         if lap is not None:
             outcome.lap_percent = lap_error(estimate, truth, lap, with_scale=single).percent
             outcome.scale_percent = 100 * scale_drift(estimate, truth, lap)

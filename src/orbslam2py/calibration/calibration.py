@@ -19,7 +19,13 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py._files import atomic_write
 from orbslam2py.calibration.chessboard import Board, BoardView, BoardViews, choose_views
 from orbslam2py.errors import DatasetError
-from orbslam2py.settings import CameraSettings, OrbSettings, Sensor, Settings
+from orbslam2py.settings import (
+    CameraSettings,
+    OrbSettings,
+    Sensor,
+    Settings,
+    settings_for_camera,
+)
 
 _log = logging.getLogger(__name__)
 
@@ -150,9 +156,16 @@ class Calibration:
         return found
 
     def settings(
-        self, *, fps: float = 30.0, n_features: int | None = None, rgb: bool = False
+        self,
+        *,
+        fps: float = 30.0,
+        n_features: int | None = None,
+        rgb: bool = False,
+        sensor: Sensor | str = Sensor.MONOCULAR,
+        baseline: float | None = None,
+        depth_factor: float | None = None,
     ) -> Settings:
-        """Make settings for this camera alone.
+        """Make settings for this camera.
 
         Parameters
         ----------
@@ -162,6 +175,8 @@ class Calibration:
             Features per image; by default 1000, or 2000 for images above 0.6 megapixels.
         rgb
             Whether the images that will be tracked are RGB (True) or BGR.
+        sensor, baseline, depth_factor
+            As for `orbslam2py.settings.settings_for_camera`.
 
         Raises
         ------
@@ -170,8 +185,6 @@ class Calibration:
         """
         width, height = self.size
         k1, k2, p1, p2, k3 = self.distortion.tolist()
-        if n_features is None:
-            n_features = 1000 if width * height <= 600_000 else 2000
         camera = CameraSettings(
             fx=self.K[0, 0],
             fy=self.K[1, 1],
@@ -187,12 +200,23 @@ class Calibration:
             fps=fps,
             rgb=rgb,
         )
-        return Settings(
-            sensor=Sensor.MONOCULAR, camera=camera, orb=OrbSettings(n_features=n_features)
+        return settings_for_camera(
+            camera,
+            sensor,
+            baseline=baseline,
+            depth_factor=depth_factor,
+            orb=None if n_features is None else OrbSettings(n_features=n_features),
         )
 
     def save(
-        self, path: str | PathLike[str], *, fps: float = 30.0, n_features: int | None = None
+        self,
+        path: str | PathLike[str],
+        *,
+        fps: float = 30.0,
+        n_features: int | None = None,
+        sensor: Sensor | str = Sensor.MONOCULAR,
+        baseline: float | None = None,
+        depth_factor: float | None = None,
     ) -> None:
         """Write a settings file that says where it comes from.
 
@@ -200,7 +224,7 @@ class Calibration:
         ----------
         path
             The file; replaced only when everything was written.
-        fps, n_features
+        fps, n_features, sensor, baseline, depth_factor
             As for `settings`.
 
         Raises
@@ -210,7 +234,14 @@ class Calibration:
         OSError
             If the file cannot be written; an existing file is kept then.
         """
-        first, rest = self.settings(fps=fps, n_features=n_features).to_yaml().split("\n", 1)
+        settings = self.settings(
+            fps=fps,
+            n_features=n_features,
+            sensor=sensor,
+            baseline=baseline,
+            depth_factor=depth_factor,
+        )
+        first, rest = settings.to_yaml().split("\n", 1)
         note = (
             f"# Calibrated from {len(self.views)} views of a {self.board} board, reprojection "
             f"error {self.rms:.3f} pixels (RMS)"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Settings from calibration files of other programs: OpenCV, Kalibr, ROS and COLMAP.
+"""Settings from calibration files of other programs: OpenCV, Kalibr, ROS, COLMAP and KITTI.
 
 All of these use OpenCV's distortion, and but for COLMAP also its pixels, in which the centre of the
 top-left pixel is (0, 0).
@@ -7,7 +7,7 @@ top-left pixel is (0, 0).
 
 from __future__ import annotations
 
-import re
+from dataclasses import replace
 from enum import Enum
 from pathlib import Path
 
@@ -22,6 +22,7 @@ from orbslam2py.calibration.camera_model import (
     five_coefficients,
     require_supported,
 )
+from orbslam2py.calibration.kitti_camera_file import kitti_settings
 from orbslam2py.calibration.yaml_camera_files import (
     kalibr_settings,
     parse_yaml,
@@ -30,7 +31,8 @@ from orbslam2py.calibration.yaml_camera_files import (
 )
 from orbslam2py.datasets.images import quiet_opencv
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings import Settings
+from orbslam2py.settings import OrbSettings, Sensor, Settings, settings_for_camera
+from orbslam2py.settings.foreign import recognise_camera_file
 
 
 class CameraFileFormat(str, Enum):
@@ -41,6 +43,7 @@ class CameraFileFormat(str, Enum):
     KALIBR = "kalibr"
     ROS = "ros"
     COLMAP = "colmap"
+    KITTI = "kitti"
 
     def __str__(self) -> str:
         return self.value
@@ -52,8 +55,11 @@ def read_camera_file(
     *,
     camera: int | None = None,
     right: str | Path | None = None,
-    fps: float = 30.0,
-    n_features: int = 1000,
+    sensor: Sensor | str | None = None,
+    baseline: float | None = None,
+    depth_factor: float | None = None,
+    fps: float | None = None,
+    n_features: int | None = None,
 ) -> Settings:
     """Make settings of another program's calibration file.
 
@@ -64,17 +70,23 @@ def read_camera_file(
     file_format
         Who wrote it; by default told by its content.
     camera
-        Number of the camera: ``cam0``, ``cam1`` ... of Kalibr, ``CAMERA_ID`` of COLMAP. By default
-        the only one; of a Kalibr file with several the pair of the first two.
+        Number of the camera: ``cam0``, ``cam1`` ... of Kalibr, ``CAMERA_ID`` of COLMAP, ``P0`` to
+        ``P3`` of KITTI. By default the only one; of a file of Kalibr or KITTI with several the pair
+        of the first two.
     right
         ROS: the file of the right camera of a rectified pair; `path` is the left one's.
+    sensor
+        What the settings are for; by default a single camera or the pair, as the file is.
+    baseline, depth_factor
+        As for `orbslam2py.settings.settings_for_camera`.
     fps, n_features
-        Frames per second and ORB features per image, which such files do not tell.
+        Frames per second and ORB features per image, which such files do not tell. By default 30
+        (KITTI: 10), and 1000 or, above 0.6 megapixels and for KITTI, 2000.
 
     Returns
     -------
     Settings
-        For a single camera, or for a stereo pair with its rectification.
+        For a single camera, an RGB-D camera, or a stereo pair with its rectification if it is raw.
 
     Raises
     ------
@@ -85,21 +97,63 @@ def read_camera_file(
     text = _read_text(path)
     if file_format is CameraFileFormat.AUTO:
         file_format = _recognise(path, text)
+    sensor = None if sensor is None else Sensor(sensor)
+    settings = _read(path, text, file_format, camera, right, sensor, fps)
+    if n_features is not None:
+        settings = replace(settings, orb=OrbSettings(n_features=n_features))
+    return _made_for(path, settings, sensor, baseline, depth_factor)
+
+
+def _read(
+    path: Path,
+    text: str,
+    file_format: CameraFileFormat,
+    camera: int | None,
+    right: str | Path | None,
+    sensor: Sensor | None,
+    fps: float | None,
+) -> Settings:
+    """Make settings of what the file holds: of one camera, or of a pair if none else is wanted."""
+    alone = sensor is not None and sensor is not Sensor.STEREO
     if right is not None and file_format is not CameraFileFormat.ROS:
         raise SettingsError(f"a file of the right camera goes with ros files, {path} is not one")
     if camera is not None and file_format in (CameraFileFormat.OPENCV, CameraFileFormat.ROS):
         raise SettingsError(f"{path} holds one camera; choosing camera {camera} makes no sense")
+    if file_format is CameraFileFormat.KITTI:
+        return kitti_settings(path, text, camera, sensor, fps)
+    fps = 30.0 if fps is None else fps
     if file_format is CameraFileFormat.COLMAP:
-        return _colmap(path, text, camera).settings(fps, n_features)
+        return _colmap(path, text, camera).settings(fps)
     if file_format is CameraFileFormat.OPENCV:
-        return _opencv(path, text).settings(fps, n_features)
+        return _opencv(path, text).settings(fps)
+    document = parse_yaml(path, text)
     if file_format is CameraFileFormat.KALIBR:
-        return kalibr_settings(path, parse_yaml(path, text), camera, fps, n_features)
+        return kalibr_settings(path, document, camera, fps, alone=alone)
     if right is None:
-        return ros_camera(path, parse_yaml(path, text)).settings(fps, n_features)
+        return ros_camera(path, document).settings(fps)
+    if alone:
+        raise SettingsError(f"{path} and {right} are a pair; leave --right out for {sensor}")
     right = Path(right)
-    pair = (path, parse_yaml(path, text)), (right, parse_yaml(right, _read_text(right)))
-    return ros_pair_settings(pair[0], pair[1], fps, n_features)
+    return ros_pair_settings((path, document), (right, parse_yaml(right, _read_text(right))), fps)
+
+
+def _made_for(
+    path: Path,
+    settings: Settings,
+    sensor: Sensor | None,
+    baseline: float | None,
+    depth_factor: float | None,
+) -> Settings:
+    sensor = sensor or settings.sensor
+    if settings.sensor is Sensor.STEREO and sensor is Sensor.STEREO and depth_factor is None:
+        if baseline is not None:
+            raise SettingsError(
+                f"{path} tells the baseline, {settings.baseline:.4g} m; leave --baseline out"
+            )
+        return settings
+    return settings_for_camera(
+        settings.camera, sensor, baseline=baseline, depth_factor=depth_factor, orb=settings.orb
+    )
 
 
 def _read_text(path: Path) -> str:
@@ -110,18 +164,13 @@ def _read_text(path: Path) -> str:
 
 
 def _recognise(path: Path, text: str) -> CameraFileFormat:
-    if re.search(r"^cam\d+\s*:", text, re.MULTILINE):
-        return CameraFileFormat.KALIBR
-    if "opencv-matrix" in text or "<opencv_storage>" in text:
-        return CameraFileFormat.OPENCV
-    if re.search(r"^camera_matrix\s*:", text, re.MULTILINE):
-        return CameraFileFormat.ROS
-    if re.search(r"^\s*\d+\s+[A-Z][A-Z_]+\s+\d+\s+\d+\s", text, re.MULTILINE):
-        return CameraFileFormat.COLMAP
+    known = recognise_camera_file(text)
+    if known is not None:
+        return CameraFileFormat(known)
     raise SettingsError(
         f"{path} is no camera file we know: an OpenCV file (matrices), Kalibr's camchain.yaml "
-        "(cam0), ROS's camera_info (camera_matrix) or COLMAP's cameras.txt. Name the format if it "
-        "is one of them"
+        "(cam0), ROS's camera_info (camera_matrix), COLMAP's cameras.txt or KITTI's calib.txt. "
+        "Name the format if it is one of them"
     )
 
 

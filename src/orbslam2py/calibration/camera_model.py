@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings import CameraSettings, OrbSettings, Sensor, Settings
+from orbslam2py.settings import CameraSettings, Sensor, Settings, settings_for_camera
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class CameraModel:
     distortion: FloatArray
     size: tuple[int, int] | None
 
-    def settings(self, fps: float, n_features: int) -> Settings:
+    def settings(self, fps: float) -> Settings:
         """Make settings for this camera alone."""
         k1, k2, p1, p2, k3 = self.distortion.tolist()
         width, height = self.size or (None, None)
@@ -51,9 +51,7 @@ class CameraModel:
             height=height,
             fps=fps,
         )
-        return Settings(
-            sensor=Sensor.MONOCULAR, camera=camera, orb=OrbSettings(n_features=n_features)
-        )
+        return settings_for_camera(camera, Sensor.MONOCULAR)
 
 
 def checked_numbers(path: Path, where: str, value: object, count: tuple[int, ...]) -> FloatArray:

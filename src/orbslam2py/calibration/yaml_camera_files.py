@@ -31,6 +31,7 @@ from orbslam2py.settings import (
     StereoRectification,
     builtin_settings,
 )
+from orbslam2py.settings.defaults import usual_n_features
 
 
 def parse_yaml(path: Path, text: str) -> Mapping[str, Any]:
@@ -60,7 +61,12 @@ def _value(path: Path, where: str, values: Mapping[str, Any], key: str) -> Any:
 
 # ---- Kalibr --------------------------------------------------------------------------------------
 def kalibr_settings(
-    path: Path, document: Mapping[str, Any], number: int | None, fps: float, n_features: int
+    path: Path,
+    document: Mapping[str, Any],
+    number: int | None,
+    fps: float,
+    *,
+    alone: bool = False,
 ) -> Settings:
     """Make settings of Kalibr's camchain: of one camera, or of the pair of the first two.
 
@@ -70,8 +76,10 @@ def kalibr_settings(
         The file, for messages, and its values.
     number
         Which camera; None for the only one or the pair.
-    fps, n_features
-        Frames per second and ORB features per image, which the file does not tell.
+    fps
+        Frames per second, which the file does not tell.
+    alone
+        Take the first camera, not the pair.
 
     Raises
     ------
@@ -85,9 +93,9 @@ def kalibr_settings(
         raise SettingsError(f"{path} has no cam0; is it a camchain of Kalibr?")
     if number is not None and f"cam{number}" not in names:
         raise SettingsError(f"{path} has no cam{number}; there are: {', '.join(names)}")
-    if number is not None or len(names) == 1:
+    if number is not None or alone or len(names) == 1:
         name = names[0] if number is None else f"cam{number}"
-        return _kalibr_camera(path, name, document[name]).settings(fps, n_features)
+        return _kalibr_camera(path, name, document[name]).settings(fps)
     left, right = (_kalibr_camera(path, name, document[name]) for name in names[:2])
     where = f"{names[1]}."
     given = _value(path, where, document[names[1]], "T_cn_cnm1")
@@ -99,7 +107,7 @@ def kalibr_settings(
     rectification = rectification_of_pair(
         (left.K, right.K), (left.distortion, right.distortion), T, left.size
     )
-    return _pair_settings(path, rectification, fps, n_features)
+    return _pair_settings(path, rectification, fps)
 
 
 def _kalibr_camera(path: Path, name: str, values: object) -> CameraModel:
@@ -167,7 +175,6 @@ def ros_pair_settings(
     left: tuple[Path, Mapping[str, Any]],
     right: tuple[Path, Mapping[str, Any]],
     fps: float,
-    n_features: int,
 ) -> Settings:
     """Make settings of the camera_info files of a rectified pair.
 
@@ -175,8 +182,8 @@ def ros_pair_settings(
     ----------
     left, right
         Path, for messages, and values of either file.
-    fps, n_features
-        Frames per second and ORB features per image, which the files do not tell.
+    fps
+        Frames per second, which the files do not tell.
 
     Raises
     ------
@@ -202,12 +209,10 @@ def ros_pair_settings(
             "equal but for the last column, which is 0 for the left camera"
         )
     rectification = StereoRectification(left=cameras[0], right=cameras[1])
-    return _pair_settings(right[0], rectification, fps, n_features)
+    return _pair_settings(right[0], rectification, fps)
 
 
-def _pair_settings(
-    path: Path, rectification: StereoRectification, fps: float, n_features: int
-) -> Settings:
+def _pair_settings(path: Path, rectification: StereoRectification, fps: float) -> Settings:
     P, P_right = rectification.left.P, rectification.right.P
     bf = -float(P_right[0, 3])
     if bf <= 0 or abs(float(P_right[1, 3])) > 1e-3 * abs(bf):
@@ -228,7 +233,7 @@ def _pair_settings(
     return Settings(
         sensor=Sensor.STEREO,
         camera=camera,
-        orb=OrbSettings(n_features=n_features),
+        orb=OrbSettings(n_features=usual_n_features(camera.width, camera.height)),
         depth=builtin_settings("euroc", Sensor.STEREO).depth,
         rectification=rectification,
     )

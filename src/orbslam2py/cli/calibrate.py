@@ -23,6 +23,7 @@ from orbslam2py.calibration import (
 from orbslam2py.calibration import calibrate as calibrate_views
 from orbslam2py.calibration.plot import draw_residuals
 from orbslam2py.errors import SettingsError
+from orbslam2py.settings import CameraSettings, Sensor, settings_for_camera
 
 Output = Annotated[Path, typer.Option("--output", "-o", help="Settings file to write.")]
 Fps = Annotated[
@@ -31,6 +32,17 @@ Fps = Annotated[
 Features = Annotated[
     int | None,
     typer.Option(help="ORB features per image [1000, or 2000 above 0.6 megapixels]."),
+]
+OutputSensor = Annotated[
+    Sensor | None, typer.Option(help="What the settings are for [what the file is of].")
+]
+DepthFactor = Annotated[
+    float | None,
+    typer.Option(help="RGB-D: units of the depth images per metre [1000: millimetres]."),
+]
+Baseline = Annotated[
+    float | None,
+    typer.Option(help="Stereo: distance of the cameras [m]. RGB-D: 40 of these are close [0.075]."),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Replace existing files.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Only errors.")]
@@ -61,17 +73,37 @@ def calibrate(
     plot: Annotated[
         Path | None, typer.Option(help="PNG file for a picture of the residuals.")
     ] = None,
+    sensor: Annotated[
+        Sensor, typer.Option(help="What the settings are for: mono, or rgbd.")
+    ] = Sensor.MONOCULAR,
+    depth_factor: DepthFactor = None,
+    baseline: Baseline = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
     """Calibrate a camera with a chessboard; write a settings file that run takes."""
+    if sensor is Sensor.STEREO:
+        raise SettingsError(
+            "calibrate sees one camera, and a pair needs both together; calibrate it with Kalibr "
+            "and give its file to orbslam2py import-camera"
+        )
+    # What does not go together is refused before the long search.
+    a_camera = CameraSettings(1.0, 1.0, 0.0, 0.0)
+    settings_for_camera(a_camera, sensor, baseline=baseline, depth_factor=depth_factor)
     model = Board.parse(board, square)
     for path in (output, plot):
-        _check_target(path, force=force)
+        check_target(path, force=force)
     console = Console(quiet=quiet)
     found = _search(source, model, every, console)
     result = calibrate_views(found, model, max_views=max_views, k3=k3)
-    result.save(output, fps=fps or found.fps or 30.0, n_features=features)
+    result.save(
+        output,
+        fps=fps or found.fps or 30.0,
+        n_features=features,
+        sensor=sensor,
+        depth_factor=depth_factor,
+        baseline=baseline,
+    )
     if plot is not None:
         draw_residuals(plot, result, title=f"Calibration from {source.name}")
     console.print(_table(result, source))
@@ -86,7 +118,8 @@ def import_camera(
     file: Annotated[
         Path,
         typer.Argument(
-            help="OpenCV YAML or XML, Kalibr camchain, ROS camera_info, COLMAP cameras.txt."
+            help="OpenCV YAML or XML, Kalibr camchain, ROS camera_info, COLMAP cameras.txt, "
+            "KITTI calib.txt."
         ),
     ],
     output: Output,
@@ -97,7 +130,7 @@ def import_camera(
         int | None,
         typer.Option(
             help="Number of the camera in a file of several; without it, the pair of a Kalibr "
-            "camchain.",
+            "camchain or of KITTI (--sensor stereo --camera 2: its colour pair).",
             min=0,
         ),
     ] = None,
@@ -105,15 +138,28 @@ def import_camera(
         Path | None,
         typer.Option(help="ROS: camera_info of the right camera, to get settings for a pair."),
     ] = None,
-    fps: Annotated[float, typer.Option(help="Frames per second of the camera.")] = 30.0,
-    features: Annotated[int, typer.Option(help="ORB features per image.")] = 1000,
+    sensor: OutputSensor = None,
+    depth_factor: DepthFactor = None,
+    baseline: Baseline = None,
+    fps: Annotated[
+        float | None, typer.Option(help="Frames per second of the camera [30; KITTI: 10].")
+    ] = None,
+    features: Features = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
     """Turn another program's calibration into a settings file."""
-    _check_target(output, force=force)
+    check_target(output, force=force)
     settings = read_camera_file(
-        file, file_format, camera=camera, right=right, fps=fps, n_features=features
+        file,
+        file_format,
+        camera=camera,
+        right=right,
+        sensor=sensor,
+        baseline=baseline,
+        depth_factor=depth_factor,
+        fps=fps,
+        n_features=features,
     )
     settings.save(output)
     console = Console(quiet=quiet)
@@ -133,7 +179,8 @@ def _search(source: Path, board: Board, every: int | None, console: Console) -> 
         return find_views(source, board, every=every, progress=show)
 
 
-def _check_target(path: Path | None, *, force: bool) -> None:
+def check_target(path: Path | None, *, force: bool) -> None:
+    """Raise `SettingsError` if a file must not or cannot be written."""
     if path is None:
         return
     if path.exists() and not force:

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import json as json_module
 import logging
+import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,16 +15,38 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from orbslam2py._arrays import FloatArray
 from orbslam2py._files import atomic_write
-from orbslam2py.datasets import open_sequence
+from orbslam2py.cli.display import log_to
+from orbslam2py.datasets import Layout, open_sequence, recognise
+from orbslam2py.datasets.euroc import find_root
 from orbslam2py.datasets.euroc_calibration import read_sensor_yaml
+from orbslam2py.datasets.extrinsics import read_extrinsics
 from orbslam2py.errors import DatasetError
-from orbslam2py.evaluation import Alignment, evaluate_trajectory
-from orbslam2py.trajectory import Trajectory, TrajectoryFormat, read_trajectory
+from orbslam2py.evaluation import (
+    Alignment,
+    Evaluation,
+    Paired,
+    Poses,
+    ends_early,
+    evaluate_trajectory,
+    pair,
+    read_estimate,
+    read_truth,
+)
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.trajectory import Trajectory, TrajectoryFormat, read_times
 
 _log = logging.getLogger(__name__)
 
-_UNITS = (("_percent", "%"), ("_deg_per_100m", "deg/100 m"), ("_m", "m"), ("_deg", "deg"))
+_UNITS = (
+    ("_percent", "%"),
+    ("_deg_per_100m", "deg/100 m"),
+    ("_m", "m"),
+    ("_deg", "deg"),
+    ("_s", "s"),
+)
+_FEW = 0.5  # of the estimate's poses
 
 
 def evaluate(
@@ -33,11 +57,32 @@ def evaluate(
         Path, typer.Argument(help="The truth: a trajectory file, or the folder of a sequence.")
     ],
     alignment: Annotated[
-        Alignment, typer.Option(help="se3 for metric estimates, sim3 for those of one camera.")
-    ] = Alignment.SE3,
+        Alignment,
+        typer.Option(
+            help="se3 for metric estimates, sim3 for those of one camera; auto takes what fits "
+            "the run's sensor, or the lengths if that is not known."
+        ),
+    ] = Alignment.AUTO,
     file_format: Annotated[
         TrajectoryFormat, typer.Option("--format", help="Of both files; auto looks at each.")
     ] = TrajectoryFormat.AUTO,
+    times: Annotated[
+        Path | None,
+        typer.Option(
+            help="Times of the rows of a file in KITTI format, one per line [times.txt beside it]."
+        ),
+    ] = None,
+    offset: Annotated[
+        float,
+        typer.Option(help="Added to the time stamps of the estimate.", metavar="SECONDS"),
+    ] = 0.0,
+    extrinsics: Annotated[
+        Path | None,
+        typer.Option(
+            help="Camera in the body whose poses the truth holds: a sensor.yaml with T_BS, or 12 "
+            "or 16 numbers [EuRoC's by itself]."
+        ),
+    ] = None,
     json: Annotated[
         Path | None, typer.Option(help="Write the figures to this file as well.")
     ] = None,
@@ -47,45 +92,150 @@ def evaluate(
     **Example**
 
         orbslam2py evaluate runs/latest/trajectory.txt rgbd_dataset_freiburg1_xyz/groundtruth.txt
+
+        orbslam2py evaluate estimate.txt poses.txt --times times.txt
     """
-    estimate, estimate_format = read_trajectory(trajectory, file_format)
-    numbered = estimate_format is TrajectoryFormat.KITTI
-    truth = _read_truth(ground_truth, file_format, numbered=numbered)
-    result = evaluate_trajectory(estimate, truth, alignment, timed=not numbered)
+    log_to(Console(stderr=True), quiet=False)
+    if not math.isfinite(offset):
+        raise DatasetError(f"--offset is {offset}; give a number of seconds")
+    sensor = _sensor_of_run(trajectory)
+    both = _read_both(trajectory, ground_truth, file_format, times, extrinsics, sensor)
+    if offset and not both.on_clocks:
+        raise DatasetError(
+            f"--offset has no meaning: poses are matched by {both.by}, not by two clocks; leave it "
+            "out"
+        )
+    result = evaluate_trajectory(
+        both.estimate,
+        both.truth,
+        alignment,
+        single_camera=None if sensor is None else sensor is Sensor.MONOCULAR,
+        offset=offset,
+        timed=both.is_timed,
+    )
     figures = result.as_dict()
     Console().print(_table(figures, trajectory, ground_truth))
+    _say_what_was_compared(both, result, asked=alignment)
     if json is not None:
         with atomic_write(json) as stream:
             stream.write(json_module.dumps(figures, indent=2) + "\n")
 
 
-def _read_truth(path: Path, file_format: TrajectoryFormat, *, numbered: bool) -> Trajectory:
-    """Read the truth, with frame numbers as time stamps if the estimate has only those."""
-    if path.is_dir():
-        truth = open_sequence(path).ground_truth()
-        if truth is None:
-            raise DatasetError(f"the sequence {path} comes without ground truth")
-        if numbered:
-            return Trajectory(truth.indices.astype(float), truth.T_wc)
-        return truth
-    truth, truth_format = read_trajectory(path, file_format)
-    if numbered != (truth_format is TrajectoryFormat.KITTI):
-        raise DatasetError(
-            "a file in KITTI format has no time stamps, so both files must be in it (or give the "
-            "folder of the sequence as ground truth)"
+def _say_what_was_compared(both: Paired, result: Evaluation, *, asked: Alignment) -> None:
+    matched = result.matched
+    say = Console().print
+    say(f"Compared: {matched}, by {escape(both.by)}.", highlight=False, soft_wrap=True)
+    lost = int(both.estimate.lost.sum())
+    if lost:
+        rows = "1 row" if lost == 1 else f"{lost} rows"
+        say(f"Left out: {rows} of frames without a pose.", highlight=False, soft_wrap=True)
+    if asked is Alignment.AUTO:
+        why = {
+            True: "a single camera",
+            False: "the run's sensor sees metres",
+            None: "told by the lengths",
+        }
+        reason = why[result.single_camera]
+        say(f"Alignment: {result.alignment} ({reason}).", highlight=False, soft_wrap=True)
+    if result.hint:
+        _log.warning("%s", result.hint)
+    if matched.poses < result.alignment.fewest_poses:
+        _log.warning(
+            "no absolute error: %d matched, and %s takes at least %d poses; compare a longer part",
+            *(matched.poses, result.alignment, result.alignment.fewest_poses),
         )
-    if truth_format is TrajectoryFormat.EUROC:
-        return _of_camera(path, truth)
-    return truth
+    elif result.ate is None:
+        _log.warning("no absolute error: positions are too large to reckon with; check the files")
+    if matched.poses < _FEW * matched.estimate_poses:
+        _log.warning(
+            "only %d of %d poses have a true one at their time: the figures are of a part of the "
+            "path; if the clocks differ, give --offset",
+            *(matched.poses, matched.estimate_poses),
+        )
 
 
-def _of_camera(path: Path, body: Trajectory) -> Trajectory:
-    """Poses of cam0 from those of the body, if the calibration lies where EuRoC puts it."""
-    calibration = path.resolve().parent.parent / "cam0" / "sensor.yaml"
-    if not calibration.is_file():
-        _log.warning("%s holds poses of the body, not of a camera: no %s", path, calibration)
-        return body
-    return Trajectory(body.timestamps, body.T_wc @ read_sensor_yaml(calibration).T_BS)
+def _read_both(
+    trajectory: Path,
+    ground_truth: Path,
+    file_format: TrajectoryFormat,
+    times_file: Path | None,
+    extrinsics: Path | None,
+    sensor: Sensor | None,
+) -> Paired:
+    times = None if times_file is None else read_times(times_file)
+    T_body_camera = None if extrinsics is None else read_extrinsics(extrinsics)
+    estimate = read_estimate(trajectory, file_format, times=times)
+    if ground_truth.is_dir():
+        truth = _truth_of_sequence(ground_truth, sensor, T_body_camera)
+    else:
+        truth = read_truth(ground_truth, file_format, times=times)
+        truth = _of_camera(ground_truth, truth, T_body_camera)
+    if times is not None:
+        _see_that_they_fit(times_file, times, (estimate, truth))
+    n = len(truth.trajectory)
+    if truth.file_format is TrajectoryFormat.KITTI and ends_early(truth, truth.frame_times):
+        assert truth.frame_times is not None
+        _log.warning(
+            "%s has %d poses for %d times; frames after these are not compared",
+            *(truth.source, n, len(truth.frame_times)),
+        )
+    return pair(estimate, truth)
+
+
+def _see_that_they_fit(path: Path | None, times: FloatArray, files: tuple[Poses, ...]) -> None:
+    rows = [poses for poses in files if poses.file_format is TrajectoryFormat.KITTI]
+    if any(len(poses.trajectory) == len(times) for poses in rows) or ends_early(files[1], times):
+        return
+    if not rows:
+        raise DatasetError(f"{path} is not needed: both files have time stamps; leave out --times")
+    counts = " and ".join(f"{poses.source} {len(poses.trajectory)} rows" for poses in rows)
+    raise DatasetError(
+        f"{path} holds {len(times)} time stamps, but {counts}; give a file with one per row"
+    )
+
+
+def _truth_of_sequence(folder: Path, sensor: Sensor | None, extrinsics: FloatArray | None) -> Poses:
+    is_euroc = recognise(folder) is Layout.EUROC
+    sequence = open_sequence(folder, sensor if is_euroc else None)
+    root = find_root(folder) if is_euroc else None
+    if root is not None and extrinsics is not None:
+        body = root / "state_groundtruth_estimate0" / "data.csv"
+        return _of_camera(body, read_truth(body), extrinsics)
+    truth = sequence.ground_truth()
+    if truth is None:
+        raise DatasetError(
+            f"the sequence {folder} comes without ground truth; give a file with it instead"
+        )
+    if extrinsics is not None:
+        truth = Trajectory(truth.timestamps, truth.T_wc @ extrinsics)
+    return Poses(str(folder), truth, TrajectoryFormat.TUM, frame_times=sequence.timestamps)
+
+
+def _of_camera(path: Path, body: Poses, extrinsics: FloatArray | None) -> Poses:
+    """Poses of the camera from those of the body: with T_BS of cam0 where EuRoC puts it."""
+    if extrinsics is None:
+        if body.file_format is not TrajectoryFormat.EUROC:
+            return body
+        calibration = path.resolve().parent.parent / "cam0" / "sensor.yaml"
+        if not calibration.is_file():
+            _log.warning(
+                "%s holds poses of the body, not of a camera: no %s; give the camera's place with "
+                "--extrinsics",
+                *(path, calibration),
+            )
+            return body
+        extrinsics = read_sensor_yaml(calibration).T_BS
+    poses = body.trajectory
+    return replace(body, trajectory=Trajectory(poses.timestamps, poses.T_wc @ extrinsics))
+
+
+def _sensor_of_run(trajectory: Path) -> Sensor | None:
+    """The sensor of the run that a file belongs to, by its report; None if that is not known."""
+    try:
+        report = json_module.loads((trajectory.parent / "report.json").read_text(encoding="utf-8"))
+        return Sensor(report["sensor"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
 
 
 def _table(figures: dict[str, Any], trajectory: Path, ground_truth: Path) -> Table:

@@ -29,6 +29,7 @@ from orbslam2py.runs.remedies import why_nothing_was_tracked
 from orbslam2py.runs.run import FinishedRun, run_sequence
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.options import SystemOptions
+from orbslam2py.vocabulary.vocabulary import load_vocabulary
 
 EXAMPLE = """
 **Example**
@@ -51,7 +52,10 @@ def run(
             "video file; number of a camera (ends with Ctrl-C)."
         ),
     ],
-    sensor: Annotated[Sensor, typer.Option(help="What the images come from.")],
+    sensor: Annotated[
+        Sensor | None,
+        typer.Option(help="What the images come from [the richest there are images for]."),
+    ] = None,
     settings: Annotated[
         str | None,
         typer.Option(
@@ -89,7 +93,7 @@ def run(
         Path | None,
         typer.Option(
             help="File with a time stamp per image of a folder or video: decimal seconds or whole "
-            "nanoseconds."
+            "nanoseconds, with the images' file names or without (rgb.txt, data.csv)."
         ),
     ] = None,
     mask: Annotated[
@@ -136,7 +140,7 @@ def run(
     log_to(Console(stderr=True), quiet=quiet)  # opening warns already
     images = open_input(sequence, sensor, settings=settings, fps=fps, times=times, mask=mask)
     options = RunOptions(
-        sensor,
+        images.sensor,
         SystemOptions(
             deterministic=deterministic,
             loop_closing=loop_closing,
@@ -173,11 +177,12 @@ def run_and_show(
     errors = Console(stderr=True)
     log_to(errors, quiet=quiet)
     n_frames = options.n_frames(sequence)
+    words = load_vocabulary(vocabulary)  # until here a Ctrl-C leaves nothing behind
     with StopOnInterrupt() as interrupt, progress_bar(console) as bar:
         done = run_sequence(
             sequence,
             options,
-            vocabulary=vocabulary,
+            vocabulary=words,
             output=output or new_output_folder(sequence.name),
             force=force,
             progress=Display(bar, n_frames).show,

@@ -3,17 +3,21 @@
 
 from orbslam2py.datasets.base import Images, Layout, LiveFrame, LiveSource, Sequence, Source
 from orbslam2py.datasets.euroc import EurocSequence
+from orbslam2py.datasets.frames import Frame, FramesInOrder
 from orbslam2py.datasets.image_folder import ImageFolder
 from orbslam2py.datasets.kitti import KittiSequence
 from orbslam2py.datasets.live import LiveCamera
 from orbslam2py.datasets.masks import MaskedCamera, MaskedSequence
 from orbslam2py.datasets.open_input import open_input
 from orbslam2py.datasets.recognise import open_sequence, recognise
+from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.datasets.tum import TumSequence
 from orbslam2py.datasets.video import VideoReader, VideoSequence
 
 __all__ = [
     "EurocSequence",
+    "Frame",
+    "FramesInOrder",
     "ImageFolder",
     "Images",
     "KittiSequence",
@@ -23,6 +27,7 @@ __all__ = [
     "LiveSource",
     "MaskedCamera",
     "MaskedSequence",
+    "RecordedSequence",
     "Sequence",
     "Source",
     "TumSequence",

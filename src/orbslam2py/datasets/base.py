@@ -27,6 +27,10 @@ class Layout(str, Enum):
     KITTI = "kitti"
     EUROC = "euroc"
 
+    @classmethod
+    def _missing_(cls, value: object) -> Layout:
+        raise DatasetError(f"no layout {value!r}; there are: {', '.join(map(str, cls))}")
+
     def __str__(self) -> str:
         return self.value
 
@@ -247,7 +251,9 @@ class Stamps:
             )
 
 
-def choose_sensor(folder: Path, wanted: Sensor | None, available: tuple[Sensor, ...]) -> Sensor:
+def choose_sensor(
+    folder: Path, wanted: Sensor | str | None, available: tuple[Sensor, ...]
+) -> Sensor:
     """Return the wanted sensor, or the richest available one.
 
     Parameters
@@ -266,6 +272,7 @@ def choose_sensor(folder: Path, wanted: Sensor | None, available: tuple[Sensor, 
     """
     if wanted is None:
         return available[0]
+    wanted = Sensor(wanted)
     if wanted not in available:
         names = ", ".join(str(sensor) for sensor in available)
         raise DatasetError(f"{folder} has no {wanted} images; it can be used as: {names}")

@@ -8,41 +8,45 @@ from collections.abc import Callable
 from pathlib import Path
 
 from orbslam2py.errors import DatasetError
-from orbslam2py.settings import BUILTIN_NAMES, Sensor, Settings, builtin_settings
+from orbslam2py.settings import Sensor, Settings, builtin_settings
 
 #: What a caller may give: settings, a file, a built-in name, or None to let the folder decide.
 SettingsChoice = Settings | str | Path | None
 
 _SETTINGS_FILE = "settings.yaml"
-_FREIBURG = re.compile(r"freiburg([123])", re.IGNORECASE)
+#: ``rgbd_dataset_freiburg1_desk``, ``fr1_desk``.
+_FREIBURG = re.compile(r"(?:freiburg|(?<![a-z0-9])fr)([123])(?![0-9])", re.IGNORECASE)
 
 
 def choose_settings(
     sensor: Sensor,
     folders: tuple[Path, ...],
     from_calibration: Callable[[], Settings | None],
+    advice: str,
 ) -> Settings:
     """Choose the settings for a sequence by its folder.
 
     In this order: ``settings.yaml`` in the folder, the calibration that came with the data, the
-    TUM camera that the folder's name tells.
+    TUM camera that the folder's name tells, or that of a link to it.
 
     Parameters
     ----------
     sensor
         What the settings are for.
     folders
-        Where ``settings.yaml`` may lie; the first one's name may tell the camera.
+        Where ``settings.yaml`` may lie; the names of the first one, followed to its place and as it
+        was given, may tell the camera.
     from_calibration
         Makes settings of the data's own calibration, None if there is none.
+    advice
+        What is missing in data of this layout and what to do about it, for the message.
 
     Raises
     ------
     SettingsError
         If the file found is wrong.
     DatasetError
-        If nothing was found, listing what can be done; or if the calibration
-        is malformed.
+        If nothing was found, with the advice; or if the calibration is malformed.
     """
     for folder in folders:
         path = folder / _SETTINGS_FILE
@@ -51,11 +55,12 @@ def choose_settings(
     settings = from_calibration()
     if settings is not None:
         return settings
-    named = _FREIBURG.search(folders[0].name)
+    names = (folders[0].resolve().name, folders[0].absolute().name)
+    named = next(filter(None, map(_FREIBURG.search, names)), None)
     if named and sensor is not Sensor.STEREO:
         return builtin_settings(f"tum{named[1]}", sensor)
+    shown = folders[0] if folders[0].name else folders[0].resolve()
     raise DatasetError(
-        f"no settings for {folders[0]}: give a settings file or one of the built-in names "
-        f"{', '.join(BUILTIN_NAMES)}, or put {_SETTINGS_FILE} into the folder "
-        "(KITTI's calib.txt and EuRoC's sensor.yaml are used if they are there)"
+        f"no settings for {shown}: {advice}; for another camera give a file of its own, or put it "
+        f"into the folder as {_SETTINGS_FILE}"
     )

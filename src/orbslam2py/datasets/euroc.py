@@ -71,11 +71,15 @@ class EurocSequence(RecordedSequence):
     """
 
     layout = Layout.EUROC
+    _missing_calibration = (
+        "sensor.yaml is missing in cam0, or for stereo in cam1; copy it there from the data set, "
+        "or for EuRoC's own cameras give --settings euroc"
+    )
 
     def __init__(
         self,
         folder: str | Path,
-        sensor: Sensor | None = None,
+        sensor: Sensor | str | None = None,
         *,
         settings: SettingsChoice = None,
     ) -> None:
@@ -103,6 +107,7 @@ class EurocSequence(RecordedSequence):
             if not kept and left.paths:
                 raise DatasetError(f"{root}: cam0 and cam1 have no time stamp in common")
         require_frames(left.source, len(kept))
+        self._list_path = left.source
         self._nanoseconds, self._left = kept, left.paths
         self._stamps = Stamps(
             np.array([stamp / 1e9 for stamp in kept], dtype=np.float64),
@@ -117,22 +122,27 @@ class EurocSequence(RecordedSequence):
 
     def load(self, index: int, /) -> Images:
         """Read and rectify the images of a frame; see `datasets.base.Sequence.load`."""
-        stamp = self._nanoseconds[index]
-        left = self._read(self._left[stamp])
+        paths = self._files(index)
+        raw = [self._read(path) for path in paths]
         if self.sensor is Sensor.MONOCULAR:
-            return Images(left)
-        right = self._read(self._right[stamp])
-        rectify_left, rectify_right = self._rectifiers
-        return Images(
-            rectify_left.rectify(left, self._left[stamp]),
-            right=rectify_right.rectify(right, self._right[stamp]),
+            return Images(raw[0])
+        left, right = (
+            rectifier.rectify(image, path)
+            for rectifier, image, path in zip(self._rectifiers, raw, paths, strict=True)
         )
+        return Images(left, right=right)
+
+    def _files(self, index: int) -> tuple[Path, ...]:
+        stamp = self._nanoseconds[index]
+        if self.sensor is Sensor.MONOCULAR:
+            return (self._left[stamp],)
+        return self._left[stamp], self._right[stamp]
 
     def ground_truth(self) -> Trajectory | None:
         """Read the body's poses and move them to the (rectified) left camera.
 
-        See `datasets.base.Sequence.ground_truth`. None as well if ``cam0/sensor.yaml`` is missing:
-        without ``T_BS`` the camera's place on the vehicle is unknown.
+        See `datasets.base.Sequence.ground_truth`. None as well if ``cam0/sensor.yaml`` is missing
+        or has no ``T_BS``: the camera's place on the vehicle is unknown then.
         """
         path = self._root / "state_groundtruth_estimate0" / "data.csv"
         if not path.is_file():
@@ -141,8 +151,12 @@ class EurocSequence(RecordedSequence):
         if not calibration.is_file():
             _log.warning("%s is not used: %s with T_BS is missing", path, calibration)
             return None
+        sensor = read_sensor_yaml(calibration)
+        if sensor.T_body_camera is None:
+            _log.warning("%s is not used: %s has no T_BS", path, calibration)
+            return None
         body = read_euroc(path)
-        T_body_camera = read_sensor_yaml(calibration).T_BS.copy()
+        T_body_camera = sensor.T_BS.copy()
         if self.sensor is Sensor.STEREO:
             rectification = self._rectification
             # R of the rectification turns raw into rectified coordinates.
@@ -168,7 +182,7 @@ class EurocSequence(RecordedSequence):
         return read_image(path, rgb=self.settings.camera.rgb)
 
     def _settings_folders(self) -> tuple[Path, ...]:
-        return (self.folder.resolve(), self._root.resolve())
+        return (self.folder, self._root)
 
     def _from_calibration(self) -> Settings | None:
         paths = [self._root / "cam0" / "sensor.yaml"]

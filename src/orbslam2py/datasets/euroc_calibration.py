@@ -28,8 +28,10 @@ class SensorCalibration:
 
     Attributes
     ----------
-    T_BS
-        Camera to body, float64 (4, 4), metres.
+    path
+        The file.
+    T_body_camera
+        Camera to body, float64 (4, 4), metres; None if the file has no ``T_BS``.
     intrinsics
         fx, fy, cx, cy in pixels, (4,).
     distortion
@@ -40,11 +42,28 @@ class SensorCalibration:
         Images per second.
     """
 
-    T_BS: FloatArray
+    path: Path
+    T_body_camera: FloatArray | None
     intrinsics: FloatArray
     distortion: FloatArray
     size: tuple[int, int]
     rate: float
+
+    @property
+    def T_BS(self) -> FloatArray:
+        """Camera to body, float64 (4, 4), metres.
+
+        Raises
+        ------
+        DatasetError
+            If the file does not tell it.
+        """
+        if self.T_body_camera is None:
+            raise DatasetError(
+                f"{self.path} has no T_BS, the camera's place on the vehicle; stereo and ground "
+                "truth need it: add it, or use the camera alone with --sensor mono"
+            )
+        return self.T_body_camera
 
     @property
     def camera_matrix(self) -> FloatArray:
@@ -64,7 +83,8 @@ def read_sensor_yaml(path: Path) -> SensorCalibration:
     Returns
     -------
     SensorCalibration
-        With 20 images per second if the file does not tell its rate.
+        With 20 images per second if the file does not tell its rate, and without `T_body_camera` if
+        it has no ``T_BS``, which a single camera does not need.
 
     Raises
     ------
@@ -78,7 +98,7 @@ def read_sensor_yaml(path: Path) -> SensorCalibration:
     if document.problems:
         raise DatasetError("\n".join(problem.located(path) for problem in document.problems))
     entries = document.entries
-    keys = ("T_BS", "intrinsics", "distortion_coefficients", "resolution")
+    keys = ("intrinsics", "distortion_coefficients", "resolution")
     missing = [key for key in keys if key not in entries]
     if missing:
         raise DatasetError(f"{path} has no {', '.join(missing)}")
@@ -86,13 +106,11 @@ def read_sensor_yaml(path: Path) -> SensorCalibration:
         if key in entries and entries[key].value != allowed:
             entry = entries[key]
             raise DatasetError(f"{path}:{entry.line}: {key} is {entry.value}; allowed: {allowed}")
-    T_BS = _matrix(path, entries["T_BS"])
-    if T_BS.shape != (4, 4) or np.abs(T_BS[:3, :3] @ T_BS[:3, :3].T - np.eye(3)).max() > 1e-3:
-        raise DatasetError(f"{path}:{entries['T_BS'].line}: T_BS is no 4 x 4 rigid transform")
     width, height = _numbers(path, entries["resolution"], 2)
     rate = _numbers(path, entries["rate_hz"], 1)[0] if "rate_hz" in entries else 20.0
     return SensorCalibration(
-        T_BS=poses_from(nearest_rotations(T_BS[None, :3, :3]), T_BS[None, :3, 3])[0],
+        path=path,
+        T_body_camera=_rigid(path, entries["T_BS"]) if "T_BS" in entries else None,
         intrinsics=_numbers(path, entries["intrinsics"], 4),
         distortion=_numbers(path, entries["distortion_coefficients"], 4),
         size=(int(width), int(height)),
@@ -153,11 +171,15 @@ def stereo_settings(left: SensorCalibration, right: SensorCalibration) -> Settin
     )
 
 
-def _matrix(path: Path, entry: Entry) -> FloatArray:
+def _rigid(path: Path, entry: Entry) -> FloatArray:
     try:
-        return read_matrix(entry)
+        T = read_matrix(entry)
     except ValueError as error:
         raise DatasetError(f"{path}:{entry.line}: {error}") from None
+    if T.shape != (4, 4) or np.abs(T[:3, :3] @ T[:3, :3].T - np.eye(3)).max() > 1e-3:
+        raise DatasetError(f"{path}:{entry.line}: {entry.key} is no 4 x 4 rigid transform")
+    pose: FloatArray = poses_from(nearest_rotations(T[None, :3, :3]), T[None, :3, 3])[0]
+    return pose
 
 
 def _numbers(path: Path, entry: Entry, count: int) -> FloatArray:

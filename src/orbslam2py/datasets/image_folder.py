@@ -10,6 +10,7 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.datasets.base import Images
 from orbslam2py.datasets.choose_settings import SettingsChoice
+from orbslam2py.datasets.frames import FramesInOrder
 from orbslam2py.datasets.images import read_image
 from orbslam2py.datasets.unposed import UnposedSource, chosen_stamps
 from orbslam2py.errors import DatasetError
@@ -43,7 +44,7 @@ def image_files(folder: Path) -> list[Path]:
     return sorted(found, key=lambda path: (natural_key(path.name), path.name))
 
 
-class ImageFolder(UnposedSource):
+class ImageFolder(FramesInOrder, UnposedSource):
     """The images of a folder; see `datasets.base.Sequence`.
 
     Parameters
@@ -57,7 +58,8 @@ class ImageFolder(UnposedSource):
     fps
         Images per second; by default that of the settings.
     times
-        File with one time stamp per image, in the order of the images.
+        File with one time stamp per image, in the order of the images; or a list of images with
+        their time stamps, such as ``rgb.txt`` of TUM RGB-D.
 
     Raises
     ------
@@ -72,7 +74,7 @@ class ImageFolder(UnposedSource):
     def __init__(
         self,
         folder: str | Path,
-        sensor: Sensor | None = None,
+        sensor: Sensor | str | None = None,
         *,
         settings: SettingsChoice = None,
         fps: float | None = None,
@@ -88,7 +90,8 @@ class ImageFolder(UnposedSource):
         if settings is None and own.is_file():
             settings = own
         super().__init__(self.folder, self.folder.resolve().name, sensor, settings, fps)
-        self._stamps = chosen_stamps(len(self.paths), fps, times, self.settings.camera.fps)
+        names = [path.name for path in self.paths]
+        self._stamps = chosen_stamps(len(names), fps, times, self.settings.camera.fps, names)
 
     def __len__(self) -> int:
         return len(self.paths)

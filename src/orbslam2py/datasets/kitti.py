@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""KITTI odometry: ``times.txt``, ``image_0``, ``image_1``, ``calib.txt``."""
+"""KITTI odometry: ``times.txt``, ``calib.txt``, and the images of a grey or a colour pair."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from orbslam2py._arrays import ByteArray, FloatArray
+from orbslam2py._arrays import FloatArray
 from orbslam2py._text_lines import content_lines, number_of
 from orbslam2py.datasets.base import Images, Layout, Stamps, require_frames
 from orbslam2py.datasets.choose_settings import SettingsChoice
@@ -28,6 +28,9 @@ from orbslam2py.trajectory import Trajectory, read_kitti
 
 _log = logging.getLogger(__name__)
 
+#: Numbers of the left and the right camera of the grey pair, which comes first, and the colour one.
+_PAIRS = ((0, 1), (2, 3))
+
 _CLOSE_FACTOR = 40.0
 _USUAL_RATE = 10.0
 
@@ -35,12 +38,15 @@ _USUAL_RATE = 10.0
 class KittiSequence(RecordedSequence):
     """A sequence in the layout of KITTI odometry; see `datasets.base.Sequence`.
 
+    The grey cameras ``image_0`` and ``image_1`` are taken if they are there, else the colour
+    cameras ``image_2`` and ``image_3``, with their own calibration.
+
     Parameters
     ----------
     folder
-        The folder with ``times.txt`` and ``image_0``.
+        The folder with ``times.txt`` and ``image_0`` or ``image_2``.
     sensor
-        Monocular (left camera) or stereo; by default stereo if ``image_1`` is there.
+        Monocular (left camera) or stereo; by default stereo if both cameras of a pair are there.
     settings
         Settings, a file, a built-in name, or None to let the folder decide.
 
@@ -53,39 +59,45 @@ class KittiSequence(RecordedSequence):
     """
 
     layout = Layout.KITTI
+    _missing_calibration = (
+        "calib.txt is missing; copy it there from the data set, or give --settings kitti00-02, "
+        "kitti03 or kitti04-12, by the number of the sequence"
+    )
 
     def __init__(
         self,
         folder: str | Path,
-        sensor: Sensor | None = None,
+        sensor: Sensor | str | None = None,
         *,
         settings: SettingsChoice = None,
     ) -> None:
         folder = Path(folder)
-        has_right = (folder / "image_1").is_dir()
+        sensor = None if sensor is None else Sensor(sensor)
+        self._left, self._right, has_right = _choose_cameras(folder, sensor)
         available = (Sensor.STEREO, Sensor.MONOCULAR) if has_right else (Sensor.MONOCULAR,)
         super().__init__(folder, available, sensor, settings)
         times = self.folder / "times.txt"
+        self._list_path = times
         self._stamps = _read_times(times)
         require_frames(times, len(self))
         self._stamps.warn_unless_increasing(times)
 
     def image_path(self, index: int, /) -> Path:
         """Return the file of the left image of a frame."""
-        return self._path("image_0", index)
+        return self._path(self._left, index)
 
     def load(self, index: int, /) -> Images:
         """Read the images of a frame; see `datasets.base.Sequence.load`."""
-        image = self._read("image_0", index)
-        if self.sensor is Sensor.MONOCULAR:
-            return Images(image)
-        return Images(image, right=self._read("image_1", index))
+        rgb = self.settings.camera.rgb
+        image, *right = (read_image(path, rgb=rgb) for path in self._files(index))
+        return Images(image, right=right[0]) if right else Images(image)
 
     def ground_truth(self) -> Trajectory | None:
         """Read ``poses.txt``, ``NN.txt`` or ``../../poses/NN.txt``.
 
         See `datasets.base.Sequence.ground_truth`. Poses belong to frames by their number; the
-        files of the benchmark may hold more of them than a shortened sequence has frames.
+        files of the benchmark may hold more of them than a shortened sequence has frames. They are
+        those of the left grey camera; ``calib.txt`` tells how far beside it the colour one is.
         """
         path = self._ground_truth_path()
         if path is None:
@@ -94,19 +106,31 @@ class KittiSequence(RecordedSequence):
         n = min(len(poses), len(self))
         if len(poses) != len(self):
             _log.warning("%s holds %d poses for %d frames", path, len(poses), len(self))
-        return Trajectory(self.timestamps[:n], poses.T_wc[:n])
+        return Trajectory(self.timestamps[:n], poses.T_wc[:n] @ self._T_grey_camera())
 
-    def _read(self, camera: str, index: int) -> ByteArray:
-        return read_image(self._path(camera, index), rgb=self.settings.camera.rgb)
+    def _files(self, index: int) -> tuple[Path, ...]:
+        cameras = (self._left, self._right)[: 1 + (self.sensor is Sensor.STEREO)]
+        return tuple(self._path(camera, index) for camera in cameras)
 
-    def _path(self, camera: str, index: int) -> Path:
+    def _path(self, camera: int, index: int) -> Path:
         if not 0 <= index < len(self):
             raise IndexError(f"frame {index} of {len(self)}")
-        folder = self.folder / camera
+        folder = self.folder / f"image_{camera}"
         path = folder / f"{index:06d}.png"
         if not path.is_file() and path.with_suffix(".jpg").is_file():
             path = path.with_suffix(".jpg")
         return path
+
+    def _T_grey_camera(self) -> FloatArray:
+        """Return the transform (4, 4) from the left camera to the left grey one [m]."""
+        T = np.eye(4)
+        path = self.folder / "calib.txt"
+        name = f"P{self._left}"
+        if self._left and path.is_file() and name in (projections := _read_calibration(path)):
+            # P = K [I | t] takes points of the left grey camera, to which all are rectified.
+            P = projections[name]
+            T[:3, 3] = -np.linalg.solve(P[:, :3], P[:, 3])
+        return T
 
     def _ground_truth_path(self) -> Path | None:
         candidates = [self.folder / "poses.txt"]
@@ -123,20 +147,25 @@ class KittiSequence(RecordedSequence):
         if not path.is_file():
             return None
         projections = _read_calibration(path)
-        if "P0" not in projections:
-            raise DatasetError(f"{path} has no line 'P0:' (left grey camera)")
         stereo = self.sensor is Sensor.STEREO
-        if stereo and "P1" not in projections:
-            raise DatasetError(f"{path} has no line 'P1:' (right grey camera), needed for stereo")
-        P0 = projections["P0"]
+        for number, side in ((self._left, "left"), (self._right, "right"))[: 1 + stereo]:
+            if f"P{number}" not in projections:
+                colour = "grey" if number in _PAIRS[0] else "colour"
+                needed = ", needed for stereo" if side == "right" else ""
+                raise DatasetError(
+                    f"{path} has no line 'P{number}:' ({side} {colour} camera){needed}; copy the "
+                    "sequence's own calib.txt there, or give settings"
+                )
+        P = projections[f"P{self._left}"]
         try:
             camera = CameraSettings(
-                fx=P0[0, 0],
-                fy=P0[1, 1],
-                cx=P0[0, 2],
-                cy=P0[1, 2],
+                fx=P[0, 0],
+                fy=P[1, 1],
+                cx=P[0, 2],
+                cy=P[1, 2],
                 fps=self._rate(),
-                bf=-projections["P1"][0, 3] if stereo else 0.0,
+                # Minus the left one's: colour cameras are not at the origin, as P0's is.
+                bf=P[0, 3] - projections[f"P{self._right}"][0, 3] if stereo else 0.0,
                 rgb=True,
             )
             return Settings(
@@ -154,6 +183,19 @@ class KittiSequence(RecordedSequence):
         steps = steps[steps > 0]
         # Rounded, since times are written with few digits: 9.99999 would count as 9 frames.
         return round(1.0 / float(np.median(steps)), 3) if len(steps) else _USUAL_RATE
+
+
+def find_cameras(folder: Path) -> tuple[int, ...]:
+    """Return the numbers of the left cameras that have images: 0 (grey), 2 (colour)."""
+    return tuple(left for left, _ in _PAIRS if (folder / f"image_{left}").is_dir())
+
+
+def _choose_cameras(folder: Path, sensor: Sensor | None) -> tuple[int, int, bool]:
+    """Choose the left and the right camera, and tell whether there are images of the right one."""
+    there = [pair for pair in _PAIRS if pair[0] in find_cameras(folder)] or list(_PAIRS[:1])
+    whole = [pair for pair in there if (folder / f"image_{pair[1]}").is_dir()]
+    left, right = there[0] if sensor is Sensor.MONOCULAR or not whole else whole[0]
+    return left, right, bool(whole)
 
 
 def _read_times(path: Path) -> Stamps:

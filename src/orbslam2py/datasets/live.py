@@ -82,7 +82,7 @@ class LiveCamera(UnposedSource):
     def __init__(
         self,
         number: int,
-        sensor: Sensor | None = None,
+        sensor: Sensor | str | None = None,
         *,
         settings: SettingsChoice = None,
         fps: float | None = None,

@@ -10,6 +10,7 @@ import numpy as np
 
 from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py.datasets.base import Images, LiveFrame, LiveSource, Sequence
+from orbslam2py.datasets.frames import FramesInOrder
 from orbslam2py.datasets.image_folder import image_files
 from orbslam2py.datasets.images import read_image
 from orbslam2py.errors import DatasetError, ImageError
@@ -189,7 +190,7 @@ class _Masked:
         return replace(images, mask=self._masks.mask(index, images.image))
 
 
-class MaskedSequence(_Masked):
+class MaskedSequence(FramesInOrder, _Masked):
     """A sequence whose images come with masks; see `datasets.base.Sequence`.
 
     Parameters

@@ -18,7 +18,7 @@ from orbslam2py.settings import Sensor
 
 def open_input(
     source: str | Path | int,
-    sensor: Sensor | None = None,
+    sensor: Sensor | str | None = None,
     *,
     settings: SettingsChoice = None,
     fps: float | None = None,
@@ -40,7 +40,7 @@ def open_input(
         Images per second of a folder of images or a video; the rate a camera is asked for.
     times
         File with one time stamp per image of a folder of images or a video: decimal seconds or
-        whole nanoseconds.
+        whole nanoseconds, with the images' file names or without.
     mask
         An image file, 0 where no keypoint may lie, or a folder with one per image.
 
@@ -73,7 +73,7 @@ def open_input(
 
 def _open_recorded(
     path: Path,
-    sensor: Sensor | None,
+    sensor: Sensor | str | None,
     settings: SettingsChoice,
     fps: float | None,
     times: str | Path | None,
@@ -87,6 +87,7 @@ def _open_recorded(
         if inner and not any(has_layout(child) for child in path.iterdir()):
             raise DatasetError(f"no images in {path} itself; did you mean {inner[0]}?")
     sequence = open_sequence(path, sensor, settings=settings)
+    sequence.require_images()
     for name, value in (("--fps", fps), ("--times", times)):
         if value is not None:
             raise DatasetError(

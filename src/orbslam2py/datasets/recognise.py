@@ -8,14 +8,15 @@ from pathlib import Path
 from orbslam2py.datasets.base import Layout
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.euroc import EurocSequence, find_root
-from orbslam2py.datasets.kitti import KittiSequence
+from orbslam2py.datasets.kitti import KittiSequence, find_cameras
 from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.datasets.tum import TumSequence, find_association
 from orbslam2py.errors import DatasetError
 from orbslam2py.settings import Sensor
 
 _MARKS = (
-    "rgb.txt or associations.txt (TUM), times.txt and image_0 (KITTI), mav0/cam0 or cam0 (EuRoC)"
+    "rgb.txt or associations.txt (TUM), times.txt with image_0 or image_2 (KITTI), "
+    "mav0/cam0 or cam0 (EuRoC)"
 )
 
 
@@ -57,11 +58,11 @@ def has_layout(folder: Path) -> bool:
 
 def open_sequence(
     folder: str | Path,
-    sensor: Sensor | None = None,
+    sensor: Sensor | str | None = None,
     *,
     settings: SettingsChoice = None,
     association: str | Path | None = None,
-    layout: Layout | None = None,
+    layout: Layout | str | None = None,
 ) -> RecordedSequence:
     """Open the sequence in a folder, recognised by its files.
 
@@ -90,7 +91,7 @@ def open_sequence(
     SettingsError
         If the settings given are wrong.
     """
-    layout = recognise(folder) if layout is None else layout
+    layout = recognise(folder) if layout is None else Layout(layout)
     if layout is Layout.TUM:
         return TumSequence(folder, sensor, settings=settings, association=association)
     if association is not None:
@@ -103,7 +104,7 @@ def _layouts(folder: Path) -> list[Layout]:
     found = []
     if (folder / "rgb.txt").is_file() or find_association(folder) is not None:
         found.append(Layout.TUM)
-    if (folder / "times.txt").is_file() and (folder / "image_0").is_dir():
+    if (folder / "times.txt").is_file() and find_cameras(folder):
         found.append(Layout.KITTI)
     if find_root(folder) is not None:
         found.append(Layout.EUROC)

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
+from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.datasets.base import (
     Images,
     Layout,
@@ -17,11 +18,16 @@ from orbslam2py.datasets.base import (
     choose_sensor,
 )
 from orbslam2py.datasets.choose_settings import SettingsChoice, choose_settings
+from orbslam2py.datasets.frames import FramesInOrder
+from orbslam2py.errors import DatasetError
 from orbslam2py.settings import Sensor, Settings, resolve_settings
 from orbslam2py.trajectory import Trajectory
 
+#: So many frames without images in the beginning, and a sequence is refused.
+_FIRST = 10
 
-class RecordedSequence(ABC):
+
+class RecordedSequence(FramesInOrder, ABC):
     """A folder of images, opened for one sensor; see `datasets.base.Sequence`.
 
     Parameters
@@ -44,12 +50,14 @@ class RecordedSequence(ABC):
     """
 
     layout: Layout
+    #: Why there are no settings if none were found, and which of the built-in ones to give.
+    _missing_calibration: str
 
     def __init__(
         self,
         folder: Path,
         available: tuple[Sensor, ...],
-        sensor: Sensor | None,
+        sensor: Sensor | str | None,
         settings: SettingsChoice,
     ) -> None:
         self.folder = folder
@@ -58,6 +66,8 @@ class RecordedSequence(ABC):
         self.sensor = choose_sensor(folder, sensor, available)
         self._chosen = None if settings is None else resolve_settings(settings, self.sensor)
         self._stamps = Stamps(np.zeros(0), (), ())
+        #: What tells the images, for messages.
+        self._list_path = folder
 
     @cached_property
     def settings(self) -> Settings:
@@ -66,7 +76,9 @@ class RecordedSequence(ABC):
 
     def default_settings(self) -> Settings:
         """Choose by what is in the folder; see `choose_settings`."""
-        return choose_settings(self.sensor, self._settings_folders(), self._from_calibration)
+        return choose_settings(
+            self.sensor, self._settings_folders(), self._from_calibration, self._missing_calibration
+        )
 
     def __len__(self) -> int:
         return len(self._stamps.texts)
@@ -80,6 +92,27 @@ class RecordedSequence(ABC):
         """Return the time of a frame in seconds, with all digits of the source."""
         return self._stamps.texts[index]
 
+    def require_images(self) -> None:
+        """See that at least one of the first frames has its images.
+
+        Raises
+        ------
+        DatasetError
+            If none has, so that no run skips a thousand frames one after the other.
+        """
+        n = min(_FIRST, len(self))
+        for missing in zip(*(self._files(index) for index in range(n)), strict=True):
+            if not any(path.exists() for path in missing):
+                raise DatasetError(
+                    f"none of the first {n} images that {self._list_path} tells is there, from "
+                    f"{missing[0]} on{_found_instead(self.folder, missing[0])}; put them where "
+                    "the list says, or correct the list"
+                )
+
+    @abstractmethod
+    def _files(self, index: int) -> tuple[Path, ...]:
+        """Return the files of a frame, the image first."""
+
     @abstractmethod
     def load(self, index: int, /) -> Images:
         """Read (and rectify) the images of a frame; see `datasets.base.Sequence.load`."""
@@ -89,7 +122,19 @@ class RecordedSequence(ABC):
         """Read the true poses; see `datasets.base.Sequence.ground_truth`."""
 
     def _settings_folders(self) -> tuple[Path, ...]:
-        return (self.folder.resolve(),)
+        return (self.folder,)
 
     def _from_calibration(self) -> Settings | None:
         return None
+
+
+def _found_instead(folder: Path, missing: Path) -> str:
+    """Say what the image's folder holds instead, or, if there is none, where the image is."""
+    if missing.parent.is_dir():
+        names = [p.name for p in missing.parent.iterdir() if p.suffix.lower() in IMAGE_SUFFIXES]
+        return f" (there is {missing.parent / min(names)})" if names else ""
+    inner = sorted(path for path in folder.iterdir() if path.is_dir()) if folder.is_dir() else []
+    for place in (folder, *inner):
+        if (place / missing.name).exists():
+            return f" (there is {place / missing.name})"
+    return f" ({missing.parent} does not exist)"

@@ -3,17 +3,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
-from orbslam2py._text_lines import content_lines, number_of
+from orbslam2py._text_lines import TextLine, content_lines, number_of
 from orbslam2py.datasets.base import Stamps
 from orbslam2py.errors import DatasetError
 
 #: Whole numbers are nanoseconds if their typical step is longer than this as seconds (a day).
 _LONGEST_STEP = 86400
+
+#: Fields of a line: time; time and file; the same of two cameras.
+_FIELDS = {1, 2, 4}
 
 
 def stamps_of_rate(n: int, fps: float) -> Stamps:
@@ -35,11 +39,15 @@ def stamps_of_seconds(seconds: FloatArray) -> Stamps:
     return Stamps(seconds, tuple(f"{time:.9f}" for time in seconds.tolist()), ())
 
 
-def read_time_file(path: Path, n: int) -> Stamps:
+def read_time_file(path: Path, n: int, names: Sequence[str] | None = None) -> Stamps:
     """Read one time stamp per image: decimal seconds, or whole nanoseconds.
 
     A file of whole numbers holds nanoseconds if its typical step would be more than a day in
     seconds. Empty lines and lines starting with ``#`` are left out.
+
+    Lists with the images' files in the second field are read as well, such as ``rgb.txt`` and
+    associations of TUM RGB-D, or EuRoC's ``data.csv``. The names of the files count then, without
+    their folders, and what is listed beyond them is left out.
 
     Parameters
     ----------
@@ -47,22 +55,23 @@ def read_time_file(path: Path, n: int) -> Stamps:
         The file.
     n
         Number of images.
+    names
+        Names of their files; None if they have none (a video).
 
     Raises
     ------
     DatasetError
         If the file cannot be read or does not hold `n` increasing numbers.
     """
-    lines = content_lines(path)
-    for line in lines:
-        if len(line.fields) != 1:
-            raise DatasetError(
-                f"{path}:{line.number}: expected one time stamp, found {len(line.fields)} fields"
-            )
+    lines = _uniform_lines(path)
+    if names is not None and lines and len(lines[0].fields) > 1:
+        lines = _lines_of(path, lines, names)
     texts = [line.fields[0] for line in lines]
     seconds = np.array([number_of(path, line, line.fields[0]) for line in lines])
     if len(lines) != n:
-        raise DatasetError(f"{path} holds {len(lines)} time stamps, but there are {n} images")
+        raise DatasetError(
+            f"{path} holds {len(lines)} time stamps, but there are {n} images; give one for each"
+        )
     whole = [int(text) for text in texts if text.isdecimal()]
     if len(whole) == n > 1 and np.median(np.diff(whole)) > _LONGEST_STEP:
         texts = [f"{time // 10**9}.{time % 10**9:09d}" for time in whole]
@@ -73,3 +82,30 @@ def read_time_file(path: Path, n: int) -> Stamps:
             f"it, {texts[i]}; time must grow from image to image"
         )
     return Stamps(seconds, tuple(texts), tuple(line.number for line in lines))
+
+
+def _uniform_lines(path: Path) -> list[TextLine]:
+    """Split into fields, at commas if there are any, and see that all lines have as many."""
+    lines = content_lines(path)
+    if any("," in field for line in lines for field in line.fields):
+        lines = content_lines(path, separator=",")
+    counts = {len(line.fields) for line in lines}
+    if len(counts) > 1 or not counts <= _FIELDS:
+        odd = next(line for line in lines if len(line.fields) != 1)
+        raise DatasetError(
+            f"{path}:{odd.number}: expected one time stamp, or a time stamp and an image file in "
+            f"every line, found {len(odd.fields)} fields"
+        )
+    return lines
+
+
+def _lines_of(path: Path, lines: list[TextLine], names: Sequence[str]) -> list[TextLine]:
+    """Choose the line of each image by the name of its file."""
+    by_name = {Path(line.fields[1]).name: line for line in reversed(lines)}
+    missing = [name for name in names if name not in by_name]
+    if missing:
+        raise DatasetError(
+            f"{path} has no time stamp for {len(missing)} of {len(names)} images, the first is "
+            f"{missing[0]}; give a list of all images, or a file with nothing but time stamps"
+        )
+    return [by_name[name] for name in names]

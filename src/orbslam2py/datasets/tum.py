@@ -54,11 +54,15 @@ class TumSequence(RecordedSequence):
     """
 
     layout = Layout.TUM
+    _missing_calibration = (
+        "its name does not tell the camera; for TUM RGB-D give --settings tum1 (if the sequence "
+        "was named freiburg1 there), tum2 (freiburg2) or tum3 (freiburg3)"
+    )
 
     def __init__(
         self,
         folder: str | Path,
-        sensor: Sensor | None = None,
+        sensor: Sensor | str | None = None,
         *,
         settings: SettingsChoice = None,
         association: str | Path | None = None,
@@ -82,6 +86,7 @@ class TumSequence(RecordedSequence):
             colour, _ = _read_association(found)
         require_frames(source, len(colour.paths))
         colour.stamps.warn_unless_increasing(source)
+        self._list_path = source
         self._colour_paths, self._stamps = colour.paths, colour.stamps
 
     def image_path(self, index: int, /) -> Path:
@@ -90,10 +95,14 @@ class TumSequence(RecordedSequence):
 
     def load(self, index: int, /) -> Images:
         """Read the images of a frame; see `datasets.base.Sequence.load`."""
-        image = read_image(self.image_path(index), rgb=self.settings.camera.rgb)
+        image_path, *depth_path = self._files(index)
+        image = read_image(image_path, rgb=self.settings.camera.rgb)
+        return Images(image, depth=read_depth(depth_path[0])) if depth_path else Images(image)
+
+    def _files(self, index: int) -> tuple[Path, ...]:
         if self._depth_paths is None:
-            return Images(image)
-        return Images(image, depth=read_depth(self.folder / self._depth_paths[index]))
+            return (self.image_path(index),)
+        return self.image_path(index), self.folder / self._depth_paths[index]
 
     def ground_truth(self) -> Trajectory | None:
         """Read ``groundtruth.txt``; see `datasets.base.Sequence.ground_truth`."""

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -49,7 +50,7 @@ class UnposedSource:
         self,
         what: str | Path,
         name: str,
-        sensor: Sensor | None,
+        sensor: Sensor | str | None,
         settings: SettingsChoice,
         fps: float | None,
     ) -> None:
@@ -102,7 +103,11 @@ def _with_rate(camera: CameraSettings, fps: float) -> CameraSettings:
 
 
 def chosen_stamps(
-    n: int, fps: float | None, times: str | Path | None, otherwise: Stamps | float
+    n: int,
+    fps: float | None,
+    times: str | Path | None,
+    otherwise: Stamps | float,
+    names: Sequence[str] | None = None,
 ) -> Stamps:
     """Choose the time stamps of images: from a rate, from a file, or else their own.
 
@@ -113,9 +118,11 @@ def chosen_stamps(
     fps
         Constant rate, or None.
     times
-        File with a time stamp per image, or None.
+        File with a time stamp per image, or a list of images with their time stamps, or None.
     otherwise
         Time stamps, or a rate, if neither is given.
+    names
+        Names of the images' files, if they have any.
 
     Raises
     ------
@@ -125,7 +132,7 @@ def chosen_stamps(
     if fps is not None and times is not None:
         raise DatasetError("--fps and --times exclude each other: both tell the time stamps")
     if times is not None:
-        return read_time_file(Path(times), n)
+        return read_time_file(Path(times), n, names)
     if fps is not None:
         return stamps_of_rate(n, fps)
     return otherwise if isinstance(otherwise, Stamps) else stamps_of_rate(n, otherwise)

@@ -15,6 +15,7 @@ from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.datasets.base import Images, Stamps
 from orbslam2py.datasets.choose_settings import SettingsChoice
+from orbslam2py.datasets.frames import FramesInOrder
 from orbslam2py.datasets.images import quiet_opencv
 from orbslam2py.datasets.time_files import stamps_of_rate, stamps_of_seconds
 from orbslam2py.datasets.unposed import UnposedSource, chosen_stamps
@@ -161,7 +162,7 @@ def _rate(capture: cv2.VideoCapture) -> float:
     return fps if math.isfinite(fps) and 0 < fps <= 1e5 else 0.0
 
 
-class VideoSequence(UnposedSource):
+class VideoSequence(FramesInOrder, UnposedSource):
     """The frames of a video file; see `datasets.base.Sequence`.
 
     Parameters
@@ -190,7 +191,7 @@ class VideoSequence(UnposedSource):
     def __init__(
         self,
         path: str | Path,
-        sensor: Sensor | None = None,
+        sensor: Sensor | str | None = None,
         *,
         settings: SettingsChoice = None,
         fps: float | None = None,

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How far an estimate is from the truth: paths, laps, poses found in a map, closed loops."""
 
-from orbslam2py.evaluation.alignment import Alignment, Similarity, align, match_poses
+from orbslam2py.evaluation.alignment import Alignment, Similarity, align, differ_in_unit
 from orbslam2py.evaluation.keyframes import (
     PoseError,
     errors_through_keyframes,
@@ -17,6 +17,7 @@ from orbslam2py.evaluation.loops import (
     loop_error,
     metres_per_unit_at,
 )
+from orbslam2py.evaluation.matching import Matched, describe_match, match_poses
 from orbslam2py.evaluation.metrics import (
     SEGMENT_LENGTHS,
     ErrorStatistics,
@@ -26,6 +27,7 @@ from orbslam2py.evaluation.metrics import (
     relative_errors,
     segment_errors,
 )
+from orbslam2py.evaluation.pairing import Paired, Poses, ends_early, pair, read_estimate, read_truth
 
 __all__ = [
     "SEGMENT_LENGTHS",
@@ -34,11 +36,17 @@ __all__ = [
     "Evaluation",
     "LapError",
     "LoopError",
+    "Matched",
+    "Paired",
     "PoseError",
+    "Poses",
     "Revisit",
     "Similarity",
     "align",
     "closed_revisits",
+    "describe_match",
+    "differ_in_unit",
+    "ends_early",
     "errors_through_keyframes",
     "evaluate_trajectory",
     "find_revisits",
@@ -48,7 +56,10 @@ __all__ = [
     "metres_per_unit_at",
     "nearest_keyframes",
     "one_second_pairs",
+    "pair",
     "pose_error",
+    "read_estimate",
+    "read_truth",
     "relative_errors",
     "scale_drift",
     "segment_errors",

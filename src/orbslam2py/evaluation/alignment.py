@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""An estimate brought onto the truth: poses matched by time, and the transform between worlds."""
+"""An estimate brought onto the truth: the transform between worlds, and how it is chosen."""
 
 from __future__ import annotations
 
@@ -8,9 +8,12 @@ from enum import Enum
 
 import numpy as np
 
-from orbslam2py._arrays import FloatArray, IntArray
+from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import DatasetError
-from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory, associate
+
+#: Lengths that differ by more than this factor are those of one camera, not of a wrong baseline.
+_OTHER_UNIT = 1.5
+_FEWEST_POSES = 3  # of which a scale can be told apart from an error
 
 
 class Alignment(str, Enum):
@@ -22,6 +25,28 @@ class Alignment(str, Enum):
     """Turned, shifted and scaled: for one camera, which cannot see metres."""
     NONE = "none"
     """Left as it is: both are in one world."""
+    AUTO = "auto"
+    """``sim3`` for a single camera, ``se3`` for others; told by the lengths if it is not known."""
+
+    @classmethod
+    def of(cls, value: Alignment | str) -> Alignment:
+        """Take an alignment or its name.
+
+        Raises
+        ------
+        DatasetError
+            Listing the names, if there is none like that.
+        """
+        try:
+            return cls(value)
+        except ValueError:
+            names = ", ".join(alignment.value for alignment in cls)
+            raise DatasetError(f"'{value}' is no alignment; give one of {names}") from None
+
+    @property
+    def fewest_poses(self) -> int:
+        """Matched poses from which on a distance to the truth says something."""
+        return _FEWEST_POSES if self is Alignment.SIM3 else 2
 
     def __str__(self) -> str:
         return self.value
@@ -96,39 +121,26 @@ def align(points: FloatArray, targets: FloatArray, *, with_scale: bool = False) 
     return Similarity(scale, R, target_centre - scale * R @ centre)
 
 
-def match_poses(
-    estimate: Trajectory, truth: Trajectory, max_difference: float = MAX_DIFFERENCE
-) -> tuple[IntArray, IntArray]:
-    """Find which poses belong together by their time stamps.
+def differ_in_unit(points: FloatArray, targets: FloatArray) -> float | None:
+    """Tell whether lengths are in another unit, as those of a single camera are.
 
     Parameters
     ----------
-    estimate, truth
-        Both on one clock.
-    max_difference
-        Poses belong together if their time stamps differ by less [s].
+    points, targets
+        Positions of the same moments, float64 (n, 3).
 
     Returns
     -------
-    i, j
-        Indices into the estimate and into the truth, (k,) each, k > 0.
-
-    Raises
-    ------
-    DatasetError
-        If no time stamps match.
+    float or None
+        The factor from `points` to `targets` if it is above 1.5 or below 1 / 1.5 and scaling by it
+        at least halves the distance that is left; None else.
     """
-    i, j = associate(estimate.timestamps, truth.timestamps, max_difference)
-    if not len(i):
-        raise DatasetError(
-            f"no poses to compare: no time stamps of estimate ({_span(estimate)}) and ground truth "
-            f"({_span(truth)}) differ by less than {max_difference} s"
-        )
-    return i, j
-
-
-def _span(trajectory: Trajectory) -> str:
-    if not len(trajectory):
-        return "no poses"
-    times = trajectory.timestamps
-    return f"{len(times)} poses from {times.min():.3f} to {times.max():.3f} s"
+    if len(points) < _FEWEST_POSES:
+        return None
+    rigid, scaled = align(points, targets), align(points, targets, with_scale=True)
+    if 1 / _OTHER_UNIT <= scaled.scale <= _OTHER_UNIT:
+        return None
+    before, after = (
+        float(np.linalg.norm(found.apply(points) - targets)) for found in (rigid, scaled)
+    )
+    return scaled.scale if after < 0.5 * before else None

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import DatasetError
-from orbslam2py.evaluation.alignment import align, match_poses
+from orbslam2py.evaluation.alignment import align
+from orbslam2py.evaluation.matching import match_poses
 from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory
 from orbslam2py.trajectory.rotations import inverse_poses, rotation_angles
 

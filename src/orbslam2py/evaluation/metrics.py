@@ -7,13 +7,15 @@ over path segments as the KITTI odometry benchmark does (Geiger et al., CVPR 201
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from orbslam2py._arrays import FloatArray, IntArray
-from orbslam2py.evaluation.alignment import Alignment, Similarity, align, match_poses
+from orbslam2py.evaluation.alignment import Alignment, Similarity, align, differ_in_unit
+from orbslam2py.evaluation.matching import Matched, describe_match, match_poses
 from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory
 from orbslam2py.trajectory.rotations import inverse_poses, rotation_angles
 
@@ -21,6 +23,8 @@ from orbslam2py.trajectory.rotations import inverse_poses, rotation_angles
 SEGMENT_LENGTHS = (100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0)
 _SEGMENT_STEP = 10  # frames between the starts of segments
 _SECOND_TOLERANCE = 0.1  # how far "one second later" may be off [s]
+
+_Value = TypeVar("_Value")
 
 
 @dataclass(frozen=True)
@@ -41,8 +45,10 @@ class ErrorStatistics:
     max: float
 
     @classmethod
-    def of(cls, errors: FloatArray) -> ErrorStatistics:
-        """Take the figures of errors, float64 (n,), n > 0."""
+    def of(cls, errors: FloatArray) -> ErrorStatistics | None:
+        """Take the figures of errors, float64 (n,); None if there are none, or not all finite."""
+        if not len(errors) or not np.isfinite(errors).all():
+            return None
         return cls(
             rmse=float(np.sqrt(np.mean(errors**2))),
             mean=float(np.mean(errors)),
@@ -53,30 +59,39 @@ class ErrorStatistics:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """An estimate compared with the truth.
+    """An estimate compared with the truth; each figure is None where it cannot be computed.
 
     Attributes
     ----------
-    matched_poses
-        Poses of the estimate that have a true pose at their time.
+    matched
+        Which poses were compared.
     alignment
-        How they were aligned.
+        How they were aligned; never ``auto``, but what it has chosen.
     transform
         From the estimate's world to the true one.
+    single_camera
+        Whether the estimate is of one camera without depth; None if it is not known.
+    unit_factor
+        What lengths would have to be multiplied by, if they are in another unit than the truth,
+        as those of a single camera are; None if they are not, or if it cannot be seen.
     ate
-        Distance of aligned and true positions [m].
+        Distance of aligned and true positions [m]; None for a single pose, and with ``sim3`` for
+        two: any of them can be brought onto the truth.
     rpe_translation, rpe_rotation
         Error of the motion from one matched pose to the next [m], [deg]; None for a single pose.
+        No lengths if ``sim3`` has too few poses to find the scale.
     rpe_translation_1s, rpe_rotation_1s
         The same over one second; None if the sequence is shorter or has no time stamps.
     t_rel_percent, r_rel_deg_per_100m
         KITTI's mean errors over segments of 100 to 800 m; None for shorter paths.
     """
 
-    matched_poses: int
+    matched: Matched
     alignment: Alignment
     transform: Similarity
-    ate: ErrorStatistics
+    single_camera: bool | None
+    unit_factor: float | None
+    ate: ErrorStatistics | None
     rpe_translation: ErrorStatistics | None
     rpe_rotation: ErrorStatistics | None
     rpe_translation_1s: ErrorStatistics | None
@@ -84,16 +99,44 @@ class Evaluation:
     t_rel_percent: float | None
     r_rel_deg_per_100m: float | None
 
+    @property
+    def matched_poses(self) -> int:
+        """Poses of the estimate that have a true pose at their time."""
+        return self.matched.poses
+
+    @property
+    def hint(self) -> str:
+        """What to try, if the alignment does not fit the estimate; empty if there is nothing."""
+        if self.alignment is Alignment.SIM3 or self.single_camera is False:
+            return ""
+        if self.unit_factor is None and not self.single_camera:
+            return ""
+        factor = "" if self.unit_factor is None else f" (here by {self.unit_factor:.3g})"
+        whose = "the estimate is" if self.single_camera else "the estimate looks like one"
+        return (
+            f"{whose} of a single camera, which cannot see metres: lengths have to be scaled"
+            f"{factor} to be compared; give --alignment {Alignment.SIM3}"
+        )
+
     def as_dict(self) -> dict[str, Any]:
         """Return the figures under the names that reports use; None where there is none."""
+        ate, matched = self.ate, self.matched
+        timed = matched.is_timed
         return {
-            "matched_poses": self.matched_poses,
+            "matched_poses": matched.poses,
+            "matched_of_poses": matched.estimate_poses,
+            "matched_from_s": matched.first if timed else None,
+            "matched_to_s": matched.last if timed else None,
+            "matched_path_m": finite(matched.path),
+            "true_path_m": finite(matched.truth_path),
+            "time_difference_median_s": matched.median_difference if timed else None,
+            "time_difference_max_s": matched.max_difference if timed else None,
             "ate_alignment": str(self.alignment),
-            "ate_scale": self.transform.scale,
-            "ate_rmse_m": self.ate.rmse,
-            "ate_mean_m": self.ate.mean,
-            "ate_median_m": self.ate.median,
-            "ate_max_m": self.ate.max,
+            "ate_scale": None if ate is None else self.transform.scale,
+            "ate_rmse_m": _rmse(ate),
+            "ate_mean_m": None if ate is None else ate.mean,
+            "ate_median_m": None if ate is None else ate.median,
+            "ate_max_m": None if ate is None else ate.max,
             "rpe_translation_rmse_m": _rmse(self.rpe_translation),
             "rpe_rotation_rmse_deg": _rmse(self.rpe_rotation),
             "rpe_translation_rmse_m_1s": _rmse(self.rpe_translation_1s),
@@ -106,9 +149,11 @@ class Evaluation:
 def evaluate_trajectory(
     estimate: Trajectory,
     truth: Trajectory,
-    alignment: Alignment = Alignment.SE3,
+    alignment: Alignment | str = Alignment.AUTO,
     *,
+    single_camera: bool | None = None,
     max_difference: float = MAX_DIFFERENCE,
+    offset: float = 0.0,
     timed: bool = True,
 ) -> Evaluation:
     """Compare an estimate with the truth.
@@ -121,9 +166,15 @@ def evaluate_trajectory(
         True poses of the same camera in any world.
     alignment
         ``se3`` for metric estimates, ``sim3`` for those of one camera, ``none`` if both share one
-        world. With ``sim3`` the relative errors are those of the scaled estimate.
+        world. With ``sim3`` the relative errors are those of the scaled estimate. ``auto`` takes
+        ``sim3`` for a single camera and ``se3`` for others.
+    single_camera
+        Whether the estimate is of one camera without depth, for ``auto``. If it is not known,
+        lengths that differ by a factor above 1.5 tell it, where scaling halves the error.
     max_difference
         Poses belong together if their time stamps differ by less [s].
+    offset
+        Added to the time stamps of the estimate [s], if the clocks differ.
     timed
         False if the time stamps are only frame numbers: no figures over one second then.
 
@@ -137,35 +188,67 @@ def evaluate_trajectory(
     DatasetError
         If no time stamps match.
     """
-    estimate = estimate.select(~estimate.lost)
+    alignment = Alignment.of(alignment)
+    estimate = estimate.select(~estimate.lost).shifted(offset)
     truth = truth.select(~truth.lost)
     i, j = match_poses(estimate, truth, max_difference)
-    transform = Similarity.identity()
-    if alignment is not Alignment.NONE:
-        transform = align(
-            estimate.positions[i], truth.positions[j], with_scale=alignment is Alignment.SIM3
+    with np.errstate(all="ignore"):  # what overflows is not finite, and no figure
+        unit_factor = _attempt(lambda: differ_in_unit(estimate.positions[i], truth.positions[j]))
+        if alignment is Alignment.AUTO:
+            single = unit_factor is not None if single_camera is None else single_camera
+            alignment = Alignment.SIM3 if single else Alignment.SE3
+        transform = _transform(estimate.positions[i], truth.positions[j], alignment)
+        figures = _figures(
+            transform.apply_to_poses(estimate.T_wc[i]),
+            truth.T_wc[j],
+            estimate.timestamps[i] if timed else np.zeros(0),
+            alignment,
         )
-    times = estimate.timestamps[i]
-    aligned, true = transform.apply_to_poses(estimate.T_wc[i]), truth.T_wc[j]
-    next_pose = (np.arange(len(i) - 1), np.arange(1, len(i)))
-    translation, rotation = _relative_statistics(aligned, true, next_pose)
-    after_second = one_second_pairs(times) if timed else (next_pose[0][:0], next_pose[1][:0])
-    translation_1s, rotation_1s = _relative_statistics(aligned, true, after_second)
-    segments = segment_errors(aligned, true)
     return Evaluation(
-        matched_poses=len(i),
+        matched=describe_match(estimate, truth, i, j, timed=timed),
         alignment=alignment,
         transform=transform,
-        ate=ErrorStatistics.of(np.linalg.norm(aligned[:, :3, 3] - true[:, :3, 3], axis=1)),
-        rpe_translation=translation,
-        rpe_rotation=rotation,
-        rpe_translation_1s=translation_1s,
-        rpe_rotation_1s=rotation_1s,
-        t_rel_percent=float(segments[:, 0].mean() * 100) if len(segments) else None,
-        r_rel_deg_per_100m=float(np.degrees(segments[:, 1].mean()) * 100)
-        if len(segments)
-        else None,
+        single_camera=single_camera,
+        unit_factor=unit_factor,
+        **figures,
     )
+
+
+def finite(value: float | None) -> float | None:
+    """Return a value, or None if it is none or not finite."""
+    return value if value is not None and np.isfinite(value) else None
+
+
+def _transform(points: FloatArray, targets: FloatArray, alignment: Alignment) -> Similarity:
+    """Align as far as possible: figures that need no alignment are taken even without one."""
+    if alignment is Alignment.NONE:
+        return Similarity.identity()
+    with_scale = alignment is Alignment.SIM3 and len(points) >= alignment.fewest_poses
+    found = _attempt(lambda: align(points, targets, with_scale=with_scale))
+    return found or Similarity.identity()
+
+
+def _figures(
+    aligned: FloatArray, true: FloatArray, times: FloatArray, alignment: Alignment
+) -> dict[str, Any]:
+    """Compute every figure for itself: one that fails leaves the others alone."""
+    n = len(aligned)
+    next_pose = (np.arange(n - 1), np.arange(1, n))
+    steps = _relative_statistics(aligned, true, next_pose)
+    second = _relative_statistics(aligned, true, one_second_pairs(times))
+    segments = segment_errors(aligned, true)
+    drift = segments.mean(axis=0) if len(segments) else np.full(2, np.nan)
+    has_scale = alignment is not Alignment.SIM3 or n >= alignment.fewest_poses
+    distances = np.linalg.norm(aligned[:, :3, 3] - true[:, :3, 3], axis=1)
+    return {
+        "ate": ErrorStatistics.of(distances) if n >= alignment.fewest_poses else None,
+        "rpe_translation": steps[0] if has_scale else None,
+        "rpe_rotation": steps[1],
+        "rpe_translation_1s": second[0] if has_scale else None,
+        "rpe_rotation_1s": second[1],
+        "t_rel_percent": finite(float(drift[0] * 100)) if has_scale else None,
+        "r_rel_deg_per_100m": finite(float(np.degrees(drift[1]) * 100)),
+    }
 
 
 def relative_errors(
@@ -252,6 +335,13 @@ def _relative_statistics(
         return None, None
     translations, rotations = relative_errors(estimate, truth, pairs)
     return ErrorStatistics.of(translations), ErrorStatistics.of(np.degrees(rotations))
+
+
+def _attempt(compute: Callable[[], _Value]) -> _Value | None:
+    try:
+        return compute()
+    except np.linalg.LinAlgError:
+        return None
 
 
 def _rmse(statistics: ErrorStatistics | None) -> float | None:

@@ -220,7 +220,8 @@ def _draw(
         scale, unit = 1.0, "units"
     if evaluation is not None:
         truth = (evaluation.truth.timestamps - begin, scale * evaluation.truth.positions)
-        subtitle += f", ATE {report['ate_rmse_m']:.4f} m"
+        if report["ate_rmse_m"] is not None:
+            subtitle += f", ATE {report['ate_rmse_m']:.4f} m"
     draw_trajectory(
         path,
         title=f"{report['sequence']} ({report['sensor']})",

@@ -19,8 +19,9 @@ _WHAT_HELPS = {
     Reason.FEW_MATCHES_FIRST_VIEW: "slower motion, higher frame rate, more features "
     "(ORBextractor.nFeatures)",
     Reason.LOW_PARALLAX: "move further sideways, or closer to things",
-    Reason.AMBIGUOUS_MOTION: "move further sideways; show other things than one wall",
-    Reason.DEGENERATE_VIEWS: "move instead of turning; look at things at several distances",
+    Reason.AMBIGUOUS_MOTION: "move further sideways; include things at several distances, "
+    "not one wall or flat ground",
+    Reason.DEGENERATE_VIEWS: "translate: a plane alone can start a map, a pure rotation cannot",
     Reason.INITIAL_MAP_FAILED: "go on moving sideways; more features (ORBextractor.nFeatures), "
     "things at several distances",
     Reason.FEW_MATCHES_LAST_FRAME: "slower motion, higher frame rate; come back to the map",

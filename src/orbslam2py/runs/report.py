@@ -32,8 +32,8 @@ class RunEvaluation:
 
     figures: Evaluation
     """Of all tracked frames."""
-    keyframes_ate_rmse: float
-    """Of the keyframes alone [m]."""
+    keyframes_ate_rmse: float | None
+    """Of the keyframes alone [m]; None if too few of them have a true pose."""
     truth: Trajectory
     """Ground truth over the time of the whole run, in the estimate's frame and unit."""
 
@@ -44,25 +44,36 @@ def evaluate_run(result: RunResult) -> RunEvaluation | None:
     Returns
     -------
     RunEvaluation or None
-        None if there is no ground truth, or too few poses have a partner in it.
+        None if there is no ground truth, or no pose has a partner in it.
     """
     estimate = result.tracked_trajectory()
+    # The unit of length of a single camera is its own.
+    monocular = result.options.sensor is Sensor.MONOCULAR
+    alignment = Alignment.SIM3 if monocular else Alignment.SE3
     try:
         truth = result.sequence.ground_truth()
         if truth is None or not len(estimate):
             return None
-        # The unit of length of a single camera is its own.
-        monocular = result.options.sensor is Sensor.MONOCULAR
-        alignment = Alignment.SIM3 if monocular else Alignment.SE3
         figures = evaluate_trajectory(estimate, truth, alignment)
-        keyframes = evaluate_trajectory(result.keyframes, truth, alignment)
     except (OrbSlamError, OSError) as error:
         _log.warning("no comparison with ground truth: %s", describe_error(error))
         return None
+    keyframes_ate = _ate_of_keyframes(result.keyframes, truth, alignment)
     begin, end = float(result.rows[0].timestamp) - 0.02, float(result.rows[-1].timestamp) + 0.02
     during = truth.select((truth.timestamps >= begin) & (truth.timestamps <= end))
     T_wc = figures.transform.inverse().apply_to_poses(during.T_wc)
-    return RunEvaluation(figures, keyframes.ate.rmse, Trajectory(during.timestamps, T_wc))
+    return RunEvaluation(figures, keyframes_ate, Trajectory(during.timestamps, T_wc))
+
+
+def _ate_of_keyframes(
+    keyframes: Trajectory, truth: Trajectory, alignment: Alignment
+) -> float | None:
+    try:
+        ate = evaluate_trajectory(keyframes, truth, alignment).ate
+    except OrbSlamError as error:
+        _log.warning("the keyframes alone are not compared with ground truth: %s", error)
+        return None
+    return None if ate is None else ate.rmse
 
 
 def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from orbslam2py import _core as core
+from orbslam2py.datasets import RecordedSequence
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.runs.losses import find_losses, last_loss_warning
 from orbslam2py.runs.options import RunOptions
@@ -82,7 +83,8 @@ def run_sequence(
     Raises
     ------
     DatasetError
-        If the options make no sense for the sequence, or the folder cannot take results.
+        If the options make no sense for the sequence, none of its first images is there, or the
+        folder cannot take results.
     SettingsError, VocabularyError
         If these cannot be used.
 
@@ -92,6 +94,8 @@ def run_sequence(
     >>> orb.run_sequence(sequence, output="runs/desk").report["ate_rmse_m"]  # doctest: +SKIP
     0.0158
     """
+    if isinstance(sequence, RecordedSequence):
+        sequence.require_images()
     options = options or RunOptions(sequence.settings.sensor)
     if not isinstance(vocabulary, core.Vocabulary):
         vocabulary = load_vocabulary(vocabulary)

@@ -2,6 +2,7 @@
 """What must be known before the first image: sensor, camera, features, depth."""
 
 from orbslam2py.settings.builtin import BUILTIN_NAMES
+from orbslam2py.settings.defaults import settings_for_camera
 from orbslam2py.settings.groups import (
     CameraRectification,
     CameraSettings,
@@ -25,4 +26,5 @@ __all__ = [
     "ViewerSettings",
     "builtin_settings",
     "resolve_settings",
+    "settings_for_camera",
 ]

@@ -36,6 +36,17 @@ _FILES: dict[str, dict[Sensor, str]] = {
 
 BUILTIN_NAMES: tuple[str, ...] = tuple(_FILES)
 
+#: What data they are for.
+BUILTIN_DATA: dict[str, str] = {
+    "tum1": "TUM RGB-D, camera of freiburg1",
+    "tum2": "TUM RGB-D, camera of freiburg2",
+    "tum3": "TUM RGB-D, camera of freiburg3",
+    "kitti00-02": "KITTI odometry, sequences 00 to 02",
+    "kitti03": "KITTI odometry, sequence 03",
+    "kitti04-12": "KITTI odometry, sequences 04 to 12",
+    "euroc": "EuRoC MAV",
+}
+
 #: Single sequences of KITTI and the settings they share.
 _KITTI_SEQUENCES = {
     f"kitti{number:02d}": "kitti00-02" if number < 3 else "kitti04-12" for number in range(13)
@@ -45,6 +56,11 @@ _KITTI_SEQUENCES = {
 def is_builtin_name(name: str) -> bool:
     """Whether a name, in any case, is one of `BUILTIN_NAMES` or of a single KITTI sequence."""
     return name.lower() in _FILES or name.lower() in _KITTI_SEQUENCES
+
+
+def builtin_sensors(name: str) -> tuple[Sensor, ...]:
+    """Sensors for which there are settings of a name, the one it is made for first."""
+    return tuple(_FILES[_KITTI_SEQUENCES.get(name.lower(), name.lower())])
 
 
 def builtin_file(name: str, sensor: Sensor) -> Path:

@@ -122,11 +122,12 @@ class DepthSettings:
     close_factor
         Points nearer than this many baselines are trusted from one view (key ``ThDepth``).
     raw_per_metre
-        Units of the depth image per metre (key ``DepthMapFactor``, RGB-D); 1 for metres.
+        Units of the depth image per metre (key ``DepthMapFactor``): 1000 for millimetres, 1 for
+        metres. RGB-D needs it.
     """
 
     close_factor: float
-    raw_per_metre: float = 1.0
+    raw_per_metre: float | None = None
 
     def __post_init__(self) -> None:
         raise_if_any(check_group("depth", self))

@@ -45,6 +45,8 @@ class Key:
         Who uses the key; for other sensors it may stand in the file and is not looked at.
     required
         Whether those sensors cannot do without it.
+    usual
+        Values that most have, for messages.
     """
 
     name: str
@@ -54,6 +56,12 @@ class Key:
     rule: Rule
     sensors: frozenset[Sensor] = _ALL
     required: bool = False
+    usual: str = ""
+
+    @property
+    def allowed(self) -> str:
+        """The values allowed, and those that are usual, for a message."""
+        return f"{self.rule.text} (usual: {self.usual})" if self.usual else self.rule.text
 
 
 def _above_zero(limit: float, unit: str = "") -> Rule:
@@ -65,6 +73,13 @@ def _between(low: float, high: float, unit: str = "") -> Rule:
     return Rule(f"{low:g} to {high:g}{unit and ' '}{unit}", lambda value: low <= value <= high)
 
 
+def _key(
+    name: str, group: str, field: str, kind: type[float] | type[int], rule: Rule, usual: str
+) -> Key:
+    """A key that every sensor needs."""
+    return Key(name, group, field, kind, rule, required=True, usual=usual)
+
+
 _FOCAL = _above_zero(1e5, "pixels")
 _CENTRE = _between(-1e5, 1e5, "pixels")
 _COEFFICIENT = _between(-1e4, 1e4)
@@ -73,10 +88,10 @@ _WIDTH = _above_zero(1e6)
 _PLACE = _between(-1e6, 1e6)
 
 KEYS: tuple[Key, ...] = (
-    Key("Camera.fx", "camera", "fx", float, _FOCAL, required=True),
-    Key("Camera.fy", "camera", "fy", float, _FOCAL, required=True),
-    Key("Camera.cx", "camera", "cx", float, _CENTRE, required=True),
-    Key("Camera.cy", "camera", "cy", float, _CENTRE, required=True),
+    _key("Camera.fx", "camera", "fx", float, _FOCAL, "0.5 to 1.5 times the image's width"),
+    _key("Camera.fy", "camera", "fy", float, _FOCAL, "nearly Camera.fx"),
+    _key("Camera.cx", "camera", "cx", float, _CENTRE, "near half the image's width"),
+    _key("Camera.cy", "camera", "cy", float, _CENTRE, "near half the image's height"),
     Key("Camera.k1", "camera", "k1", float, _COEFFICIENT),
     Key("Camera.k2", "camera", "k2", float, _COEFFICIENT),
     Key("Camera.p1", "camera", "p1", float, _COEFFICIENT),
@@ -93,6 +108,7 @@ KEYS: tuple[Key, ...] = (
         _above_zero(1e6, "pixel metres (baseline times fx)"),
         _DEPTH_SENSORS,
         True,
+        "40 for rgbd",
     ),
     Key("Camera.RGB", "camera", "rgb", bool, Rule("0 (BGR) or 1 (RGB)", lambda v: v in (0, 1))),
     Key(
@@ -103,27 +119,38 @@ KEYS: tuple[Key, ...] = (
         _above_zero(1e6, "baselines"),
         _DEPTH_SENSORS,
         True,
+        "35 to 40",
     ),
     Key(
         "DepthMapFactor",
         "depth",
         "raw_per_metre",
         float,
-        _between(0, 1e9, "raw units per metre"),
+        # What lies below counts as 1 in the core: "already metres" in the files of ORB-SLAM.
+        _between(1e-5, 1e9, "raw units per metre"),
         _RGBD,
+        True,
+        "1000 for millimetres, 5000 for TUM, 1 for metres",
     ),
-    Key("ORBextractor.nFeatures", "orb", "n_features", int, _between(1, 1e6), required=True),
-    Key(
+    _key(
+        "ORBextractor.nFeatures",
+        "orb",
+        "n_features",
+        int,
+        _between(1, 1e6),
+        "1000, or 2000 for large images",
+    ),
+    _key(
         "ORBextractor.scaleFactor",
         "orb",
         "scale_factor",
         float,
         Rule("greater than 1 and at most 2", lambda value: 1 < value <= 2),
-        required=True,
+        "1.2",
     ),
-    Key("ORBextractor.nLevels", "orb", "n_levels", int, _between(1, 16), required=True),
-    Key("ORBextractor.iniThFAST", "orb", "ini_th_fast", int, _between(1, 255), required=True),
-    Key("ORBextractor.minThFAST", "orb", "min_th_fast", int, _between(1, 255), required=True),
+    _key("ORBextractor.nLevels", "orb", "n_levels", int, _between(1, 16), "8"),
+    _key("ORBextractor.iniThFAST", "orb", "ini_th_fast", int, _between(1, 254), "20"),
+    _key("ORBextractor.minThFAST", "orb", "min_th_fast", int, _between(1, 254), "7"),
     Key("Viewer.KeyFrameSize", "viewer", "keyframe_size", float, _WIDTH),
     Key("Viewer.KeyFrameLineWidth", "viewer", "keyframe_line_width", float, _WIDTH),
     Key("Viewer.GraphLineWidth", "viewer", "graph_line_width", float, _WIDTH),
@@ -171,6 +198,25 @@ def is_known(name: str) -> bool:
     return name in _KNOWN or name.startswith(_IGNORED_PREFIXES)
 
 
+#: What others call a key, without the signs between words.
+_OTHER_NAMES = {
+    "baseline": "Camera.bf",
+    "depthfactor": "DepthMapFactor",
+    "depthscale": "DepthMapFactor",
+    "pngdepthscale": "DepthMapFactor",
+    "framerate": "Camera.fps",
+    "imagewidth": "Camera.width",
+    "imageheight": "Camera.height",
+    "features": "ORBextractor.nFeatures",
+} | {key.name.rpartition(".")[2].lower(): key.name for key in KEYS}
+
+
+def nearest_key(name: str) -> str | None:
+    """Find the key that was meant: ``fx`` is ``Camera.fx``; None if nothing comes close."""
+    plain = name.rpartition(".")[2].replace("_", "").replace("-", "").lower()
+    return _OTHER_NAMES.get(plain) or nearest(name)
+
+
 def nearest(name: str, candidates: Iterable[str] = _KNOWN) -> str | None:
     """Find the candidate spelt most alike, whatever the case; None if nothing comes close."""
     by_lower = {candidate.lower(): candidate for candidate in sorted(candidates)}
@@ -187,11 +233,11 @@ def convert(key: Key, value: float) -> float | int | bool:
         With a sentence for the user.
     """
     if not math.isfinite(value):
-        raise ValueError(f"{key.name} is not finite; allowed: {key.rule.text}")
+        raise ValueError(f"{key.name} is not finite; allowed: {key.allowed}")
     if key.kind is not float and not float(value).is_integer():
-        raise ValueError(f"{key.name} is {value:g}, but must be a whole number: {key.rule.text}")
+        raise ValueError(f"{key.name} is {value:g}, but must be a whole number: {key.allowed}")
     if not key.rule.allows(value):
-        raise ValueError(f"{key.name} is {value:g}; allowed: {key.rule.text}")
+        raise ValueError(f"{key.name} is {value:g}; allowed: {key.allowed}")
     return key.kind(value)
 
 

@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,12 @@ import numpy as np
 
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import keys as schema
+from orbslam2py.settings.foreign import (
+    FOREIGN_FORMATS,
+    import_line,
+    new_line,
+    recognise_camera_file,
+)
 from orbslam2py.settings.groups import (
     CameraRectification,
     CameraSettings,
@@ -38,10 +45,32 @@ _log = logging.getLogger(__name__)
 _MOST_PROBLEMS = 30
 
 
-def read_groups(path: Path, sensor: Sensor, *, allow_unknown: bool) -> SettingsGroups:
+def read_text(path: Path) -> str:
+    """Read a settings file.
+
+    Raises
+    ------
+    SettingsError
+        If it cannot be read.
+    """
+    try:
+        return path.read_text(encoding="utf-8", errors="replace")
+    except OSError as error:
+        raise SettingsError(
+            f"cannot open settings file {path}: {error.strerror or error}"
+        ) from error
+
+
+def read_groups(
+    path: Path,
+    sensor: Sensor,
+    *,
+    allow_unknown: bool,
+    warn: Callable[[str], None] = _log.warning,
+) -> SettingsGroups:
     """Read a settings file for a sensor.
 
-    What is allowed but probably a mistake is logged as a warning.
+    What is allowed but probably a mistake is a warning.
 
     Parameters
     ----------
@@ -51,6 +80,8 @@ def read_groups(path: Path, sensor: Sensor, *, allow_unknown: bool) -> SettingsG
         What to read it for: keys that only other sensors use are not looked at.
     allow_unknown
         Log keys nobody knows as warnings instead of refusing the file.
+    warn
+        Takes the warnings; by default the log.
 
     Raises
     ------
@@ -58,21 +89,19 @@ def read_groups(path: Path, sensor: Sensor, *, allow_unknown: bool) -> SettingsG
         If the file cannot be read, or listing everything that is wrong: file, line, key, allowed
         values, nearest key.
     """
-    try:
-        text = path.read_text(encoding="utf-8", errors="replace")
-    except OSError as error:
-        raise SettingsError(
-            f"cannot open settings file {path}: {error.strerror or error}"
-        ) from error
+    text = read_text(path)
     document = scan(text)
+    if not any(map(schema.is_known, document.entries)):
+        _refuse_camera_file(path, text, sensor)
     problems = document.problems
     if not document.entries and not problems:
         problems.append(Problem(None, "the file holds no settings"))
-    _check_names(document, path, allow_unknown)
+    _check_names(document, path, warn if allow_unknown else None)
     _check_camera_type(document)
     values = _read_values(document, sensor)
+    missing = sum(" is missing; " in problem.text for problem in problems)
     rectification = _read_rectification(document) if sensor is Sensor.STEREO else None
-    _raise_if_any(path, problems)
+    _raise_if_any(path, problems, new_line(sensor) if missing > 1 else None)
 
     groups = SettingsGroups(
         camera=CameraSettings(**values["camera"]),
@@ -82,11 +111,11 @@ def read_groups(path: Path, sensor: Sensor, *, allow_unknown: bool) -> SettingsG
         viewer=ViewerSettings(**values["viewer"]),
     )
     for warning in _doubts(sensor, groups):
-        _log.warning("%s: %s", path, warning)
+        warn(f"{path}: {warning}")
     return groups
 
 
-def _raise_if_any(path: Path, problems: list[Problem]) -> None:
+def _raise_if_any(path: Path, problems: list[Problem], remedy: str | None) -> None:
     if not problems:
         return
     ordered = sorted(problems, key=lambda problem: (problem.line is None, problem.line or 0))
@@ -95,18 +124,30 @@ def _raise_if_any(path: Path, problems: list[Problem]) -> None:
         lines.append(f"... and {len(ordered) - _MOST_PROBLEMS} more")
     if len(ordered) > 1:
         lines.insert(0, f"{len(ordered)} problems in settings file {path}:")
+    if remedy is not None:
+        lines.append(f"A complete file is written by\n    {remedy}")
     raise SettingsError("\n".join(lines))
 
 
-def _check_names(document: Document, path: Path, allow_unknown: bool) -> None:
+def _refuse_camera_file(path: Path, text: str, sensor: Sensor) -> None:
+    """Raise `SettingsError` with the command to use, if this is another program's calibration."""
+    file_format = recognise_camera_file(text)
+    if file_format is not None:
+        raise SettingsError(
+            f"{path} is {FOREIGN_FORMATS[file_format]}, not a settings file; make one of it with\n"
+            f"    {import_line(path, file_format, sensor)}"
+        )
+
+
+def _check_names(document: Document, path: Path, warn: Callable[[str], None] | None) -> None:
     for entry in document.entries.values():
         if schema.is_known(entry.key):
             continue
-        nearest = schema.nearest(entry.key)
+        nearest = schema.nearest_key(entry.key)
         advice = f"did you mean {nearest}?" if nearest else "remove it or allow unknown keys"
         problem = Problem(entry.line, f"unknown key {entry.key}; {advice}")
-        if allow_unknown:
-            _log.warning("%s", problem.located(path))
+        if warn is not None:
+            warn(problem.located(path))
         else:
             document.problems.append(problem)
 
@@ -146,7 +187,7 @@ def _read_values(document: Document, sensor: Sensor) -> dict[str, dict[str, Any]
 
 
 def _missing(document: Document, key: schema.Key, sensor: Sensor) -> Problem:
-    text = f"{key.name} is missing; {sensor} needs it: {key.rule.text}"
+    text = f"{key.name} is missing; {sensor} needs it: {key.allowed}"
     successor = key.name.replace("Camera.", "Camera1.")
     if successor != key.name and successor in document.entries:
         text += f" (rename {successor}, the name of ORB-SLAM3)"
@@ -157,7 +198,7 @@ def _number(key: schema.Key, entry: Entry) -> float:
     try:
         return read_number(entry)
     except ValueError as error:
-        raise ValueError(f"{error}; allowed: {key.rule.text}") from None
+        raise ValueError(f"{error}; allowed: {key.allowed}") from None
 
 
 def _read_rectification(document: Document) -> StereoRectification | None:

@@ -61,12 +61,18 @@ class Settings:
     viewer: ViewerSettings = field(default_factory=ViewerSettings)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "sensor", Sensor(self.sensor))
         problems = []
         if self.sensor.has_depth:
             if not self.camera.bf > 0:
                 problems.append(f"Camera.bf is {self.camera.bf:g}; {self.sensor} needs it above 0")
             if self.depth is None:
                 problems.append(f"ThDepth (depth.close_factor) is missing; {self.sensor} needs it")
+            elif self.sensor is Sensor.RGBD and self.depth.raw_per_metre is None:
+                problems.append(
+                    "DepthMapFactor (depth.raw_per_metre) is missing; rgbd needs it: 1000 for "
+                    "millimetres, 5000 for TUM, 1 for metres"
+                )
         raise_if_any(problems)
 
     @property
@@ -89,19 +95,22 @@ class Settings:
     @property
     def depth_factor(self) -> float:
         """Raw units of the depth image per metre; 1 if it is in metres."""
-        # A factor of (nearly) zero stands for "already metres" in the files of ORB-SLAM.
-        if self.depth is None or self.depth.raw_per_metre < 1e-5:
+        if self.depth is None or self.depth.raw_per_metre is None:
             return 1.0
         return self.depth.raw_per_metre
 
-    def check_for(self, sensor: Sensor) -> None:
+    def check_for(self, sensor: Sensor | str) -> None:
         """Raise `SettingsError` unless these settings were made for the sensor."""
+        sensor = Sensor(sensor)
         if self.sensor is not sensor:
-            raise SettingsError(f"these settings are for {self.sensor}, not for {sensor}")
+            raise SettingsError(
+                f"these settings are for {self.sensor}, not for {sensor}; make or load them for "
+                f"{sensor}, or open the images for {self.sensor}"
+            )
 
     @classmethod
     def load(
-        cls, path: str | PathLike[str], sensor: Sensor, *, allow_unknown: bool = False
+        cls, path: str | PathLike[str], sensor: Sensor | str, *, allow_unknown: bool = False
     ) -> Settings:
         """Read an ORB-SLAM settings file, or take built-in settings by name.
 
@@ -169,7 +178,7 @@ class Settings:
         return lines
 
 
-def builtin_settings(name: str, sensor: Sensor) -> Settings:
+def builtin_settings(name: str, sensor: Sensor | str) -> Settings:
     """Make the settings of a data set, as published with ORB-SLAM2 for that sensor.
 
     Parameters
@@ -185,11 +194,12 @@ def builtin_settings(name: str, sensor: Sensor) -> Settings:
     SettingsError
         If there is no such name, or none for that sensor.
     """
+    sensor = Sensor(sensor)
     return _settings_of_file(builtin_file(name, sensor), sensor)
 
 
 def resolve_settings(
-    choice: str | PathLike[str] | Settings, sensor: Sensor, *, allow_unknown: bool = False
+    choice: str | PathLike[str] | Settings, sensor: Sensor | str, *, allow_unknown: bool = False
 ) -> Settings:
     """Make settings of what a user gave: a built-in name, a file, or finished settings.
 
@@ -210,14 +220,19 @@ def resolve_settings(
     SettingsError
         If it is neither a name nor a readable and correct file, or made for another sensor.
     """
+    sensor = Sensor(sensor)
     if isinstance(choice, Settings):
         choice.check_for(sensor)
         return choice
-    path = Path(choice)
-    looks_like_path = path.exists() or path.suffix or len(path.parts) > 1
-    if looks_like_path and not is_builtin_name(str(choice)):
-        return _settings_of_file(path, sensor, allow_unknown=allow_unknown)
+    if looks_like_path(choice) and not is_builtin_name(str(choice)):
+        return _settings_of_file(Path(choice), sensor, allow_unknown=allow_unknown)
     return builtin_settings(str(choice), sensor)
+
+
+def looks_like_path(choice: str | PathLike[str]) -> bool:
+    """Whether a choice exists, or has a suffix or a folder."""
+    path = Path(choice)
+    return path.exists() or bool(path.suffix) or len(path.parts) > 1
 
 
 def _settings_of_file(path: Path, sensor: Sensor, *, allow_unknown: bool = False) -> Settings:

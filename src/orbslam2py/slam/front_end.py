@@ -11,6 +11,7 @@ from orbslam2py._timing import StageTimer
 from orbslam2py.errors import ImageError
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
+from orbslam2py.slam.depth_check import DepthCheck
 from orbslam2py.slam.thresholds import InitializationThresholds
 
 Mask = npt.NDArray[np.uint8]
@@ -40,6 +41,7 @@ class FrontEnd:
             _orb_options(settings, factor=InitializationThresholds().feature_factor)
         )
         self._pair_extractor = core.PairExtractor(options) if sensor is Sensor.STEREO else None
+        self._depth_check: DepthCheck | None = DepthCheck(settings.depth_factor)
 
     def monocular(
         self,
@@ -116,6 +118,10 @@ class FrontEnd:
         if depth.dtype.kind not in "uif":
             raise ImageError(f"depth must hold numbers (uint16, float32...), got {depth.dtype}")
         _check_mask(mask, image, "mask")
+        if self._depth_check is not None:
+            self._depth_check.look(depth)
+            if self._depth_check.done:
+                self._depth_check = None
         context = self._context_for(image)
         with timer("extract"):
             grey = core.to_grey(image, self._settings.camera.rgb)

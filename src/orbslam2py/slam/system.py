@@ -10,17 +10,19 @@ import weakref
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
-from orbslam2py.errors import StateError, WorkerError
+from orbslam2py.errors import ImageError, StateError, WorkerError
 from orbslam2py.maps.snapshot import MapSnapshot, keyframe_trajectory, take_snapshot
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings, resolve_settings
 from orbslam2py.slam.back_end import BackEnd
 from orbslam2py.slam.events import Callbacks, LoopClosed
+from orbslam2py.slam.frame_source import FrameSource, SomeImages, timed_images
 from orbslam2py.slam.front_end import Mask, PairMask
 from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
 from orbslam2py.slam.options import SystemOptions
@@ -30,6 +32,8 @@ from orbslam2py.trajectory.trajectory import Trajectory
 from orbslam2py.vocabulary.vocabulary import load_vocabulary
 
 _log = logging.getLogger(__name__)
+
+_Array = TypeVar("_Array", npt.NDArray[np.uint8], npt.NDArray[np.generic])
 
 
 class System:
@@ -246,6 +250,52 @@ class System:
             ),
         )
 
+    def run(self, source: FrameSource, *, details: bool = False) -> list[TrackingRecord]:
+        """Track all images of a sequence, and wait until their keyframes have been processed.
+
+        For recorded images make the system with `wait_for_mapping` or `deterministic`, else mapping
+        does not keep up. `orbslam2py.run_sequence` does more: it reads ahead, skips images that
+        cannot be read, compares with ground truth and writes files.
+
+        Parameters
+        ----------
+        source : sequence, or iterable of frames
+            As from `orbslam2py.open_sequence`, or whatever gives frames with a ``timestamp`` and
+            ``images``: a camera, ``itertools.islice(sequence, 100)``. A mask that comes with the
+            images is used.
+        details : bool
+            Also return the frames' keypoints and matches.
+
+        Returns
+        -------
+        list of TrackingRecord
+            One per image.
+
+        Raises
+        ------
+        StateError, ImageError, WorkerError
+            As for `track_stereo`; also if the source is for another sensor. What was tracked
+            before stays in the map and the trajectory.
+        DatasetError
+            If a file is missing.
+        """
+        images_in_time = timed_images(source, self.sensor)
+        records = [self._track_any(images, t, details) for t, images in images_in_time]
+        self.wait_until_idle()
+        return records
+
+    def _track_any(self, images: SomeImages, timestamp: float, details: bool) -> TrackingRecord:
+        mask = images.mask
+        if self.sensor is Sensor.MONOCULAR:
+            return self.track_monocular(images.image, timestamp, mask=mask, details=details)
+        if self.sensor is Sensor.RGBD:
+            depth = _present(images.depth, "depth image", timestamp)
+            return self.track_rgbd(images.image, depth, timestamp, mask=mask, details=details)
+        right = _present(images.right, "right image", timestamp)
+        # The mask is the left image's; what it hides there needs no partner.
+        pair = None if mask is None else (mask, None)
+        return self.track_stereo(images.image, right, timestamp, mask=pair, details=details)
+
     def _require(self, sensor: Sensor, call: str) -> None:
         if self.sensor is not sensor:
             raise StateError(
@@ -455,6 +505,12 @@ class System:
                 raise
             if not isinstance(error, WorkerError):  # else it is the same one
                 _log.exception("shutdown after an error failed as well")
+
+
+def _present(array: _Array | None, what: str, timestamp: float) -> _Array:
+    if array is None:
+        raise ImageError(f"the frame of {timestamp:.6f} s has no {what}, which this sensor needs")
+    return array
 
 
 class CallGuard:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from orbslam2py import _core as core
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
-from orbslam2py.datasets import Images, Layout
+from orbslam2py.datasets import FramesInOrder, Images, Layout
 from orbslam2py.settings import CameraSettings, DepthSettings, OrbSettings, Sensor, Settings
 from orbslam2py.synthetic.files import write_sequence
 from orbslam2py.synthetic.options import SyntheticOptions
@@ -33,7 +33,7 @@ from orbslam2py.trajectory.rotations import inverse_poses
 DEPTH_PER_METRE = 5000.0
 
 
-class SyntheticSequence:
+class SyntheticSequence(FramesInOrder):
     """Renders its images when they are asked for; has the interface of the recorded sequences.
 
     Parameters
@@ -119,7 +119,7 @@ class SyntheticSequence:
         """Return settings with the exact calibration."""
         depth = None
         if self.sensor.has_depth:
-            raw_per_metre = DEPTH_PER_METRE if self.sensor is Sensor.RGBD else 1.0
+            raw_per_metre = DEPTH_PER_METRE if self.sensor is Sensor.RGBD else None
             depth = DepthSettings(close_factor=40.0, raw_per_metre=raw_per_metre)
         n_features = 2000 if self._scene.outdoors else 1000
         return Settings(

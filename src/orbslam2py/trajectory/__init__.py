@@ -11,15 +11,19 @@ from orbslam2py.trajectory.files import (
     write_kitti,
     write_tum,
 )
+from orbslam2py.trajectory.frame_times import FrameTable, read_frame_table, read_times
 from orbslam2py.trajectory.trajectory import Trajectory
 
 __all__ = [
     "MAX_DIFFERENCE",
+    "FrameTable",
     "Trajectory",
     "TrajectoryFormat",
     "associate",
     "read_euroc",
+    "read_frame_table",
     "read_kitti",
+    "read_times",
     "read_trajectory",
     "read_tum",
     "write_kitti",

@@ -62,3 +62,7 @@ class Trajectory:
         return Trajectory(
             self.timestamps[which], self.T_wc[which], self.lost[which], self.indices[which]
         )
+
+    def shifted(self, seconds: float) -> Trajectory:
+        """Return the same poses at time stamps that are later by so many seconds."""
+        return Trajectory(self.timestamps + seconds, self.T_wc, self.lost, self.indices)

@@ -209,4 +209,5 @@ def test_ignored_in_the_background(lap: Path) -> None:
     process.send_signal(signal.SIGINT)
     code_at_end, err = finish(process)
     assert (code_at_end, err) == (0, "")
-    assert Results(lap.parent / "r").report["tracked"] == N
+    report = Results(lap.parent / "r").report
+    assert (report["frames"], report["interrupted"]) == (N, False)

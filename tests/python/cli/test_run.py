@@ -203,8 +203,7 @@ def test_wrong_usage(
     assert list(Path().iterdir()) == [], "nothing is left behind"
 
 
-def test_usage_without_sensor_or_sequence(command: CommandLine, rgbd: Path) -> None:
-    assert command("run", rgbd).code == 2
+def test_usage_without_sequence(command: CommandLine) -> None:
     assert command("run", "--sensor", "rgbd").code == 2
     done = command("run", "nowhere", "--sensor", "rgbd")
     assert done.code == 2

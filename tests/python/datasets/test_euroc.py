@@ -201,3 +201,34 @@ def test_euroc_ground_truth_with_velocities_and_biases(euroc: Path) -> None:
     (folder / "data.csv").write_text(",".join(row[:9]) + "\n")
     with pytest.raises(DatasetError, match=r"data\.csv:1: expected 8 or 17 numbers, found 9"):
         open_sequence(euroc, Sensor.MONOCULAR).ground_truth()
+
+
+def without_T_BS(euroc: Path, camera: str) -> Path:
+    path = euroc / "mav0" / camera / "sensor.yaml"
+    text = path.read_text()
+    begin, end = text.index("T_BS"), text.index("rate_hz")
+    path.write_text(text[:begin] + text[end:])
+    return path
+
+
+def test_a_single_camera_needs_no_place_on_the_vehicle(
+    euroc: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    with_it = open_sequence(euroc, "mono").settings
+    path = without_T_BS(euroc, "cam0")
+    sequence = open_sequence(euroc, "mono")
+    assert sequence.settings == with_it
+    folder = euroc / "mav0" / "state_groundtruth_estimate0"
+    folder.mkdir()
+    (folder / "data.csv").write_text(f"#t\n{STAMPS[0]},1,2,3,1,0,0,0\n")
+    assert sequence.ground_truth() is None
+    assert f"data.csv is not used: {path} has no T_BS" in caplog.text
+
+
+@pytest.mark.parametrize("camera", ["cam0", "cam1"])
+def test_stereo_needs_the_places_on_the_vehicle(euroc: Path, camera: str) -> None:
+    path = without_T_BS(euroc, camera)
+    with pytest.raises(DatasetError) as caught:
+        _ = open_sequence(euroc, "stereo").settings
+    assert str(caught.value).startswith(f"{path} has no T_BS")
+    assert "--sensor mono" in str(caught.value)

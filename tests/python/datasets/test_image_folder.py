@@ -73,3 +73,11 @@ def test_options_that_a_known_layout_does_not_take(tmp_path: Path) -> None:
         open_input(tum, MONO, fps=20)
     with pytest.raises(DatasetError, match=r"--times is for .*is tum"):
         open_input(tum, MONO, times=tum / "rgb.txt")
+
+
+def test_time_stamps_of_a_tum_list(tum: Path) -> None:
+    images = ImageFolder(tum / "rgb", settings="tum1", times=tum / "rgb.txt")
+    assert [images.timestamp_text(i) for i in range(4)] == [f"100.{k}00000" for k in range(4)]
+    (tum / "rgb/100.200000.png").unlink()
+    images = ImageFolder(tum / "rgb", settings="tum1", times=tum / "rgb.txt")
+    assert [images.timestamp_text(i) for i in range(3)] == [f"100.{k}00000" for k in (0, 1, 3)]

@@ -12,7 +12,7 @@ import pytest
 from orbslam2py import DatasetError, Sensor
 from orbslam2py.datasets import Layout, Sequence, open_sequence
 from orbslam2py.settings import builtin_settings
-from support.small_folders import P0, P1, SIZE, image
+from support.small_folders import P0, P1, SIZE, image, save
 
 
 def poses_text(n: int) -> str:
@@ -128,3 +128,60 @@ def test_kitti_bad_ground_truth(kitti: Path) -> None:
     (kitti / "poses.txt").write_text("1 0 0\n")
     with pytest.raises(DatasetError, match=r"poses\.txt:1: expected 12"):
         open_sequence(kitti).ground_truth()
+
+
+# ---- colour cameras ------------------------------------------------------------------------------
+# The left colour camera is 6 cm to the left of the left grey one, the right one 54 cm beside it.
+P2 = "P2: 700 0 600 42 0 700 180 0 0 0 1 0"
+P3 = "P3: 700 0 600 -336 0 700 180 0 0 0 1 0"
+
+
+@pytest.fixture
+def colour(kitti: Path) -> Path:
+    """As it is downloaded with colour images only."""
+    for left, right in ((0, 2), (1, 3)):
+        shutil.rmtree(kitti / f"image_{left}")
+        for k in range(3):
+            save(kitti / f"image_{right}" / f"{k:06d}.png", image(10 * right + k, (*SIZE, 3)))
+    (kitti / "calib.txt").write_text(f"{P0}\n{P1}\n{P2}\n{P3}\n")
+    return kitti
+
+
+def test_kitti_with_colour_cameras_only(colour: Path) -> None:
+    sequence = open_sequence(colour)
+    assert (sequence.layout, sequence.sensor) == (Layout.KITTI, Sensor.STEREO)
+    images = sequence.load(2)
+    np.testing.assert_array_equal(images.image, image(22, (*SIZE, 3))[..., ::-1])
+    np.testing.assert_array_equal(images.right, image(32, (*SIZE, 3))[..., ::-1])
+    assert sequence.settings.camera.bf == pytest.approx(378)
+    assert sequence.settings.baseline == pytest.approx(0.54)
+    assert open_sequence(colour, Sensor.MONOCULAR).settings.camera.fx == 700
+
+
+def test_kitti_true_poses_are_those_of_the_colour_camera(colour: Path) -> None:
+    (colour / "poses.txt").write_text(poses_text(3))
+    truth = open_sequence(colour).ground_truth()
+    assert truth is not None
+    np.testing.assert_allclose(truth.positions[2], [2 - 0.06, 0, 4])
+    (colour / "calib.txt").unlink()
+    truth = open_sequence(colour).ground_truth()
+    assert truth is not None
+    np.testing.assert_allclose(truth.positions[2], [2, 0, 4])
+
+
+def test_kitti_grey_cameras_come_first(colour: Path) -> None:
+    save(colour / "image_0" / "000000.png", image(0))
+    mono = open_sequence(colour, Sensor.MONOCULAR)
+    assert mono.load(0).image.ndim == 2
+    stereo = open_sequence(colour)  # of the grey pair only one is there
+    assert stereo.sensor is Sensor.STEREO
+    assert stereo.load(0).image.ndim == 3
+
+
+def test_kitti_calibration_without_the_colour_cameras(colour: Path) -> None:
+    (colour / "calib.txt").write_text(f"{P0}\n{P1}\n")
+    with pytest.raises(DatasetError, match=r"no line 'P2:' \(left colour camera\); copy"):
+        _ = open_sequence(colour).settings
+    (colour / "calib.txt").write_text(f"{P2}\n")
+    with pytest.raises(DatasetError, match=r"no line 'P3:' \(right colour camera\), needed for"):
+        _ = open_sequence(colour).settings

@@ -74,7 +74,8 @@ def test_equals_evo(alignment: Alignment, scale: float) -> None:
     truth = wander(300)
     estimate = disturbed(truth, scale)
     ours = evaluate_trajectory(estimate, truth, alignment)
-    pair = evo_pair(estimate, truth, alignment)
+    assert ours.ate is not None
+    pair = evo_pair(estimate, truth, ours.alignment)
 
     ape = metrics.APE(metrics.PoseRelation.translation_part)
     ape.process_data(pair)
@@ -107,6 +108,7 @@ def test_equals_evo_with_gaps_and_denser_truth() -> None:
     stamps[-5:] += 50
     estimate = Trajectory(stamps, estimate.T_wc)
     ours = evaluate_trajectory(estimate, truth)
+    assert ours.ate is not None
     pair = evo_pair(estimate, truth, Alignment.SE3)
     ape = metrics.APE(metrics.PoseRelation.translation_part)
     ape.process_data(pair)
@@ -125,6 +127,7 @@ def test_lost_poses_do_not_count() -> None:
     lost[40:50] = True
     result = evaluate_trajectory(Trajectory(truth.timestamps, T_wc, lost), truth)
     assert result.matched_poses == 90
+    assert result.ate is not None
     assert result.ate.rmse < 1e-9
 
 
@@ -162,6 +165,7 @@ def test_standing_still(alignment: Alignment, still: str) -> None:
         assert result.rpe_translation is not None
         assert result.rpe_translation.rmse < 1e-12
         if alignment is not Alignment.NONE:
+            assert result.ate is not None
             assert result.ate.rmse < 1e-12
 
 
@@ -182,6 +186,70 @@ def test_paths_that_have_nothing_in_common_keep_their_scale() -> None:
     assert align(points, targets, with_scale=True).scale == 1.0
 
 
+# ---- auto ----------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("scale", "single_camera", "expected"),
+    [
+        (1.0, None, "se3"),
+        (1.2, None, "se3"),
+        (0.3, None, "sim3"),
+        (4.0, None, "sim3"),
+        (1.0, True, "sim3"),
+        (0.3, False, "se3"),
+    ],
+)
+def test_auto(scale: float, single_camera: bool | None, expected: str) -> None:
+    truth = wander(100)
+    estimate = disturbed(truth, scale)
+    result = evaluate_trajectory(estimate, truth, single_camera=single_camera)
+    assert str(result.alignment) == expected
+    assert result.hint == ""
+
+
+def test_hint_for_a_single_camera() -> None:
+    truth = wander(100)
+    assert "--alignment sim3" in evaluate_trajectory(disturbed(truth, 0.3), truth, "se3").hint
+    single = evaluate_trajectory(disturbed(truth), truth, "se3", single_camera=True)
+    assert "cannot see metres" in single.hint
+    assert evaluate_trajectory(disturbed(truth), truth, "se3").hint == ""
+
+
+def test_noise_is_no_unit() -> None:
+    generator = np.random.default_rng(0)
+    T_wc = wander(50).T_wc
+    T_wc[:, :3, 3] = generator.normal(size=(50, 3))
+    result = evaluate_trajectory(Trajectory(wander(50).timestamps, T_wc), wander(50))
+    assert result.alignment is Alignment.SE3
+
+
+def test_alignment_that_does_not_exist() -> None:
+    with pytest.raises(DatasetError, match="'sim2' is no alignment; give one of se3, sim3"):
+        evaluate_trajectory(wander(5), wander(5), "sim2")
+
+
+# ---- what was matched ----------------------------------------------------------------------------
+def test_what_was_matched() -> None:
+    truth = straight(101, 1.0)
+    part = truth.select(np.r_[10:31, 61:81]).shifted(0.003)
+    matched = evaluate_trajectory(part, truth).matched
+    assert (matched.poses, matched.estimate_poses, matched.truth_poses) == (41, 41, 101)
+    assert matched.path == pytest.approx(20 + 19), "the gap of 30 m is not covered"
+    assert matched.truth_path == pytest.approx(100)
+    assert matched.median_difference == pytest.approx(0.003)
+    assert (matched.first, matched.last) == pytest.approx((1.003, 8.003))
+    assert "41 of 41 poses matched, from 1.003 to 8.003 s, over 39.00 of 100.00 m" in str(matched)
+    assert "differ by 3.00 ms" in str(matched)
+
+
+def test_offset_of_the_clocks() -> None:
+    truth = wander(50)
+    result = evaluate_trajectory(truth.shifted(-12.5), truth, offset=12.5)
+    assert result.matched_poses == 50
+    assert result.matched.max_difference < 1e-9
+    with pytest.raises(DatasetError, match="--offset"):
+        evaluate_trajectory(truth.shifted(-12.5), truth)
+
+
 # ---- one second ----------------------------------------------------------------------------------
 def test_pairs_of_one_second() -> None:
     first, second = one_second_pairs(np.array([0.0, 0.5, 0.95, 1.04, 1.5, 2.2, 3.31]))
@@ -197,12 +265,36 @@ def test_no_figures_over_a_second_without_one() -> None:
     assert evaluate_trajectory(numbered, numbered, timed=False).rpe_rotation_1s is None
 
 
-def test_single_pose() -> None:
+@pytest.mark.parametrize("alignment", list(Alignment))
+def test_single_pose_has_no_error(alignment: Alignment) -> None:
     truth = wander(1)
-    figures = evaluate_trajectory(truth, truth).as_dict()
-    assert figures["ate_rmse_m"] == 0
-    assert figures["rpe_translation_rmse_m"] is None
+    figures = evaluate_trajectory(truth, truth, alignment).as_dict()
+    assert figures["matched_poses"] == 1
+    for name in ("ate_rmse_m", "ate_max_m", "ate_scale", "rpe_translation_rmse_m"):
+        assert figures[name] is None, name
     assert figures["t_rel_percent"] is None
+
+
+def test_scale_of_two_poses_is_not_known() -> None:
+    truth = wander(2)
+    result = evaluate_trajectory(disturbed(truth), truth, "sim3")
+    assert result.ate is None
+    assert result.rpe_translation is None
+    assert result.rpe_rotation is not None, "turns need no scale"
+    assert evaluate_trajectory(disturbed(truth), truth, "se3").ate is not None
+
+
+def test_figure_that_overflows_leaves_the_others() -> None:
+    truth = wander(30)
+    T_wc = truth.T_wc.copy()
+    T_wc[3, :3, 3] = 1e300
+    result = evaluate_trajectory(Trajectory(truth.timestamps, T_wc), truth)
+    assert result.ate is None
+    assert result.rpe_translation is None
+    assert result.rpe_rotation is not None
+    assert result.rpe_rotation.rmse < 1e-5
+    values = [v for v in result.as_dict().values() if isinstance(v, float)]
+    assert np.isfinite(values).all()
 
 
 # ---- KITTI's segments by hand --------------------------------------------------------------------

@@ -67,7 +67,7 @@ def test_calibrated_and_builtin_kitti_agree(shared_data: Path) -> None:
     builtin = builtin_settings("kitti06", Sensor.STEREO)
     assert own.camera.matrix == pytest.approx(builtin.camera.matrix)
     assert own.camera.bf == builtin.camera.bf
-    assert own.max_frames == 10
+    assert own.max_keyframe_interval == 10
 
 
 def test_calibrated_and_builtin_euroc_nearly_agree(shared_data: Path) -> None:

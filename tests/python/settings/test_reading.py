@@ -35,12 +35,6 @@ def test_derived_quantities(tmp_path: Path) -> None:
     assert settings.depth_factor == 5000
 
 
-@pytest.mark.parametrize(("factor", "expected"), [("0", 1.0), ("0.000001", 1.0), ("1000", 1000.0)])
-def test_depth_factor_of_zero_means_metres(tmp_path: Path, factor: str, expected: float) -> None:
-    path = write(tmp_path / "a.yaml", {**MONO, **DEPTH, "DepthMapFactor": factor})
-    assert Settings.load(path, Sensor.RGBD).depth_factor == expected
-
-
 def test_rates_below_one_still_allow_a_frame(tmp_path: Path) -> None:
     """The original's largest spacing of keyframes becomes 0 (OD-5)."""
     path = write(tmp_path / "a.yaml", {**MONO, "Camera.fps": "0.5"})

@@ -33,13 +33,34 @@ def test_missing_key(tmp_path: Path, name: str) -> None:
     assert str(tmp_path / "a.yaml") in message
 
 
-@pytest.mark.parametrize("name", sorted(DEPTH))
-@pytest.mark.parametrize("sensor", [Sensor.STEREO, Sensor.RGBD])
+@pytest.mark.parametrize(
+    ("name", "sensor"),
+    [
+        ("Camera.bf", Sensor.STEREO),
+        ("Camera.bf", Sensor.RGBD),
+        ("ThDepth", Sensor.STEREO),
+        ("ThDepth", Sensor.RGBD),
+        ("DepthMapFactor", Sensor.RGBD),
+    ],
+)
 def test_missing_key_of_depth_sensors(tmp_path: Path, name: str, sensor: Sensor) -> None:
+    """Without the factor, millimetres were metres, and nothing was said."""
     values = {key: value for key, value in {**MONO, **DEPTH}.items() if key != name}
     assert f"{name} is missing; {sensor} needs it" in refusal(
         write(tmp_path / "a.yaml", values), sensor
     )
+
+
+def test_a_pair_needs_no_factor_of_depth_images(tmp_path: Path) -> None:
+    values = {**MONO, "Camera.bf": "40.0", "ThDepth": "40.0"}
+    assert Settings.load(write(tmp_path / "a.yaml", values), Sensor.STEREO).depth_factor == 1.0
+
+
+def test_a_missing_factor_is_told_with_usual_values(tmp_path: Path) -> None:
+    values = {**MONO, "Camera.bf": "40.0", "ThDepth": "40.0"}
+    message = refusal(write(tmp_path / "a.yaml", values), Sensor.RGBD)
+    for usual in ("1000 for millimetres", "5000 for TUM", "1 for metres"):
+        assert usual in message
 
 
 @pytest.mark.parametrize(
@@ -65,13 +86,17 @@ def test_missing_key_of_depth_sensors(tmp_path: Path, name: str, sensor: Sensor)
         ("Camera.RGB", "true", "'true' is not a number"),
         ("Camera.bf", "0", "allowed"),
         ("ThDepth", "-3", "allowed"),
-        ("DepthMapFactor", "-5000", "allowed: 0 to"),
+        ("DepthMapFactor", "-5000", "1000 for millimetres"),
+        ("DepthMapFactor", "0", "DepthMapFactor is 0; allowed: 1e-05 to 1e+09"),
+        ("DepthMapFactor", "0.000001", "allowed: 1e-05 to 1e+09"),
         ("ORBextractor.nFeatures", "0", "allowed"),
         ("ORBextractor.nFeatures", "8.7", "must be a whole number"),
         ("ORBextractor.scaleFactor", "1", "allowed: greater than 1 and at most 2"),
         ("ORBextractor.scaleFactor", "2.1", "allowed: greater than 1 and at most 2"),
         ("ORBextractor.nLevels", "17", "allowed: 1 to 16"),
-        ("ORBextractor.iniThFAST", "256", "allowed: 1 to 255"),
+        ("ORBextractor.iniThFAST", "255", "ORBextractor.iniThFAST is 255; allowed: 1 to 254"),
+        ("ORBextractor.iniThFAST", "0", "ORBextractor.iniThFAST is 0; allowed: 1 to 254"),
+        ("ORBextractor.minThFAST", "255", "ORBextractor.minThFAST is 255; allowed: 1 to 254"),
         ("ORBextractor.minThFAST", "21", "which is 20"),
         ("Viewer.PointSize", "0", "allowed"),
         ("Camera.type", "KannalaBrandt8", "allowed: PinHole"),

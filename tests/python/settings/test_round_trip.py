@@ -41,7 +41,7 @@ CAMERAS = st.builds(
     rgb=st.booleans(),
 )
 
-ORBS = st.integers(1, 255).flatmap(
+ORBS = st.integers(1, 254).flatmap(
     lambda first: st.builds(
         OrbSettings,
         st.integers(1, 10**6),
@@ -72,7 +72,7 @@ def rectified_cameras(draw: st.DrawFn) -> CameraRectification:
 def any_settings(draw: st.DrawFn) -> Settings:
     sensor = draw(st.sampled_from(Sensor))
     camera = draw(CAMERAS)
-    factor = draw(number(0, 1e9)) if sensor is Sensor.RGBD else 1.0
+    factor = draw(number(1e-5, 1e9)) if sensor is Sensor.RGBD else None
     rectified = sensor is Sensor.STEREO and draw(st.booleans())
     return Settings(
         sensor=sensor,

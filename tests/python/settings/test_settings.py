@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from orbslam2py import SettingsError
+from orbslam2py import _core as core
 from orbslam2py.settings import (
     CameraSettings,
     DepthSettings,
@@ -29,9 +30,19 @@ def test_values_are_checked_without_a_file_too() -> None:
         OrbSettings(n_levels="eight")  # type: ignore[arg-type]
     with pytest.raises(SettingsError, match="ThDepth"):
         DepthSettings(0.0)
+    with pytest.raises(SettingsError, match=r"DepthMapFactor is 0; .*1000 for millimetres"):
+        DepthSettings(40.0, 0.0)
     camera = CameraSettings(500.0, 500.0, 320.0, 240.0)
     with pytest.raises(SettingsError, match=r"Camera\.bf.*ThDepth"):
         Settings(Sensor.RGBD, camera)
+
+
+def test_a_depth_camera_must_say_the_unit_of_its_depth_in_python_too() -> None:
+    camera = CameraSettings(500.0, 500.0, 320.0, 240.0, bf=40.0)
+    with pytest.raises(SettingsError, match=r"DepthMapFactor \(depth\.raw_per_metre\) is missing"):
+        Settings(Sensor.RGBD, camera, depth=DepthSettings(40.0))
+    assert Settings(Sensor.RGBD, camera, depth=DepthSettings(40.0, 1.0)).depth_factor == 1.0
+    assert Settings(Sensor.STEREO, camera, depth=DepthSettings(40.0)).depth_factor == 1.0
 
 
 def test_numpy_numbers_become_plain_ones() -> None:
@@ -57,3 +68,13 @@ def test_description_names_the_figures() -> None:
     text = "\n".join(builtin_settings("tum1", Sensor.RGBD).describe())
     for figure in ("517.306", "0.262383", "1000 features", "20 and 7", "3.093 m"):
         assert figure in text
+
+
+@pytest.mark.parametrize("threshold", [1, 254])
+def test_the_extractor_takes_every_threshold_that_settings_take(threshold: int) -> None:
+    orb = OrbSettings(ini_th_fast=threshold, min_th_fast=threshold)
+    core.OrbExtractor(
+        core.OrbOptions(initial_threshold=orb.ini_th_fast, minimum_threshold=orb.min_th_fast)
+    )
+    with pytest.raises(SettingsError, match="1 to 254"):
+        core.OrbExtractor(core.OrbOptions(initial_threshold=255, minimum_threshold=7))

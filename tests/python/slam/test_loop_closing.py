@@ -16,6 +16,7 @@ import pytest
 from orbslam2py import LoopClosed, Sensor, StateError, _core
 from orbslam2py.slam import loop_closing
 from orbslam2py.slam.loop_closing import LoopClosing
+from orbslam2py.slam.options import SystemOptions
 from orbslam2py.slam.worker import Worker
 
 
@@ -33,6 +34,7 @@ class FakeLoop:
 
 class FakeMap:
     def __init__(self) -> None:
+        self.epoch = 0
         self.dead: set[int] = set()
         self.leases: list[int] = []
         self.dies_after_lease = False
@@ -78,7 +80,6 @@ class FakeConsistency:
 class FakeAdjustment:
     def __init__(self, calls: list[str]) -> None:
         self.calls = calls
-        self.options = SimpleNamespace(enabled=True)
 
     @contextlib.contextmanager
     def kept_away(self) -> Iterator[None]:
@@ -93,7 +94,9 @@ class FakeAdjustment:
 class Scene:
     """Loop closing with stand-ins."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, *, enabled: bool = True) -> None:
+    def __init__(
+        self, monkeypatch: pytest.MonkeyPatch, *, enabled: bool = True, adjust: bool = True
+    ) -> None:
         self.map, self.index = FakeMap(), FakeIndex()
         self.calls = self.map.calls
         self.consistency = FakeConsistency()
@@ -112,9 +115,7 @@ class Scene:
             Sensor.STEREO,
             self.mapping,
             self.adjustment,  # type: ignore[arg-type]
-            enabled=enabled,
-            seed=5,
-            threaded=False,
+            SystemOptions(deterministic=True, loop_closing=enabled, full_adjustment=adjust, seed=5),
             on_loop=self.events.append,
         )
 
@@ -266,8 +267,8 @@ def test_a_correction_that_could_not_be_applied_is_no_loop(scene: Scene) -> None
     assert len(scene.events) == 1, "no gap after it"
 
 
-def test_full_adjustment_can_be_switched_off(scene: Scene) -> None:
-    scene.adjustment.options.enabled = False
+def test_full_adjustment_can_be_switched_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = Scene(monkeypatch, adjust=False)
     scene.consistency.consistent.append([4])
     scene.process(20)
     assert len(scene.events) == 1

@@ -63,7 +63,8 @@ class Camera:
         truth = Trajectory(times, np.array([self._truth[t] for t in times]))
         estimate = self.system.trajectory()
         figures = evaluate_trajectory(estimate.select(~estimate.lost), truth, Alignment.SIM3)
-        return float(figures.ate.rmse)
+        assert figures.ate is not None
+        return figures.ate.rmse
 
 
 def n_ok(records: Iterable[TrackingRecord]) -> int:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import inspect
 import threading
 from pathlib import Path
 
@@ -20,6 +22,7 @@ from orbslam2py import (
     _core,
 )
 from orbslam2py.datasets import Images
+from orbslam2py.runs import SystemOptions
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.trajectory import write_tum
 from support.scripts import run_script
@@ -251,7 +254,7 @@ def test_nothing_runs_after_a_failed_construction(tmp_path: Path) -> None:
         System("tum1", "rgbd", bad)
     with pytest.raises(SettingsError, match="no-such-camera"):
         System("no-such-camera", "rgbd")
-    with pytest.raises(ValueError, match="lidar"):
+    with pytest.raises(SettingsError, match="'lidar'; there are: mono, stereo, rgbd"):
         System("tum1", "lidar")
 
 
@@ -275,3 +278,9 @@ def test_concurrent_call(monkeypatch: pytest.MonkeyPatch) -> None:
         thread.join(20)
         assert system.n_keyframes == 1
         assert track(system, 1).frame_id == 1
+
+
+def test_every_option_is_a_keyword_with_the_same_default() -> None:
+    keywords = inspect.signature(System.__init__).parameters
+    for option in dataclasses.fields(SystemOptions):
+        assert keywords[option.name].default == option.default, option.name

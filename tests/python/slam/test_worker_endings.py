@@ -7,8 +7,10 @@ import threading
 
 import pytest
 
-from orbslam2py import StateError, WorkerError
+from orbslam2py import Sensor, StateError, WorkerError
 from orbslam2py.slam.worker import Worker, WorkerState
+from support.interleaving import LIMIT
+from support.small_sequences import new_system, play
 from support.worker_steps import NAME, Gate, eventually
 
 pytestmark = pytest.mark.watchdog(10)
@@ -121,3 +123,22 @@ def test_finish_from_inside_the_step() -> None:
     worker.submit(0)
     eventually(lambda: worker.state is WorkerState.FINISHED)
     worker.finish(timeout=10)
+
+
+def test_work_that_nobody_misses_is_refused_quietly_after_the_end(worker: Worker[int]) -> None:
+    worker.finish(timeout=10)
+    assert worker.offer(1) is False
+    with pytest.raises(StateError, match="has been shut down"):
+        worker.submit(1)
+
+
+def test_mapping_may_end_after_loop_closing() -> None:
+    """A shutdown that ran out of time is repeated: the last keyframe finds loops closed no more."""
+    system = new_system(Sensor.RGBD, wait_for_mapping=True)
+    play(system, 5)
+    back_end = system.pipeline.back_end
+    assert system.wait_until_idle(LIMIT)
+    back_end.loop_closing.worker.finish(timeout=LIMIT)
+    newest = int(system.map_snapshot().keyframe_ids[-1])
+    back_end.mapping.on_done(newest)
+    system.shutdown(timeout=LIMIT)

@@ -65,6 +65,14 @@ projection_matrix:
   data: [500, 0, 320, 0, 0, 500, 240, 0, 0, 0, 1, 0]
 """
 
+#: Grey pair with a baseline of 0.5 m, colour pair with one of 0.4 m.
+KITTI = """P0: 700 0 600 0 0 700 180 0 0 0 1 0
+P1: 700 0 600 -350 0 700 180 0 0 0 1 0
+P2: 710 0 610 45 0 710 181 0 0 0 1 0
+P3: 710 0 610 -239 0 710 181 0 0 0 1 0
+Tr: 1 0 0 0 0 1 0 0 0 0 1 0
+"""
+
 
 def written(tmp_path: Path, text: str, name: str = "camera.yaml") -> Path:
     path = tmp_path / name

@@ -17,24 +17,25 @@ from orbslam2py.vocabulary import read_training_images, save_vocabulary, train_v
 
 FRAMES, SIZE = 40, (320, 240)
 
+#: The pair that took the images of `mypair`.
 CAMCHAIN = """\
 cam0:
   camera_model: pinhole
-  distortion_coeffs: [-0.28, 0.07, 0.0002, 0.00002]
+  distortion_coeffs: [0.0, 0.0, 0.0, 0.0]
   distortion_model: radtan
-  intrinsics: [458.6, 457.3, 367.2, 248.4]
-  resolution: [752, 480]
+  intrinsics: [200.0, 200.0, 159.5, 119.5]
+  resolution: [320, 240]
 cam1:
   T_cn_cnm1:
-  - [1.0, 0.0, 0.0, -0.11]
+  - [1.0, 0.0, 0.0, -0.1]
   - [0.0, 1.0, 0.0, 0.0]
   - [0.0, 0.0, 1.0, 0.0]
   - [0.0, 0.0, 0.0, 1.0]
   camera_model: pinhole
-  distortion_coeffs: [-0.28, 0.07, -0.0001, -0.00003]
+  distortion_coeffs: [0.0, 0.0, 0.0, 0.0]
   distortion_model: radtan
-  intrinsics: [457.6, 456.1, 380.0, 255.2]
-  resolution: [752, 480]
+  intrinsics: [200.0, 200.0, 159.5, 119.5]
+  resolution: [320, 240]
 """
 
 
@@ -47,6 +48,8 @@ def make_data(folder: Path) -> None:
     }
     for name, (sensor, layout) in sequences.items():
         _walk(sensor).write(folder / name, layout)
+    (folder / "mypair").symlink_to(folder / "V1_01_easy")
+    _write_phone(folder / "phone")
     single = _walk("mono")
     images = [single.load(i).image for i in range(FRAMES)]
     single.settings.save(folder / "my.yaml")
@@ -67,6 +70,18 @@ def _walk(sensor: str) -> SyntheticSequence:
     return SyntheticSequence(
         SyntheticOptions(world="corridor", sensor=sensor, frames=FRAMES, size=SIZE)
     )
+
+
+def _write_phone(folder: Path) -> None:
+    """Images, and depth images in millimetres, without lists."""
+    walk = _walk("rgbd")
+    for part in ("rgb", "depth"):
+        (folder / part).mkdir(parents=True)
+    for i in range(FRAMES):
+        shown = walk.load(i)
+        assert shown.depth is not None
+        write_image(folder / f"rgb/{i:03d}.png", shown.image)
+        write_image(folder / f"depth/{i:03d}.png", shown.depth // 5)
 
 
 def _write_vocabulary(folder: Path) -> None:

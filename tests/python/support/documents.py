@@ -19,6 +19,7 @@ SHELL = frozenset({"bash", "console"})
 _FENCE = re.compile(r"^(?P<indent> *)(?P<ticks>`{3,})\s*(?P<language>[\w+-]*)\s*$")
 _MARK = re.compile(r"^\s*<!-- (?P<kind>not run|exit code|check|file): (?P<text>.*?) -->\s*$")
 _HEADING = re.compile(r"^(?P<level>#{1,6}) +(?P<title>.+?)(?: +\{.*\})?\s*$")
+_MARKED = re.compile(r'<a id="([\w-]+)"></a>')
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 
 
@@ -113,8 +114,8 @@ def headings_of(text: str) -> Iterator[str]:
 
 
 def anchors_of(text: str) -> set[str]:
-    """What a link may point to in a page: GitHub's anchors of its headings, and MkDocs'."""
-    anchors: set[str] = set()
+    """What a link may point to: GitHub's anchors of the headings, MkDocs', and those marked."""
+    anchors = set(_MARKED.findall(prose_of(text)))
     for title in headings_of(text):
         plain = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", title).replace("`", "")
         github = re.sub(r"[^\w\- ]", "", plain.lower()).replace(" ", "-")

@@ -21,7 +21,7 @@ MONO = {
     "ORBextractor.minThFAST": "7",
 }
 
-DEPTH = {"Camera.bf": "40.0", "ThDepth": "40.0"}
+DEPTH = {"Camera.bf": "40.0", "ThDepth": "40.0", "DepthMapFactor": "5000.0"}
 
 MATRIX = """\
 LEFT.height: 480

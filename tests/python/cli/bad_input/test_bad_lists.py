@@ -86,3 +86,11 @@ def test_associated_image_that_does_not_exist(command: CommandLine, rgbd: Path) 
     pairs[BAD][3] = "depth/elsewhere.png"
     associate(rgbd, pairs)
     expect_skipped(run(command, rgbd), "r", "depth/elsewhere.png is listed but missing")
+
+
+@pytest.mark.parametrize("images", ["rgb", "depth"])
+def test_all_listed_images_lie_elsewhere(command: CommandLine, rgbd: Path, images: str) -> None:
+    (rgbd / images).rename(rgbd / "elsewhere")
+    done = run(command, rgbd)
+    expect_refused(done, "none of the first 10 images")
+    assert "put them where the list says" in done.err.replace("\n", " ")

@@ -28,6 +28,8 @@ pytestmark = pytest.mark.watchdog(40)
         ("ORBextractor.nFeatures: ", "ORBextractor.nFeatures: -", ["ORBextractor.nFeatures"]),
         ("ORBextractor.scaleFactor: ", "ORBextractor.scaleFactor: 0 #", ["scaleFactor"]),
         ("DepthMapFactor: ", "DepthMapFactor: -", ["DepthMapFactor"]),
+        ("DepthMapFactor: ", "DepthMapFactor: 0 #", ["DepthMapFactor is 0", "5000 for TUM"]),
+        ("DepthMapFactor: ", "# ", ["DepthMapFactor is missing", "1000 for millimetres"]),
         ("%YAML:1.0", "\x00\x01\x02", ["mine.yaml"]),
     ],
 )
@@ -41,6 +43,16 @@ def test_settings(
     # The same where it is found by itself.
     shutil.copy("mine.yaml", rgbd / "settings.yaml")
     expect_refused(run(command, rgbd), "settings.yaml", *messages[: 1 if old[0] != "%" else 0])
+
+
+def test_depth_that_does_not_fit_the_factor(command: CommandLine, rgbd: Path) -> None:
+    """A warning, once, with the factor that would make sense."""
+    good = (rgbd / "settings.yaml").read_text()
+    assert "DepthMapFactor: 5000.0" in good
+    Path("mine.yaml").write_text(good.replace("DepthMapFactor: 5000.0", "DepthMapFactor: 1"))
+    done = run(command, rgbd, "rgbd", "--settings", "mine.yaml")
+    assert done.err.count("Warning: depth images do not fit DepthMapFactor 1:") == 1, done.err
+    assert "DepthMapFactor: 5000 would make it" in done.err
 
 
 def vocabulary_file() -> Path:

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``orbslam2py settings``: make, show, check and list settings files."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from orbslam2py._files import atomic_write
+from orbslam2py.cli.calibrate import Baseline, DepthFactor, Force, Quiet, check_target
+from orbslam2py.cli.display import log_to
+from orbslam2py.cli.synthesize import parse_size
+from orbslam2py.errors import SettingsError
+from orbslam2py.settings import (
+    BUILTIN_NAMES,
+    CameraSettings,
+    OrbSettings,
+    Sensor,
+    Settings,
+    builtin_settings,
+    resolve_settings,
+    settings_for_camera,
+)
+from orbslam2py.settings.builtin import BUILTIN_DATA, builtin_sensors, is_builtin_name
+from orbslam2py.settings.check import likely_sensor, sensors_of
+from orbslam2py.settings.settings import looks_like_path
+
+app = typer.Typer(
+    help="Make, show, check and list settings files.",
+    no_args_is_help=True,
+    rich_markup_mode="markdown",
+)
+
+Choice = Annotated[str, typer.Argument(metavar="NAME_OR_FILE", help="Built-in name, or file.")]
+OfSensor = Annotated[
+    Sensor | None, typer.Option(help="Sensor [the one that the name or the file is for].")
+]
+
+
+def new(
+    sensor: Annotated[Sensor, typer.Option(help="What the images come from.")],
+    fx: Annotated[float, typer.Option(help="Focal length in x [pixels].")],
+    fy: Annotated[float, typer.Option(help="Focal length in y [pixels].")],
+    cx: Annotated[float, typer.Option(help="Image centre in x [pixels].")],
+    cy: Annotated[float, typer.Option(help="Image centre in y [pixels].")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="File to write [the terminal].")
+    ] = None,
+    size: Annotated[
+        str | None, typer.Option(help="Size of the images, such as 640x480.", metavar="WxH")
+    ] = None,
+    fps: Annotated[float, typer.Option(help="Images per second.")] = 30.0,
+    depth_factor: DepthFactor = None,
+    baseline: Baseline = None,
+    distortion: Annotated[
+        str | None,
+        typer.Option(help="OpenCV's k1,k2,p1,p2 or k1,k2,p1,p2,k3 [none].", metavar="NUMBERS"),
+    ] = None,
+    features: Annotated[
+        int | None,
+        typer.Option(help="ORB features per image [1000, or 2000 above 0.6 megapixels]."),
+    ] = None,
+    rgb: Annotated[bool, typer.Option("--rgb", help="Colour images are RGB, not BGR.")] = False,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Make settings of the numbers of a camera; all others get their usual values."""
+    check_target(output, force=force)
+    width, height = (None, None) if size is None else parse_size(size)
+    camera = CameraSettings(fx, fy, cx, cy, width=width, height=height, fps=fps, rgb=rgb)
+    settings = settings_for_camera(
+        replace(camera, **_coefficients(distortion)),
+        sensor,
+        baseline=baseline,
+        depth_factor=depth_factor,
+        orb=None if features is None else OrbSettings(n_features=features),
+    )
+    if output is None:
+        typer.echo(settings.to_yaml(), nl=False)
+        return
+    with atomic_write(output) as stream:
+        stream.write(settings.to_yaml())
+    log_to(Console(stderr=True), quiet=quiet)
+    Settings.load(output, sensor)  # warns of what is doubtful
+    console = Console(quiet=quiet, highlight=False, soft_wrap=True)
+    _describe(console, settings)
+    if sensor is Sensor.RGBD and depth_factor is None:
+        console.print("depth images are taken to be in millimetres; if not, give --depth-factor")
+    console.print(f"Settings are in [bold]{escape(str(output))}[/]")
+
+
+def show(choice: Choice, sensor: OfSensor = None) -> None:
+    """Print settings as a complete file, to look at or to start from."""
+    log_to(Console(stderr=True), quiet=False)
+    typer.echo(resolve_settings(choice, sensor or _likely(choice)).to_yaml(), nl=False)
+
+
+def check(choice: Choice, sensor: OfSensor = None) -> None:
+    """Check a settings file as a whole: say what is wrong, doubtful, and what it is good for."""
+    log_to(Console(stderr=True), quiet=False)
+    settings = resolve_settings(choice, sensor or _likely(choice))
+    console = Console(highlight=False, soft_wrap=True)
+    _describe(console, settings)
+    usable = [str(one) for one in sensors_of(choice)]
+    console.print(f"{choice} is complete for {', '.join(usable)}", markup=False)
+
+
+def list_names() -> None:
+    """List the built-in settings: name, sensors, size of the images, focal length, data."""
+    table = Table("name", "sensors", "images", "fx [pixels]", "data")
+    for name in BUILTIN_NAMES:
+        sensors = builtin_sensors(name)
+        camera = builtin_settings(name, sensors[0]).camera
+        size = f"{camera.width} x {camera.height}"
+        words = ", ".join(map(str, sensors))
+        table.add_row(name, words, size, f"{camera.fx:.1f}", BUILTIN_DATA[name])
+    Console(highlight=False).print(table)
+
+
+def _likely(choice: str) -> Sensor:
+    """The sensor that a name or a file is for; what is neither is refused like by run."""
+    if looks_like_path(choice) or is_builtin_name(choice):
+        return likely_sensor(choice)
+    return resolve_settings(choice, Sensor.MONOCULAR).sensor
+
+
+def _coefficients(text: str | None) -> dict[str, Any]:
+    """The distortion by the names of the fields of `CameraSettings`."""
+    if text is None:
+        return {}
+    try:
+        numbers = [float(word) for word in text.replace(",", " ").split()]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (4, 5):
+        raise SettingsError(
+            f"--distortion is '{text}'; give four or five numbers k1,k2,p1,p2[,k3] like "
+            "0.1,-0.2,0,0"
+        )
+    return dict(zip(("k1", "k2", "p1", "p2", "k3"), numbers, strict=False))
+
+
+def _describe(console: Console, settings: Settings) -> None:
+    for line in settings.describe():
+        console.print(line, markup=False)
+
+
+EXAMPLE = "{}\n\n**Example**\n\n    orbslam2py settings {}\n"
+new.__doc__ = EXAMPLE.format(
+    new.__doc__,
+    "new --sensor rgbd --fx 525 --fy 525 --cx 319.5 --cy 239.5 --size 640x480 "
+    "--depth-factor 1000 -o phone.yaml",
+)
+show.__doc__ = EXAMPLE.format(show.__doc__, "show tum1")
+check.__doc__ = EXAMPLE.format(check.__doc__, "check my.yaml")
+list_names.__doc__ = EXAMPLE.format(list_names.__doc__, "list")
+app.command("new")(new)
+app.command("show")(show)
+app.command("check")(check)
+app.command("list")(list_names)

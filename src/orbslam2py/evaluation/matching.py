@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which poses of an estimate and of the truth are compared, and how much of the path they cover."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from orbslam2py._arrays import FloatArray, IntArray
+from orbslam2py.errors import DatasetError
+from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory, associate
+
+_LONGEST_STEP = 1.0  # seconds between matched poses; what is longer, and unusual, is a gap
+_UNUSUAL_STEP = 5.0  # times the median step
+
+
+@dataclass(frozen=True)
+class Matched:
+    """What was compared.
+
+    Attributes
+    ----------
+    poses
+        Pairs of an estimated and a true pose.
+    estimate_poses, truth_poses
+        How many there were, without lost ones.
+    first, last
+        Time stamps of the first and the last matched pose of the estimate [s].
+    path
+        Length of the true path that they cover [m], without gaps: steps between matched poses of
+        more than a second and of five times the usual step.
+    truth_path
+        Length of the whole true path [m].
+    median_difference, max_difference
+        By how much the time stamps of the pairs differ [s].
+    is_timed
+        Whether time stamps are seconds; numbers of frames else.
+    """
+
+    poses: int
+    estimate_poses: int
+    truth_poses: int
+    first: float
+    last: float
+    path: float
+    truth_path: float
+    median_difference: float
+    max_difference: float
+    is_timed: bool = True
+
+    def __str__(self) -> str:
+        part = f" ({100 * self.path / self.truth_path:.0f} %)" if self.truth_path > 0 else ""
+        text = f"{self.poses} of {self.estimate_poses} poses matched, "
+        text += (
+            f"from {self.first:.3f} to {self.last:.3f} s, "
+            if self.is_timed
+            else f"from row {self.first:.0f} to {self.last:.0f}, "
+        )
+        text += f"over {self.path:.2f} of {self.truth_path:.2f} m of the true path{part}"
+        if self.is_timed:
+            text += (
+                f"; time stamps differ by {1e3 * self.median_difference:.2f} ms (median), "
+                f"{1e3 * self.max_difference:.2f} ms (largest)"
+            )
+        return text
+
+
+def match_poses(
+    estimate: Trajectory, truth: Trajectory, max_difference: float = MAX_DIFFERENCE
+) -> tuple[IntArray, IntArray]:
+    """Find which poses belong together by their time stamps.
+
+    Parameters
+    ----------
+    estimate, truth
+        Both on one clock.
+    max_difference
+        Poses belong together if their time stamps differ by less [s].
+
+    Returns
+    -------
+    i, j
+        Indices into the estimate and into the truth, (k,) each, k > 0.
+
+    Raises
+    ------
+    DatasetError
+        If no time stamps match.
+    """
+    i, j = associate(estimate.timestamps, truth.timestamps, max_difference)
+    if not len(i):
+        raise DatasetError(
+            f"no poses to compare: no time stamps of estimate ({_span(estimate)}) and ground truth "
+            f"({_span(truth)}) differ by less than {max_difference} s{_remedy(estimate, truth)}"
+        )
+    return i, j
+
+
+def describe_match(
+    estimate: Trajectory, truth: Trajectory, i: IntArray, j: IntArray, *, timed: bool = True
+) -> Matched:
+    """Say what `match_poses` has found.
+
+    Parameters
+    ----------
+    estimate, truth
+        Without lost poses, both on one clock.
+    i, j
+        Indices into both, (k,) each, k > 0.
+    timed
+        False if the time stamps are only frame numbers.
+    """
+    differences = np.abs(estimate.timestamps[i] - truth.timestamps[j])
+    by_time = np.argsort(truth.timestamps, kind="stable")
+    with np.errstate(all="ignore"):
+        along = _lengths_along(truth.positions[by_time])
+        place = np.empty(len(truth), np.int64)
+        place[by_time] = np.arange(len(truth))
+        matched = np.sort(place[j])
+        steps = np.diff(truth.timestamps[by_time][matched])
+        usual = float(np.median(steps)) if len(steps) else 0.0
+        covered = steps <= max(_LONGEST_STEP if timed else 0.0, _UNUSUAL_STEP * usual)
+        path = float(np.sum(np.diff(along[matched])[covered]))
+    times = estimate.timestamps[i]
+    return Matched(
+        poses=len(i),
+        estimate_poses=len(estimate),
+        truth_poses=len(truth),
+        first=float(times.min()),
+        last=float(times.max()),
+        path=path,
+        truth_path=float(along[-1]),
+        median_difference=float(np.median(differences)),
+        max_difference=float(differences.max()),
+        is_timed=timed,
+    )
+
+
+def _lengths_along(positions: FloatArray) -> FloatArray:
+    steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def _span(trajectory: Trajectory) -> str:
+    if not len(trajectory):
+        return "no poses"
+    times = trajectory.timestamps
+    return f"{len(times)} poses from {times.min():.3f} to {times.max():.3f} s"
+
+
+def _remedy(estimate: Trajectory, truth: Trajectory) -> str:
+    if not len(estimate) or not len(truth):
+        return ""
+    return "; if their clocks differ, give evaluate the seconds between them with --offset"

@@ -1,0 +1,291 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Poses of two files on one clock: by time, or by frame numbers that are known, or not at all.
+
+A row of a file in KITTI format says nothing about when it was taken. It is only compared where
+that is known from elsewhere: from ``frames.csv`` of the run that it belongs to, from a list of
+times, or because both files have a row for every frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbslam2py._arrays import FloatArray, IntArray
+from orbslam2py.errors import DatasetError
+from orbslam2py.trajectory import (
+    FrameTable,
+    Trajectory,
+    TrajectoryFormat,
+    read_frame_table,
+    read_times,
+    read_trajectory,
+)
+
+_SAME_TIME = 1e-6  # [s]
+_END = 0.02  # part of a sequence that may be without a true pose at its end
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """Poses of a file, and what is known about when they were taken.
+
+    Attributes
+    ----------
+    source
+        The file, for messages.
+    trajectory
+        The poses; time stamps are numbers of rows if `is_timed` is False.
+    file_format
+        Of the file.
+    is_timed
+        Whether the time stamps are times.
+    frames
+        The frames of the run that the file belongs to; None if it is not known.
+    frame_times
+        Time of every frame of the sequence [s], (n,); None if it is not known.
+    """
+
+    source: str
+    trajectory: Trajectory
+    file_format: TrajectoryFormat
+    is_timed: bool = True
+    frames: FrameTable | None = None
+    frame_times: FloatArray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Paired:
+    """Two trajectories whose time stamps can be compared.
+
+    Attributes
+    ----------
+    estimate, truth
+        On one clock.
+    by
+        What the pairs are told by, for people.
+    is_timed
+        Whether the time stamps are seconds; numbers of rows else.
+    on_clocks
+        Whether each has time stamps of its own, so that an offset makes sense.
+    """
+
+    estimate: Trajectory
+    truth: Trajectory
+    by: str
+    is_timed: bool = True
+    on_clocks: bool = True
+
+
+def read_estimate(
+    path: Path,
+    file_format: TrajectoryFormat = TrajectoryFormat.AUTO,
+    *,
+    times: FloatArray | None = None,
+) -> Poses:
+    """Read an estimate, with ``frames.csv`` or ``times.txt`` beside it.
+
+    Rows of a file in KITTI format that only stand for frames without a pose are marked as lost:
+    those that ``frames.csv`` lists without one; without that file the identity at the beginning
+    and repetitions of the row before.
+
+    Parameters
+    ----------
+    path, file_format
+        The file, and what it is.
+    times
+        Times of the frames [s], (n,); used if there are as many as rows and no ``frames.csv``.
+
+    Raises
+    ------
+    DatasetError
+        If a file is missing or malformed.
+    """
+    trajectory, file_format = read_trajectory(path, file_format)
+    frames = _frames_beside(path)
+    if file_format is not TrajectoryFormat.KITTI:
+        return Poses(str(path), trajectory, file_format, frames=frames)
+    if frames is not None and len(frames) == len(trajectory):
+        lost = ~frames.has_pose | _before_the_map(trajectory.T_wc)
+        trajectory = Trajectory(frames.timestamps, trajectory.T_wc, lost, frames.indices)
+        return Poses(str(path), trajectory, file_format, frames=frames)
+    lost = rows_without_pose(trajectory.T_wc)
+    trajectory = Trajectory(trajectory.timestamps, trajectory.T_wc, lost)
+    return _with_times(Poses(str(path), trajectory, file_format, is_timed=False), path, times)
+
+
+def read_truth(
+    path: Path,
+    file_format: TrajectoryFormat = TrajectoryFormat.AUTO,
+    *,
+    times: FloatArray | None = None,
+) -> Poses:
+    """Read true poses, with ``times.txt`` beside them or where KITTI's benchmark has it.
+
+    Parameters
+    ----------
+    path, file_format
+        The file, and what it is.
+    times
+        Times of its poses [s], (n,); used if there are as many as rows of KITTI's format.
+
+    Raises
+    ------
+    DatasetError
+        If a file is missing or malformed.
+    """
+    trajectory, file_format = read_trajectory(path, file_format)
+    timed = file_format is not TrajectoryFormat.KITTI
+    poses = Poses(str(path), trajectory, file_format, timed)
+    return _with_times(poses, path, times, may_end_early=True)
+
+
+def pair(estimate: Poses, truth: Poses) -> Paired:
+    """Put an estimate and the truth on one clock.
+
+    Raises
+    ------
+    DatasetError
+        If it is not known which rows belong together: saying what to give.
+    """
+    if not estimate.is_timed and _as_many(estimate.trajectory, truth.frame_times):
+        estimate = replace(estimate, trajectory=_at(estimate, truth.frame_times), is_timed=True)
+        by = "time: a row for every frame of the sequence"
+        return Paired(estimate.trajectory, truth.trajectory, by, on_clocks=False)
+    if estimate.is_timed and truth.is_timed:
+        return Paired(estimate.trajectory, truth.trajectory, "time")
+    if estimate.is_timed:
+        return _by_frame_number(estimate, truth)
+    if not truth.is_timed and len(estimate.trajectory) == len(truth.trajectory):
+        by = "row: both files have a row for every frame"
+        return Paired(estimate.trajectory, truth.trajectory, by, is_timed=False, on_clocks=False)
+    raise DatasetError(
+        f"{estimate.source} has {len(estimate.trajectory)} rows without time stamps, for "
+        f"{_what_is_true(truth)}: which belong together is not known; compare trajectory.txt of "
+        "the run, leave frames.csv of the run beside the file, or give the time of every row with "
+        "--times"
+    )
+
+
+def rows_without_pose(T_wc: FloatArray) -> NDArray[np.bool_]:
+    """Find rows of KITTI's format that stand for frames without a pose.
+
+    Parameters
+    ----------
+    T_wc
+        All rows of the file, float64 (n, 4, 4).
+
+    Returns
+    -------
+    bool (n,)
+        Rows that repeat the one before, and the identity where the file begins with several.
+    """
+    repeats = np.zeros(len(T_wc), bool)
+    repeats[1:] = (T_wc[1:] == T_wc[:-1]).all(axis=(1, 2))
+    if len(T_wc) > 1 and repeats[1] and (T_wc[0] == np.eye(4)).all():
+        repeats[0] = True
+    return repeats
+
+
+def _before_the_map(T_wc: FloatArray) -> NDArray[np.bool_]:
+    """Leading rows with the identity, but for the last, which may be the first pose."""
+    is_identity = (T_wc == np.eye(4)).all(axis=(1, 2))
+    leading = np.logical_and.accumulate(is_identity)
+    leading[max(0, int(leading.sum()) - 1) :] = False
+    return leading
+
+
+def _by_frame_number(estimate: Poses, truth: Poses) -> Paired:
+    """Pair the frames of a run with the rows of a truth that has one for every frame."""
+    frames, n = estimate.frames, len(truth.trajectory)
+    if frames is None or not _all_listed(estimate.trajectory, frames):
+        raise DatasetError(
+            f"{truth.source} has {n} poses without time stamps; give the time of each with "
+            "--times, put times.txt beside it, or give the folder of the sequence instead"
+        )
+    last, step = _last_and_step(frames.indices)
+    if not last + 1 - _end(last + 1) <= n <= last + step:
+        raise DatasetError(
+            f"{truth.source} has {n} poses without time stamps, but the run has ended with frame "
+            f"{last} of its sequence: whether there is a pose for every frame is not known; give "
+            "the time of each with --times, or the folder of the sequence instead"
+        )
+    known = frames.indices < n
+    rows = Trajectory(frames.timestamps[known], truth.trajectory.T_wc[frames.indices[known]])
+    by = "number of the frame, as frames.csv tells it"
+    return Paired(estimate.trajectory, rows, by, on_clocks=False)
+
+
+def _last_and_step(indices: IntArray) -> tuple[int, int]:
+    steps = np.diff(indices)
+    return int(indices.max()), int(max(1, steps.min())) if len(steps) else 1
+
+
+def _all_listed(trajectory: Trajectory, frames: FrameTable) -> bool:
+    """Whether every time stamp is that of a frame of the run."""
+    if not len(frames):
+        return False
+    ordered = np.sort(frames.timestamps)
+    after = np.clip(np.searchsorted(ordered, trajectory.timestamps), 0, len(ordered) - 1)
+    nearest = np.minimum(
+        np.abs(ordered[after] - trajectory.timestamps),
+        np.abs(ordered[np.maximum(after - 1, 0)] - trajectory.timestamps),
+    )
+    return bool((nearest < _SAME_TIME).all())
+
+
+def _with_times(
+    poses: Poses, path: Path, times: FloatArray | None, *, may_end_early: bool = False
+) -> Poses:
+    """Give the rows of KITTI's format their times, if there are as many of them."""
+    if poses.is_timed:
+        return poses
+    for known in (times, _times_beside(path)):
+        if _as_many(poses.trajectory, known) or (may_end_early and ends_early(poses, known)):
+            trajectory = _at(poses, known)
+            return replace(poses, trajectory=trajectory, is_timed=True, frame_times=known)
+    return poses
+
+
+def ends_early(poses: Poses, times: FloatArray | None) -> bool:
+    """Whether only a few frames at the end of a sequence are without a true pose."""
+    n = len(poses.trajectory)
+    return times is not None and len(times) - _end(len(times)) <= n < len(times)
+
+
+def _end(n: int) -> int:
+    """How many frames at the end of a sequence may be without a true pose."""
+    return max(1, int(_END * n))
+
+
+def _as_many(trajectory: Trajectory, times: FloatArray | None) -> bool:
+    return times is not None and len(times) == len(trajectory)
+
+
+def _at(poses: Poses, times: FloatArray | None) -> Trajectory:
+    assert times is not None
+    n = len(poses.trajectory)
+    return Trajectory(times[:n], poses.trajectory.T_wc, poses.trajectory.lost)
+
+
+def _frames_beside(path: Path) -> FrameTable | None:
+    table = path.parent / "frames.csv"
+    return read_frame_table(table) if table.is_file() else None
+
+
+def _times_beside(path: Path) -> FloatArray | None:
+    benchmark = path.resolve().parent.parent / "sequences" / path.stem
+    for folder in (path.parent, benchmark):
+        if (folder / "times.txt").is_file():
+            return read_times(folder / "times.txt")
+    return None
+
+
+def _what_is_true(truth: Poses) -> str:
+    n = len(truth.trajectory)
+    if truth.frame_times is not None:
+        return f"a sequence of {len(truth.frame_times)} frames ({truth.source})"
+    return f"{n} poses {'with' if truth.is_timed else 'without'} time stamps in {truth.source}"

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Settings for one's own camera: what is usual for all that is not the camera itself."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from orbslam2py.errors import SettingsError
+from orbslam2py.settings.groups import CameraSettings, DepthSettings, OrbSettings
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings.settings import Settings
+
+#: Of the pair that an RGB-D camera counts as, though it has none [m]: as in the files for TUM.
+USUAL_BASELINE = 0.075
+#: Points nearer than this many baselines are close: 3 m for the baseline above.
+USUAL_CLOSE_FACTOR = 40.0
+#: Raw units per metre: millimetres.
+USUAL_DEPTH_FACTOR = 1000.0
+_LARGE = 600_000
+
+
+def usual_n_features(width: int | None, height: int | None) -> int:
+    """Features per image: 1000, or 2000 above 0.6 megapixels; 1000 if the size is unknown."""
+    return 2000 if (width or 0) * (height or 0) > _LARGE else 1000
+
+
+def settings_for_camera(
+    camera: CameraSettings,
+    sensor: Sensor | str,
+    *,
+    baseline: float | None = None,
+    depth_factor: float | None = None,
+    orb: OrbSettings | None = None,
+) -> Settings:
+    """Make complete settings of a camera: all that is not known of it is what is usual.
+
+    Parameters
+    ----------
+    camera
+        The camera; its ``bf`` counts if there is no `baseline`.
+    sensor
+        What delivers the images.
+    baseline
+        Distance of the two cameras of a pair [m]. For RGB-D that of the pair it counts as: points
+        nearer than 40 baselines are close; by default 0.075 m, which makes 3 m.
+    depth_factor
+        RGB-D: units of the depth images per metre; by default 1000 (millimetres).
+    orb
+        The extraction; by default 1000 features, or 2000 above 0.6 megapixels.
+
+    Raises
+    ------
+    SettingsError
+        If a number is out of range or does not go with the sensor, the baseline of a pair is
+        missing, or a pair is not rectified.
+    """
+    sensor = Sensor(sensor)
+    _check(camera, sensor, baseline, depth_factor)
+    bf = 0.0
+    if sensor.has_depth:
+        usual = camera.bf or USUAL_BASELINE * camera.fx
+        bf = usual if baseline is None else baseline * camera.fx
+    depth = None
+    if sensor is Sensor.STEREO:
+        depth = DepthSettings(USUAL_CLOSE_FACTOR)
+    elif sensor is Sensor.RGBD:
+        raw_per_metre = USUAL_DEPTH_FACTOR if depth_factor is None else depth_factor
+        depth = DepthSettings(USUAL_CLOSE_FACTOR, raw_per_metre)
+    return Settings(
+        sensor=sensor,
+        camera=replace(camera, bf=bf),
+        orb=orb or OrbSettings(n_features=usual_n_features(camera.width, camera.height)),
+        depth=depth,
+    )
+
+
+def _check(
+    camera: CameraSettings, sensor: Sensor, baseline: float | None, depth_factor: float | None
+) -> None:
+    if baseline is not None and not sensor.has_depth:
+        raise SettingsError(f"a baseline goes with stereo and rgbd; leave it out for {sensor}")
+    if depth_factor is not None and sensor is not Sensor.RGBD:
+        raise SettingsError(f"a depth factor goes with rgbd; leave it out for {sensor}")
+    if baseline is not None and not (math.isfinite(baseline) and baseline > 0):
+        raise SettingsError(
+            f"the baseline is {baseline:g}; give the distance of the two cameras in metres, above 0"
+        )
+    if sensor is not Sensor.STEREO:
+        return
+    if baseline is None and not camera.bf:
+        raise SettingsError(
+            "the baseline is missing; stereo needs the distance of its two cameras in metres "
+            "(--baseline 0.12)"
+        )
+    if camera.is_distorted:
+        raise SettingsError(
+            "stereo images must be rectified, and this camera has distortion; give the calibration "
+            "of both cameras to import-camera (camchain of Kalibr, or --right with ROS)"
+        )

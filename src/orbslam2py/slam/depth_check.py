@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Whether the first depth images fit the factor of the settings.
+
+A wrong factor is not seen in anything later: the map is consistent, only of another size.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+_log = logging.getLogger(__name__)
+
+#: So many images with depth are looked at, and so many at all: a camera may begin without.
+N_CHECKED, N_LOOKED_AT = 5, 100
+#: Every so many pixels count. No divisor of a usual width, so that all columns take part.
+_STEP = 7
+#: Medians of depth images that a camera for which RGB-D is meant may have [m].
+_LEAST, _MOST = 0.05, 200.0
+#: Factors in use, the commonest first: millimetres, TUM, metres, centimetres, 0.1 mm.
+_USUAL = (1000.0, 5000.0, 1.0, 100.0, 10_000.0)
+#: Where the median of a depth image usually lies [m].
+_LIKELY = (0.3, 8.0)
+
+
+class DepthCheck:
+    """Warns once if the median of a depth image cannot be right.
+
+    Parameters
+    ----------
+    factor
+        Raw units per metre as the settings have them.
+    """
+
+    def __init__(self, factor: float) -> None:
+        self._factor = factor
+        self._left = N_CHECKED
+        self._chances = N_LOOKED_AT
+
+    @property
+    def done(self) -> bool:
+        """Whether nothing further needs to be looked at."""
+        return self._left == 0 or self._chances == 0
+
+    def look(self, depth: npt.NDArray[np.generic]) -> None:
+        """Judge a raw depth image (height, width); one without depth does not count."""
+        if self.done:
+            return
+        self._chances -= 1
+        median = _median_of_known(depth.reshape(-1)[::_STEP])
+        if median is None:
+            return
+        self._left -= 1
+        if _LEAST <= median / self._factor <= _MOST:
+            return
+        self._left = 0
+        better = _fitting_factor(median)
+        _log.warning(
+            "depth images do not fit DepthMapFactor %g: their median is %.4g m; "
+            "DepthMapFactor: %g would make it %.4g m",
+            self._factor,
+            median / self._factor,
+            better,
+            median / better,
+        )
+
+
+def _median_of_known(depth: npt.NDArray[np.generic]) -> float | None:
+    """Median of what is above 0 and finite [raw]; the largest integer stands for unknown, too."""
+    known = depth[np.isfinite(depth) & (depth > 0)]  # type: ignore[operator]
+    if depth.dtype.kind in "ui":
+        known = known[known != np.iinfo(depth.dtype).max]  # type: ignore[type-var]
+    return float(np.median(known.astype(np.float64))) if len(known) else None
+
+
+def _fitting_factor(median: float) -> float:
+    """The commonest factor that makes a likely depth; else a power of ten that makes 1 to 10 m."""
+    for factor in _USUAL:
+        if _LIKELY[0] <= median / factor <= _LIKELY[1]:
+            return factor
+    return float(10.0 ** math.floor(math.log10(median)))

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What `System.run` takes: anything that gives images and time stamps, whoever made it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from orbslam2py.errors import StateError
+from orbslam2py.settings.sensor import Sensor
+
+
+class SomeImages(Protocol):
+    """The images of one moment; see `orbslam2py.datasets.Images`."""
+
+    @property
+    def image(self) -> npt.NDArray[np.uint8]: ...  # noqa: D102
+    @property
+    def right(self) -> npt.NDArray[np.uint8] | None: ...  # noqa: D102
+    @property
+    def depth(self) -> npt.NDArray[np.generic] | None: ...  # noqa: D102
+    @property
+    def mask(self) -> npt.NDArray[np.uint8] | None: ...  # noqa: D102
+
+
+class SomeFrame(Protocol):
+    """Images with their time; see `orbslam2py.datasets.Frame` and ``LiveFrame``."""
+
+    @property
+    def timestamp(self) -> float: ...  # noqa: D102
+    @property
+    def images(self) -> SomeImages: ...  # noqa: D102
+
+
+class Recording(Protocol):
+    """Images by their number; see `orbslam2py.datasets.Sequence`."""
+
+    @property
+    def timestamps(self) -> npt.NDArray[np.float64]: ...  # noqa: D102
+    def load(self, index: int, /) -> SomeImages: ...  # noqa: D102
+
+
+#: A sequence, or whatever gives frames: a camera, a generator, a part of a sequence.
+FrameSource = Recording | Iterable[SomeFrame]
+
+
+def timed_images(source: FrameSource, sensor: Sensor) -> Iterator[tuple[float, SomeImages]]:
+    """Yield time stamps and images.
+
+    Parameters
+    ----------
+    source
+        Where they come from.
+    sensor
+        What the images are needed for.
+
+    Raises
+    ------
+    StateError
+        If the source was opened for another sensor.
+    """
+    opened_for: Any = getattr(source, "sensor", sensor)
+    if opened_for != sensor:
+        raise StateError(
+            f"the sequence gives images for sensor '{opened_for}', but this system is for "
+            f'\'{sensor}\'; open it with "{sensor}", or make the system for "{opened_for}"'
+        )
+    if isinstance(source, Iterable):
+        for frame in source:
+            yield frame.timestamp, frame.images
+    else:
+        for index, timestamp in enumerate(source.timestamps.tolist()):
+            yield timestamp, source.load(index)
