@@ -26,6 +26,21 @@ IMAGE_SUFFIXES = (
 )
 
 
+def reason_of(error: OSError) -> str:
+    """Say why something failed, without the file, numbers and names of classes."""
+    return os.strerror(error.errno) if error.errno else str(error)
+
+
+def describe_error(error: BaseException) -> str:
+    """Say what failed in words for people; of a file which, and why, without numbers."""
+    if not isinstance(error, OSError):
+        return str(error) or type(error).__name__
+    text = error.strerror or str(error)
+    if error.filename is None or str(error.filename) in text:
+        return text
+    return f"{error.filename}: {text}"
+
+
 @contextlib.contextmanager
 def atomic_write(path: str | os.PathLike[str], *, binary: bool = False) -> Iterator[IO[Any]]:
     r"""Open a file for writing; it appears under its name only when all was written.
@@ -141,7 +156,6 @@ def _report_as(path: str | os.PathLike[str], step: Callable[[], object]) -> None
 
 
 def _raise_named(path: str | os.PathLike[str], error: OSError) -> NoReturn:
-    reason = os.strerror(error.errno) if error.errno else str(error)
-    message = f"cannot write {path}: {reason}; a file that was there is kept"
+    message = f"cannot write {path}: {reason_of(error)}; a file that was there is kept"
     # OSError(errno, ...) makes the matching subclass by itself.
     raise OSError(error.errno, message, str(path)) from error

@@ -4,18 +4,34 @@
 from __future__ import annotations
 
 import sys
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+import typer.core
 from rich.console import Console
-from rich.markup import escape
 
+from orbslam2py._files import describe_error
 from orbslam2py._version import __version__
 from orbslam2py.cli import calibrate, demo, evaluate, run, settings, synthesize, vocabulary
+from orbslam2py.cli.display import print_error, tell_repeated
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.errors import OrbSlamError
 
+
+class _Group(typer.core.TyperGroup):
+    """Leaves the names of classes out of messages about wrong usage."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the subcommand."""
+        try:
+            return super().invoke(ctx)
+        except typer.BadParameter as error:
+            error.message = error.message.replace("Value error, ", "")
+            raise
+
+
 app = typer.Typer(
+    cls=_Group,
     name="orbslam2py",
     help="Visual SLAM for one camera, a stereo pair or RGB-D: images in, path and map out.",
     no_args_is_help=True,
@@ -56,7 +72,7 @@ def run_app() -> None:
     try:
         app()
     except (OrbSlamError, OSError) as error:
-        Console(stderr=True).print(
-            f"[bold red]Error:[/] {escape(str(error))}", highlight=False, soft_wrap=True
-        )
+        print_error(Console(stderr=True), "Error", describe_error(error))
         sys.exit(ExitCode.BAD_INPUT)
+    finally:
+        tell_repeated()

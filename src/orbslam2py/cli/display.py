@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import logging
+from collections import Counter
 from typing import Any
 
 from rich.console import Console
@@ -20,26 +21,62 @@ def print_error(console: Console, title: str, text: str) -> None:
     console.print(f"[bold red]{title}:[/] {escape(text)}", highlight=False, soft_wrap=True)
 
 
+#: How often a warning of one kind is printed before the next ones are only counted.
+_TOLD_EACH = 3
+
+
 class _ConsoleHandler(logging.Handler):
-    """Prints warnings like errors, in one line each: paths can be copied from it."""
+    """Prints warnings like errors, in one line each: paths can be copied from it.
+
+    Of warnings of one kind, which differ only in what they name, the fourth and later ones are
+    counted; `tell_rest` says how many there were.
+    """
 
     def __init__(self, console: Console) -> None:
         super().__init__()
         self._console = console
+        self._counts: Counter[str] = Counter()
+        self._last: dict[str, logging.LogRecord] = {}
 
     def emit(self, record: logging.LogRecord) -> None:
+        kind = str(record.msg)
+        # What a kind is is told by the text with its gaps; a text without any is its own kind.
+        if record.levelno < logging.ERROR:
+            self._counts[kind] += 1
+            if self._counts[kind] > _TOLD_EACH:
+                self._last[kind] = record
+                return
+        self._print(record, self.format(record))
+
+    def tell_rest(self) -> None:
+        """Print how many warnings were only counted, kind by kind, and begin anew."""
+        for kind, record in self._last.items():
+            more = self._counts[kind] - _TOLD_EACH
+            text = self.format(record)
+            self._print(record, text if more == 1 else f"{more} more like this, the last: {text}")
+        self._counts.clear()
+        self._last.clear()
+
+    def _print(self, record: logging.LogRecord, text: str) -> None:
         colour = "red" if record.levelno >= logging.ERROR else "yellow"
         title = f"[bold {colour}]{record.levelname.capitalize()}:[/]"
-        text = escape(self.format(record))
-        self._console.print(f"{title} {text}", highlight=False, soft_wrap=True)
+        self._console.print(f"{title} {escape(text)}", highlight=False, soft_wrap=True)
 
 
 def log_to(console: Console, *, quiet: bool) -> None:
     """Print the package's warnings (errors, if quiet) on a console."""
+    tell_repeated()
     logger = logging.getLogger("orbslam2py")
     logger.handlers = [_ConsoleHandler(console)]
     logger.propagate = False
     logger.setLevel(logging.ERROR if quiet else logging.WARNING)
+
+
+def tell_repeated() -> None:
+    """Print how many warnings were only counted because there had been three like them."""
+    for handler in logging.getLogger("orbslam2py").handlers:
+        if isinstance(handler, _ConsoleHandler):
+            handler.tell_rest()
 
 
 def progress_bar(console: Console) -> Progress:
@@ -81,13 +118,52 @@ class Display:
         self._shown_at = now
 
 
-def _describe_loop(loop: dict[str, Any]) -> str:
+def _describe_loop(loop: dict[str, Any], unit: str) -> str:
     matched, current = loop["keyframes"]
-    text = f"keyframe {current} at {matched}: {loop['correction_m']:.3f} m"
+    text = f"keyframe {current} at {matched}: {loop['correction_m']:.3f} {unit}"
     text += f", {loop['correction_deg']:.2f} deg"
     if loop["scale"] != 1.0:
         text += f", scale {loop['scale']:.4f}"
     return text
+
+
+#: Keys of report.json that the table leaves out: they are its title, or told by another row.
+_UNTOLD = {
+    *("sequence", "sensor", "milliseconds", "settings", "losses"),
+    *("lost_frames", "lost_seconds", "longest_loss_seconds"),
+}
+
+#: Keys that hold frames by reason, and how the table calls them.
+_COUNTED = {"initialisation_reasons": "no map yet", "lost_reasons": "lost"}
+
+
+def _rows_of(key: str, value: Any, report: dict[str, Any]) -> list[tuple[str, str]]:
+    """What the table says about one key of report.json: names and texts."""
+    if key in _UNTOLD or value is None:
+        return []
+    if key in _COUNTED:
+        return [(f"{_COUNTED[key]}: {reason}", str(count)) for reason, count in value.items()]
+    if key == "loops":
+        unit = "units" if report["sensor"] == "mono" else "m"
+        return [("loop", _describe_loop(loop, unit)) for loop in value]
+    text = f"{value:.4f}" if isinstance(value, float) else str(value)
+    if key == "lost":
+        text = _describe_losses(report)
+    elif key == "lost_at_end":
+        text = "yes" if value else ""
+    elif key == "full_adjustments":
+        text = f"{sum(entry['used'] for entry in value)} of {len(value)} used" if value else ""
+    return [(key.replace("_", " "), text)] if text else []
+
+
+def _describe_losses(report: dict[str, Any]) -> str:
+    if not report["lost"]:
+        return "never"
+    times = "once" if report["lost"] == 1 else f"{report['lost']} times"
+    return (
+        f"{times}, {report['lost_frames']} frames, {report['lost_seconds']:.1f} s in all, "
+        f"{report['longest_loss_seconds']:.1f} s at the longest"
+    )
 
 
 def report_table(report: dict[str, Any]) -> Table:
@@ -97,23 +173,8 @@ def report_table(report: dict[str, Any]) -> Table:
     table.add_column(justify="left")
     table.add_column(justify="right")
     for key, value in report.items():
-        if key in {"sequence", "sensor", "milliseconds", "settings"} or value is None:
-            continue
-        if key == "initialisation_reasons":
-            for reason, count in value.items():
-                table.add_row(f"no map yet: {escape(reason)}", str(count))
-            continue
-        if key == "loops":
-            for loop in value:
-                table.add_row("loop", _describe_loop(loop))
-            continue
-        if key == "full_adjustments":
-            used = sum(entry["used"] for entry in value)
-            if value:
-                table.add_row(key.replace("_", " "), f"{used} of {len(value)} used")
-            continue
-        text = f"{value:.4f}" if isinstance(value, float) else str(value)
-        table.add_row(key.replace("_", " "), escape(text))
+        for name, text in _rows_of(key, value, report):
+            table.add_row(escape(name), escape(text))
     table.add_section()
     for stage, numbers in report["milliseconds"].items():
         table.add_row(

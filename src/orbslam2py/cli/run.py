@@ -10,13 +10,22 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from orbslam2py.cli.display import Display, log_to, print_error, progress_bar, report_table
+from orbslam2py._files import describe_error
+from orbslam2py.cli.display import (
+    Display,
+    log_to,
+    print_error,
+    progress_bar,
+    report_table,
+    tell_repeated,
+)
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.interrupts import StopOnInterrupt
 from orbslam2py.datasets import open_input
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.outputs import new_output_folder
+from orbslam2py.runs.remedies import why_nothing_was_tracked
 from orbslam2py.runs.run import FinishedRun, run_sequence
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.options import SystemOptions
@@ -179,6 +188,7 @@ def run_and_show(
             progress=Display(bar, n_frames).show,
             stop=interrupt.event,
         )
+    tell_repeated()
     console.print(report_table(done.report))
     folder = escape(str(done.folder))
     console.print(f"Results are in [bold]{folder}[/]", highlight=False, soft_wrap=True)
@@ -194,11 +204,11 @@ def _conclude(done: FinishedRun, errors: Console) -> ExitCode:
     for problem in done.problems:
         print_error(errors, "Error", problem)
     if result.error is not None:
-        what = str(result.error) or type(result.error).__name__
+        what = describe_error(result.error)
         print_error(errors, "Error", f"{what} (what was done until then is saved)")
     if result.error is not None or done.problems:
         return ExitCode.FAILED
     if result.n_tracked == 0 and not result.interrupted:
-        print_error(errors, "Nothing could be tracked", result.why_nothing_was_tracked())
+        print_error(errors, "Nothing could be tracked", why_nothing_was_tracked(result.rows))
         return ExitCode.NOTHING_TRACKED
     return ExitCode.OK

@@ -11,7 +11,7 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py._files import atomic_write
 
 
-def write_ply(path: str | Path, points: FloatArray) -> None:
+def write_ply(path: str | Path, points: FloatArray, *, unit: str = "m") -> None:
     """Write points as a binary PLY file that common viewers open.
 
     Parameters
@@ -19,8 +19,10 @@ def write_ply(path: str | Path, points: FloatArray) -> None:
     path
         The file; replaced only when everything was written.
     points
-        Positions (p, 3) in the frame of keyframe 0's camera [m] (one camera: its unit of length);
-        written as float32.
+        Positions (p, 3) in the frame of keyframe 0's camera; written as float32.
+    unit
+        Of the positions, for the comment in the file: metres, or ``units`` for one camera, whose
+        unit of length is its own.
 
     Raises
     ------
@@ -29,7 +31,7 @@ def write_ply(path: str | Path, points: FloatArray) -> None:
     """
     header = (
         "ply\nformat binary_little_endian 1.0\ncomment camera frame of keyframe 0: "
-        f"x right, y down, z forward [m]\nelement vertex {len(points)}\n"
+        f"x right, y down, z forward [{unit}]\nelement vertex {len(points)}\n"
         "property float x\nproperty float y\nproperty float z\nend_header\n"
     )
     with atomic_write(path, binary=True) as stream:

@@ -21,11 +21,11 @@ class MapSnapshot:
     keyframe_timestamps: FloatArray
     """(k,) seconds."""
     keyframe_T_wc: FloatArray
-    """(k, 4, 4) camera to world."""
+    """(k, 4, 4) camera to world, lengths as in `point_positions`."""
     point_ids: IntArray
     """(p,) ascending."""
     point_positions: FloatArray
-    """(p, 3) world [m]."""
+    """(p, 3) world [m] (one camera: the map's own units)."""
     loop_edges: IntArray
     """(l, 2) ids of the keyframes that a closed loop connects."""
 

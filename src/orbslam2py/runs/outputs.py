@@ -4,8 +4,6 @@
 from __future__ import annotations
 
 import contextlib
-import csv
-import io
 import json
 import logging
 import os
@@ -18,19 +16,28 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from orbslam2py._files import atomic_write
+from orbslam2py._files import atomic_write, reason_of
 from orbslam2py.errors import DatasetError
+from orbslam2py.evaluation import Alignment
 from orbslam2py.maps.ply import write_ply
+from orbslam2py.runs.frame_table import write_frames
 from orbslam2py.runs.plots import draw_trajectory
 from orbslam2py.runs.report import RunEvaluation
-from orbslam2py.runs.result import FrameRow, RunResult
+from orbslam2py.runs.result import RunResult
+from orbslam2py.runs.timeline import Timeline
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.trajectory import Trajectory, write_kitti, write_tum
-from orbslam2py.trajectory.rotations import quaternions_from_rotations
 
 _log = logging.getLogger(__name__)
 
-STAGES = ("wait", "extract", "stereo", "predict", "local_map", "keyframe", "track")
+#: So many poses must have a true one at their time before they tell how long a unit is.
+_POSES_FOR_SCALE = 3
+
+#: Files that a run may have no content for.
+_NOT_ALWAYS = (
+    *("trajectory.txt", "trajectory_online.txt", "trajectory_kitti.txt", "keyframes.txt"),
+    *("trajectory.png", "trajectory_map*.txt"),
+)
 
 
 def new_output_folder(name: str) -> Path:
@@ -70,7 +77,7 @@ def prepare_output_folder(folder: Path, *, force: bool) -> Path:
         probe.unlink()
     except OSError as error:
         raise DatasetError(
-            f"cannot write to {folder}: {error.strerror}; give another folder with --output"
+            f"cannot write to {folder}: {reason_of(error)}; give another folder with --output"
         ) from error
     return folder
 
@@ -112,9 +119,10 @@ class OutputWriter:
         """Write all files of the run."""
         self._write("settings.yaml", result.settings.save)
         self._write_trajectories(result)
-        self._write("frames.csv", lambda path: _write_frames(path, result.rows))
+        self._write("frames.csv", lambda path: write_frames(path, result.rows))
         points = anchored_points(result)
-        self._write("points.ply", lambda path: write_ply(path, points))
+        unit = "units" if result.options.sensor is Sensor.MONOCULAR else "m"
+        self._write("points.ply", lambda path: write_ply(path, points, unit=unit))
         if len(result.tracked_trajectory()):
             self._write("trajectory.png", lambda path: _draw(path, result, evaluation, report))
         self._write(
@@ -124,7 +132,7 @@ class OutputWriter:
 
     def _remove_stale(self) -> None:
         """Remove what an earlier run left in the folder and this one has no counterpart of."""
-        for path in [self.folder / "trajectory.png", *self.folder.glob("trajectory_map*.txt")]:
+        for path in (path for name in _NOT_ALWAYS for path in self.folder.glob(name)):
             if path.name not in self._written:
                 with contextlib.suppress(OSError):
                     path.unlink()
@@ -136,9 +144,19 @@ class OutputWriter:
         self._write_tum("trajectory.txt", result, last)
         self._write_tum("trajectory_online.txt", result, result.online_trajectory())
         self._write_tum("keyframes.txt", result, result.keyframes)
-        self._write("trajectory_kitti.txt", lambda path: write_kitti(path, last, len(result.rows)))
+        paths = [f"trajectory_map{n}.txt" for n, t in enumerate(earlier) if not t.lost.all()]
+        if last.lost.all() and paths:
+            _log.warning(
+                "no trajectory.txt: the last map has no pose; the path until then is in %s",
+                ", ".join(paths),
+            )
+        if not last.lost.all():
+            n_frames = len(result.rows)
+            self._write("trajectory_kitti.txt", lambda path: write_kitti(path, last, n_frames))
 
     def _write_tum(self, name: str, result: RunResult, trajectory: Trajectory) -> None:
+        if trajectory.lost.all():  # also if there are no poses at all
+            return
         texts = [result.rows[int(i)].timestamp for i in trajectory.indices]
         self._write(name, lambda path: write_tum(path, trajectory, texts))
 
@@ -153,14 +171,14 @@ class OutputWriter:
             self.problems.append(f"cannot make {name}: {str(error) or type(error).__name__}")
 
     def _keep_elsewhere(self, name: str, write: Callable[[Path], object], error: OSError) -> None:
-        message = f"cannot write {self.folder / name}: {error.strerror or error}"
+        message = f"cannot write {self.folder / name}: {reason_of(error)}"
         try:
             if self._rescue is None:
                 self._rescue = Path(tempfile.mkdtemp(prefix="orbslam2py-"))
             write(self._rescue / name)
             message += f"; kept in {self._rescue / name}"
         except OSError as second:
-            message += f"; neither in the temporary folder ({second.strerror or second})"
+            message += f"; neither in the temporary folder ({reason_of(second)})"
         self.problems.append(message)
 
 
@@ -179,45 +197,6 @@ def _write_text(path: Path, text: str) -> None:
         stream.write(text)
 
 
-def _write_frames(path: Path, rows: list[FrameRow]) -> None:
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(
-        ["index", "timestamp", "map", "state", "reason", "inliers", "matches", "keyframe"]
-        + ["reference_keyframe", "tx", "ty", "tz", "qx", "qy", "qz", "qw"]
-        + [f"ms_{stage}" for stage in STAGES]
-    )
-    for row in rows:
-        writer.writerow(_frame_fields(row))
-    _write_text(path, stream.getvalue())
-
-
-def _frame_fields(row: FrameRow) -> list[object]:
-    record = row.record
-    if record is None:
-        return [row.index, row.timestamp, "", row.state, row.reason] + [""] * (11 + len(STAGES))
-    pose: list[object] = [""] * 7
-    if record.T_wc is not None:
-        quaternion = quaternions_from_rotations(record.T_wc[None, :3, :3])[0]
-        values = [*record.T_wc[:3, 3], *quaternion]
-        pose = [f"{value:.9f}" for value in values]
-    reference = record.reference_keyframe if record.reference_keyframe >= 0 else ""
-    stages = [f"{record.milliseconds.get(stage, 0.0):.3f}" for stage in STAGES]
-    return [
-        row.index,
-        row.timestamp,
-        record.map_index,
-        row.state,
-        row.reason,
-        record.n_inliers,
-        record.n_matches,
-        int(record.is_keyframe),
-        reference,
-        *pose,
-        *stages,
-    ]
-
-
 def _loop_positions(result: RunResult) -> npt.NDArray[np.float64]:
     """Both ends of every loop of the last map, (l, 2, 3), in the frame of keyframe 0."""
     snapshot = result.snapshot
@@ -229,25 +208,44 @@ def _draw(
     path: Path, result: RunResult, evaluation: RunEvaluation | None, report: dict[str, Any]
 ) -> None:
     last = result.tracked_trajectory()
-    begin = float(last.timestamps[0])
+    timeline = Timeline.of(result.rows, len(result.trajectories) - 1)
+    begin = float(result.rows[0].timestamp)
     truth = None
     subtitle = (
         f"{report['tracked']} of {report['frames']} frames tracked, "
         f"{report['keyframes']} keyframes, {report['map_points']} points"
     )
+    scale, unit = metres_per_unit(result, evaluation), "m"
+    if scale is None:
+        scale, unit = 1.0, "units"
     if evaluation is not None:
-        truth = (evaluation.truth.timestamps - begin, evaluation.truth.positions)
+        truth = (evaluation.truth.timestamps - begin, scale * evaluation.truth.positions)
         if report["ate_rmse_m"] is not None:
             subtitle += f", ATE {report['ate_rmse_m']:.4f} m"
     draw_trajectory(
         path,
         title=f"{report['sequence']} ({report['sensor']})",
         subtitle=subtitle,
-        positions=last.positions,
+        positions=scale * last.positions,
         seconds=last.timestamps - begin,
-        keyframes=result.keyframes.positions,
-        points=anchored_points(result),
+        keyframes=scale * result.keyframes.positions,
+        points=scale * anchored_points(result),
         truth=truth,
-        loops=_loop_positions(result),
-        unit="units" if result.options.sensor is Sensor.MONOCULAR else "m",
+        loops=scale * _loop_positions(result),
+        gaps=timeline.gaps_before(last.indices),
+        timeline=timeline,
+        unit=unit,
     )
+
+
+def metres_per_unit(result: RunResult, evaluation: RunEvaluation | None) -> float | None:
+    """Tell what lengths of the map are multiplied by for metres; None where nobody knows.
+
+    A single camera's unit of length is its own: only ground truth tells how long it is.
+    """
+    if result.options.sensor is not Sensor.MONOCULAR:
+        return 1.0
+    if evaluation is None or evaluation.figures.alignment is not Alignment.SIM3:
+        return None
+    enough = evaluation.figures.matched_poses >= _POSES_FOR_SCALE
+    return evaluation.figures.transform.scale if enough else None

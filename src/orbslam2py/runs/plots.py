@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from orbslam2py._files import atomic_write
+from orbslam2py.runs.timeline import Timeline, gaps_in_time
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,7 +19,9 @@ if TYPE_CHECKING:
 FloatArray = npt.NDArray[np.float64]
 
 _ESTIMATE = "#1f5fa8"
-_TRUTH = "#9a9a9a"
+_TRUTH = "#8fce7e"
+_UNTRACKED = "#f6cfc6"
+_EARLIER = "#e2e2e2"
 _POINTS = "#c9b99a"
 _LOOP = "#c8442c"
 #: Width by height of the view from above.
@@ -34,10 +38,12 @@ def draw_trajectory(
     points: FloatArray,
     truth: tuple[FloatArray, FloatArray] | None = None,
     loops: FloatArray | None = None,
+    gaps: npt.NDArray[np.bool_] | None = None,
+    timeline: Timeline | None = None,
     subtitle: str = "",
     unit: str = "m",
 ) -> None:
-    """Draw the path from above, and its height over time, into a PNG file.
+    """Draw the path from above, and how high it goes over time, into a PNG file.
 
     Parameters
     ----------
@@ -58,8 +64,13 @@ def draw_trajectory(
         Ground truth, aligned to the estimate.
     loops : array of float64, (l, 2, 3), optional
         Positions of the two keyframes of every loop.
+    gaps : array of bool, (n,), optional
+        Whether the path is interrupted before each position; by default only where much time
+        passes.
+    timeline : Timeline, optional
+        Of the whole recording; by default that of the positions.
     unit : str
-        Unit of length of the estimate, for the axes.
+        Unit of length of all positions, for the axes.
     """
     # The object interface keeps the process-wide state of pyplot untouched.
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
@@ -70,21 +81,17 @@ def draw_trajectory(
     above, height = figure.subplots(2, 1, height_ratios=[3.2, 1])
     figure.suptitle(f"{title}\n{subtitle}" if subtitle else title, fontsize=11)
 
-    _draw_above(above, positions, keyframes, points, truth)
+    estimate = _Path(seconds, positions, gaps_in_time(seconds) if gaps is None else gaps)
+    true = None if truth is None else _Path(*truth, gaps_in_time(truth[0]))
+    _draw_above(above, estimate, keyframes, points, true)
     if loops is not None and len(loops):
         _draw_loops(above, loops)
     above.legend(loc="best", fontsize=9, framealpha=0.9, markerscale=1.2)
     above.set_xlabel(f"x (right) [{unit}]")
     above.set_ylabel(f"z (forward) [{unit}]")
-    if truth is not None:
-        height.plot(truth[0], -truth[1][:, 1], color=_TRUTH, linewidth=2.5)
-    height.plot(seconds, -positions[:, 1], color=_ESTIMATE, linewidth=1.2)
-    height.set_xlabel("time [s]")
-    height.set_ylabel(f"height [{unit}]")
-    low, high = height.get_ylim()
-    if high - low < 0.1:  # a level path should look level
-        middle = 0.5 * (low + high)
-        height.set_ylim(middle - 0.05, middle + 0.05)
+    _draw_height(height, estimate, true, timeline)
+    height.set_xlabel("time since the first image [s]")
+    height.set_ylabel(f"up in the\nfirst keyframe [{unit}]")
     for axes in (above, height):
         axes.grid(color="#eeeeee", linewidth=0.8)
         axes.set_axisbelow(True)
@@ -94,14 +101,56 @@ def draw_trajectory(
         figure.savefig(stream, format="png")
 
 
+@dataclass(frozen=True)
+class _Path:
+    """Positions (n, 3) over time (n,), and whether there is a gap before each."""
+
+    seconds: FloatArray
+    positions: FloatArray
+    gaps: npt.NDArray[np.bool_]
+
+    def draw(self, axes: Axes, x: FloatArray, y: FloatArray, **style: Any) -> None:
+        """Draw a line that ends at gaps; a position between two gaps becomes a dot."""
+        where = np.flatnonzero(self.gaps)
+        axes.plot(np.insert(x, where, np.nan), np.insert(y, where, np.nan), **style)
+        alone = self.gaps | (np.arange(len(x)) == 0)
+        alone &= np.append(self.gaps[1:], True)
+        size = float(style["linewidth"]) ** 2
+        axes.scatter(x[alone], y[alone], s=size, color=style["color"], zorder=2, linewidths=0)
+
+
+def _draw_height(
+    axes: Axes, estimate: _Path, truth: _Path | None, timeline: Timeline | None
+) -> None:
+    if truth is not None:
+        truth.draw(axes, truth.seconds, -truth.positions[:, 1], color=_TRUTH, linewidth=5.0)
+    estimate.draw(axes, estimate.seconds, -estimate.positions[:, 1], color=_ESTIMATE, linewidth=1.2)
+    low, high = axes.get_ylim()
+    if high - low < 0.1:  # a level path should look level
+        middle = 0.5 * (low + high)
+        axes.set_ylim(middle - 0.05, middle + 0.05)
+    if timeline is None:
+        return
+    labels = {_UNTRACKED: "not tracked", _EARLIER: "in an earlier map"}
+    for spans, color in ((timeline.untracked, _UNTRACKED), (timeline.earlier, _EARLIER)):
+        for begin, end in spans:
+            axes.axvspan(begin, end, color=color, linewidth=0, label=labels.pop(color, None))
+    if len(labels) < 2:
+        axes.legend(loc="best", fontsize=8, framealpha=0.9)
+    end = max([timeline.duration, *(span[1] for span in timeline.untracked)])
+    if end > 0:
+        axes.set_xlim(-0.01 * end, 1.01 * end)
+
+
 def _draw_above(
     axes: Axes,
-    positions: FloatArray,
+    estimate: _Path,
     keyframes: FloatArray,
     points: FloatArray,
-    truth: tuple[FloatArray, FloatArray] | None,
+    truth: _Path | None,
 ) -> None:
-    path = positions if truth is None else np.vstack([positions, truth[1]])
+    positions = estimate.positions
+    path = positions if truth is None else np.vstack([positions, truth.positions])
     low, high = path[:, [0, 2]].min(axis=0), path[:, [0, 2]].max(axis=0)
     # The window follows the path and shows the points around it, but not those so far away that
     # they would shrink the path to a dot. It has the shape of the axes: lengths are equal on both.
@@ -125,15 +174,18 @@ def _draw_above(
             rasterized=True,
         )
     if truth is not None:
-        axes.plot(truth[1][:, 0], truth[1][:, 2], color=_TRUTH, linewidth=3.0, label="ground truth")
-    axes.plot(positions[:, 0], positions[:, 2], color=_ESTIMATE, linewidth=1.4, label="estimate")
+        # Wide enough to be seen on both sides of an estimate that lies on it.
+        x, z = truth.positions[:, 0], truth.positions[:, 2]
+        truth.draw(axes, x, z, color=_TRUTH, linewidth=6.0, label="ground truth")
+    x, z = positions[:, 0], positions[:, 2]
+    estimate.draw(axes, x, z, color=_ESTIMATE, linewidth=1.4, label="estimate")
     axes.scatter(
         keyframes[:, 0],
         keyframes[:, 2],
-        s=14,
+        s=9,
         facecolors="white",
         edgecolors=_ESTIMATE,
-        linewidths=0.9,
+        linewidths=0.7,
         zorder=3,
         label="keyframes",
     )

@@ -11,9 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from orbslam2py._files import describe_error
 from orbslam2py._version import __version__
 from orbslam2py.errors import OrbSlamError
 from orbslam2py.evaluation import Alignment, Evaluation, evaluate_trajectory
+from orbslam2py.runs.losses import losses_report
 from orbslam2py.runs.result import RunResult
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.events import LoopClosed
@@ -33,7 +35,7 @@ class RunEvaluation:
     keyframes_ate_rmse: float | None
     """Of the keyframes alone [m]; None if too few of them have a true pose."""
     truth: Trajectory
-    """Ground truth over the time of the run, in the estimate's frame."""
+    """Ground truth over the time of the whole run, in the estimate's frame and unit."""
 
 
 def evaluate_run(result: RunResult) -> RunEvaluation | None:
@@ -54,10 +56,10 @@ def evaluate_run(result: RunResult) -> RunEvaluation | None:
             return None
         figures = evaluate_trajectory(estimate, truth, alignment)
     except (OrbSlamError, OSError) as error:
-        _log.warning("no comparison with ground truth: %s", error)
+        _log.warning("no comparison with ground truth: %s", describe_error(error))
         return None
     keyframes_ate = _ate_of_keyframes(result.keyframes, truth, alignment)
-    begin, end = estimate.timestamps[0] - 0.02, estimate.timestamps[-1] + 0.02
+    begin, end = float(result.rows[0].timestamp) - 0.02, float(result.rows[-1].timestamp) + 0.02
     during = truth.select((truth.timestamps >= begin) & (truth.timestamps <= end))
     T_wc = figures.transform.inverse().apply_to_poses(during.T_wc)
     return RunEvaluation(figures, keyframes_ate, Trajectory(during.timestamps, T_wc))
@@ -80,6 +82,8 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
     n_done = len(result.rows)
     n_tracked = result.n_tracked
     n_frames = n_done if result.n_frames is None else result.n_frames
+    losses = losses_report(result.rows)
+    each_loss = losses.pop("losses")
     report: dict[str, Any] = {
         "version": __version__,
         "sequence": result.sequence.name,
@@ -90,6 +94,7 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "realtime": options.realtime,
         "seed": options.system.seed,
         "frames": n_frames,
+        "seen_frames": n_done,
         "tracked": n_tracked,
         "tracked_fraction": n_tracked / n_frames if n_frames else 0.0,
         "skipped_frames": result.n_skipped,
@@ -99,6 +104,7 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "loops_closed": len(result.loops),
         "relocalisations": result.n_relocalizations,
         "resets": result.n_resets,
+        **losses,
         "initialisation_reasons": initialization_reasons(result),
         "interrupted": result.interrupted,
         "seconds": result.seconds,
@@ -106,6 +112,7 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "slam_frames_per_second": _rate(n_done, result.slam_seconds),
         "peak_memory_mb": peak_memory_mb(),
         "milliseconds": result.stages,
+        "losses": each_loss,
         "loops": [loop_entry(loop) for loop in result.loops],
         "full_adjustments": [adjustment_entry(a) for a in result.full_adjustments],
     }

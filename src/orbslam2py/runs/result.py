@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -127,8 +126,3 @@ class RunResult:
             T_wc=np.array([record.T_wc for _, record in tracked]),
             indices=np.array([position for position, _ in tracked]),
         )
-
-    def why_nothing_was_tracked(self) -> str:
-        """The most frequent reason."""
-        reasons = Counter(row.reason for row in self.rows if row.reason)
-        return reasons.most_common(1)[0][0] if reasons else "no frames"

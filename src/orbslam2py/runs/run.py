@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 from orbslam2py import _core as core
 from orbslam2py.datasets import RecordedSequence
 from orbslam2py.datasets.base import LiveSource, Sequence
+from orbslam2py.runs.losses import find_losses, last_loss_warning
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.outputs import OutputWriter, link_latest, prepare_output_folder
 from orbslam2py.runs.report import RunEvaluation, evaluate_run, make_report
@@ -18,6 +20,8 @@ from orbslam2py.runs.result import RunResult
 from orbslam2py.runs.runner import Progress, SequenceRunner
 from orbslam2py.trajectory.trajectory import Trajectory
 from orbslam2py.vocabulary.vocabulary import load_vocabulary
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -101,6 +105,9 @@ def run_sequence(
         folder = prepare_output_folder(Path(output), force=force)
         link_latest(folder)
     result = runner.run(progress, stop)
+    warning = last_loss_warning(find_losses(result.rows))
+    if warning is not None:
+        _log.warning("%s", warning)
     evaluation = evaluate_run(result)
     report = make_report(result, evaluation)
     problems: tuple[str, ...] = ()

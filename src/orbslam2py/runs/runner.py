@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
+from orbslam2py._files import describe_error
 from orbslam2py.datasets.base import Images, LiveSource, Sequence
 from orbslam2py.errors import DatasetError, ImageError, OrbSlamError
 from orbslam2py.runs.feeds import FedFrame, LiveFeed, RecordedFeed, is_sequence
@@ -111,7 +112,8 @@ class SequenceRunner:
             self._take_note(error)
         result.interrupted = stop.is_set() and not result.is_live
         if result.interrupted:
-            _log.warning("interrupted; saving what was done so far")
+            seen = f"{len(result.rows)} of {result.n_frames} frames"
+            _log.warning("interrupted; saving what was done so far (%s)", seen)
         self._shut_down(system)
         self._collect(system)
         result.seconds = time.perf_counter() - begin
@@ -170,8 +172,9 @@ class SequenceRunner:
         return system.track_monocular(images.image, timestamp, mask=mask)
 
     def _skip(self, frame: FedFrame, error: Exception) -> FrameRow:
-        _log.warning("frame %d skipped: %s", frame.index, error)
-        return _row(frame, None, str(error))
+        reason = describe_error(error)
+        _log.warning("frame %d skipped: %s", frame.index, reason)
+        return _row(frame, None, reason)
 
     # ---- the end ---------------------------------------------------------------------------------
     def _wait_for_mapping(self, system: System, stop: threading.Event) -> None:

@@ -44,7 +44,7 @@ class LoopClosed:
     S_cm: FloatArray
     """(4, 4) similarity: camera of the matched keyframe to camera of the current one."""
     translation: float
-    """Metres by which the current keyframe was moved."""
+    """Metres (one camera: the map's own units) by which the current keyframe was moved."""
     rotation_deg: float
     """Degrees by which it was turned."""
     milliseconds: dict[str, float] = field(default_factory=dict)

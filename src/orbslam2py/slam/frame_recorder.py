@@ -5,6 +5,9 @@ from __future__ import annotations
 
 import threading
 
+import numpy as np
+import numpy.typing as npt
+
 from orbslam2py import _core as core
 from orbslam2py.slam.records import FrameFeatures
 from orbslam2py.trajectory.trajectory import Trajectory
@@ -51,14 +54,29 @@ class FrameRecorder:
         )
 
 
-def frame_features(frame: core.TrackedFrame) -> FrameFeatures:
-    """Copy the keypoints of a frame and what they were matched to."""
-    ids = frame.map_points
+def accepted_keypoints(frame: core.TrackedFrame) -> npt.NDArray[np.bool_]:
+    """Which keypoints have a point that agrees with the pose, (n,)."""
+    accepted: npt.NDArray[np.bool_] = (frame.map_points >= 0) & (frame.outlier == 0)
+    return accepted
+
+
+def frame_features(
+    frame: core.TrackedFrame, inliers: npt.NDArray[np.bool_] | None = None
+) -> FrameFeatures:
+    """Copy the keypoints of a frame and what they were matched to.
+
+    Parameters
+    ----------
+    frame : orbslam2py._core.TrackedFrame
+        The frame.
+    inliers : array of bool, (n,), optional
+        `accepted_keypoints` as they were before points were made or dropped.
+    """
     features = frame.features
     return FrameFeatures(
         keypoints=features.keypoints,
         levels=features.levels,
         depths=features.depth,
-        map_point_ids=ids,
-        inliers=(ids >= 0) & (frame.outlier == 0),
+        map_point_ids=frame.map_points,
+        inliers=accepted_keypoints(frame) if inliers is None else inliers,
     )

@@ -25,7 +25,7 @@ from orbslam2py.slam.keyframe_decision import KeyframeDecision
 from orbslam2py.slam.localization_mode import LocalizationSwitch
 from orbslam2py.slam.options import SystemOptions
 from orbslam2py.slam.pose_search import PoseSearch
-from orbslam2py.slam.records import TrackingOutcome, TrackingRecord, TrackingState
+from orbslam2py.slam.records import Reason, TrackingOutcome, TrackingRecord, TrackingState
 from orbslam2py.slam.relocalization import Relocalizer
 from orbslam2py.slam.thresholds import TrackingThresholds
 from orbslam2py.slam.tracking import Tracking
@@ -89,6 +89,7 @@ class Pipeline:
         self.statistics = StageStatistics()
         self.reset_requested = threading.Event()
         self.n_resets = 0
+        self._start_failed = False
         self._next_frame_id = 0
         self._last_timestamp = -math.inf
 
@@ -157,7 +158,9 @@ class Pipeline:
 
     def _keep(self, frame: core.TrackedFrame, outcome: TrackingOutcome) -> None:
         if outcome.reset_needed:
-            _log.info("lost soon after initialization; starting a new map")
+            self._start_failed = outcome.estimate.reason is Reason.INITIAL_MAP_FAILED
+            if not self._start_failed:
+                _log.info("lost soon after initialization; starting a new map")
             self.reset_requested.set()
         elif outcome.state in (TrackingState.OK, TrackingState.LOST):
             self.recorder.record(frame, lost=outcome.state is TrackingState.LOST)
@@ -186,7 +189,7 @@ class Pipeline:
             reference_keyframe=self.tracking.reference_keyframe,
             visual_odometry=ok and estimate.visual_odometry,
             milliseconds=timer.milliseconds,
-            features=frame_features(frame) if details else None,
+            features=frame_features(frame, outcome.inliers) if details else None,
         )
 
     def _announce(self, before: TrackingState, record: TrackingRecord) -> None:
@@ -218,7 +221,9 @@ class Pipeline:
         self._next_frame_id = 0
         self._last_timestamp = -math.inf
         self.reset_requested.clear()
-        self.n_resets += 1
+        # A map that never began was not given up.
+        self.n_resets += not self._start_failed
+        self._start_failed = False
 
 
 def _make_tracking(

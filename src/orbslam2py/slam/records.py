@@ -55,9 +55,9 @@ class FrameFeatures:
     depths: npt.NDArray[np.float32]
     """(n,) metres, -1 where unknown."""
     map_point_ids: npt.NDArray[np.int64]
-    """(n,) id of the matched map point, -1 for none."""
+    """(n,) id of the matched map point, -1 for none; in a keyframe also of points made from it."""
     inliers: npt.NDArray[np.bool_]
-    """(n,) matched and accepted by the pose optimisation."""
+    """(n,) matched and accepted by the pose optimisation: as many as `TrackingRecord.n_inliers`."""
 
 
 @dataclass(frozen=True)
@@ -69,15 +69,16 @@ class TrackingRecord:
     timestamp: float
     """Seconds, as given by the caller."""
     map_index: int
-    """0 for the first map; grows with every reset."""
+    """0 for the first map; grows with every reset, and with every start of a single camera that
+    failed."""
     state: TrackingState
     reason: Reason
     """Why there is no pose (`Reason.NONE` if there is one)."""
     T_cw: FloatArray | None
     """(4, 4) world to camera, None unless the state is OK."""
     covariance: FloatArray | None
-    """(6, 6) covariance of the pose: rotation [rad], then translation [m], left perturbation in the
-    camera frame, scaled by the residual variance."""
+    """(6, 6) covariance of the pose: rotation [rad], then translation [m] (one camera: the map's
+    own units), left perturbation in the camera frame, scaled by the residual variance."""
     n_matches: int
     """Keypoints matched to map points before the last pose optimisation."""
     n_inliers: int
@@ -149,3 +150,5 @@ class TrackingOutcome:
     is_keyframe: bool = False
     reset_needed: bool = False
     """The map was lost so soon that it is better to begin another one."""
+    inliers: npt.NDArray[np.bool_] | None = None
+    """(n,) keypoints that the pose was accepted with; None: those that have a point."""

@@ -446,7 +446,7 @@ class System:
 
     @property
     def n_resets(self) -> int:
-        """How often a new map was begun after the first."""
+        """How often a map was given up for a new one; not a single camera's failed starts."""
         return self.pipeline.n_resets
 
     @property
@@ -465,7 +465,7 @@ class System:
         return self.trajectories()[-1]
 
     def trajectories(self) -> list[Trajectory]:
-        """One trajectory per map: those ended by resets, then the present one."""
+        """One trajectory per map: those that ended, also failed starts, then the present one."""
         return self.pipeline.recorder.trajectories()
 
     def keyframe_trajectory(self) -> Trajectory:

@@ -15,6 +15,7 @@ import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py._timing import StageTimer
+from orbslam2py.slam.frame_recorder import accepted_keypoints
 from orbslam2py.slam.initialization import Initializer
 from orbslam2py.slam.keyframe_decision import KeyframeClock, KeyframeDecision
 from orbslam2py.slam.local_mapping import LocalMapping
@@ -176,6 +177,8 @@ class Tracking:
             self.n_relocalizations += 1
         self.state = TrackingState.OK
         self._search.motion.update_velocity(frame)
+        # Before temporary points go, and a keyframe's keypoints become points.
+        inliers = accepted_keypoints(frame)
         is_keyframe = False
         if localize:
             core.discard_temporary(frame)
@@ -188,7 +191,7 @@ class Tracking:
         # frame must not start from them.
         frame.discard_outliers()
         self._search.motion.remember(frame)
-        return TrackingOutcome(self.state, estimate, is_keyframe)
+        return TrackingOutcome(self.state, estimate, is_keyframe, inliers=inliers)
 
     def _find_pose(
         self, frame: core.TrackedFrame, timer: StageTimer, localize: bool

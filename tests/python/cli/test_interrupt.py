@@ -112,8 +112,10 @@ def test_once(lap: Path, module: str, name: str, n: int, options: tuple[str, ...
     rows = results.frames
     assert report["tracked"] == len(rows) == len(read_tum(results.folder / "trajectory.txt"))
     assert 1 <= len(rows) <= N
+    assert report["seen_frames"] == len(rows)
+    assert report["frames"] == N
     if report["interrupted"]:
-        assert "interrupted; saving what was done so far" in err
+        assert f"interrupted; saving what was done so far ({len(rows)} of {N} frames)" in err
     else:
         assert len(rows) == N
     if module == "orbslam2py._core" and name == "match_local_map":

@@ -125,7 +125,8 @@ def test_frames_csv(command: CommandLine, rgbd: Path) -> None:
     ]
     assert header[8] == "reference_keyframe"
     assert header[9:16] == ["tx", "ty", "tz", "qx", "qy", "qz", "qw"]
-    assert set(header[16:]) >= {f"ms_{stage}" for stage in STAGES}
+    assert header[16:19] == ["std_position", "std_angle", "visual_odometry"]
+    assert set(header[19:]) >= {f"ms_{stage}" for stage in STAGES}
     frames = results.frames
     assert [int(row["index"]) for row in frames] == list(range(N))
     assert all(row["state"] == "OK" and row["reason"] == "" for row in frames)
@@ -134,6 +135,10 @@ def test_frames_csv(command: CommandLine, rgbd: Path) -> None:
     assert sum(int(row["keyframe"]) for row in frames) >= results.report["keyframes"]
     assert all(int(row["inliers"]) >= 30 for row in frames)
     assert all(float(row["ms_track"]) > 0 for row in frames)
+    assert frames[0]["std_position"] == frames[0]["std_angle"] == "0.000000000"
+    assert all(0 < float(row["std_position"]) < 0.05 for row in frames[1:])
+    assert all(0 < float(row["std_angle"]) < 1 for row in frames[1:])
+    assert {row["visual_odometry"] for row in frames} == {"0"}
     online = read_tum(results.folder / "trajectory_online.txt")
     positions = [[float(row[axis]) for axis in ("tx", "ty", "tz")] for row in frames]
     np.testing.assert_allclose(positions, online.positions, atol=2e-9)
@@ -304,7 +309,17 @@ def test_nothing_to_see(command: CommandLine, rgbd: Path) -> None:
     assert len(results.frames) == N
     assert {row["reason"] for row in results.frames} == {"too few keypoints"}
     assert {row["state"] for row in results.frames} == {"NOT_INITIALIZED"}
-    assert {path.name for path in results.folder.iterdir()} == RUN_FILES - {"trajectory.png"}
+    names = {path.name for path in results.folder.iterdir()}
+    assert names == {"frames.csv", "points.ply", "report.json", "settings.yaml"}, "nothing empty"
+
+
+def test_what_an_earlier_run_left_is_removed(command: CommandLine, rgbd: Path) -> None:
+    assert command("run", rgbd, "--sensor", "rgbd", "--output", "r", "--max-frames", 3).code == 0
+    for path in (Path(shutil.copytree(rgbd, "black")) / "rgb").iterdir():
+        cv2.imwrite(str(path), np.zeros((240, 320), np.uint8))
+    assert command("run", "black", "--sensor", "rgbd", "--output", "r", "--force").code == 3
+    names = {path.name for path in Path("r").iterdir()}
+    assert names == {"frames.csv", "points.ply", "report.json", "settings.yaml"}
 
 
 # ---- several maps --------------------------------------------------------------------------------
@@ -325,6 +340,19 @@ def test_earlier_maps_are_kept(command: CommandLine, rgbd: Path) -> None:
     assert len(read_tum(Path("r/trajectory_map0.txt"))) == 8
     assert len(read_tum(Path("r/trajectory.txt"))) == N - 10
     assert len(read_tum(Path("r/trajectory_online.txt"))) == N - 2
+
+
+def test_a_last_map_without_a_pose(command: CommandLine, rgbd: Path) -> None:
+    sequence = Path(shutil.copytree(rgbd, "dark"))
+    for path in sorted((sequence / "rgb").iterdir())[8:]:
+        cv2.imwrite(str(path), np.zeros((240, 320), np.uint8))
+    done = command("run", sequence, "--sensor", "rgbd", "--output", "r", "--deterministic")
+    assert done.code == 0
+    assert "lost at the end: no pose from frame 8 on" in done.err
+    assert "what helps: " in done.err
+    assert "the path until then is in trajectory_map0.txt\n" in done.err
+    names = {path.name for path in Path("r").iterdir() if path.name.startswith("trajectory")}
+    assert names == {"trajectory_map0.txt", "trajectory_online.txt"}
 
 
 # ---- the other commands --------------------------------------------------------------------------

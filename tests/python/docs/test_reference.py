@@ -17,6 +17,8 @@ import pytest
 
 import orbslam2py
 from orbslam2py.cli.exit_codes import ExitCode
+from orbslam2py.runs.remedies import what_helps
+from orbslam2py.runs.result import DROPPED
 from orbslam2py.settings import BUILTIN_NAMES, keys
 from orbslam2py.settings.settings import CameraSettings, DepthSettings, OrbSettings, ViewerSettings
 from orbslam2py.slam.events import LoopClosed
@@ -76,6 +78,12 @@ def test_reasons_page_lists_every_reason() -> None:
     listed = {code_in(row[1])[0]: row[0] for row in rows}
     assert listed == {r.name: r.value for r in Reason if r is not Reason.NONE}
     assert all(all(row) for row in rows), "a reason without meaning or help"
+    told = {code_in(row[1])[0]: row[3].replace("`", "") for row in rows}
+    assert told == {r.name: what_helps(r) for r in Reason if r is not Reason.NONE}
+    (dropped,) = [
+        row for row in table_below(page, "Frames that were not tracked") if row[1] == DROPPED
+    ]
+    assert dropped[3].replace("`", "") == what_helps(DROPPED)
 
 
 # ---- files.md ------------------------------------------------------------------------------------
@@ -133,6 +141,8 @@ def test_files_page_lists_the_keys_of_the_report(run: Path) -> None:
 def test_files_page_lists_the_keys_of_entries() -> None:
     report = importlib.import_module("orbslam2py.runs.report")
     numbers = {"n_keyframes": 1, "n_points": 1, "n_observations": 1, "milliseconds": {}}
+    losses = importlib.import_module("orbslam2py.runs.losses")
+    assert tables_below("An entry of losses") == list(losses.loss_entry(_filled(losses.Loss, {})))
     loop = _filled(LoopClosed, {"milliseconds": {}})
     adjustment = _filled(FullAdjustmentRecord, numbers)
     assert tables_below("An entry of loops") == list(report.loop_entry(loop))

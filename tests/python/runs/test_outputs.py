@@ -4,12 +4,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from orbslam2py import DatasetError
+from orbslam2py import DatasetError, run_sequence
+from orbslam2py.runs import RunOptions, SystemOptions, outputs
 from orbslam2py.runs.outputs import link_latest, prepare_output_folder, write_ply
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.files import names_in
 
 pytestmark = pytest.mark.watchdog(20)
@@ -58,6 +61,46 @@ def test_ply(tmp_path: Path, n: int) -> None:
     header, _, body = (tmp_path / "p.ply").read_bytes().partition(b"end_header\n")
     assert header.startswith(b"ply\nformat binary_little_endian 1.0\n")
     assert f"element vertex {n}\n".encode() in header
+    assert b"z forward [m]\n" in header
     np.testing.assert_array_equal(
         np.frombuffer(body, "<f4").reshape(n, 3), points.astype(np.float32)
     )
+
+
+# ---- the unit of length --------------------------------------------------------------------------
+class Untold(SyntheticSequence):
+    """Nobody knows where the camera was."""
+
+    def ground_truth(self) -> None:  # type: ignore[override]
+        return None
+
+
+@pytest.mark.parametrize("kind", [SyntheticSequence, Untold])
+def test_lengths_of_one_camera_are_metres_only_where_the_truth_tells(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: type[SyntheticSequence]
+) -> None:
+    drawn: dict[str, Any] = {}
+    monkeypatch.setattr(outputs, "draw_trajectory", lambda _, **values: drawn.update(values))
+    sequence = kind(SyntheticOptions(world="corridor", sensor="mono", frames=40, size=(320, 240)))
+    options = RunOptions("mono", SystemOptions(deterministic=True))
+    done = run_sequence(sequence, options, output=tmp_path / "r")
+    path = done.trajectory.positions
+    length = np.linalg.norm(np.diff(path, axis=0), axis=1).sum()
+    shown = np.linalg.norm(np.diff(drawn["positions"], axis=0), axis=1).sum()
+    assert b"z forward [units]\n" in (tmp_path / "r/points.ply").read_bytes()[:300]
+    if kind is Untold:
+        assert (drawn["unit"], drawn["truth"]) == ("units", None)
+        assert shown == pytest.approx(length)
+        return
+    true = SyntheticSequence(sequence.options).ground_truth().positions
+    n = len(path)
+    assert drawn["unit"] == "m"
+    truth_length = np.linalg.norm(np.diff(true[-n:], axis=0), axis=1).sum()
+    assert shown == pytest.approx(truth_length, rel=0.05)
+    assert shown != pytest.approx(length, rel=0.05), "the unit is not a metre by chance"
+    times, positions = drawn["truth"]
+    assert len(times) == 40, "the truth of the whole recording, also before the map began"
+    assert times[0] == pytest.approx(0.0)
+    np.testing.assert_allclose(positions[-n:], drawn["positions"], atol=0.05)
+    snapshot = done.result.snapshot.point_positions
+    assert len(drawn["points"]) == len(snapshot)

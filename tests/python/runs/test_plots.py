@@ -4,13 +4,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
+from orbslam2py.runs import plots
 from orbslam2py.runs.plots import draw_trajectory
+from orbslam2py.runs.timeline import Timeline
 from support.files import names_in
+from support.made_up_rows import FPS, rows_of
 
 pytestmark = pytest.mark.watchdog(20)
 
@@ -59,3 +63,76 @@ def test_axes_tell_the_unit(tmp_path: Path) -> None:
     # The labels differ, left and below; and with their size, a little, the axes.
     assert columns.min() < 0.05 * width
     assert rows.max() > 0.5 * height
+
+
+# ---- what there is to see ------------------------------------------------------------------------
+def circle(n: int = 200) -> np.ndarray:
+    angles = np.linspace(0, 2 * np.pi, n)
+    return np.stack([10 * np.cos(angles), np.sin(angles), 10 * np.sin(angles)], axis=1)
+
+
+def drawn(path: Path, positions: np.ndarray, **more: Any) -> np.ndarray:
+    values: dict[str, Any] = {
+        "seconds": np.arange(len(positions)) / FPS,
+        "keyframes": np.zeros((0, 3)),
+        "points": np.zeros((0, 3)),
+    }
+    draw_trajectory(path, title="t", positions=positions, **values | more)
+    picture = cv2.imread(str(path))
+    assert picture is not None
+    return picture
+
+
+def pixels_of(picture: np.ndarray, colour: str) -> np.ndarray:
+    """Rows and columns (n, 2) of the pixels that have just this colour."""
+    bgr = [int(colour[i : i + 2], 16) for i in (5, 3, 1)]
+    return np.argwhere((picture == bgr).all(axis=2))
+
+
+def test_ground_truth_is_seen_under_a_perfect_estimate(tmp_path: Path) -> None:
+    positions = circle()
+    seconds = np.arange(200) / FPS
+    picture = drawn(tmp_path / "p", positions, keyframes=positions[::4], truth=(seconds, positions))
+    middle = picture.shape[0] * 0.7
+    rows = pixels_of(picture, plots._TRUTH)[:, 0]
+    assert (rows < middle).sum() > 2000, "from above"
+    assert (rows > middle).sum() > 1000, "over time"
+
+
+def test_gaps_are_gaps(tmp_path: Path) -> None:
+    gaps = np.zeros(200, bool)
+    gaps[[50, 150]] = True
+    positions, seconds = circle(), np.arange(200) / FPS
+    # Half of the circle is missing, and half of the time.
+    kept = np.r_[0:50, 150:200]
+    pictures = [
+        drawn(tmp_path / "a", positions[kept], seconds=seconds[kept]),
+        drawn(tmp_path / "b", positions[kept], seconds=seconds[kept], gaps=gaps[kept]),
+    ]
+    blue = [len(pixels_of(picture, plots._ESTIMATE)) for picture in pictures]
+    np.testing.assert_array_equal(pictures[0], pictures[1], "ten seconds are a gap by themselves")
+    straight = drawn(tmp_path / "c", positions[kept])
+    assert len(pixels_of(straight, plots._ESTIMATE)) > blue[0] + 300, "20 m of a straight line"
+
+
+def test_a_pose_between_two_gaps_is_a_dot(tmp_path: Path) -> None:
+    lonely = np.array([[0.0, 0, 0], [1, 0, 1], [2, 0, 2]])
+    picture = drawn(tmp_path / "p", lonely, gaps=np.array([False, True, True]))
+    start = drawn(tmp_path / "q", lonely[:1])
+    assert len(pixels_of(picture, plots._ESTIMATE)) >= len(pixels_of(start, plots._ESTIMATE))
+
+
+def test_time_axis_is_that_of_the_recording(tmp_path: Path) -> None:
+    rows = rows_of("n" * 50 + "k" * 50 + "r" + "l" * 99)
+    timeline = Timeline.of(rows, 0)
+    positions, seconds = circle(50), np.arange(50, 100) / FPS
+    picture = drawn(tmp_path / "p", positions, seconds=seconds, timeline=timeline)
+    below = np.arange(len(picture)) > 0.75 * len(picture)
+    marked = pixels_of(picture, plots._UNTRACKED)
+    marked = marked[below[marked[:, 0]], 1]
+    line = pixels_of(picture, plots._ESTIMATE)
+    line = line[below[line[:, 0]], 1]
+    width = marked.max() - marked.min()
+    assert line.min() - marked.min() == pytest.approx(0.25 * width, abs=0.02 * width)
+    assert line.max() - marked.min() == pytest.approx(0.5 * width, abs=0.02 * width)
+    assert not ((marked > line.min() + 5) & (marked < line.max() - 5)).any()

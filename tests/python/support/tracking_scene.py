@@ -36,6 +36,7 @@ class FakeFrame:
         self.T_cw: _core.Pose | None = None
         self.reference_keyframe = -1
         self.map_points = np.arange(100)
+        self.outlier = np.zeros(100, np.uint8)
         self.close_counts = (200, 0)
         self.n_cleared = 0
         self.n_discards = 0

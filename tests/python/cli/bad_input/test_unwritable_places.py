@@ -84,8 +84,10 @@ def test_disk_full(
     assert {path.name for path in kept.iterdir()} == RUN_FILES
     assert list(Path("r").iterdir()) == [], "no halves"
     for name in sorted(RUN_FILES):
-        assert f"cannot write r/{name}: No space left on device" in done.err
+        assert f"cannot write r/{name}: No space left on device; kept in" in done.err
         assert f"kept in {kept / name}" in done.err
+    assert "Errno" not in done.err
+    assert done.err.count("cannot write") == len(RUN_FILES), "each is said once"
     assert len(read_tum(kept / "trajectory.txt")) == N
     assert Results(kept).report["tracked"] == N
 

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The table of all frames: frames.csv."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from orbslam2py._files import atomic_write
+from orbslam2py.runs.result import FrameRow
+from orbslam2py.slam.records import TrackingRecord
+from orbslam2py.trajectory.rotations import quaternions_from_rotations
+
+STAGES = ("wait", "extract", "stereo", "predict", "local_map", "keyframe", "track")
+
+_ALWAYS = ["index", "timestamp", "map", "state", "reason"]
+_TRACKED = [
+    *("inliers", "matches", "keyframe", "reference_keyframe"),
+    *("tx", "ty", "tz", "qx", "qy", "qz", "qw", "std_position", "std_angle", "visual_odometry"),
+    *(f"ms_{stage}" for stage in STAGES),
+]
+
+
+def write_frames(path: Path, rows: Iterable[FrameRow]) -> None:
+    """Write one line for every frame, tracked or not.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(_ALWAYS + _TRACKED)
+    for row in rows:
+        writer.writerow(_fields(row))
+    with atomic_write(path) as file:
+        file.write(stream.getvalue())
+
+
+def pose_deviation(record: TrackingRecord) -> tuple[float, float] | None:
+    """Take the standard deviation of a pose from its covariance.
+
+    The camera's centre is moved by the translation of a perturbation on the left, turned into the
+    world, so that both figures are roots of the trace of a block of the covariance.
+
+    Returns
+    -------
+    position, angle
+        Of the camera's centre [m] (one camera: the map's unit) and of its orientation [deg], all
+        directions together; None if they are not known.
+    """
+    if record.covariance is None:
+        return None
+    variances = np.diag(record.covariance)
+    angle, position = float(variances[:3].sum()), float(variances[3:].sum())
+    if not (math.isfinite(angle) and math.isfinite(position) and min(angle, position) >= 0):
+        return None
+    return math.sqrt(position), math.degrees(math.sqrt(angle))
+
+
+def _fields(row: FrameRow) -> list[object]:
+    record = row.record
+    if record is None:
+        return [row.index, row.timestamp, "", row.state, row.reason] + [""] * len(_TRACKED)
+    pose: list[object] = [""] * 7
+    if record.T_wc is not None:
+        quaternion = quaternions_from_rotations(record.T_wc[None, :3, :3])[0]
+        pose = [f"{value:.9f}" for value in (*record.T_wc[:3, 3], *quaternion)]
+    deviation = pose_deviation(record)
+    return [
+        row.index,
+        row.timestamp,
+        record.map_index,
+        row.state,
+        row.reason,
+        record.n_inliers,
+        record.n_matches,
+        int(record.is_keyframe),
+        record.reference_keyframe if record.reference_keyframe >= 0 else "",
+        *pose,
+        *([""] * 2 if deviation is None else [f"{value:.9f}" for value in deviation]),
+        int(record.visual_odometry) if record.T_wc is not None else "",
+        *(f"{record.milliseconds.get(stage, 0.0):.3f}" for stage in STAGES),
+    ]

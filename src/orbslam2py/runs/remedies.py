@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What helps when frames have no pose, reason by reason."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from orbslam2py.runs.result import DROPPED, FrameRow
+from orbslam2py.slam.records import Reason
+
+#: In the words of `docs/reference/reasons.md`.
+_WHAT_HELPS = {
+    Reason.TOO_FEW_KEYPOINTS: "light, texture, a sharp image; ORBextractor.minThFAST down, "
+    "ORBextractor.nFeatures up",
+    Reason.TOO_FEW_DEPTHS: "stereo: rectified pair, left and right not swapped; RGB-D: registered "
+    "depth, right DepthMapFactor, things within range",
+    Reason.FIRST_VIEW: "move the camera sideways; give it more images",
+    Reason.FEW_MATCHES_FIRST_VIEW: "slower motion, higher frame rate, more features "
+    "(ORBextractor.nFeatures)",
+    Reason.LOW_PARALLAX: "move further sideways, or closer to things",
+    Reason.AMBIGUOUS_MOTION: "move further sideways; include things at several distances, "
+    "not one wall or flat ground",
+    Reason.DEGENERATE_VIEWS: "translate: a plane alone can start a map, a pure rotation cannot",
+    Reason.INITIAL_MAP_FAILED: "go on moving sideways; more features (ORBextractor.nFeatures), "
+    "things at several distances",
+    Reason.FEW_MATCHES_LAST_FRAME: "slower motion, higher frame rate; come back to the map",
+    Reason.FEW_MATCHES_REFERENCE: "slower motion, higher frame rate, more features "
+    "(ORBextractor.nFeatures), more light, a wider lens",
+    Reason.FEW_INLIERS_REFERENCE: "a mask for what moves (--mask); the right calibration",
+    Reason.FEW_INLIERS_LOCAL_MAP: "more features (ORBextractor.nFeatures), texture and light, a "
+    "wider lens; more time at one place before moving on",
+    Reason.NOT_FOUND_IN_MAP: "come back to a place seen before, from a similar direction",
+}
+
+
+def what_helps(reason: Reason | str) -> str:
+    """Say what to change so that frames with this reason get a pose; empty if nobody knows."""
+    if reason == DROPPED:
+        return "leave out --realtime; fewer features (ORBextractor.nFeatures), smaller images"
+    return next((text for known, text in _WHAT_HELPS.items() if known.value == str(reason)), "")
+
+
+def why_nothing_was_tracked(rows: Sequence[FrameRow]) -> str:
+    """Name the commonest reason of a run without a pose, how common it was, and what helps.
+
+    That the first of two views was taken is a step on the way, and told only if there is nothing
+    else; frames that could not be read count as one reason, told by the first of them.
+    """
+    reasons = Counter(row.reason for row in rows if row.state != "SKIPPED" and row.reason)
+    skipped = [row.reason for row in rows if row.state == "SKIPPED"]
+    waiting = reasons.pop(Reason.FIRST_VIEW.value, 0)
+    if not reasons and waiting:
+        reasons[Reason.FIRST_VIEW.value] = waiting
+    reason, count = next(iter(reasons.most_common(1)), ("", 0))
+    if len(skipped) > count:
+        more = f" (and {len(skipped) - 1} more frames skipped)" if len(skipped) > 1 else ""
+        return skipped[0] + more
+    if not reason:
+        return "no frames"
+    told = f"{reason} ({count} of {len(rows)} frames)"
+    remedy = what_helps(reason)
+    return f"{told}; what helps: {remedy}" if remedy else told

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where a run's path has gaps, and what was tracked when."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from orbslam2py._arrays import FloatArray, IntArray
+from orbslam2py.runs.result import FrameRow
+
+#: Without a pose for longer than so many seconds, and so many frames, a path has a gap.
+_LONG_SECONDS, _LONG_FRAMES = 1.0, 5.0
+
+#: A stretch of time: its beginning and its end [s].
+Span = tuple[float, float]
+
+
+def gaps_in_time(seconds: FloatArray) -> npt.NDArray[np.bool_]:
+    """Find the places where too much time passes for a line to be drawn.
+
+    Parameters
+    ----------
+    seconds
+        Ascending, (n,).
+
+    Returns
+    -------
+    array of bool, (n,)
+        Whether there is a gap before each moment; never before the first.
+    """
+    gaps = np.zeros(len(seconds), bool)
+    steps = np.diff(seconds)
+    if len(steps):
+        gaps[1:] = steps > max(_LONG_SECONDS, _LONG_FRAMES * float(np.median(steps)))
+    return gaps
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """What became of the frames of a run, in seconds since the first of them."""
+
+    seconds: FloatArray
+    """(n,) of every frame."""
+    n_failed: IntArray
+    """(n,) how many frames up to each, itself included, should have a pose and have none."""
+    untracked: list[Span]
+    """When there was no pose."""
+    earlier: list[Span]
+    """When there were poses in a map before the last one."""
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first frame to the last; 0 without any."""
+        return float(self.seconds[-1]) if len(self.seconds) else 0.0
+
+    @classmethod
+    def of(cls, rows: Sequence[FrameRow], last_map: int) -> Timeline:
+        """Take it from the rows of a run whose last map has a number."""
+        seconds = np.array([float(row.timestamp) for row in rows])
+        seconds = seconds - seconds[:1].sum()
+        # What nobody looked at is no failure: tracking went on across it.
+        failed = np.array([row.state not in ("OK", "DROPPED") for row in rows], bool)
+        earlier = np.array([_in_map_before(row, last_map) for row in rows], bool)
+        return cls(seconds, np.cumsum(failed), _spans(seconds, failed), _spans(seconds, earlier))
+
+    def gaps_before(self, positions: IntArray) -> npt.NDArray[np.bool_]:
+        """Find gaps between poses.
+
+        Parameters
+        ----------
+        positions
+            Of the frames with a pose among those of the run, ascending, (k,).
+
+        Returns
+        -------
+        array of bool, (k,)
+            Whether tracking failed, or nothing was seen for long, between each and the one before.
+        """
+        gaps = gaps_in_time(self.seconds[positions])
+        gaps[1:] |= np.diff(self.n_failed[positions]) > 0
+        return gaps
+
+
+def _in_map_before(row: FrameRow, last_map: int) -> bool:
+    return row.record is not None and row.state == "OK" and row.record.map_index < last_map
+
+
+def _spans(seconds: FloatArray, chosen: npt.NDArray[np.bool_]) -> list[Span]:
+    """Stretches of chosen frames, each up to the next frame that is not."""
+    if not chosen.any():
+        return []
+    step = float(np.median(np.diff(seconds))) if len(seconds) > 1 else 0.0
+    padded = np.concatenate([[False], chosen, [False]]).astype(np.int8)
+    begins, ends = np.flatnonzero(np.diff(padded) == 1), np.flatnonzero(np.diff(padded) == -1)
+    after = np.append(seconds, seconds[-1] + step)
+    return [(float(seconds[b]), float(after[e])) for b, e in zip(begins, ends, strict=True)]

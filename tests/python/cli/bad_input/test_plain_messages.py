@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Messages are for people: no numbers of errors, no names of classes, nothing said twice."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from orbslam2py._files import describe_error
+from support.command_line import CommandLine
+
+pytestmark = pytest.mark.watchdog(30)
+
+SMALL = ("--frames", 2, "--size", "64x64")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("synthesize", "/proc/none/world", *SMALL), "/proc/none"),
+        (("synthesize", "w", "--world", "nowhere"), "--world"),
+        (("synthesize", "w", "--sensor", "lidar"), "--sensor"),
+        (("run", "w", "--sensor", "lidar"), "--sensor"),
+        (("evaluate", "est.txt", "est.txt", "--json", "none/figures.json"), "none/figures.json"),
+        (("evaluate", "est.txt", "est.txt", "--json", "."), "."),
+        (("evaluate", "est.txt", "est.txt", "--alignment", "so3"), "--alignment"),
+        (("evaluate", "missing.txt", "est.txt"), "missing.txt"),
+        (("evaluate", "est.txt", "a" * 300), "aaa"),
+        (("vocabulary", "convert", "missing.txt", "out.bvoc"), "missing.txt"),
+    ],
+)
+def test_what_does_not_show_through(
+    command: CommandLine, arguments: tuple[object, ...], named: str
+) -> None:
+    Path("est.txt").write_text("0.0 0 0 0 0 0 0 1\n0.1 1 0 0 0 0 0 1\n0.2 1 1 0 0 0 0 1\n")
+    done = command(*arguments)
+    assert done.code == 2, done.err
+    assert named in done.err
+    for word in ("Errno", "Value error", "ValueError", "Traceback", "OSError"):
+        assert word not in done.err
+    assert done.err.count("cannot write") <= 1
+
+
+@pytest.mark.parametrize(
+    ("error", "text"),
+    [
+        (FileNotFoundError(2, "No such file or directory", "x"), "x: No such file or directory"),
+        (OSError(28, "cannot write x: No space left", "x"), "cannot write x: No space left"),
+        (OSError("the camera is gone"), "the camera is gone"),
+        (RuntimeError("out of order"), "out of order"),
+        (RuntimeError(), "RuntimeError"),
+    ],
+)
+def test_errors_in_words(error: Exception, text: str) -> None:
+    assert describe_error(error) == text

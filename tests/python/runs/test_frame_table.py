@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What frames.csv says about the certainty of a pose."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orbslam2py.runs.frame_table import pose_deviation, write_frames
+from support.made_up_rows import rows_of
+
+pytestmark = pytest.mark.watchdog(20)
+
+
+def test_standard_deviation_in_metres_and_degrees(tmp_path: Path) -> None:
+    ok, lost = rows_of("kr")
+    assert ok.record is not None
+    degrees = np.radians(np.array([0.1, 0.2, 0.2]))
+    covariance = np.diag(np.concatenate([degrees, [0.03, 0.0, 0.04]]) ** 2)
+    known = replace(ok.record, covariance=covariance, visual_odometry=True)
+    assert pose_deviation(known) == pytest.approx((0.05, 0.3))
+    for unknown in (np.full((6, 6), np.nan), -np.eye(6), None):
+        assert pose_deviation(replace(known, covariance=unknown)) is None
+    write_frames(tmp_path / "f.csv", [replace(ok, record=known), ok, lost, *rows_of("s")])
+    with (tmp_path / "f.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    names = ("std_position", "std_angle", "visual_odometry")
+    assert [rows[0][name] for name in names] == ["0.050000000", "0.300000000", "1"]
+    assert [rows[1][name] for name in names] == ["", "", "0"]
+    assert [rows[2][name] for name in names] == ["", "", ""]
+    assert [rows[3][name] for name in names] == ["", "", ""]
+
+
+def test_turning_the_world_does_not_change_it() -> None:
+    """The translation of a perturbation on the left, turned into the world, moves the centre."""
+    rng = np.random.default_rng(3)
+    R = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    R *= np.sign(np.linalg.det(R))
+    t, A = rng.normal(size=3), 1e-4 * rng.normal(size=(6, 6))
+    centres = []
+    for w, v in (A @ rng.normal(size=(6, 40_000))).T.reshape(-1, 2, 3):
+        skew = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+        turned = (np.eye(3) + skew) @ R
+        centres.append(-turned.T @ (t + np.cross(w, t) + v))
+    measured = np.sqrt(np.var(np.array(centres), axis=0).sum())
+    (row,) = rows_of("k")
+    assert row.record is not None
+    deviation = pose_deviation(replace(row.record, covariance=A @ A.T))
+    assert deviation is not None
+    assert deviation[0] == pytest.approx(measured, rel=0.02)
