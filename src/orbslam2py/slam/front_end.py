@@ -9,9 +9,9 @@ import numpy.typing as npt
 from orbslam2py import _core as core
 from orbslam2py._timing import StageTimer
 from orbslam2py.errors import ImageError
+from orbslam2py.settings.depth_check import DepthCheck
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
-from orbslam2py.slam.depth_check import DepthCheck
 from orbslam2py.slam.thresholds import InitializationThresholds
 
 Mask = npt.NDArray[np.uint8]

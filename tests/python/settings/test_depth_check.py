@@ -13,8 +13,8 @@ import pytest
 from orbslam2py import Sensor
 from orbslam2py._timing import StageTimer
 from orbslam2py.settings import builtin_settings
+from orbslam2py.settings.depth_check import N_CHECKED, N_LOOKED_AT, DepthCheck
 from orbslam2py.slam import front_end
-from orbslam2py.slam.depth_check import N_CHECKED, N_LOOKED_AT, DepthCheck
 from orbslam2py.slam.front_end import FrontEnd
 from support.small_sequences import images, sequence
 
