@@ -12,7 +12,7 @@ import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
-from orbslam2py.trajectory import write_tum
+from orbslam2py.trajectory import write_kitti, write_tum
 from orbslam2py.vocabulary import read_training_images, save_vocabulary, train_vocabulary
 
 FRAMES, SIZE = 40, (320, 240)
@@ -53,7 +53,11 @@ def make_data(folder: Path) -> None:
     single = _walk("mono")
     images = [single.load(i).image for i in range(FRAMES)]
     single.settings.save(folder / "my.yaml")
-    write_tum(folder / "groundtruth.txt", single.ground_truth())
+    truth = single.ground_truth()
+    write_tum(folder / "groundtruth.txt", truth)
+    for name in ("estimate.txt", "poses.txt"):  # KITTI's format has no times of its own
+        write_kitti(folder / name, truth)
+    (folder / "times.txt").write_text("".join(f"{t:.9f}\n" for t in truth.timestamps))
     write_video(folder / "video.mp4", images, 20)
     (folder / "photographs").mkdir()
     for i, image in enumerate(images):
