@@ -129,7 +129,7 @@ class Pipeline:
             # From here on the image counts: every id is one image.
             self._next_frame_id += 1
             self._last_timestamp = timestamp
-            outcome = tracking.track(frame, timer, localize=self.localization.on)
+            outcome = tracking.track(frame, timer, localize=self.localization.on, details=details)
         self.statistics.add(timer.milliseconds)
 
         self._keep(frame, outcome)

@@ -151,4 +151,4 @@ class TrackingOutcome:
     reset_needed: bool = False
     """The map was lost so soon that it is better to begin another one."""
     inliers: npt.NDArray[np.bool_] | None = None
-    """(n,) keypoints that the pose was accepted with; None: those that have a point."""
+    """(n,) keypoints that the pose was accepted with; None unless details were asked for."""

@@ -151,7 +151,12 @@ class Tracking:
 
     # ---- one image -------------------------------------------------------------------------------
     def track(
-        self, frame: core.TrackedFrame, timer: StageTimer, *, localize: bool = False
+        self,
+        frame: core.TrackedFrame,
+        timer: StageTimer,
+        *,
+        localize: bool = False,
+        details: bool = False,
     ) -> TrackingOutcome:
         """Find the frame's pose; make it a keyframe if the map needs one.
 
@@ -166,6 +171,8 @@ class Tracking:
             Takes the time of each step.
         localize : bool
             Pose only: no keyframes, no new points.
+        details : bool
+            The outcome is to say which keypoints the pose was accepted with.
         """
         if self.initializing:
             return self._begin_map(frame, timer)
@@ -178,7 +185,7 @@ class Tracking:
         self.state = TrackingState.OK
         self._search.motion.update_velocity(frame)
         # Before temporary points go, and a keyframe's keypoints become points.
-        inliers = accepted_keypoints(frame)
+        inliers = accepted_keypoints(frame) if details else None
         is_keyframe = False
         if localize:
             core.discard_temporary(frame)
