@@ -17,10 +17,10 @@ import numpy as np
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py._files import atomic_write
+from orbslam2py.calibration.camera_model import camera_settings
 from orbslam2py.calibration.chessboard import Board, BoardView, BoardViews, choose_views
 from orbslam2py.errors import DatasetError
 from orbslam2py.settings import (
-    CameraSettings,
     OrbSettings,
     Sensor,
     Settings,
@@ -183,23 +183,7 @@ class Calibration:
         SettingsError
             If a number is out of range.
         """
-        width, height = self.size
-        k1, k2, p1, p2, k3 = self.distortion.tolist()
-        camera = CameraSettings(
-            fx=self.K[0, 0],
-            fy=self.K[1, 1],
-            cx=self.K[0, 2],
-            cy=self.K[1, 2],
-            k1=k1,
-            k2=k2,
-            p1=p1,
-            p2=p2,
-            k3=k3,
-            width=width,
-            height=height,
-            fps=fps,
-            rgb=rgb,
-        )
+        camera = camera_settings(self.K, self.distortion, self.size, fps=fps, rgb=rgb)
         return settings_for_camera(
             camera,
             sensor,

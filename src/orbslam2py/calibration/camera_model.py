@@ -35,23 +35,36 @@ class CameraModel:
 
     def settings(self, fps: float) -> Settings:
         """Make settings for this camera alone."""
-        k1, k2, p1, p2, k3 = self.distortion.tolist()
-        width, height = self.size or (None, None)
-        camera = CameraSettings(
-            fx=self.K[0, 0],
-            fy=self.K[1, 1],
-            cx=self.K[0, 2],
-            cy=self.K[1, 2],
-            k1=k1,
-            k2=k2,
-            p1=p1,
-            p2=p2,
-            k3=k3,
-            width=width,
-            height=height,
-            fps=fps,
-        )
+        camera = camera_settings(self.K, self.distortion, self.size, fps=fps)
         return settings_for_camera(camera, Sensor.MONOCULAR)
+
+
+def camera_settings(
+    K: NDArray[np.float64],
+    distortion: NDArray[np.float64],
+    size: tuple[int, int] | None,
+    *,
+    fps: float,
+    rgb: bool = False,
+) -> CameraSettings:
+    """Camera settings of a matrix (3, 3) [pixels], five coefficients, and width and height."""
+    k1, k2, p1, p2, k3 = distortion.tolist()
+    width, height = size or (None, None)
+    return CameraSettings(
+        fx=K[0, 0],
+        fy=K[1, 1],
+        cx=K[0, 2],
+        cy=K[1, 2],
+        k1=k1,
+        k2=k2,
+        p1=p1,
+        p2=p2,
+        k3=k3,
+        width=width,
+        height=height,
+        fps=fps,
+        rgb=rgb,
+    )
 
 
 def checked_numbers(path: Path, where: str, value: object, count: tuple[int, ...]) -> FloatArray:

@@ -78,10 +78,7 @@ def literals_of(text: str, name: str) -> list[float]:
 
 @pytest.fixture(scope="module")
 def thresholds() -> ModuleType:
-    try:
-        return importlib.import_module("orbslam2py.slam.thresholds")
-    except ModuleNotFoundError:
-        pytest.skip("there is no orbslam2py.slam.thresholds yet")
+    return importlib.import_module("orbslam2py.slam.thresholds")
 
 
 @pytest.mark.parametrize("path", CHAPTERS, ids=lambda p: p.stem)
