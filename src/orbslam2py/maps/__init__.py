@@ -9,8 +9,13 @@ from orbslam2py.maps.contents import (
     Observations,
     Points,
     RemovedKeyframes,
+    restore_contents,
+    take_contents,
 )
+from orbslam2py.maps.map_file import save_map
+from orbslam2py.maps.map_reader import load_map
 from orbslam2py.maps.ply import write_ply
+from orbslam2py.maps.saved_map import RecordedFrames, Run, SavedMap, VocabularyIdentity
 from orbslam2py.maps.snapshot import MapSnapshot, keyframe_trajectory, take_snapshot
 
 __all__ = [
@@ -21,8 +26,16 @@ __all__ = [
     "MapSnapshot",
     "Observations",
     "Points",
+    "RecordedFrames",
     "RemovedKeyframes",
+    "Run",
+    "SavedMap",
+    "VocabularyIdentity",
     "keyframe_trajectory",
+    "load_map",
+    "restore_contents",
+    "save_map",
+    "take_contents",
     "take_snapshot",
     "write_ply",
 ]
