@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The map outside of a running system: plain copies of it, and files of them."""
 
+from orbslam2py.maps.changes import KeyframesSet, MapChanges, MapFollower, PointsSet
 from orbslam2py.maps.contents import (
     Cameras,
     Covisibility,
@@ -22,10 +23,14 @@ __all__ = [
     "Cameras",
     "Covisibility",
     "Keyframes",
+    "KeyframesSet",
+    "MapChanges",
     "MapContents",
+    "MapFollower",
     "MapSnapshot",
     "Observations",
     "Points",
+    "PointsSet",
     "RecordedFrames",
     "RemovedKeyframes",
     "Run",
