@@ -234,7 +234,7 @@ def test_changes_are_printed_in_one_line(frame: core.Frame) -> None:
     growing = Growing(frame, keyframes=2)
     growing.add_point(0, 0, 1)
     assert repr(growing.look()) == (
-        "MapChanges(map_index=0, restarted=True, keyframes=+2 -0, points=+1 -0, "
-        "edges=covisibility, loop_edges, spanning_tree)"
+        "<MapChanges: map 0 from the beginning, keyframes +2 -0, points +1 -0, "
+        "new covisibility, loop edges, spanning tree>"
     )
-    assert repr(growing.look()).endswith("points=+0 -0, edges=as before)")
+    assert repr(growing.look()) == "<MapChanges: map 0, keyframes +0 -0, points +0 -0>"
