@@ -79,4 +79,5 @@ def frame_features(
         depths=features.depth,
         map_point_ids=frame.map_points,
         inliers=accepted_keypoints(frame) if inliers is None else inliers,
+        colours=features.colours,
     )

@@ -60,9 +60,10 @@ class FrontEnd:
         with timer("extract"):
             grey = core.to_grey(image, self._settings.camera.rgb)
             extractor = self._initial_extractor if initializing else self._extractor
-            return core.build_monocular_frame(
+            frame = core.build_monocular_frame(
                 context, frame_id, timestamp, extractor.extract(grey, mask)
             )
+            return self._coloured(frame, image)
 
     def stereo(
         self,
@@ -92,9 +93,10 @@ class FrontEnd:
                 left_grey, right_grey, left_mask, right_mask
             )
         with timer("stereo"):
-            return core.build_stereo_frame(
+            frame = core.build_stereo_frame(
                 context, frame_id, timestamp, features_left, features_right
             )
+            return self._coloured(frame, left)
 
     def rgbd(
         self,
@@ -128,7 +130,13 @@ class FrontEnd:
             extraction = self._extractor.extract(grey, mask)
         with timer("stereo"):
             metres = core.to_depth_metres(depth, self._settings.depth_factor)
-            return core.build_rgbd_frame(context, frame_id, timestamp, extraction, metres)
+            frame = core.build_rgbd_frame(context, frame_id, timestamp, extraction, metres)
+            return self._coloured(frame, image)
+
+    def _coloured(self, frame: core.Frame, image: npt.NDArray[np.uint8]) -> core.Frame:
+        if image.ndim == 3:
+            core.sample_colours(frame, image, self._settings.camera.rgb)
+        return frame
 
     def _check(self, image: npt.NDArray[np.uint8], what: str) -> None:
         if not isinstance(image, np.ndarray):

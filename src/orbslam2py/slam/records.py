@@ -58,6 +58,8 @@ class FrameFeatures:
     """(n,) id of the matched map point, -1 for none; in a keyframe also of points made from it."""
     inliers: npt.NDArray[np.bool_]
     """(n,) matched and accepted by the pose optimisation: as many as `TrackingRecord.n_inliers`."""
+    colours: npt.NDArray[np.uint8]
+    """(n, 3) red, green, blue of the image at the keypoints; (0, 3) for a grey image."""
 
 
 @dataclass(frozen=True)

@@ -53,7 +53,7 @@ ROOMS = {
     "calibration": ["Board", "Calibration", "calibrate", "find_views", "read_camera_file"],
     "datasets": ["ImageFolder", "Images", "LiveCamera", "Sequence", "VideoSequence", "open_input"],
     "evaluation": ["Alignment", "align", "evaluate_trajectory", "lap_error"],
-    "maps": ["MapSnapshot"],
+    "maps": ["MapChanges", "MapFollower", "MapSnapshot"],
     "runs": ["RunOptions", "RunResult", "SequenceRunner", "SystemOptions", "run_sequence"],
     "settings": ["CameraSettings", "DepthSettings", "OrbSettings", "Settings", "builtin_settings"],
     "synthetic": ["SyntheticOptions", "SyntheticSequence"],
