@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO, Any, NoReturn
 
+from orbslam2py._arguments import path_of
+
 #: Endings of names, in lower case, that OpenCV reads as single images.
 IMAGE_SUFFIXES = (
     ".png",
@@ -61,7 +63,10 @@ def atomic_write(path: str | os.PathLike[str], *, binary: bool = False) -> Itera
     OSError
         If the file cannot be written (no permission, no such folder, disk full); the message
         names the file. Subclasses (`PermissionError`, `FileNotFoundError`) as usual.
+    DatasetError
+        If `path` is no path.
     """
+    path = path_of(path, "the file to write")
     target = Path(os.path.realpath(path))
     if target.exists() and not target.is_file():
         with _open(path, target, os.O_WRONLY, binary) as stream:
@@ -107,7 +112,7 @@ def atomic_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
     OSError
         If it cannot be written or replaced.
     """
-    target = Path(os.path.realpath(path))
+    target = Path(os.path.realpath(path_of(path, "the folder to write")))
     token = secrets.token_hex(4)
     temporary = target.with_name(f".{target.name}.{token}.tmp")
     temporary.mkdir(parents=True)

@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
+from orbslam2py._arguments import path_of
 from orbslam2py.errors import DatasetError
 
 
@@ -33,8 +34,9 @@ def content_lines(path: str | Path, separator: str | None = None) -> list[TextLi
     DatasetError
         If the file cannot be read.
     """
+    path = path_of(path, "the file to read")
     try:
-        text = Path(path).read_text(encoding="utf-8-sig", errors="replace")
+        text = path.read_text(encoding="utf-8-sig", errors="replace")
     except OSError as error:
         raise DatasetError(f"cannot open {path}: {error.strerror or error}") from error
     lines = []

@@ -14,6 +14,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from orbslam2py._arguments import path_of
 from orbslam2py.calibration.camera_model import (
     CameraModel,
     checked_camera_matrix,
@@ -93,7 +94,7 @@ def read_camera_file(
     SettingsError
         If the file cannot be read or understood, or has a camera model that is not supported.
     """
-    path = Path(path)
+    path = path_of(path, "the calibration file", SettingsError)
     text = _read_text(path)
     if file_format is CameraFileFormat.AUTO:
         file_format = _recognise(path, text)

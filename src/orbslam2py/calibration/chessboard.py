@@ -11,6 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from orbslam2py._arguments import finite_number, is_whole, shown
 from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py.datasets import VideoReader
 from orbslam2py.datasets.image_folder import image_files
@@ -43,6 +44,12 @@ class Board:
     square: float = 1.0
 
     def __post_init__(self) -> None:
+        if not (is_whole(self.columns) and is_whole(self.rows)):
+            raise SettingsError(
+                f"the board has {shown(self.columns)} x {shown(self.rows)} inner corners; give "
+                "whole numbers, such as 9 x 6"
+            )
+        finite_number(self.square, "the side of the squares", "metres, such as 0.025")
         if min(self.columns, self.rows) < 3 or max(self.columns, self.rows) > 100:
             raise SettingsError(
                 f"a board of {self.columns} x {self.rows} inner corners cannot be used: give 3 to "

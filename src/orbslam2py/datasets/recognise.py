@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from orbslam2py._arguments import path_of
 from orbslam2py.datasets.base import Layout
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.euroc import EurocSequence, find_root
@@ -33,7 +34,7 @@ def recognise(folder: str | Path) -> Layout:
     DatasetError
         If the folder is missing, fits no layout, or several.
     """
-    folder = Path(folder)
+    folder = path_of(folder, "the folder of the sequence")
     if not folder.exists():
         raise DatasetError(f"{folder} does not exist")
     if not folder.is_dir():
@@ -91,6 +92,9 @@ def open_sequence(
     SettingsError
         If the settings given are wrong.
     """
+    folder = path_of(folder, "the folder of the sequence")
+    if association is not None:
+        association = path_of(association, "association")
     layout = recognise(folder) if layout is None else Layout(layout)
     if layout is Layout.TUM:
         return TumSequence(folder, sensor, settings=settings, association=association)

@@ -5,11 +5,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from orbslam2py._arguments import choice_of, is_whole, shown
 from orbslam2py.datasets.base import LiveSource, Sequence
-from orbslam2py.errors import DatasetError
+from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.runs.feeds import is_sequence
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.options import SystemOptions
+
+_MAY_BE_NONE = ("max_frames", "localize_after")
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,13 @@ class RunOptions:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sensor", Sensor(self.sensor))
+        object.__setattr__(self, "realtime", choice_of(self.realtime, "realtime"))
+        if not isinstance(self.system, SystemOptions):
+            raise SettingsError(f"system is {shown(self.system)}; give SystemOptions(...)")
+        for name in ("start", "stride", "max_frames", "localize_after"):
+            value = getattr(self, name)
+            if not is_whole(value) and not (value is None and name in _MAY_BE_NONE):
+                raise SettingsError(f"{name} is {shown(value)}; give a whole number of frames")
 
     def n_frames(self, source: Sequence | LiveSource) -> int | None:
         """How many frames a run over the source will take; None for a camera without an end.

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from orbslam2py._arguments import choice_of, is_number, seed_of, shown
 from orbslam2py.errors import SettingsError
 
 
@@ -16,7 +17,8 @@ class SystemOptions:
     Raises
     ------
     SettingsError
-        If the time limit is not more than 0, or given for the deterministic mode.
+        If a switch is not True or False, the seed is no whole number from 0 to 2^64 - 1, or the
+        time limit is not more than 0 or given for the deterministic mode.
     """
 
     deterministic: bool = False
@@ -27,12 +29,16 @@ class SystemOptions:
     seed: int = 0
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "seed", seed_of(self.seed))
+        for name in ("deterministic", "wait_for_mapping", "loop_closing", "full_adjustment"):
+            object.__setattr__(self, name, choice_of(getattr(self, name), name))
         seconds = self.full_adjustment_time_limit
         if seconds is None:
             return
-        if not (math.isfinite(seconds) and seconds > 0):
+        if not (is_number(seconds) and math.isfinite(seconds) and seconds > 0):
             raise SettingsError(
-                f"the time limit of the full adjustment must be more than 0 s, got {seconds}"
+                "the time limit of the full adjustment must be more than 0 s, got "
+                f"{shown(seconds)}; give seconds, or None for no limit"
             )
         if self.deterministic:
             raise SettingsError(

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
+from orbslam2py._arguments import is_number, shown
 from orbslam2py.errors import ImageError, StateError, WorkerError
 from orbslam2py.maps.snapshot import MapSnapshot, keyframe_trajectory, take_snapshot
 from orbslam2py.settings.sensor import Sensor
@@ -115,7 +116,7 @@ class System:
             vocabulary = load_vocabulary(vocabulary)
         self.vocabulary = vocabulary
         self.pipeline = Pipeline(
-            self.settings, self.sensor, vocabulary, self.options, callbacks or Callbacks()
+            self.settings, self.sensor, vocabulary, self.options, Callbacks.of(callbacks)
         )
         self._guard = CallGuard("tracking")
         self._shut_down = False
@@ -329,8 +330,8 @@ class System:
     def reset(self) -> None:
         """Ask for a new map; carried out at the beginning of the next track call.
 
-        Settings, vocabulary and mode stay. The trajectory of the present map is kept, see
-        `trajectories`.
+        Settings, vocabulary and mode stay; the images may have another size from then on. The
+        trajectory of the present map is kept, see `trajectories`.
         """
         self.pipeline.reset_requested.set()
 
@@ -370,7 +371,7 @@ class System:
             False when `timeout` seconds passed first, or keyframes wait for the end of localization
             mode.
         """
-        return self.pipeline.back_end.wait_until_idle(timeout)
+        return self.pipeline.back_end.wait_until_idle(_seconds(timeout))
 
     def shutdown(
         self,
@@ -398,6 +399,7 @@ class System:
         WorkerError
             If a worker has failed, or does not end in time.
         """
+        timeout = _seconds(timeout)
         self._shut_down = True
         if not self._finalizer.alive:
             return
@@ -511,6 +513,12 @@ def _present(array: _Array | None, what: str, timestamp: float) -> _Array:
     if array is None:
         raise ImageError(f"the frame of {timestamp:.6f} s has no {what}, which this sensor needs")
     return array
+
+
+def _seconds(timeout: float | None) -> float | None:
+    if timeout is None or (is_number(timeout) and timeout >= 0):
+        return timeout
+    raise StateError(f"timeout is {shown(timeout)}; give seconds from 0, or None to wait for ever")
 
 
 class CallGuard:

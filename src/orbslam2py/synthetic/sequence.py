@@ -20,8 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbslam2py import _core as core
+from orbslam2py._arguments import shown
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
 from orbslam2py.datasets import FramesInOrder, Images, Layout
+from orbslam2py.errors import SettingsError
 from orbslam2py.settings import CameraSettings, DepthSettings, OrbSettings, Sensor, Settings
 from orbslam2py.synthetic.files import write_sequence
 from orbslam2py.synthetic.options import SyntheticOptions
@@ -45,6 +47,8 @@ class SyntheticSequence(FramesInOrder):
     """
 
     def __init__(self, options: SyntheticOptions, *, threads: int = 1) -> None:
+        if not isinstance(options, SyntheticOptions):
+            raise SettingsError(f"options are {shown(options)}; give SyntheticOptions(...)")
         self.options = options
         self._threads = threads
         self._world = SyntheticWorld(options.world)

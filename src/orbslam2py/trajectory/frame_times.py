@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from orbslam2py._arguments import path_of
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._text_lines import content_lines, number_of
 from orbslam2py.errors import DatasetError
@@ -49,7 +50,7 @@ def read_frame_table(path: str | Path) -> FrameTable:
     """
     rows = []
     try:
-        with Path(path).open(encoding="utf-8", newline="") as stream:
+        with path_of(path, "the table of frames").open(encoding="utf-8", newline="") as stream:
             reader = csv.DictReader(stream)
             for row in reader:
                 world = int(row["map"]) if row["map"] else -1

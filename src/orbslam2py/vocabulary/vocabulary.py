@@ -23,6 +23,7 @@ from typing import IO
 import numpy as np
 
 from orbslam2py import _core as core
+from orbslam2py._arguments import path_of, shown
 from orbslam2py._files import atomic_write
 from orbslam2py.errors import VocabularyError
 from orbslam2py.vocabulary import _textio
@@ -70,7 +71,7 @@ def load_vocabulary(
     """
     if path is None:
         path = os.environ.get(ENVIRONMENT_VARIABLE) or default_vocabulary_path()
-    chosen = Path(path).expanduser()
+    chosen = path_of(path, "the vocabulary", VocabularyError).expanduser()
     file_format = detect_format(chosen)
     if file_format is VocabularyFormat.BINARY:
         return core.Vocabulary.open(str(chosen))
@@ -158,7 +159,11 @@ def save_vocabulary(
     VocabularyError
         If the name has another ending or the file cannot be written.
     """
-    target = Path(path).expanduser()
+    if not isinstance(vocabulary, core.Vocabulary):
+        raise VocabularyError(
+            f"the vocabulary is {shown(vocabulary)}; give one that load_vocabulary returned"
+        )
+    target = path_of(path, "the file of the vocabulary", VocabularyError).expanduser()
     if target.suffix == ".bvoc":
         vocabulary.save(str(target), comment, core.VocabularySource())
     elif target.suffix == ".txt":
@@ -221,6 +226,7 @@ def convert_vocabulary(
     VocabularyError
         If one cannot be read or the other not be written.
     """
+    source = path_of(source, "the vocabulary", VocabularyError)
     vocabulary = load_vocabulary(source, cache=False, progress=_half(progress, 0.0))
     comment = vocabulary.comment or f"Converted from {Path(source).name}."
     save_vocabulary(vocabulary, target, comment=comment, progress=_half(progress, 0.5))
@@ -266,7 +272,9 @@ def vocabulary_info(path: str | os.PathLike[str] | None = None) -> VocabularyInf
     VocabularyError
         If it is damaged or not a vocabulary.
     """
-    chosen = Path(path or os.environ.get(ENVIRONMENT_VARIABLE) or default_vocabulary_path())
+    if path is None:
+        path = os.environ.get(ENVIRONMENT_VARIABLE) or default_vocabulary_path()
+    chosen = path_of(path, "the vocabulary", VocabularyError)
     vocabulary = load_vocabulary(chosen, cache=False)
     vocabulary.check_content()
     _, is_word, _, weights = vocabulary.table()
