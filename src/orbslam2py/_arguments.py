@@ -6,6 +6,7 @@ Without, it would surface deep inside, as a bare `TypeError` about a thing nobod
 
 from __future__ import annotations
 
+import errno
 import math
 import numbers
 import os
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from orbslam2py.errors import DatasetError, OrbSlamError, SettingsError
+from orbslam2py.errors import DatasetError, OrbSlamError, SettingsError, StateError
 
 #: Seeds are unsigned 64-bit numbers in the core.
 LARGEST_SEED = 2**64 - 1
@@ -86,6 +87,34 @@ def seed_of(value: Any, what: str = "seed", most: int = LARGEST_SEED) -> int:
     if not is_whole(value) or not 0 <= value <= most:
         raise SettingsError(f"{what} is {shown(value)}; give a whole number from 0 to {most}")
     return int(value)
+
+
+def patience_of(timeout: Any) -> float | None:
+    """Take seconds to wait at most; None waits for ever.
+
+    Raises
+    ------
+    StateError
+        For anything else.
+    """
+    if timeout is None or (is_number(timeout) and timeout >= 0):
+        return None if timeout is None else float(timeout)
+    raise StateError(f"timeout is {shown(timeout)}; give seconds from 0, or None to wait for ever")
+
+
+_REMEDIES = {
+    errno.ENOENT: "check the path",
+    errno.EISDIR: "give a file, not a folder",
+    errno.ENOTDIR: "check the path: a part of it is a file",
+    errno.EACCES: "ask for the right to read it, or give another one",
+}
+
+
+def cannot_open(path: object, error: OSError, what: str = "") -> str:
+    """Say that a file cannot be read, why, and what to do about it."""
+    named = f"{what} {path}" if what else f"{path}"
+    remedy = _REMEDIES.get(error.errno or 0, "give another file")
+    return f"cannot open {named}: {error.strerror or error}; {remedy}"
 
 
 def path_of(value: Any, what: str, error: type[OrbSlamError] = DatasetError) -> Path:

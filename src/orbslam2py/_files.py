@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import secrets
 import shutil
@@ -26,6 +27,13 @@ IMAGE_SUFFIXES = (
     ".ppm",
     ".jp2",
 )
+
+
+_REMEDIES = {
+    errno.ENOENT: "make the folder first",
+    errno.ENOTDIR: "a part of the path is a file; give another one",
+    errno.EISDIR: "give the name of a file",
+}
 
 
 def reason_of(error: OSError) -> str:
@@ -115,7 +123,14 @@ def atomic_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
     target = Path(os.path.realpath(path_of(path, "the folder to write")))
     token = secrets.token_hex(4)
     temporary = target.with_name(f".{target.name}.{token}.tmp")
-    temporary.mkdir(parents=True)
+    try:
+        temporary.mkdir(parents=True)
+    except OSError as error:
+        raise OSError(
+            error.errno,
+            f"cannot write to {path}: {reason_of(error)}; give another folder",
+            str(path),
+        ) from error
     try:
         yield temporary
         if target.exists() and any(target.iterdir()):
@@ -161,6 +176,7 @@ def _report_as(path: str | os.PathLike[str], step: Callable[[], object]) -> None
 
 
 def _raise_named(path: str | os.PathLike[str], error: OSError) -> NoReturn:
-    message = f"cannot write {path}: {reason_of(error)}; a file that was there is kept"
+    remedy = _REMEDIES.get(error.errno or 0, "a file that was there is kept")
+    message = f"cannot write {path}: {reason_of(error)}; {remedy}"
     # OSError(errno, ...) makes the matching subclass by itself.
     raise OSError(error.errno, message, str(path)) from error

@@ -208,7 +208,9 @@ def find_views(
         if progress is not None:
             progress(result.n_searched, len(result.views))
     if result.n_unreadable == result.n_searched:
-        raise ImageError(f"none of the {result.n_searched} images of {source} can be read")
+        raise ImageError(
+            f"none of the {result.n_searched} images of {source} can be read; give others"
+        )
     if not result.views:
         raise DatasetError(
             f"no board of {board} inner corners in any of the {result.n_searched} images of "
@@ -272,7 +274,7 @@ def _images(
     if source.is_dir():
         paths = image_files(source)[:: every or 1]
         if not paths:
-            raise DatasetError(f"no images in {source}")
+            raise DatasetError(f"no images in {source}; give a folder of images, or a video")
         for path in paths:
             try:
                 yield path.name, read_image(path, rgb=False)

@@ -65,7 +65,9 @@ def open_input(
     if is_whole(source) or (str(source).isdecimal() and not named.exists()):
         number = int(str(source))
         if times is not None:
-            raise DatasetError("--times does not go with a camera: its images get their own times")
+            raise DatasetError(
+                "--times does not go with a camera: its images get their own times; leave it out"
+            )
         camera = LiveCamera(number, sensor, settings=settings, fps=fps)
         live: LiveSource = camera if mask is None else MaskedCamera(camera, mask)
         live.open()

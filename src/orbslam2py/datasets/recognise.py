@@ -36,7 +36,11 @@ def recognise(folder: str | Path) -> Layout:
     """
     folder = path_of(folder, "the folder of the sequence")
     if not folder.exists():
-        raise DatasetError(f"{folder} does not exist")
+        raise DatasetError(
+            f"{folder} does not exist; give the folder of a sequence, a folder of images, a "
+            "video or "
+            "the number of a camera"
+        )
     if not folder.is_dir():
         raise DatasetError(f"{folder} is no folder; give the folder of a sequence")
     found = _layouts(folder)
@@ -49,6 +53,8 @@ def recognise(folder: str | Path) -> Layout:
     inner = sorted(child for child in folder.iterdir() if child.is_dir() and _layouts(child))
     if inner:
         message += f"; did you mean {inner[0]}?"
+    else:
+        message += "; give the folder in which these lie"
     raise DatasetError(message)
 
 

@@ -69,7 +69,9 @@ class RunOptions:
         """
         if self.system.deterministic and self.realtime:
             raise DatasetError(
-                "--deterministic and --realtime exclude each other: dropping frames depends on time"
+                "--deterministic and --realtime exclude each other: dropping frames depends on "
+                "time; "
+                "leave one of them out"
             )
         if (
             self.start < 0
@@ -79,7 +81,10 @@ class RunOptions:
             raise DatasetError("--start must be 0 or more, --stride and --max-frames 1 or more")
         indices = list(range(self.start, n_frames, self.stride))
         if not indices:
-            raise DatasetError(f"--start {self.start} is past the end: {n_frames} frames")
+            raise DatasetError(
+                f"--start {self.start} is past the end; give less than the number of frames, "
+                f"{n_frames}"
+            )
         return indices[: self.max_frames]
 
     def check_for_camera(self) -> None:

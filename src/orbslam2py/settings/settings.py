@@ -247,8 +247,8 @@ def resolve_settings(
     if not isinstance(choice, str | PathLike) or not str(choice):
         raise SettingsError(
             f"settings are {shown(choice)}; give Settings, a file, or "
-            f"a built-in name ({', '.join(BUILTIN_NAMES)}); settings_for_camera makes them of the "
-            "numbers of a camera"
+            f"a built-in name ({', '.join(BUILTIN_NAMES)}); 'orbslam2py settings new' and "
+            "settings_for_camera make them of the numbers of a camera"
         )
     choice = path_of(choice, "the settings file", SettingsError)
     if looks_like_path(choice) and not is_builtin_name(str(choice)):

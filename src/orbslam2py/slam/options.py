@@ -38,10 +38,10 @@ class SystemOptions:
         if not (is_number(seconds) and math.isfinite(seconds) and seconds > 0):
             raise SettingsError(
                 "the time limit of the full adjustment must be more than 0 s, got "
-                f"{shown(seconds)}; give seconds, or None for no limit"
+                f"{shown(seconds)}; give seconds, or leave it out"
             )
         if self.deterministic:
             raise SettingsError(
                 "deterministic mode takes no time limit for the full adjustment: what is reached "
-                "in a given time differs from run to run"
+                "in a given time differs from run to run; leave the limit out"
             )

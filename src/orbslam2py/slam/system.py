@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
-from orbslam2py._arguments import is_number, shown
+from orbslam2py._arguments import patience_of
 from orbslam2py.errors import ImageError, StateError, WorkerError
 from orbslam2py.maps.snapshot import MapSnapshot, keyframe_trajectory, take_snapshot
 from orbslam2py.settings.sensor import Sensor
@@ -371,7 +371,7 @@ class System:
             False when `timeout` seconds passed first, or keyframes wait for the end of localization
             mode.
         """
-        return self.pipeline.back_end.wait_until_idle(_seconds(timeout))
+        return self.pipeline.back_end.wait_until_idle(patience_of(timeout))
 
     def shutdown(
         self,
@@ -399,7 +399,7 @@ class System:
         WorkerError
             If a worker has failed, or does not end in time.
         """
-        timeout = _seconds(timeout)
+        timeout = patience_of(timeout)
         self._shut_down = True
         if not self._finalizer.alive:
             return
@@ -513,12 +513,6 @@ def _present(array: _Array | None, what: str, timestamp: float) -> _Array:
     if array is None:
         raise ImageError(f"the frame of {timestamp:.6f} s has no {what}, which this sensor needs")
     return array
-
-
-def _seconds(timeout: float | None) -> float | None:
-    if timeout is None or (is_number(timeout) and timeout >= 0):
-        return timeout
-    raise StateError(f"timeout is {shown(timeout)}; give seconds from 0, or None to wait for ever")
 
 
 class CallGuard:

@@ -86,12 +86,19 @@ class SyntheticOptions:
         _check_range("lateral", self.lateral, -beside, beside)
         _check_range("yaw", self.yaw, -180, 180)
         if self.speed is not None and self.world is SyntheticWorld.ROOM:
-            raise SettingsError("speed does not apply to the room: one turn takes 30 s")
+            raise SettingsError(
+                "speed does not apply to the room: one turn takes 30 s; leave it out"
+            )
         if self.laps is not None and self.world not in LAPS:
             names = ", ".join(map(str, LAPS))
-            raise SettingsError(f"laps apply to ways that come back to their start: {names}")
+            raise SettingsError(
+                f"laps apply to ways that come back to their start: {names}; take one, or give "
+                "frames"
+            )
         if self.laps is not None and self.frames is not None:
-            raise SettingsError("frames and laps exclude each other: both say how long the way is")
+            raise SettingsError(
+                "frames and laps exclude each other: both say how long the way is; give one"
+            )
 
 
 def _member(kind: type[Enum], name: str, value: object) -> Enum:

@@ -62,7 +62,9 @@ def read_kitti(path: str | Path, timestamps: FloatArray | None = None) -> Trajec
     if len(table) > len(stamps):
         raise DatasetError(f"{path}: {len(table)} poses for {len(stamps)} time stamps")
     if len(table) and np.linalg.det(table[:, :, :3]).min() < 0.5:
-        raise DatasetError(f"{path}: not all poses hold rotations")
+        raise DatasetError(
+            f"{path}: not all poses hold rotations; a row is the upper three rows of T_wc"
+        )
     return Trajectory(
         stamps[: len(table)], poses_from(nearest_rotations(table[:, :, :3]), table[:, :, 3])
     )
@@ -85,7 +87,9 @@ def read_euroc(path: str | Path) -> Trajectory:
     for line in content_lines(path, separator=","):
         nanoseconds = line.fields[0]
         if not nanoseconds.isdigit():
-            raise DatasetError(f"{path}:{line.number}: '{nanoseconds}' is not a time in ns")
+            raise DatasetError(
+                f"{path}:{line.number}: '{nanoseconds}' is not a time in ns; name another format"
+            )
         rows.append(numbers_of(path, line, (8, 17))[:8])
         rows[-1][0] = int(nanoseconds) / 1e9
     table = _table(path, rows, 8)
@@ -126,14 +130,14 @@ def read_trajectory(
     }
     trajectory = readers[file_format](path)
     if not len(trajectory):
-        raise DatasetError(f"{path} holds no poses")
+        raise DatasetError(f"{path} holds no poses; give a file with one per line")
     return trajectory, file_format
 
 
 def _recognise_format(path: str | Path) -> TrajectoryFormat:
     first = next(iter(content_lines(path)), None)
     if first is None:
-        raise DatasetError(f"{path} holds no poses")
+        raise DatasetError(f"{path} holds no poses; give a file with one per line")
     if "," in "".join(first.fields):
         return TrajectoryFormat.EUROC
     by_count = {8: TrajectoryFormat.TUM, 12: TrajectoryFormat.KITTI}
@@ -149,12 +153,17 @@ def _table(path: str | Path, rows: list[list[float]], columns: int) -> FloatArra
     table = np.array(rows, dtype=np.float64).reshape(-1, columns)
     if not np.isfinite(table).all():
         bad = int(np.flatnonzero(~np.isfinite(table).all(axis=1))[0])
-        raise DatasetError(f"{path}: pose {bad} holds a number that is not finite")
+        raise DatasetError(
+            f"{path}: pose {bad} holds a number that is not finite; correct it or leave it out"
+        )
     return table
 
 
 def _poses(path: str | Path, positions: FloatArray, quaternions: FloatArray) -> FloatArray:
     norms = np.linalg.norm(quaternions, axis=1)
     if np.any(norms < 1e-6):
-        raise DatasetError(f"{path}: the quaternion of pose {int(norms.argmin())} is zero")
+        raise DatasetError(
+            f"{path}: the quaternion of pose {int(norms.argmin())} is zero; a pose is tx ty tz "
+            "qx qy qz qw"
+        )
     return poses_from(rotations_from_quaternions(quaternions), positions)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from orbslam2py._arguments import path_of
+from orbslam2py._arguments import cannot_open, path_of
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._text_lines import content_lines, number_of
 from orbslam2py.errors import DatasetError
@@ -57,7 +57,7 @@ def read_frame_table(path: str | Path) -> FrameTable:
                 timestamp = float(row["timestamp"])
                 rows.append((int(row["index"]), timestamp, world, row["state"] == "OK"))
     except OSError as error:
-        raise DatasetError(f"cannot open {path}: {error.strerror or error}") from error
+        raise DatasetError(cannot_open(path, error)) from error
     except (KeyError, TypeError, ValueError, csv.Error):
         raise DatasetError(
             f"{path}:{len(rows) + 2}: no row of a run's frames (index, timestamp, map, state); "

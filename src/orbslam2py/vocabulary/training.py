@@ -35,7 +35,13 @@ def read_training_images(folder: str | os.PathLike[str]) -> list[Path]:
     root = path_of(folder, "the folder of images", VocabularyError).expanduser()
     images = sorted(p for p in root.rglob("*") if p.suffix.lower() in IMAGE_SUFFIXES)
     if not images:
-        raise VocabularyError(f"{root}: no images ({', '.join(sorted(IMAGE_SUFFIXES))}) found")
+        if not root.is_dir():
+            what = "is a file" if root.exists() else "does not exist"
+            raise VocabularyError(f"{root} {what}; give a folder of photographs")
+        suffixes = ", ".join(sorted(IMAGE_SUFFIXES))
+        raise VocabularyError(
+            f"{root} holds no images ({suffixes}), nor do its folders; give a folder of photographs"
+        )
     return images
 
 
@@ -107,7 +113,7 @@ def _describe_images(
             of_thread.extractor = core.OrbExtractor(features)
         image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
         if image is None:
-            raise ImageError(f"{path}: cannot be read as an image")
+            raise ImageError(f"{path}: cannot be read as an image; remove it, or replace it")
         descriptors: ByteArray = of_thread.extractor.extract(image).descriptors
         return descriptors
 

@@ -23,7 +23,7 @@ from typing import IO
 import numpy as np
 
 from orbslam2py import _core as core
-from orbslam2py._arguments import path_of, shown
+from orbslam2py._arguments import cannot_open, path_of, shown
 from orbslam2py._files import atomic_write
 from orbslam2py.errors import VocabularyError
 from orbslam2py.vocabulary import _textio
@@ -98,7 +98,7 @@ def _stamp(path: Path) -> core.VocabularySource:
                 file.seek(start)
                 digest.update(file.read(sample))
     except OSError as error:
-        raise VocabularyError(f"{path}: {error.strerror}") from error
+        raise VocabularyError(cannot_open(path, error)) from error
     content = int.from_bytes(digest.digest(), "little")
     return core.VocabularySource(status.st_size, status.st_mtime_ns, content)
 
