@@ -186,6 +186,11 @@ class _Masked:
         """Settings of the source."""
         return self._inner.settings
 
+    @property
+    def up_in_truth(self) -> FloatArray | None:
+        """Direction of up in the world of the ground truth, (3,); None if it is not known."""
+        return getattr(self._inner, "up_in_truth", None)
+
     def ground_truth(self) -> Trajectory | None:
         """Return the true poses; see `datasets.base.Source.ground_truth`."""
         return self._inner.ground_truth()

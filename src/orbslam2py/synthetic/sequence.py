@@ -46,6 +46,9 @@ class SyntheticSequence(FramesInOrder):
         Rendering threads; the images do not depend on it.
     """
 
+    #: Direction of up in the world of the ground truth: y points down.
+    up_in_truth: FloatArray = np.array([0.0, -1.0, 0.0])
+
     def __init__(self, options: SyntheticOptions, *, threads: int = 1) -> None:
         if not isinstance(options, SyntheticOptions):
             raise SettingsError(f"options are {shown(options)}; give SyntheticOptions(...)")
