@@ -73,6 +73,7 @@ def run_app() -> None:
     try:
         app()
     except (OrbSlamError, OSError) as error:
+        tell_repeated()  # warnings before what they led to
         print_error(Console(stderr=True), "Error", describe_error(error))
         sys.exit(ExitCode.BAD_INPUT)
     finally:

@@ -17,7 +17,7 @@ DEFAULT_OUTPUT = Path("runs/demo")
 
 
 def demo(
-    sensor: Annotated[Sensor, typer.Option(help="stereo or rgbd.")] = Sensor.STEREO,
+    sensor: Annotated[Sensor, typer.Option(help="What delivers the images.")] = Sensor.STEREO,
     frames: Annotated[
         int | None, typer.Option(help="Number of images [one lap and a bit].", min=10)
     ] = None,

@@ -235,6 +235,7 @@ def _draw(
         gaps=timeline.gaps_before(last.indices),
         timeline=timeline,
         unit=unit,
+        height=None if evaluation is None else evaluation.height,
     )
 
 

@@ -16,6 +16,7 @@ from orbslam2py._version import __version__
 from orbslam2py.errors import OrbSlamError
 from orbslam2py.evaluation import Alignment, Evaluation, evaluate_trajectory
 from orbslam2py.maps.saved_map import SavedMap
+from orbslam2py.runs.gravity import Height, height_of
 from orbslam2py.runs.losses import losses_report
 from orbslam2py.runs.result import RunResult
 from orbslam2py.settings.sensor import Sensor
@@ -37,6 +38,8 @@ class RunEvaluation:
     """Of the keyframes alone [m]; None if too few of them have a true pose."""
     truth: Trajectory
     """Ground truth over the time of the whole run, in the estimate's frame and unit."""
+    height: Height
+    """Which way is up in the estimate's frame."""
 
 
 def evaluate_run(result: RunResult) -> RunEvaluation | None:
@@ -63,7 +66,8 @@ def evaluate_run(result: RunResult) -> RunEvaluation | None:
     begin, end = float(result.rows[0].timestamp) - 0.02, float(result.rows[-1].timestamp) + 0.02
     during = truth.select((truth.timestamps >= begin) & (truth.timestamps <= end))
     T_wc = figures.transform.inverse().apply_to_poses(during.T_wc)
-    return RunEvaluation(figures, keyframes_ate, Trajectory(during.timestamps, T_wc))
+    height = height_of(result.sequence, estimate, truth)
+    return RunEvaluation(figures, keyframes_ate, Trajectory(during.timestamps, T_wc), height)
 
 
 def _ate_of_keyframes(

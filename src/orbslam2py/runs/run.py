@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from orbslam2py import _core as core
+from orbslam2py._arguments import path_of, shown
 from orbslam2py.datasets import RecordedSequence
 from orbslam2py.datasets.base import LiveSource, Sequence
+from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.maps.map_writer import check_map_target
 from orbslam2py.runs.losses import find_losses, last_loss_warning
 from orbslam2py.runs.options import RunOptions
@@ -97,15 +99,22 @@ def run_sequence(
     """
     if isinstance(sequence, RecordedSequence):
         sequence.require_images()
-    options = options or RunOptions(sequence.settings.sensor)
+    if not hasattr(sequence, "settings"):
+        raise DatasetError(
+            f"the sequence is {shown(sequence)}; give what orbslam2py.open_sequence returns"
+        )
+    if options is None:
+        options = RunOptions(sequence.settings.sensor)
+    elif not isinstance(options, RunOptions):
+        raise SettingsError(f"options are {shown(options)}; give orbslam2py.runs.RunOptions(...)")
+    folder = None if output is None else path_of(output, "output")
     if not isinstance(vocabulary, core.Vocabulary):
         vocabulary = load_vocabulary(vocabulary)
     if options.save_map is not None:
         check_map_target(options.save_map)
     runner = SequenceRunner(sequence, sequence.settings, vocabulary, options)
-    folder = None
-    if output is not None:
-        folder = prepare_output_folder(Path(output), force=force)
+    if folder is not None:
+        folder = prepare_output_folder(folder, force=force)
         link_latest(folder)
     result = runner.run(progress, stop)
     warning = last_loss_warning(find_losses(result.rows))

@@ -14,13 +14,20 @@ from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
 from orbslam2py.slam.thresholds import InitializationThresholds
 
+#: Pixels per side from which on an image has room for a cell of corners (30 pixels) between its
+#: borders (16 on each side): `features/corner_grid.hpp`.
+SMALLEST_SIDE = 62
+
 Mask = npt.NDArray[np.uint8]
 #: For a pair: one mask for both images, or (left, right), either of which may be None.
 PairMask = Mask | tuple[Mask | None, Mask | None]
 
 
+_LARGEST_NUMBER = 8  # bytes of the largest type of depth that is converted
+
+
 class FrontEnd:
-    """Builds frames from images; the first image fixes the size.
+    """Builds frames from images; the first image fixes the size until a reset.
 
     Parameters
     ----------
@@ -42,6 +49,11 @@ class FrontEnd:
         )
         self._pair_extractor = core.PairExtractor(options) if sensor is Sensor.STEREO else None
         self._depth_check: DepthCheck | None = DepthCheck(settings.depth_factor)
+
+    def reset(self) -> None:
+        """Let the next image have any size: a new map begins."""
+        self._context = None
+        self._size = None
 
     def monocular(
         self,
@@ -117,7 +129,7 @@ class FrontEnd:
                 f"depth has size {depth.shape}, the image {image.shape[:2]}; "
                 "depth must be registered to the image"
             )
-        if depth.dtype.kind not in "uif":
+        if depth.dtype.kind not in "uif" or depth.dtype.itemsize > _LARGEST_NUMBER:
             raise ImageError(f"depth must hold numbers (uint16, float32...), got {depth.dtype}")
         _check_mask(mask, image, "mask")
         if self._depth_check is not None:
@@ -150,10 +162,16 @@ class FrontEnd:
                 f"{what} must have shape (height, width) or (height, width, 3 or 4), "
                 f"got {image.shape}"
             )
+        if min(image.shape[:2]) < SMALLEST_SIDE:
+            raise ImageError(
+                f"{what} is too small: {image.shape[1]}x{image.shape[0]} pixels, and keypoints are "
+                f"found from {SMALLEST_SIDE} per side on; give whole images of the camera"
+            )
         if self._size is not None and image.shape[:2] != self._size:
             raise ImageError(
                 f"{what} has size {image.shape[1]}x{image.shape[0]}, the first image had "
-                f"{self._size[1]}x{self._size[0]}; the size must not change"
+                f"{self._size[1]}x{self._size[0]}; give images of one size, or call reset() before "
+                "the first one of another size"
             )
 
     def _context_for(self, image: npt.NDArray[np.uint8]) -> core.FrameContext:

@@ -13,6 +13,7 @@ import threading
 from collections.abc import Callable, Iterator
 
 from orbslam2py import _core as core
+from orbslam2py._arguments import is_number, shown
 from orbslam2py._timing import StageStatistics, StageTimer
 from orbslam2py.errors import ImageError, MapFileError, StateError
 from orbslam2py.maps.contents import restore_contents
@@ -179,8 +180,10 @@ class Pipeline:
         return record
 
     def _check_timestamp(self, timestamp: float) -> None:
-        if not math.isfinite(timestamp):
-            raise ImageError(f"the time stamp must be a finite number of seconds, got {timestamp}")
+        if not (is_number(timestamp) and math.isfinite(timestamp)):
+            raise ImageError(
+                f"the time stamp must be a finite number of seconds, got {shown(timestamp)}"
+            )
         if timestamp <= self._last_timestamp:
             raise ImageError(
                 f"time stamps must grow: {timestamp!r} came after {self._last_timestamp!r}"
@@ -258,6 +261,7 @@ class Pipeline:
         _log.info("resetting: map %d ends", self.back_end.map.epoch)
         self.back_end.reset(RESET_PATIENCE, keep=self.recorder.end_map)
         self.tracking.reset()
+        self.front_end.reset()
         self._next_frame_id = 0
         self._last_timestamp = -math.inf
         self.reset_requested.clear()

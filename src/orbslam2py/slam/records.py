@@ -15,7 +15,6 @@ from orbslam2py._arrays import FloatArray, IntArray
 class TrackingState(enum.IntEnum):
     """State of the tracker after an image."""
 
-    SYSTEM_NOT_READY = -1
     NO_IMAGES_YET = 0
     NOT_INITIALIZED = 1
     OK = 2

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
+from orbslam2py._arguments import patience_of
 from orbslam2py.errors import MapFileError, StateError, WorkerError
 from orbslam2py.maps.contents import MapContents, take_contents
 from orbslam2py.maps.saved_map import SavedMap
@@ -124,7 +125,7 @@ class System:
         setup = Setup.of(settings, sensor, vocabulary, load_map, initial_pose, allow_other_setup)
         self.sensor, self.settings, self.vocabulary = setup.sensor, setup.settings, setup.vocabulary
         self.pipeline = Pipeline(
-            self.settings, self.sensor, self.vocabulary, self.options, callbacks or Callbacks()
+            self.settings, self.sensor, self.vocabulary, self.options, Callbacks.of(callbacks)
         )
         if setup.loaded is not None:
             self.pipeline.begin_in(setup.loaded, self.vocabulary, setup.initial_pose)
@@ -351,8 +352,8 @@ class System:
     def reset(self) -> None:
         """Ask for a new map; carried out at the beginning of the next track call.
 
-        Settings, vocabulary and mode stay. The trajectory of the present map is kept, see
-        `trajectories`.
+        Settings, vocabulary and mode stay; the images may have another size from then on. The
+        trajectory of the present map is kept, see `trajectories`.
         """
         self.pipeline.reset_requested.set()
 
@@ -392,7 +393,7 @@ class System:
             False when `timeout` seconds passed first, or keyframes wait for the end of localization
             mode.
         """
-        return self.pipeline.back_end.wait_until_idle(timeout)
+        return self.pipeline.back_end.wait_until_idle(patience_of(timeout))
 
     def shutdown(
         self,
@@ -422,6 +423,7 @@ class System:
         MapFileError
             If the last autosave could not be written.
         """
+        timeout = patience_of(timeout)
         self._shut_down = True
         if not self._finalizer.alive:
             return

@@ -18,7 +18,9 @@ from support.scripts import run_script
 
 NAMES = {
     "Callbacks",
+    "CameraSettings",
     "DatasetError",
+    "DepthSettings",
     "FrameFeatures",
     "FullAdjustmentRecord",
     "ImageError",
@@ -28,6 +30,7 @@ NAMES = {
     "MapChanged",
     "MapFileError",
     "MapSnapshot",
+    "OrbSettings",
     "OrbSlamError",
     "Reason",
     "Relocalized",
