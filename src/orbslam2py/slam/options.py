@@ -25,6 +25,7 @@ class SystemOptions:
     full_adjustment: bool = True
     full_adjustment_time_limit: float | None = None
     seed: int = 0
+    check_calibration: bool = True
 
     def __post_init__(self) -> None:
         seconds = self.full_adjustment_time_limit

@@ -66,6 +66,9 @@ class System:
         Functions that are told of loops, keyframes, losses and changes of the map.
     seed : int
         Seed of all random draws.
+    check_calibration : bool
+        Log one warning if the calibration cannot belong to images of the first one's size.
+        `orbslam2py.check_calibration` looks into the images, too.
 
     Attributes
     ----------
@@ -100,6 +103,7 @@ class System:
         full_adjustment_time_limit: float | None = None,
         callbacks: Callbacks | None = None,
         seed: int = 0,
+        check_calibration: bool = True,
     ) -> None:
         self.options = SystemOptions(
             deterministic=deterministic,
@@ -108,6 +112,7 @@ class System:
             full_adjustment=full_adjustment,
             full_adjustment_time_limit=full_adjustment_time_limit,
             seed=seed,
+            check_calibration=check_calibration,
         )
         self.sensor = Sensor(sensor)
         self.settings = resolve_settings(settings, self.sensor)
