@@ -49,7 +49,10 @@ def find_pair_misfit(rows: list[PairRows], limits: FitThresholds) -> Misfit | No
 
 
 def find_data_misfit(
-    camera: CameraSettings, pairs: list[PointPair], limits: FitThresholds
+    camera: CameraSettings,
+    pairs: list[PointPair],
+    whole: CalibrationGains | None,
+    limits: FitThresholds,
 ) -> Misfit | None:
     """Judge a calibration by points that were followed from image to image.
 
@@ -59,10 +62,11 @@ def find_data_misfit(
         The calibration.
     pairs : list of PointPair
         All with depths or all without.
+    whole : CalibrationGains, optional
+        `calibration_gains` of all pairs.
     limits : FitThresholds
         The limits. What all pairs say counts if each half of them says it, too.
     """
-    whole = calibration_gains(camera, pairs)
     if whole is None or whole.n_pairs < limits.least_pairs:
         return None
     with_depth = pairs[0].depths is not None

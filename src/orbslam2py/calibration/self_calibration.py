@@ -32,6 +32,8 @@ _N_CHANGES = 4
 _SCALE = 1.0
 #: Factors of the focal length that are tried first are exp of these.
 _TRIED = (0.25, 0.5, 0.75)
+#: The one for which poses are found anew.
+_ANEW = 0.5
 _STEP = 1e-6
 _HALVED = 6
 
@@ -154,10 +156,10 @@ def calibration_gains(
     if not kept:
         return None
     problem = _make_problem(camera, kept)
-    start = _evaluate(problem, *_first_poses(problem), np.zeros(_N_CHANGES))
+    start = _begin(problem, np.zeros(_N_CHANGES))
     start = _solve(problem, start, (), 15)
     count = float(problem.counts.sum())
-    near = min(_tried(problem, start), key=lambda state: state.cost)
+    near = min(_tried(problem, start), key=_cost)
     return CalibrationGains(
         residual=float(np.sqrt(start.cost / count)),
         n_pairs=len(kept),
@@ -198,20 +200,22 @@ def _normalised(camera: CameraSettings, pixels: FloatArray) -> FloatArray:
     return np.asarray(rays[:, 0], dtype=np.float64)
 
 
-def _first_poses(problem: _Problem) -> tuple[FloatArray, FloatArray]:
+def _begin(problem: _Problem, changes: FloatArray) -> _State:
+    """Find poses without knowing any, for a changed calibration."""
     n = len(problem.counts)
     R, t = np.repeat(np.eye(3)[None], n, axis=0), np.zeros((n, 3))
     if problem.depths is not None:
-        return R, t
+        return _evaluate(problem, R, t, changes)
     t[:, 2] = 1.0
+    limit = 1.5 * _SCALE / (problem.focal * float(np.exp(changes[0])))
     for i, counts in enumerate(problem.counts):
-        first, second = problem.first[i, counts > 0], problem.second[i, counts > 0]
-        limit = 1.5 * _SCALE / problem.focal
+        first = _changed(problem.first[i, counts > 0], changes)
+        second = _changed(problem.second[i, counts > 0], changes)
         E, _ = cv2.findEssentialMat(first, second, np.eye(3), cv2.RANSAC, 0.999, limit)
         if E is not None and E.shape[0] >= 3:
             _, R[i], direction, _ = cv2.recoverPose(E[:3], first, second, np.eye(3))
             t[i] = direction.ravel()
-    return R, t
+    return _evaluate(problem, R, t, changes)
 
 
 # ---- residuals ---------------------------------------------------------------------------------
@@ -357,8 +361,15 @@ def _tried(problem: _Problem, start: _State) -> Iterable[_State]:
         for value in _TRIED:
             changes = start.changes.copy()
             changes[0] = sign * value
-            state = _solve(problem, _evaluate(problem, state.R, state.t, changes), (), 4)
+            near = _evaluate(problem, state.R, state.t, changes)
+            # Poses of a far too long or short focal length may lead nowhere.
+            anew = [_begin(problem, changes)] if value == _ANEW else []
+            state = min((_solve(problem, one, (), 4) for one in (near, *anew)), key=_cost)
             yield state
+
+
+def _cost(state: _State) -> float:
+    return state.cost
 
 
 def _change(problem: _Problem, before: _State, start: _State, free: tuple[int, ...]) -> Change:

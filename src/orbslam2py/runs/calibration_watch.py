@@ -15,7 +15,12 @@ from orbslam2py import _core as core
 from orbslam2py._arrays import ByteArray
 from orbslam2py.calibration.data_misfit import find_data_misfit, find_pair_misfit
 from orbslam2py.calibration.pair_rows import PairRows, disparities_of, measure_rows
-from orbslam2py.calibration.self_calibration import PointPair, without_gross_errors
+from orbslam2py.calibration.self_calibration import (
+    CalibrationGains,
+    PointPair,
+    calibration_gains,
+    without_gross_errors,
+)
 from orbslam2py.calibration.tracks import PointTracker, TrackedPair
 from orbslam2py.datasets.base import Images
 from orbslam2py.errors import OrbSlamError
@@ -59,6 +64,13 @@ class CalibrationWatch:
         Judge the points in a thread of its own, since the next image does not wait.
     thresholds : FitThresholds, optional
         The limits.
+
+    Attributes
+    ----------
+    rows : list of PairRows
+        What the first pairs of a stereo camera said.
+    gains : CalibrationGains or None
+        What the points said, when they have been judged.
     """
 
     def __init__(
@@ -78,7 +90,8 @@ class CalibrationWatch:
         self._n_seen = 0
         self._size = (0, 0)
         self._begun: dict[int, Images] = {}
-        self._rows: list[PairRows] = []
+        self.rows: list[PairRows] = []
+        self.gains: CalibrationGains | None = None
         self._pairs: list[_MovedPair] = []
         self._misfit: Misfit | None = None
         self._done = False
@@ -123,13 +136,13 @@ class CalibrationWatch:
         return core.to_grey(image, self._settings.camera.rgb)
 
     def _measure_rows(self, grey: ByteArray, images: Images) -> None:
-        if images.right is None or len(self._rows) == _N_ROWS:
+        if images.right is None or len(self.rows) == _N_ROWS:
             return
         rows = measure_rows(grey, self._grey(images.right))
         if rows is not None:
-            self._rows.append(rows)
-        if len(self._rows) == _N_ROWS:
-            self._tell(find_pair_misfit(self._rows, self._limits))
+            self.rows.append(rows)
+        if len(self.rows) == _N_ROWS:
+            self._tell(find_pair_misfit(self.rows, self._limits))
 
     def _keep(self, pair: TrackedPair) -> None:
         motion = float(np.median(np.linalg.norm(pair.second - pair.first, axis=1)))
@@ -141,8 +154,8 @@ class CalibrationWatch:
 
     def _judge(self) -> None:
         self._done = True
-        if 0 < len(self._rows) < _N_ROWS:
-            self._tell(find_pair_misfit(self._rows, self._limits))
+        if 0 < len(self.rows) < _N_ROWS:
+            self._tell(find_pair_misfit(self.rows, self._limits))
         if self._misfit is not None or len(self._pairs) < self._limits.least_pairs:
             return
         if self._in_background:
@@ -154,7 +167,9 @@ class CalibrationWatch:
     def _judge_points(self) -> None:
         most = sorted(self._pairs, key=lambda pair: (-pair.motion, pair.frames))[:_N_PAIRS]
         pairs = [self._with_depths(pair) for pair in most]
-        self._tell(find_data_misfit(self._settings.camera, pairs, self._limits))
+        camera = self._settings.camera
+        self.gains = calibration_gains(camera, pairs)
+        self._tell(find_data_misfit(camera, pairs, self.gains, self._limits))
         self._begun.clear()
         self._pairs.clear()
 
