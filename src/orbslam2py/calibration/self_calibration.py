@@ -35,6 +35,8 @@ _TRIED = (0.25, 0.5, 0.75)
 #: The one for which poses are found anew.
 _ANEW = 0.5
 _STEP = 1e-6
+#: Least stretch of a lens.
+_FOLD = 0.2
 _HALVED = 6
 
 
@@ -209,8 +211,8 @@ def _begin(problem: _Problem, changes: FloatArray) -> _State:
     t[:, 2] = 1.0
     limit = 1.5 * _SCALE / (problem.focal * float(np.exp(changes[0])))
     for i, counts in enumerate(problem.counts):
-        first = _changed(problem.first[i, counts > 0], changes)
-        second = _changed(problem.second[i, counts > 0], changes)
+        first = _changed(problem.first[i, counts > 0], changes).points
+        second = _changed(problem.second[i, counts > 0], changes).points
         E, _ = cv2.findEssentialMat(first, second, np.eye(3), cv2.RANSAC, 0.999, limit)
         if E is not None and E.shape[0] >= 3:
             _, R[i], direction, _ = cv2.recoverPose(E[:3], first, second, np.eye(3))
@@ -219,28 +221,62 @@ def _begin(problem: _Problem, changes: FloatArray) -> _State:
 
 
 # ---- residuals ---------------------------------------------------------------------------------
-def _changed(rays: FloatArray, changes: FloatArray) -> FloatArray:
-    moved = (rays - changes[1:3]) * np.exp(-changes[0])
-    return np.asarray(moved * (1 + changes[3] * (moved * moved).sum(axis=-1, keepdims=True)))
+@dataclass(frozen=True)
+class _Rays:
+    """Normalised points by a changed calibration, and how they stretch the ones as they were."""
+
+    points: FloatArray
+    """(p, n, 2)"""
+    outwards: FloatArray
+    """(p, n, 2) unit vectors from the principal point."""
+    along: FloatArray
+    """(p, n, 1) stretch along them ..."""
+    across: FloatArray
+    """... and across."""
+
+    def slopes(self, slopes: FloatArray) -> FloatArray:
+        """Slopes by the points as they were, of slopes by the changed ones, (p, n, 2)."""
+        return self._scaled(slopes, self.along, self.across)
+
+    def back(self, errors: FloatArray) -> FloatArray:
+        """Small distances between changed points, as they were before, (p, n, 2)."""
+        return self._scaled(errors, 1 / self.along, 1 / self.across)
+
+    def _scaled(self, vectors: FloatArray, along: FloatArray, across: FloatArray) -> FloatArray:
+        part = (vectors * self.outwards).sum(axis=-1, keepdims=True)
+        return np.asarray(across * vectors + (along - across) * part * self.outwards)
+
+
+def _changed(rays: FloatArray, changes: FloatArray) -> _Rays:
+    scale = float(np.exp(-changes[0]))
+    moved = (rays - changes[1:3]) * scale
+    r2 = (moved * moved).sum(axis=-1, keepdims=True)
+    bend = changes[3] * r2
+    # Beyond a fold of the lens there is nothing to compare with; the limit keeps numbers finite.
+    along, across = np.maximum(1 + 3 * bend, _FOLD), np.maximum(1 + bend, _FOLD)
+    outwards = moved / np.sqrt(np.maximum(r2, 1e-18))
+    return _Rays(moved * (1 + bend), outwards, along * scale, across * scale)
 
 
 def _residuals(problem: _Problem, R: FloatArray, t: FloatArray, changes: FloatArray) -> FloatArray:
+    """Residuals (p, n, 1 or 2) in pixels of the images as they are, whatever the changes."""
     first, second = _changed(problem.first, changes), _changed(problem.second, changes)
-    focal = problem.focal * np.exp(changes[0])
     if problem.depths is None:
-        return np.asarray(_sampson(first, second, R, t) * focal)
-    points = np.concatenate([first, np.ones_like(first[..., :1])], axis=-1)
-    seen = (points * problem.depths[..., None]) @ R.transpose(0, 2, 1) + t[:, None]
+        return np.asarray(_sampson(first, second, R, t) * problem.focal)
+    rays = np.concatenate([first.points, np.ones_like(first.along)], axis=-1)
+    seen = (rays * problem.depths[..., None]) @ R.transpose(0, 2, 1) + t[:, None]
     z = np.where(np.abs(seen[..., 2:]) < 1e-6, 1e-6, seen[..., 2:])
-    return np.asarray(np.clip((seen[..., :2] / z - second) * focal, -1e4, 1e4))
+    errors = second.back(seen[..., :2] / z - second.points) * problem.focal
+    return np.asarray(np.clip(errors, -1e4, 1e4))
 
 
-def _sampson(first: FloatArray, second: FloatArray, R: FloatArray, t: FloatArray) -> FloatArray:
+def _sampson(first: _Rays, second: _Rays, R: FloatArray, t: FloatArray) -> FloatArray:
     E = _cross(t) @ R
-    a = first @ E[:, :, :2].transpose(0, 2, 1) + E[:, None, :, 2]
-    b = second @ E[:, :2, :] + E[:, None, 2, :]
-    error = (second * a[..., :2]).sum(axis=-1) + a[..., 2]
-    slope = (a[..., :2] ** 2).sum(axis=-1) + (b[..., :2] ** 2).sum(axis=-1)
+    a = first.points @ E[:, :, :2].transpose(0, 2, 1) + E[:, None, :, 2]
+    b = second.points @ E[:, :2, :] + E[:, None, 2, :]
+    error = (second.points * a[..., :2]).sum(axis=-1) + a[..., 2]
+    by_second, by_first = second.slopes(a[..., :2]), first.slopes(b[..., :2])
+    slope = (by_second**2).sum(axis=-1) + (by_first**2).sum(axis=-1)
     return np.asarray(error / np.sqrt(np.maximum(slope, 1e-18)))[..., None]
 
 
