@@ -8,12 +8,8 @@ import math
 import numpy as np
 
 from orbslam2py.calibration.pair_rows import PairRows
-from orbslam2py.calibration.self_calibration import (
-    CalibrationGains,
-    Change,
-    PointPair,
-    calibration_gains,
-)
+from orbslam2py.calibration.self_calibration import CalibrationGains, Change, calibration_gains
+from orbslam2py.calibration.two_views import PointPair
 from orbslam2py.settings import CameraSettings
 from orbslam2py.settings.fit import MEASURE, FitThresholds, Misfit
 

@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 
 from orbslam2py._arrays import ByteArray, FloatArray
-from orbslam2py.calibration.self_calibration import PointPair, without_gross_errors
 from orbslam2py.calibration.tracks import follow_points
+from orbslam2py.calibration.two_views import PointPair, without_gross_errors
 
 #: How often the images are halved to search: disparities are larger than motions.
 _HALVINGS = 5

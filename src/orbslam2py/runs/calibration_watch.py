@@ -15,16 +15,13 @@ from orbslam2py import _core as core
 from orbslam2py._arrays import ByteArray
 from orbslam2py.calibration.data_misfit import find_data_misfit, find_pair_misfit
 from orbslam2py.calibration.pair_rows import PairRows, disparities_of, measure_rows
-from orbslam2py.calibration.self_calibration import (
-    CalibrationGains,
-    PointPair,
-    calibration_gains,
-    without_gross_errors,
-)
+from orbslam2py.calibration.self_calibration import CalibrationGains, calibration_gains
 from orbslam2py.calibration.tracks import PointTracker, TrackedPair
+from orbslam2py.calibration.two_views import PointPair, without_gross_errors
 from orbslam2py.datasets.base import Images
 from orbslam2py.errors import OrbSlamError
-from orbslam2py.settings.fit import FitThresholds, Misfit, compare_calibrations, find_misfit
+from orbslam2py.settings.comparison import compare_calibrations
+from orbslam2py.settings.fit import FitThresholds, Misfit, find_misfit
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
 from orbslam2py.slam.frame_source import FrameSource, timed_images

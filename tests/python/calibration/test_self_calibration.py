@@ -11,11 +11,8 @@ import pytest
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py.calibration.data_misfit import find_data_misfit
-from orbslam2py.calibration.self_calibration import (
-    PointPair,
-    calibration_gains,
-    without_gross_errors,
-)
+from orbslam2py.calibration.self_calibration import calibration_gains
+from orbslam2py.calibration.two_views import PointPair, without_gross_errors
 from orbslam2py.settings import CameraSettings, FitThresholds, Misfit
 
 CAMERA = CameraSettings(500, 500, 320, 240)

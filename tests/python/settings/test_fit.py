@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from orbslam2py import Sensor, Settings
 from orbslam2py.settings import BUILTIN_NAMES, CameraSettings, DepthSettings, builtin_settings
 from orbslam2py.settings.builtin import builtin_sensors
-from orbslam2py.settings.fit import calibration_distance, compare_calibrations, find_misfit
+from orbslam2py.settings.comparison import calibration_distance, compare_calibrations
+from orbslam2py.settings.fit import find_misfit
 
 SIZES = {
     "tum1": (640, 480),
