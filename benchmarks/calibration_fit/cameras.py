@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from orbslam2py.datasets import Images
 from orbslam2py.settings import CameraSettings, Settings
-from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+from orbslam2py.synthetic import DEPTH_PER_METRE, SyntheticOptions, SyntheticSequence
 
 N_IMAGES = 49
 Grey = NDArray[np.uint8]
+Depth = NDArray[np.generic]
 _SEED = 5
 
 
@@ -78,17 +79,20 @@ def _as_it_is(name: str, sequence: SyntheticSequence) -> Case:
 
 
 def _altered(
-    case: Case, name: str, change: Callable[[Grey, int], Grey], settings: Settings | None = None
+    case: Case,
+    name: str,
+    change: Callable[[Grey, int], Grey],
+    depth: Callable[[Depth, int], Depth] = lambda depth, _: depth,
 ) -> Case:
     def images() -> Iterator[Images]:
         for i, one in enumerate(case.images()):
             yield Images(
                 change(one.image, i),
                 None if one.right is None else change(one.right, i),
-                one.depth,
+                None if one.depth is None else depth(one.depth, i),
             )
 
-    return Case(name, settings or case.settings, images)
+    return Case(name, case.settings, images)
 
 
 def cut(case: Case, name: str, part: tuple[slice, slice]) -> Case:
@@ -126,15 +130,26 @@ class _PassingThing:
     """A textured board over a third of the image that moves across it."""
 
     def __call__(self, image: Grey, number: int) -> Grey:
-        height, width = image.shape
-        side = int(0.6 * height)
+        side, part = self._place(image.shape, number)
         small = np.random.default_rng(_SEED).integers(0, 255, (side // 4 + 1,) * 2, np.uint8)
         board = cv2.resize(small, (side, side), interpolation=cv2.INTER_NEAREST)
+        changed = image.copy()
+        changed[part] = board
+        return changed
+
+    def depth(self, depth: Depth, number: int) -> Depth:
+        """It is 1 m away."""
+        _, part = self._place(depth.shape, number)
+        changed = depth.copy()
+        changed[part] = DEPTH_PER_METRE
+        return changed
+
+    def _place(self, shape: tuple[int, ...], number: int) -> tuple[int, tuple[slice, slice]]:
+        height, width = shape
+        side = int(0.6 * height)
         left = int((width - side) * number / N_IMAGES)
         top = (height - side) // 2 + int(4 * np.sin(number / 3))
-        changed = image.copy()
-        changed[top : top + side, left : left + side] = board
-        return changed
+        return side, (slice(top, top + side), slice(left, left + side))
 
 
 def _rolling_shutter(world: str, seconds: float, name: str) -> Case:
@@ -187,10 +202,10 @@ def _odd_cameras(world: str, sensor: str) -> Iterator[Case]:
 
 
 def _hard_scenes(world: str, sensor: str) -> Iterator[Case]:
-    case = _as_it_is("", _sequence(world, sensor))
+    case, thing = _as_it_is("", _sequence(world, sensor)), _PassingThing()
     yield _altered(case, f"{world}, {sensor}, blurred over 13 pixels", _blurred)
     yield _altered(case, f"{world}, {sensor}, dark and noisy", _dark)
-    yield _altered(case, f"{world}, {sensor}, a thing passes by", _PassingThing())
+    yield _altered(case, f"{world}, {sensor}, a thing passes by", thing, thing.depth)
 
 
 def wrong_cases() -> Iterator[Case]:

@@ -104,6 +104,7 @@ def _candidates(gains: CalibrationGains, limits: FitThresholds, with_depth: bool
         if (change := _change_of(gains, name)).gain > _least_gain(name, limits, with_depth)
         and float(np.linalg.norm(change.values)) > _least_size(name, limits)
         and change.significance > limits.significance
+        and gains.residual / math.sqrt(change.gain) < limits.explained
     ]
 
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from orbslam2py._arrays import ByteArray, FloatArray
-from orbslam2py.calibration.tracks import follow_points
+from orbslam2py.calibration.tracks import find_corners, follow_points
 from orbslam2py.calibration.two_views import PointPair, without_gross_errors
 
 #: How often the images are halved to search: disparities are larger than motions.
@@ -51,10 +50,7 @@ def measure_rows(left: ByteArray, right: ByteArray) -> PairRows | None:
     PairRows or None
         None if too few points were found to say anything.
     """
-    corners = cv2.goodFeaturesToTrack(left, _N_CORNERS, 0.01, 7)
-    if corners is None:
-        return None
-    begin = corners.reshape(-1, 2).astype(np.float64)
+    begin = find_corners(left, _N_CORNERS)
     end, found = follow_points(left, right, begin, halvings=_HALVINGS)
     pair = without_gross_errors(PointPair(begin[found], end[found]))
     if pair is None or len(pair.first) < _LEAST:

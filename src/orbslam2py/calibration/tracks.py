@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -16,6 +17,9 @@ from orbslam2py._arrays import ByteArray, FloatArray
 _WINDOW, _HALVINGS = (15, 15), 3
 #: Points that do not come back to their beginning to so many pixels are dropped.
 _THERE_AND_BACK = 0.5
+#: Corners are looked for in so many parts of an image by row and column, so that a single thing
+#: with much texture does not take them all; least quality by the best of a part, and distance.
+_N_PARTS, _QUALITY, _APART = 4, 0.05, 7
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,42 @@ class TrackedPair:
 
     def __len__(self) -> int:
         return len(self.first)
+
+
+def find_corners(grey: ByteArray, n_points: int, mask: ByteArray | None = None) -> FloatArray:
+    """Find corners that lie all over an image, as many in every one of 16 parts.
+
+    Parameters
+    ----------
+    grey : array of uint8, (h, w)
+        The image.
+    n_points : int
+        Points wanted; there are fewer where there is no texture.
+    mask : array of uint8, (h, w), optional
+        No corner lies where it is 0.
+
+    Returns
+    -------
+    array, (n, 2)
+        Pixels.
+    """
+    height, width = grey.shape
+    ys, xs = (np.linspace(0, size, _N_PARTS + 1).astype(int) for size in (height, width))
+    found: list[FloatArray] = [np.zeros((0, 2))]
+    for top, bottom in itertools.pairwise(ys.tolist()):
+        for left, right in itertools.pairwise(xs.tolist()):
+            part = slice(top, bottom), slice(left, right)
+            corners = cv2.goodFeaturesToTrack(
+                np.ascontiguousarray(grey[part]),
+                -(-n_points // _N_PARTS**2),
+                _QUALITY,
+                _APART,
+                mask=None if mask is None else np.ascontiguousarray(mask[part]),
+            )
+            if corners is not None:
+                corner = np.array([left, top], np.float64)
+                found.append(np.asarray(corners.reshape(-1, 2) + corner, np.float64))
+    return np.concatenate(found)
 
 
 def follow_points(
@@ -130,9 +170,8 @@ class PointTracker:
             self._follow(self._previous, grey)
         pairs = list(self._pairs())
         if self._frame % self._every == 0:
-            corners = cv2.goodFeaturesToTrack(grey, self._n_points, 0.01, 7, mask=mask)
-            if corners is not None:
-                start = corners.reshape(-1, 2).astype(np.float64)
+            start = find_corners(grey, self._n_points, mask)
+            if len(start):
                 self._sets.append(_Points(self._frame, start, start.copy()))
         self._previous = grey
         self._frame += 1

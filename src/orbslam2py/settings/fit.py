@@ -68,6 +68,9 @@ class FitThresholds:
     """... and by this that of points with depth, which tell more ..."""
     gain_of_distortion: float = 1.4
     """... and another lens distortion must do as well as this at least."""
+    explained: float = 1.5
+    """Most residual that the changed calibration may leave, pixels: where things move on their own
+    no calibration explains the points."""
     significance: float = 5.0
     """Fewest standard deviations of such a change ..."""
     focal: float = 0.15
