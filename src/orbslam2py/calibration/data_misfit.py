@@ -104,8 +104,15 @@ def _candidates(gains: CalibrationGains, limits: FitThresholds, with_depth: bool
         if (change := _change_of(gains, name)).gain > _least_gain(name, limits, with_depth)
         and float(np.linalg.norm(change.values)) > _least_size(name, limits)
         and change.significance > limits.significance
+        and (with_depth or change.gain > limits.clearer * _rival(gains, name))
         and gains.residual / math.sqrt(change.gain) < limits.explained
     ]
+
+
+def _rival(gains: CalibrationGains, name: str) -> float:
+    """Gain of the best other change; epipolar lines alone may take one for the other."""
+    others = {"focal", "centre", "radial"} - {name}
+    return max(_change_of(gains, other).gain for other in others)
 
 
 def _agrees(

@@ -61,12 +61,14 @@ class FitThresholds:
     looks no farther."""
     wrong_sign: float = 0.5
     """Most part of them that lies farther right in the right image than in the left."""
-    gain: float = 1.5
-    """A changed calibration that divides the robust cost of epipolar distances by this is better
-    without doubt ..."""
-    gain_with_depth: float = 1.15
-    """... and by this that of points with depth, which tell more ..."""
-    gain_of_distortion: float = 1.4
+    gain: float = 2.5
+    """A changed focal length that divides the robust cost of epipolar distances by this is better
+    without doubt: a rolling shutter looks like another one, too ..."""
+    clearer: float = 1.1
+    """... if what it gains is by this factor more than what another change gains ..."""
+    gain_with_depth: float = 1.25
+    """... and, or a changed principal point, by this that of points with depth ..."""
+    gain_of_distortion: float = 1.6
     """... and another lens distortion must do as well as this at least."""
     explained: float = 1.5
     """Most residual that the changed calibration may leave, pixels: where things move on their own
