@@ -12,6 +12,7 @@ from .errors import StateError as StateError
 from .errors import VocabularyError as VocabularyError
 from .errors import WorkerError as WorkerError
 from .maps import MapSnapshot as MapSnapshot
+from .runs import check_calibration as check_calibration
 from .runs import run_sequence as run_sequence
 from .settings import CameraSettings as CameraSettings
 from .settings import DepthSettings as DepthSettings

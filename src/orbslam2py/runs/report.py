@@ -113,6 +113,7 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "resets": result.n_resets,
         **losses,
         "initialisation_reasons": initialization_reasons(result),
+        "warnings": result.warnings,
         "interrupted": result.interrupted,
         "seconds": result.seconds,
         "frames_per_second": _rate(n_done, result.seconds),

@@ -82,6 +82,8 @@ class RunResult:
     """Loops closed, over all maps."""
     full_adjustments: list[FullAdjustmentRecord] = field(default_factory=list)
     """Full bundle adjustments, also those that were given up."""
+    warnings: list[str] = field(default_factory=list)
+    """What the result suffers from: a calibration that does not fit, a loss until the end."""
     n_lost_by_camera: int = 0
     """Images of a camera that came while an earlier one was being tracked."""
     is_live: bool = False

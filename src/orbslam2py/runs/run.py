@@ -120,6 +120,7 @@ def run_sequence(
     warning = last_loss_warning(find_losses(result.rows))
     if warning is not None:
         _log.warning("%s", warning)
+        result.warnings.append(warning)
     evaluation = evaluate_run(result)
     report = make_report(result, evaluation)
     problems: tuple[str, ...] = ()

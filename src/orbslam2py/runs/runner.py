@@ -18,6 +18,7 @@ from orbslam2py import _core as core
 from orbslam2py._files import describe_error
 from orbslam2py.datasets.base import Images, LiveSource, Sequence
 from orbslam2py.errors import DatasetError, ImageError, OrbSlamError
+from orbslam2py.runs.calibration_watch import CalibrationWatch, settings_beside
 from orbslam2py.runs.feeds import FedFrame, LiveFeed, RecordedFeed, is_sequence
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.result import DROPPED, FrameRow, RunResult
@@ -63,6 +64,7 @@ class SequenceRunner:
     ) -> None:
         self._vocabulary = vocabulary
         self._options = options
+        self._watch: CalibrationWatch | None = None
         self._feed: RecordedFeed | LiveFeed
         if is_sequence(sequence):
             indices = options.indices(len(sequence))
@@ -100,7 +102,9 @@ class SequenceRunner:
         result, options = self.result, self._options
         begin = time.perf_counter()
         in_time = options.realtime or self._feed.is_live
-        how = replace(options.system, wait_for_mapping=not in_time)
+        # Told by the watch, which knows more, or by nobody.
+        how = replace(options.system, wait_for_mapping=not in_time, check_calibration=False)
+        self._watch = self._calibration_watch(in_time)
         system = System(
             result.settings,
             options.sensor,
@@ -126,9 +130,22 @@ class SequenceRunner:
             _log.warning("interrupted; saving what was done so far (%s)", seen)
         self._shut_down(system)
         self._save_map(system)
+        if self._watch is not None:
+            misfit = self._watch.finish()
+            result.warnings += [] if misfit is None else [str(misfit)]
         self._collect(system)
         result.seconds = time.perf_counter() - begin
         return result
+
+    def _calibration_watch(self, in_time: bool) -> CalibrationWatch | None:
+        if not self._options.system.check_calibration:
+            return None
+        return CalibrationWatch(
+            self.result.settings,
+            self._options.sensor,
+            known=settings_beside(self.result.sequence),
+            in_background=in_time,
+        )
 
     # ---- one pass over the frames ----------------------------------------------------------------
     def _process(self, system: System, progress: Progress | None, stop: threading.Event) -> None:
@@ -163,6 +180,8 @@ class SequenceRunner:
             return self._skip(frame, error)
         finally:
             self.result.slam_seconds += time.perf_counter() - begin
+        if self._watch is not None:
+            self._watch.look(frame.item)
         return _row(frame, record, str(record.reason))
 
     def _call(self, system: System, images: Images, timestamp: float) -> TrackingRecord:

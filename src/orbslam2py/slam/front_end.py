@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import logging
+
 import numpy as np
 import numpy.typing as npt
 
@@ -10,6 +12,7 @@ from orbslam2py import _core as core
 from orbslam2py._timing import StageTimer
 from orbslam2py.errors import ImageError
 from orbslam2py.settings.depth_check import DepthCheck
+from orbslam2py.settings.fit import find_misfit
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
 from orbslam2py.slam.thresholds import InitializationThresholds
@@ -17,6 +20,7 @@ from orbslam2py.slam.thresholds import InitializationThresholds
 #: Pixels per side from which on an image has room for a cell of corners (30 pixels) between its
 #: borders (16 on each side): `features/corner_grid.hpp`.
 SMALLEST_SIDE = 62
+_log = logging.getLogger(__name__)
 
 Mask = npt.NDArray[np.uint8]
 #: For a pair: one mask for both images, or (left, right), either of which may be None.
@@ -35,9 +39,13 @@ class FrontEnd:
         Calibration and extractor settings.
     sensor : Sensor
         Which images come.
+    check_calibration : bool
+        Warn if the calibration cannot belong to images of that size.
     """
 
-    def __init__(self, settings: Settings, sensor: Sensor) -> None:
+    def __init__(
+        self, settings: Settings, sensor: Sensor, *, check_calibration: bool = True
+    ) -> None:
         self._settings = settings
         self._sensor = sensor
         self._context: core.FrameContext | None = None
@@ -48,6 +56,7 @@ class FrontEnd:
             _orb_options(settings, factor=InitializationThresholds().feature_factor)
         )
         self._pair_extractor = core.PairExtractor(options) if sensor is Sensor.STEREO else None
+        self._check_calibration = check_calibration
         self._depth_check: DepthCheck | None = DepthCheck(settings.depth_factor)
 
     def reset(self) -> None:
@@ -180,7 +189,16 @@ class FrontEnd:
             camera = core.Camera(_camera_options(self._settings, width, height))
             self._context = core.FrameContext(camera, self._extractor.scales)
             self._size = (height, width)
+            self._tell_misfit(width, height)
         return self._context
+
+    def _tell_misfit(self, width: int, height: int) -> None:
+        if not self._check_calibration:
+            return
+        self._check_calibration = False
+        misfit = find_misfit(self._settings, (width, height))
+        if misfit is not None:
+            _log.warning("%s", misfit)
 
 
 def _check_mask(mask: Mask | None, image: npt.NDArray[np.uint8], what: str) -> None:

@@ -39,6 +39,7 @@ class SystemOptions:
     full_adjustment_time_limit: float | None = None
     keyframe_images: bool = False
     seed: int = 0
+    check_calibration: bool = True
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "seed", seed_of(self.seed))

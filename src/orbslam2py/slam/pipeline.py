@@ -102,7 +102,7 @@ class Pipeline:
     ) -> None:
         self._sensor = sensor
         self._waits_for_mapping = options.wait_for_mapping and not options.deterministic
-        self.front_end = FrontEnd(settings, sensor)
+        self.front_end = FrontEnd(settings, sensor, check_calibration=options.check_calibration)
         self.back_end = back_end = BackEnd(sensor, options, callbacks)
         self.tracking = _make_tracking(settings, sensor, vocabulary, back_end, options.seed)
         self.localization = LocalizationSwitch(

@@ -73,6 +73,9 @@ class System:
         Keep a small grey JPEG of every keyframe for map files.
     seed : int
         Seed of all random draws.
+    check_calibration : bool
+        Log one warning if the calibration cannot belong to images of the first one's size.
+        `orbslam2py.check_calibration` looks into the images, too.
 
     Attributes
     ----------
@@ -112,6 +115,7 @@ class System:
         callbacks: Callbacks | None = None,
         keyframe_images: bool = False,
         seed: int = 0,
+        check_calibration: bool = True,
     ) -> None:
         self.options = SystemOptions(
             deterministic=deterministic,
@@ -121,6 +125,7 @@ class System:
             full_adjustment_time_limit=full_adjustment_time_limit,
             keyframe_images=keyframe_images,
             seed=seed,
+            check_calibration=check_calibration,
         )
         setup = Setup.of(settings, sensor, vocabulary, load_map, initial_pose, allow_other_setup)
         self.sensor, self.settings, self.vocabulary = setup.sensor, setup.settings, setup.vocabulary

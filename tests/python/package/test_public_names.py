@@ -46,6 +46,7 @@ NAMES = {
     "VocabularyError",
     "WorkerError",
     "__version__",
+    "check_calibration",
     "load_vocabulary",
     "open_sequence",
     "run_sequence",
