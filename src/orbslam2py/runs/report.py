@@ -16,6 +16,8 @@ from orbslam2py._version import __version__
 from orbslam2py.errors import OrbSlamError
 from orbslam2py.evaluation import Alignment, Evaluation, evaluate_trajectory
 from orbslam2py.runs.losses import losses_report
+from orbslam2py.runs.machine import describe_machine
+from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.result import RunResult
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.events import LoopClosed
@@ -93,6 +95,11 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "deterministic": options.system.deterministic,
         "realtime": options.realtime,
         "seed": options.system.seed,
+        "options": options_entry(options),
+        "command": result.command,
+        "command_folder": None if result.command is None else str(Path.cwd()),
+        "started": result.started,
+        "machine": describe_machine(),
         "frames": n_frames,
         "seen_frames": n_done,
         "tracked": n_tracked,
@@ -120,6 +127,19 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         report |= evaluation.figures.as_dict()
         report["ate_keyframes_rmse_m"] = evaluation.keyframes_ate_rmse
     return report
+
+
+def options_entry(options: RunOptions) -> dict[str, Any]:
+    """What report.json says about which frames were taken, and what the system was to do."""
+    return {
+        "start": options.start,
+        "stride": options.stride,
+        "max_frames": options.max_frames,
+        "localize_after": options.localize_after,
+        "loop_closing": options.system.loop_closing,
+        "full_adjustment": options.system.full_adjustment,
+        "full_adjustment_time_limit": options.system.full_adjustment_time_limit,
+    }
 
 
 def loop_entry(loop: LoopClosed) -> dict[str, Any]:
