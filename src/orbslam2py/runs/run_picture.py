@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py.evaluation import Alignment
+from orbslam2py.runs.frame_errors import position_errors
 from orbslam2py.runs.plots import draw_trajectory
 from orbslam2py.runs.report import RunEvaluation
 from orbslam2py.runs.result import RunResult
@@ -58,7 +59,10 @@ def draw_run(
     scale, unit = metres_per_unit(result, evaluation), "m"
     if scale is None:
         scale, unit = 1.0, "units"
+    errors = None
     if evaluation is not None:
+        if report["ate_rmse_m"] is not None:
+            errors = position_errors(last, evaluation.truth, scale)
         truth = (evaluation.truth.timestamps - begin, scale * evaluation.truth.positions)
         if report["ate_rmse_m"] is not None:
             subtitle += f", ATE {report['ate_rmse_m']:.4f} m"
@@ -73,6 +77,7 @@ def draw_run(
         truth=truth,
         loops=scale * _loop_positions(result),
         gaps=timeline.gaps_before(last.indices),
+        errors=errors,
         timeline=timeline,
         unit=unit,
     )

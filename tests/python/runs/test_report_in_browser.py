@@ -24,7 +24,9 @@ EMPTY_DRAWINGS = """[...document.querySelectorAll("figure.plot svg, svg.boxplot"
 COLOURS = """(() => {
   const canvas = document.getElementById("solid"), pen = canvas.getContext("2d");
   const { data } = pen.getImageData(0, 0, canvas.width, canvas.height), found = new Set();
-  for (let k = 0; k < data.length; k += 4) if (data[k + 3] > 200) found.add(`${data[k]},${data[k + 1]},${data[k + 2]}`);
+  for (let k = 0; k < data.length; k += 4) {
+    if (data[k + 3] > 200) found.add(`${data[k]},${data[k + 1]},${data[k + 2]}`);
+  }
   return found.size;
 })()"""
 PICTURE = "document.getElementById('solid').toDataURL()"

@@ -131,8 +131,10 @@ def result_of(sequence: MadeUpSequence, states: str, maps: str, noise: float) ->
     result.sightings = np.array(
         [(p, k) for k in ids for p in range(len(points))], np.int64
     ).reshape(-1, 2)
-    result.stages = {"track": {"median": 5.0, "mean": 5.5, "p99": 9.0, "count": len(maps)},
-                     "mapping": {"median": 90.0, "mean": 95.0, "p99": 190.0, "count": 8}}  # fmt: skip
+    result.stages = {
+        "track": {"median": 5.0, "mean": 5.5, "p99": 9.0, "count": len(maps)},
+        "mapping": {"median": 90.0, "mean": 95.0, "p99": 190.0, "count": 8},
+    }
     result.seconds = result.slam_seconds = 2.0
     return result
 

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from orbslam2py._arrays import FloatArray, IntArray
-from orbslam2py.runs.report_page.axes import (
+from orbslam2py.runs.plane_view import View
+from orbslam2py.runs.report_page.markup import Markup, element, join
+from orbslam2py.runs.round_numbers import (
     dots_data,
     path_data,
     round_down,
@@ -16,7 +18,6 @@ from orbslam2py.runs.report_page.axes import (
     short,
     tick_texts,
 )
-from orbslam2py.runs.report_page.markup import Markup, element, join
 
 #: Width of the drawing, and bounds of its shape (height by width).
 _WIDTH, _FLATTEST, _TALLEST = 1000.0, 0.35, 1.0
@@ -24,34 +25,6 @@ _WIDTH, _FLATTEST, _TALLEST = 1000.0, 0.35, 1.0
 N_COLOURS = 8
 #: Most corners of a line, most map points.
 _CORNERS, _POINTS = 2500, 3000
-
-
-@dataclass(frozen=True)
-class View:
-    """Which axes of the first keyframe a picture shows, and what they are called."""
-
-    right: int
-    up: int
-    up_sign: float
-    right_name: str
-    up_name: str
-
-    def flatten(self, positions: FloatArray) -> FloatArray:
-        """Positions (n, 3) to the picture's right and up, (n, 2)."""
-        flat: FloatArray = positions[:, [self.right, self.up]] * np.array([1.0, self.up_sign])
-        return flat
-
-
-FROM_ABOVE = View(0, 2, 1.0, "right", "forward")
-FROM_BEHIND = View(0, 1, -1.0, "right", "up")
-
-
-def choose_view(positions: FloatArray) -> View:
-    """Look from above, or from behind where the camera went up or down more than forward."""
-    if len(positions) < 2:
-        return FROM_ABOVE
-    extent = np.ptp(positions, axis=0)
-    return FROM_BEHIND if extent[1] > 2.0 * extent[2] else FROM_ABOVE
 
 
 @dataclass(frozen=True)

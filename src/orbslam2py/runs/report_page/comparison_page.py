@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
+from orbslam2py.runs.plane_view import FROM_ABOVE, choose_view
 from orbslam2py.runs.report_page import above
-from orbslam2py.runs.report_page.axes import NONE
 from orbslam2py.runs.report_page.comparison import Comparison, Row
 from orbslam2py.runs.report_page.explained import STAGES
 from orbslam2py.runs.report_page.markup import Markup, element, join, section, table
@@ -16,6 +16,7 @@ from orbslam2py.runs.report_page.plot import Line, TimePlot, figures, strip
 from orbslam2py.runs.report_page.run_plots import state_spans
 from orbslam2py.runs.report_page.scene import as_script, rounded
 from orbslam2py.runs.report_page.story import Story
+from orbslam2py.runs.round_numbers import NONE
 from orbslam2py.runs.timeline import gaps_in_time
 
 #: Colours there are; the seventh run has that of the first, dashed.
@@ -78,7 +79,7 @@ def _paths(comparison: Comparison) -> Markup | None:
     if not shown:
         return None
     first = comparison.runs[0]
-    view = above.choose_view(shown[0][1])
+    view = choose_view(shown[0][1])
     truth = None if first.truth is None else view.flatten(first.metres * first.truth.positions)
     flats = [(k, view.flatten(path)) for k, path in shown]
     everything = [flat for _, flat in flats] + ([] if truth is None else [truth])
@@ -93,7 +94,7 @@ def _paths(comparison: Comparison) -> Markup | None:
         marks.append(above.path_mark(window, flat, gaps, look(k)))
         keys.append(element("span", element("i", class_=look(k)), comparison.names[k]))
     caption = element(
-        "figcaption", element("b", "From above" if view is above.FROM_ABOVE else "From behind"),
+        "figcaption", element("b", "From above" if view is FROM_ABOVE else "From behind"),
         element("small", f" up in the picture is {view.up_name}"),
         element("span", *keys, class_="legend"),
     )  # fmt: skip

@@ -6,11 +6,12 @@ from __future__ import annotations
 import numpy as np
 
 from orbslam2py._arrays import IntArray
+from orbslam2py.runs.plane_view import FROM_ABOVE, View, choose_view
 from orbslam2py.runs.report_page import above
-from orbslam2py.runs.report_page.axes import short
 from orbslam2py.runs.report_page.markup import Markup, element, join, section
 from orbslam2py.runs.report_page.scene import loop_ends
 from orbslam2py.runs.report_page.story import Story
+from orbslam2py.runs.round_numbers import short
 from orbslam2py.runs.timeline import gaps_in_time
 
 
@@ -55,7 +56,7 @@ def from_above(story: Story) -> Markup:
     """The path from above: truth, error in colours, keyframes, loops, the worst places."""
     run = story.run
     positions = run.metres * run.path.positions
-    view = above.choose_view(positions)
+    view = choose_view(positions)
     flat = view.flatten(positions)
     truth = None if run.truth is None else view.flatten(run.metres * run.truth.positions)
     points = view.flatten(run.metres * run.points[np.isfinite(run.points).all(axis=1)])
@@ -86,7 +87,7 @@ def from_above(story: Story) -> Markup:
     marks.append(above.dots_mark(window, flat[:1], "start"))
     legend.append(("start", "start"))
     keys = [element("span", element("i", class_=look), name) for look, name in legend]
-    which = "From above" if view is above.FROM_ABOVE else "From behind the first camera"
+    which = "From above" if view is FROM_ABOVE else "From behind the first camera"
     caption = element(
         "figcaption",
         element("b", which),
@@ -110,7 +111,7 @@ def colour_bar(largest: float, unit: str) -> Markup:
     )  # fmt: skip
 
 
-def _numbers_of_worst(story: Story, window: above.Window, view: above.View) -> Markup:
+def _numbers_of_worst(story: Story, window: above.Window, view: View) -> Markup:
     links = []
     place_of = {int(position): k for k, position in enumerate(story.of_path)}
     for number, moment in enumerate(story.worst, 1):

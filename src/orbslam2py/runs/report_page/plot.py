@@ -8,14 +8,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
-from orbslam2py.runs.report_page.axes import (
+from orbslam2py.runs.report_page.markup import Markup, element, join
+from orbslam2py.runs.round_numbers import (
     dots_data,
     path_data,
     round_ticks,
     thin,
     tick_texts,
 )
-from orbslam2py.runs.report_page.markup import Markup, element, join
 
 #: Of the drawing, before it is stretched.
 WIDTH, HEIGHT = 1000.0, 260.0

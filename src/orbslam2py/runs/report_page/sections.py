@@ -8,14 +8,15 @@ import base64
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
+from orbslam2py.runs.plane_view import choose_view
 from orbslam2py.runs.remedies import what_helps
 from orbslam2py.runs.report_page import above, run_plots, stages
-from orbslam2py.runs.report_page.axes import short
 from orbslam2py.runs.report_page.explained import FIGURES
 from orbslam2py.runs.report_page.markup import Markup, element, join, section, table
 from orbslam2py.runs.report_page.path_section import frame_link
 from orbslam2py.runs.report_page.plot import figures
 from orbslam2py.runs.report_page.story import Story, positions_of
+from orbslam2py.runs.round_numbers import short
 from orbslam2py.runs.timeline import gaps_in_time
 from orbslam2py.trajectory import Trajectory
 
@@ -157,7 +158,7 @@ def maps_section(story: Story) -> Markup | None:
 def _earlier_map(story: Story, number: int, path: Trajectory) -> Markup:
     run = story.run
     unit = "units" if run.is_monocular else "m"
-    view = above.choose_view(path.positions)
+    view = choose_view(path.positions)
     flat = view.flatten(path.positions)
     window = above.Window.around(flat, np.zeros((0, 2)))
     gaps = np.flatnonzero(gaps_in_time(path.timestamps))
