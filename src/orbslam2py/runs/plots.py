@@ -94,8 +94,10 @@ def draw_trajectory(
     estimate = _Path(seconds, positions, gaps_in_time(seconds) if gaps is None else gaps)
     true = None if truth is None else _Path(*truth, gaps_in_time(truth[0]))
     view = choose_view(positions)
-    _draw_flat(above, view, estimate, keyframes, points, true)
-    if errors is not None and np.isfinite(errors).any():
+    coloured = errors is not None and bool(np.isfinite(errors).any())
+    label = None if coloured else "estimate"  # else the bar of colours names it
+    _draw_flat(above, view, estimate, keyframes, points, true, label)
+    if errors is not None and coloured:
         _draw_errors(above, view, estimate, errors, unit)
     if loops is not None and len(loops):
         _draw_loops(above, view, loops)
@@ -161,6 +163,7 @@ def _draw_flat(
     keyframes: FloatArray,
     points: FloatArray,
     truth: _Path | None,
+    label: str | None,
 ) -> None:
     flat, dots = view.flatten(estimate.positions), view.flatten(points)
     true = None if truth is None else view.flatten(truth.positions)
@@ -172,14 +175,10 @@ def _draw_flat(
     if truth is not None and true is not None:
         # Wide enough to be seen on both sides of an estimate that lies on it.
         truth.draw(axes, *true.T, color=_TRUTH, linewidth=6.0, label="ground truth")
-    estimate.draw(axes, *flat.T, color=_ESTIMATE, linewidth=1.4, label="estimate")
-    style: dict[str, Any] = {
-        "s": 9,
-        "facecolors": "white",
-        "edgecolors": _ESTIMATE,
-        "linewidths": 0.7,
-    }
-    axes.scatter(*view.flatten(keyframes).T, zorder=3, label="keyframes", **style)
+    estimate.draw(axes, *flat.T, color=_ESTIMATE, linewidth=1.4, label=label)
+    rings: dict[str, Any] = {"facecolors": "white", "edgecolors": _ESTIMATE, "linewidths": 0.7}
+    x, y = view.flatten(keyframes).T
+    axes.scatter(x, y, s=9, zorder=3, label="keyframes", **rings)
     axes.scatter(
         flat[:1, 0], flat[:1, 1], s=50, marker="s", color=_ESTIMATE, zorder=4, label="start"
     )
@@ -218,10 +217,8 @@ def _draw_errors(axes: Axes, view: View, estimate: _Path, errors: FloatArray, un
     lines.set_clim(0.0, float(np.nanmax(errors)) or 1.0)
     lines.set_capstyle("round")
     axes.add_collection(lines, autolim=False)
-    figure = axes.figure
-    figure.colorbar(lines, ax=axes, shrink=0.85, pad=0.01).set_label(
-        f"distance to the ground truth [{unit}]"
-    )
+    bar = axes.figure.colorbar(lines, ax=axes, shrink=0.85, pad=0.01)
+    bar.set_label(f"estimate: distance to the ground truth [{unit}]")
 
 
 def _say_where_up_is(axes: Axes, view: View, unit: str) -> None:
@@ -235,13 +232,7 @@ def _say_where_up_is(axes: Axes, view: View, unit: str) -> None:
     bottom, top = axes.get_ylim()
     length = round_down(0.2 * (right - left))
     x, y = left + 0.03 * (right - left), bottom + 0.05 * (top - bottom)
-    style: dict[str, Any] = {
-        "color": "#222222",
-        "linewidth": 2.0,
-        "zorder": 6,
-        "solid_capstyle": "butt",
-    }
-    axes.plot([x, x + length], [y, y], **style)
+    axes.plot([x, x + length], [y, y], color="#222222", linewidth=2.0, zorder=6)
     axes.annotate(f"{short(length, 1)} {unit}", (x + length / 2, y), xytext=(0, 3),
                   textcoords="offset points", ha="center", fontsize=9)  # fmt: skip
 

@@ -85,16 +85,3 @@ def test_names_tell_the_runs_apart(tmp_path: Path) -> None:
     runs = [made_up_run(tmp_path / day / "circle", "k" * 8) for day in ("monday", "tuesday")]
     assert compare_runs(runs).names == ["monday/circle", "tuesday/circle"]
     assert len(set(compare_runs([runs[0], runs[0]]).names)) == 2
-
-
-def test_without_the_page(command: CommandLine, rgbd: Path) -> None:
-    done = command("run", rgbd, "--sensor", "rgbd", "--output", "r", "--no-report")
-    assert done.code == 0, done.err
-    names = {path.name for path in Path("r").iterdir()}
-    assert not names & {"report.html", "frame_images.zip"}
-    assert "report.html" not in done.out
-    done = command("run", rgbd, "--sensor", "rgbd", "--output", "r", "--force")
-    assert "report.html" in done.out
-    assert {path.name for path in Path("r").iterdir()} > names | {"report.html"}
-    command("run", rgbd, "--sensor", "rgbd", "--output", "r", "--force", "--no-report")
-    assert {path.name for path in Path("r").iterdir()} == names, "no page of another run"

@@ -113,7 +113,7 @@ class Solid {
     this.pen.lineJoin = this.pen.lineCap = "round";
     this.style = getComputedStyle(root);
     if (this.layers.points) this.drawPoints(ratio);
-    if (this.layers.truth && data.truth) this.line(data.truth, "--truth", 6 * ratio);
+    if (this.layers.truth && data.truth) this.line(data.truth, "--truth", 5 * ratio);
     for (const path of this.paths) this.drawPath(path, ratio);
     if (this.layers.keyframes) this.drawKeyframes(ratio);
     if (this.layers.loops) this.drawLoops(ratio);

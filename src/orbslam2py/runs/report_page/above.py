@@ -147,7 +147,7 @@ def plane(
     size = window.high - window.low
     xs = round_ticks(float(window.low[0]), float(window.high[0]), 6)
     ys = round_ticks(
-        float(window.low[1]), float(window.high[1]), max(2, round(6 * size[1] / size[0]))
+        float(window.low[1]), float(window.high[1]), max(3, round(6 * size[1] / size[0]))
     )
     px = _WIDTH * (xs - window.low[0]) / size[0]
     py = window.height * (window.high[1] - ys) / size[1]

@@ -77,3 +77,16 @@ def test_a_page_that_cannot_be_made_leaves_the_rest(
     assert "cannot make report.html: no ink" in done.err
     assert Path("r/report.json").is_file()
     assert Path("r/trajectory.txt").is_file()
+
+
+def test_without_the_page(command: CommandLine, rgbd: Path) -> None:
+    done = command("run", rgbd, "--sensor", "rgbd", "--output", "r", "--no-report")
+    assert done.code == 0, done.err
+    names = {path.name for path in Path("r").iterdir()}
+    assert not names & {"report.html", "frame_images.zip"}
+    assert "report.html" not in done.out
+    done = command("run", rgbd, "--sensor", "rgbd", "--output", "r", "--force")
+    assert "report.html" in done.out
+    assert {path.name for path in Path("r").iterdir()} > names | {"report.html"}
+    command("run", rgbd, "--sensor", "rgbd", "--output", "r", "--force", "--no-report")
+    assert {path.name for path in Path("r").iterdir()} == names, "no page of another run"
