@@ -12,7 +12,16 @@ from rich.console import Console
 
 from orbslam2py._files import describe_error
 from orbslam2py._version import __version__
-from orbslam2py.cli import calibrate, demo, evaluate, run, settings, synthesize, vocabulary
+from orbslam2py.cli import (
+    calibrate,
+    demo,
+    evaluate,
+    report,
+    run,
+    settings,
+    synthesize,
+    vocabulary,
+)
 from orbslam2py.cli.display import print_error, tell_repeated
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.run_arguments import RunCommand
@@ -62,6 +71,8 @@ app.command("run", cls=RunCommand)(run.run)
 app.command("demo")(demo.demo)
 app.command("synthesize")(synthesize.synthesize)
 app.command("evaluate")(evaluate.evaluate)
+app.command("report")(report.report)
+app.command("compare")(report.compare)
 app.command("calibrate")(calibrate.calibrate)
 app.command("import-camera")(calibrate.import_camera)
 app.add_typer(settings.app, name="settings")

@@ -22,6 +22,9 @@ def demo(
         int | None, typer.Option(help="Number of images [one lap and a bit].", min=10)
     ] = None,
     output: Annotated[Path, typer.Option(help="Folder for the results.")] = DEFAULT_OUTPUT,
+    no_report: Annotated[
+        bool, typer.Option("--no-report", help="Do not write the page report.html.")
+    ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
 ) -> None:
     """Track a camera once around a synthetic corridor: needs no data.
@@ -34,7 +37,14 @@ def demo(
     sequence = SyntheticSequence(options)
     # Results of an earlier demo are replaced, other files are not.
     force = output == DEFAULT_OUTPUT or (output / "report.json").is_file()
-    code = run_and_show(sequence, RunOptions(sensor), output=output, force=force, quiet=quiet)
+    code = run_and_show(
+        sequence,
+        RunOptions(sensor),
+        output=output,
+        force=force,
+        report_page=not no_report,
+        quiet=quiet,
+    )
     if not quiet:
         typer.echo(f"Look at {output / 'trajectory.png'}.")
     raise typer.Exit(code)

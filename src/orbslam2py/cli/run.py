@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -177,6 +179,9 @@ def run(
     force: Annotated[
         bool, typer.Option("--force", help="Write into an output folder that is not empty.")
     ] = False,
+    no_report: Annotated[
+        bool, typer.Option("--no-report", help="Do not write the page report.html.")
+    ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
 ) -> None:
     """Track a recorded sequence, a video or a camera; write trajectory, map and report."""
@@ -210,7 +215,13 @@ def run(
         autosave=autosave,
     )
     code = run_and_show(
-        images, options, vocabulary=vocabulary, output=output, force=force, quiet=quiet
+        images,
+        options,
+        vocabulary=vocabulary,
+        output=output,
+        force=force,
+        report_page=not no_report,
+        quiet=quiet,
     )
     raise typer.Exit(code)
 
@@ -225,6 +236,7 @@ def run_and_show(
     vocabulary: Path | None = None,
     output: Path | None = None,
     force: bool = False,
+    report_page: bool = True,
     quiet: bool = False,
 ) -> ExitCode:
     """Run, with a progress bar and a table at the end; returns the exit code."""
@@ -242,11 +254,17 @@ def run_and_show(
             force=force,
             progress=Display(bar, n_frames).show,
             stop=interrupt.event,
+            report_page=report_page,
+            command=shlex.join(["orbslam2py", *sys.argv[1:]]),
         )
     tell_repeated()
     console.print(report_table(done.report))
     folder = escape(str(done.folder))
     console.print(f"Results are in [bold]{folder}[/]", highlight=False, soft_wrap=True)
+    page = done.folder / "report.html" if done.folder is not None else None
+    if report_page and page is not None and page.is_file():
+        text = f"To look at them: [bold]{escape(str(page))}[/]"
+        console.print(text, highlight=False, soft_wrap=True)
     code = _conclude(done, errors)
     interrupted = interrupt.event.is_set() and not done.result.is_live  # also while writing
     if code is not ExitCode.FAILED and interrupted:

@@ -18,6 +18,8 @@ from orbslam2py.evaluation import Alignment, Evaluation, evaluate_trajectory
 from orbslam2py.maps.saved_map import SavedMap
 from orbslam2py.runs.gravity import Height, height_of
 from orbslam2py.runs.losses import losses_report
+from orbslam2py.runs.machine import describe_machine
+from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.result import RunResult
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.events import LoopClosed
@@ -98,6 +100,11 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "deterministic": options.system.deterministic,
         "realtime": options.realtime,
         "seed": options.system.seed,
+        "options": options_entry(options),
+        "command": result.command,
+        "command_folder": None if result.command is None else str(Path.cwd()),
+        "started": result.started,
+        "machine": describe_machine(),
         "frames": n_frames,
         "seen_frames": n_done,
         "tracked": n_tracked,
@@ -139,6 +146,19 @@ def loaded_map_entry(loaded: SavedMap | None) -> dict[str, Any] | None:
         "keyframes": len(loaded.contents.keyframes),
         "map_points": len(loaded.contents.points),
         "runs": len(loaded.runs),
+    }
+
+
+def options_entry(options: RunOptions) -> dict[str, Any]:
+    """What report.json says about which frames were taken, and what the system was to do."""
+    return {
+        "start": options.start,
+        "stride": options.stride,
+        "max_frames": options.max_frames,
+        "localize_after": options.localize_after,
+        "loop_closing": options.system.loop_closing,
+        "full_adjustment": options.system.full_adjustment,
+        "full_adjustment_time_limit": options.system.full_adjustment_time_limit,
     }
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from orbslam2py._arrays import IntArray
 from orbslam2py.datasets.base import Source
 from orbslam2py.maps.snapshot import MapSnapshot
 from orbslam2py.runs.options import RunOptions
@@ -72,6 +73,8 @@ class RunResult:
     """Keyframes of the last map."""
     snapshot: MapSnapshot = field(default_factory=empty_snapshot)
     """The last map."""
+    sightings: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
+    """(o, 2) ids of a point of the last map and of a keyframe that observes it."""
     stages: dict[str, dict[str, float]] = field(default_factory=dict)
     seconds: float = 0.0
     slam_seconds: float = 0.0
@@ -94,6 +97,10 @@ class RunResult:
     """The run was stopped before its end; never for a camera, which has none."""
     error: Exception | None = None
     """What ended it."""
+    started: str = ""
+    """Date and time of its beginning, ISO 8601 with the time zone."""
+    command: str | None = None
+    """The line that repeats it, if it was started by one."""
 
     @property
     def n_tracked(self) -> int:

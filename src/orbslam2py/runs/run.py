@@ -57,6 +57,8 @@ def run_sequence(
     force: bool = False,
     progress: Progress | None = None,
     stop: threading.Event | None = None,
+    report_page: bool = True,
+    command: str | None = None,
 ) -> FinishedRun:
     """Run the system over a sequence, judge the result and write its files.
 
@@ -76,6 +78,10 @@ def run_sequence(
         ``progress(row, system)``, called after every frame.
     stop : threading.Event, optional
         Ends the run after the present frame when it is set; what was done is written.
+    report_page : bool
+        Write ``report.html`` and the images for it as well.
+    command : str, optional
+        The line that started the run, for its report.
 
     Returns
     -------
@@ -113,6 +119,7 @@ def run_sequence(
     if options.save_map is not None:
         check_map_target(options.save_map)
     runner = SequenceRunner(sequence, sequence.settings, vocabulary, options)
+    runner.result.command = command
     if folder is not None:
         folder = prepare_output_folder(folder, force=force)
         link_latest(folder)
@@ -126,6 +133,6 @@ def run_sequence(
     problems: tuple[str, ...] = ()
     if folder is not None:
         writer = OutputWriter(folder)
-        writer.write_all(result, report, evaluation)
+        writer.write_all(result, report, evaluation, page=report_page)
         problems = tuple(writer.problems)
     return FinishedRun(result, evaluation, report, folder, problems)

@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import asdict, replace
+from datetime import datetime
 from typing import Any, cast
 
 import numpy as np
@@ -101,6 +102,7 @@ class SequenceRunner:
         """
         result, options = self.result, self._options
         begin = time.perf_counter()
+        result.started = datetime.now().astimezone().isoformat(timespec="seconds")
         in_time = options.realtime or self._feed.is_live
         # Told by the watch, which knows more, or by nobody.
         how = replace(options.system, wait_for_mapping=not in_time, check_calibration=False)
@@ -261,6 +263,9 @@ class SequenceRunner:
             keyframes, [by_time.get(float(t), -1) for t in keyframes.timestamps]
         )
         result.snapshot = system.map_snapshot()
+        seen = core.snapshot_observations(system.pipeline.back_end.map)
+        points = np.repeat(seen.ids, np.diff(seen.offsets))
+        result.sightings = np.stack([points, seen.keyframes], axis=1)
         result.stages = system.stage_statistics()
         result.n_resets = system.n_resets
         result.n_relocalizations = system.n_relocalizations
