@@ -120,7 +120,8 @@ def add_view_controls(server: viser.ViserServer, view: ViewActions) -> None:
 
     @everything.on_click
     def show_all(event: viser.GuiEvent[Any]) -> None:
-        follow.value = str(Follow.FREE)
+        switch: Any = follow
+        switch.value = str(Follow.FREE)
         if event.client is not None:
             view.show_all(event.client)
 
@@ -160,7 +161,7 @@ class SystemControls:
     ) -> None:
         gui = server.gui
         with gui.add_folder("System", order=-1.0):
-            self._localization: Any = gui.add_checkbox(
+            self._localization = gui.add_checkbox(
                 "Localization",
                 False,
                 hint="Poses only: the map stays as it is.",
@@ -177,8 +178,9 @@ class SystemControls:
 
     def show_localization(self, wanted: bool) -> None:
         """Let the switch show what somebody else has switched."""
-        if self._localization.value != wanted:
-            self._localization.value = wanted
+        switch: Any = self._localization
+        if switch.value != wanted:
+            switch.value = wanted
 
 
 def _ask(event: viser.GuiEvent[Any], action: Callable[[], str | None]) -> None:

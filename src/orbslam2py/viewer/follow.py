@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from enum import Enum
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,8 @@ _UP = np.array([0.0, -1.0, 0.0])  # that of the first camera
 _BEHIND, _AHEAD, _RAISED, _ABOVE = 24.0, 14.0, 10.0, 110.0
 #: Part of the way that the view turns to where the camera looks, with every image.
 _TURN = 0.25
+#: Distances that were set and may come back from a browser later.
+_ECHOES = 30
 
 
 class Follow(str, Enum):
@@ -38,7 +41,7 @@ class Follower:
     def __init__(self) -> None:
         self.mode = Follow.BEHIND
         self._forward: FloatArray | None = None
-        self._distances: dict[int, float] = {}
+        self._distances: dict[int, deque[float]] = {}
         self._zoom: dict[int, float] = {}
 
     def forget(self, client_id: int) -> None:
@@ -67,7 +70,8 @@ class Follower:
             client.camera.up_direction = up
             client.camera.position = eye
             client.camera.look_at = target
-        self._distances[client.client_id] = float(np.linalg.norm(eye - target))
+        set_before = self._distances.setdefault(client.client_id, deque(maxlen=_ECHOES))
+        set_before.append(float(np.linalg.norm(eye - target)))
 
     def turn(self, T_wc: FloatArray) -> None:
         """Take note of where the camera looks, once for every image."""
@@ -91,11 +95,12 @@ class Follower:
     def _zoom_of(self, client: viser.ClientHandle) -> float:
         number = client.client_id
         zoom = self._zoom.get(number, 1.0)
-        left = self._distances.get(number)
-        if left is not None:
+        set_before = np.array(self._distances.get(number, ()))
+        if len(set_before):
             now = float(np.linalg.norm(client.camera.position - client.camera.look_at))
-            if abs(now / left - 1) > 0.02:  # the wheel was turned
-                zoom = float(np.clip(zoom * now / left, 0.1, 10.0))
+            # The browser tells its view after a while: an older one of ours is no wish.
+            if (np.abs(now / set_before - 1) > 0.02).all():
+                zoom = float(np.clip(zoom * now / set_before[-1], 0.1, 10.0))
         self._zoom[number] = zoom
         return zoom
 

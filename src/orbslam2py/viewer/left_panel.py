@@ -35,8 +35,7 @@ def overlaid(view: FrameView) -> ByteArray:
         start_lines=np.zeros((0, 4)) if view.start_lines is None else view.start_lines,
     )
     height, width = view.image.shape[:2]
-    room = (min(_ROOM[0], width), min(_ROOM[1], height))
-    return draw_overlay(view.image, marks, size=fit_size((width, height), room))
+    return draw_overlay(view.image, marks, size=fit_size((width, height), _ROOM))
 
 
 def status_of(view: FrameView, n_keyframes: int, n_points: int, n_dropped: int) -> Status:

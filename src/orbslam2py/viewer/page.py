@@ -15,7 +15,6 @@ from orbslam2py.viewer.controls import add_view_controls
 from orbslam2py.viewer.follow import Follow, Follower, whole_view
 from orbslam2py.viewer.left_panel import LeftPanel
 from orbslam2py.viewer.map_model import KEYFRAME_IDS, MapModel, Stale
-from orbslam2py.viewer.palette import GROUND
 from orbslam2py.viewer.point_colours import ColourBy, PointColours
 from orbslam2py.viewer.scene import Scene, Selection
 from orbslam2py.viewer.server import address_of, start_server, stop_server
@@ -77,7 +76,6 @@ class Page:
         gui.main_panel.set_width(300)
         self.left = LeftPanel(self.server)
         self.scene = Scene(self.server, self.model, self._colours, self._select)
-        self.server.scene.set_background_image(np.full((2, 2, 3), GROUND, np.uint8))
         add_view_controls(self.server, self)
         self.server.on_client_connect(self._connected)
         self.server.on_client_disconnect(lambda client: self._follower.forget(client.client_id))

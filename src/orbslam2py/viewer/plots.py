@@ -59,7 +59,7 @@ class Plots:
         none = np.zeros(0)
         time_axis: viser.uplot.Axis = {"show": True, "label": "", "size": 26}
         scales: dict[str, viser.uplot.Scale] = {
-            "x": {"time": False, "min": -SPAN, "max": 0.0},
+            "x": {"time": False, "range": (-SPAN, 0.0)},
             "y": {"auto": True},
         }
         self._inliers = server.gui.add_uplot(

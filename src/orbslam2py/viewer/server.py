@@ -59,7 +59,7 @@ def start_server(host: str = LOOPBACK, port: int | None = None) -> viser.ViserSe
     with _quiet():
         server = viser.ViserServer(host=host, port=chosen, verbose=False)
     # It offers to share the page through somebody's server.
-    server.request_share_url = lambda verbose=True: None
+    server.request_share_url = lambda verbose=True: None  # type: ignore[method-assign]
     return server
 
 
