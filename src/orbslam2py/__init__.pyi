@@ -29,4 +29,5 @@ from .slam.records import TrackingRecord as TrackingRecord
 from .slam.records import TrackingState as TrackingState
 from .slam.system import System as System
 from .trajectory import Trajectory as Trajectory
+from .viewer import Viewer as Viewer
 from .vocabulary import load_vocabulary as load_vocabulary

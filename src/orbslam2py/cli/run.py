@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import Annotated
 
@@ -21,14 +22,24 @@ from orbslam2py.cli.display import (
 )
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.interrupts import StopOnInterrupt
+from orbslam2py.cli.viewing import (
+    ViewerExit,
+    ViewerFlag,
+    ViewerHost,
+    ViewerOptions,
+    ViewerPort,
+    Viewing,
+)
 from orbslam2py.datasets import open_input
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.outputs import new_output_folder
 from orbslam2py.runs.remedies import why_nothing_was_tracked
+from orbslam2py.runs.result import FrameRow
 from orbslam2py.runs.run import FinishedRun, run_sequence
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.options import SystemOptions
+from orbslam2py.slam.system import System
 from orbslam2py.vocabulary.vocabulary import load_vocabulary
 
 EXAMPLE = """
@@ -134,9 +145,14 @@ def run(
     force: Annotated[
         bool, typer.Option("--force", help="Write into an output folder that is not empty.")
     ] = False,
+    viewer: ViewerFlag = False,
+    viewer_port: ViewerPort = None,
+    viewer_host: ViewerHost = None,
+    viewer_exit: ViewerExit = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
 ) -> None:
     """Track a recorded sequence, a video or a camera; write trajectory, map and report."""
+    look = ViewerOptions(viewer, viewer_port, viewer_host, viewer_exit)
     log_to(Console(stderr=True), quiet=quiet)  # opening warns already
     images = open_input(sequence, sensor, settings=settings, fps=fps, times=times, mask=mask)
     options = RunOptions(
@@ -155,7 +171,13 @@ def run(
         localize_after=localize,
     )
     code = run_and_show(
-        images, options, vocabulary=vocabulary, output=output, force=force, quiet=quiet
+        images,
+        options,
+        vocabulary=vocabulary,
+        output=output,
+        force=force,
+        viewer=look,
+        quiet=quiet,
     )
     raise typer.Exit(code)
 
@@ -170,6 +192,7 @@ def run_and_show(
     vocabulary: Path | None = None,
     output: Path | None = None,
     force: bool = False,
+    viewer: ViewerOptions | None = None,
     quiet: bool = False,
 ) -> ExitCode:
     """Run, with a progress bar and a table at the end; returns the exit code."""
@@ -178,21 +201,33 @@ def run_and_show(
     log_to(errors, quiet=quiet)
     n_frames = options.n_frames(sequence)
     words = load_vocabulary(vocabulary)  # until here a Ctrl-C leaves nothing behind
-    with StopOnInterrupt() as interrupt, progress_bar(console) as bar:
-        done = run_sequence(
-            sequence,
-            options,
-            vocabulary=words,
-            output=output or new_output_folder(sequence.name),
-            force=force,
-            progress=Display(bar, n_frames).show,
-            stop=interrupt.event,
-        )
-    tell_repeated()
-    console.print(report_table(done.report))
-    folder = escape(str(done.folder))
-    console.print(f"Results are in [bold]{folder}[/]", highlight=False, soft_wrap=True)
-    code = _conclude(done, errors)
+    with contextlib.ExitStack() as page:
+        with StopOnInterrupt() as interrupt:
+            viewing = Viewing(viewer or ViewerOptions(), sequence, interrupt.event)
+            page.enter_context(viewing)
+            with progress_bar(console) as bar:
+                display = Display(bar, n_frames)
+
+                def progress(row: FrameRow, system: System) -> None:
+                    display.show(row, system)
+                    viewing.count(row)
+
+                done = run_sequence(
+                    sequence,
+                    options,
+                    vocabulary=words,
+                    output=output or new_output_folder(sequence.name),
+                    force=force,
+                    progress=progress,
+                    control=viewing.control,
+                    watch=viewing.watch,
+                )
+        tell_repeated()
+        console.print(report_table(done.report))
+        folder = escape(str(done.folder))
+        console.print(f"Results are in [bold]{folder}[/]", highlight=False, soft_wrap=True)
+        code = _conclude(done, errors)
+        viewing.stay(console, done.folder)
     interrupted = interrupt.event.is_set() and not done.result.is_live  # also while writing
     if code is not ExitCode.FAILED and interrupted:
         return ExitCode.INTERRUPTED
