@@ -150,6 +150,9 @@ class Page:
     def fit_size(self, local_points: IntArray, T_wc: FloatArray | None) -> None:
         """Make cameras and points as large as the distance of what is seen asks for."""
         places = self.model.positions_of(local_points)
+        if not len(places):  # as in the first image
+            pages = self.model.points.values()
+            places = np.concatenate([places, *(page.positions for page in pages)])
         if T_wc is None or not len(places):
             return
         distance = float(np.median(np.linalg.norm(places - T_wc[:3, 3], axis=1)))
