@@ -164,6 +164,7 @@ class System:
         return self._track(
             timestamp,
             details,
+            left,
             lambda i, timer: self.pipeline.front_end.stereo(left, right, i, timestamp, timer, mask),
         )
 
@@ -205,6 +206,7 @@ class System:
         return self._track(
             timestamp,
             details,
+            image,
             lambda i, timer: self.pipeline.front_end.rgbd(image, depth, i, timestamp, timer, mask),
         )
 
@@ -245,6 +247,7 @@ class System:
         return self._track(
             timestamp,
             details,
+            image,
             lambda i, timer: self.pipeline.front_end.monocular(
                 image, i, timestamp, timer, mask, initializing=self.pipeline.tracking.initializing
             ),
@@ -303,11 +306,17 @@ class System:
                 f"this one is for '{self.sensor.value}'"
             )
 
-    def _track(self, timestamp: float, details: bool, build: BuildFrame) -> TrackingRecord:
+    def _track(
+        self,
+        timestamp: float,
+        details: bool,
+        image: npt.NDArray[np.uint8],
+        build: BuildFrame,
+    ) -> TrackingRecord:
         with self._guard():
             if self._shut_down:
                 raise StateError("the system has been shut down; make a new one")
-            return self.pipeline.process(timestamp, build, details=details)
+            return self.pipeline.process(timestamp, build, image, details=details)
 
     # ---- control ---------------------------------------------------------------------------------
     @property

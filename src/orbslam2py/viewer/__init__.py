@@ -1,2 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a person watches: the image with its points, the map, what becomes of both over time."""
+"""What a person watches: the map while it grows, or that of a run long past."""
+
+from orbslam2py.viewer.publisher import Publisher
+from orbslam2py.viewer.watching import FrameView, QueueState, Watcher
+
+__all__ = ["FrameView", "Publisher", "QueueState", "Watcher"]

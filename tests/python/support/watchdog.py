@@ -43,5 +43,6 @@ def worker_threads() -> list[str]:
         "callbacks",
         "image loader",
         "worker under test",
+        "viewer publisher",
     }
     return [thread.name for thread in threading.enumerate() if thread.name in names]
