@@ -305,7 +305,7 @@ def draw_status(width: int, status: Status) -> ByteArray:
 
 
 def _status_size(width: int) -> int:
-    return int(np.clip(round(width / 54), 11, 30))
+    return int(np.clip(round(width / 50), 11, 30))
 
 
 def _shortened(text: str, room: int, size: int) -> str:
