@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A sequence in, a folder of results out."""
 
+from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.result import FrameRow, RunResult
 from orbslam2py.runs.run import FinishedRun, run_sequence
@@ -10,6 +11,7 @@ from orbslam2py.slam.options import SystemOptions
 __all__ = [
     "FinishedRun",
     "FrameRow",
+    "RunControl",
     "RunOptions",
     "RunResult",
     "SequenceRunner",

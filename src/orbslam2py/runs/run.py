@@ -12,12 +12,13 @@ from typing import Any
 from orbslam2py import _core as core
 from orbslam2py.datasets import RecordedSequence
 from orbslam2py.datasets.base import LiveSource, Sequence
+from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.losses import find_losses, last_loss_warning
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.outputs import OutputWriter, link_latest, prepare_output_folder
 from orbslam2py.runs.report import RunEvaluation, evaluate_run, make_report
 from orbslam2py.runs.result import RunResult
-from orbslam2py.runs.runner import Progress, SequenceRunner
+from orbslam2py.runs.runner import Progress, SequenceRunner, Watch
 from orbslam2py.trajectory.trajectory import Trajectory
 from orbslam2py.vocabulary.vocabulary import load_vocabulary
 
@@ -54,6 +55,8 @@ def run_sequence(
     force: bool = False,
     progress: Progress | None = None,
     stop: threading.Event | None = None,
+    control: RunControl | None = None,
+    watch: Watch | None = None,
 ) -> FinishedRun:
     """Run the system over a sequence, judge the result and write its files.
 
@@ -73,6 +76,11 @@ def run_sequence(
         ``progress(row, system)``, called after every frame.
     stop : threading.Event, optional
         Ends the run after the present frame when it is set; what was done is written.
+    control : RunControl, optional
+        In place of `stop`: also holds the run and lets single frames through.
+    watch : callable, optional
+        Called with the system; what it returns is entered before the first frame, and left when the
+        system has been shut down. For viewers, recordings, videos.
 
     Returns
     -------
@@ -104,7 +112,7 @@ def run_sequence(
     if output is not None:
         folder = prepare_output_folder(Path(output), force=force)
         link_latest(folder)
-    result = runner.run(progress, stop)
+    result = runner.run(progress, stop, control=control, watch=watch)
     warning = last_loss_warning(find_losses(result.rows))
     if warning is not None:
         _log.warning("%s", warning)

@@ -8,6 +8,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import asdict, replace
 from typing import Any, cast
 
@@ -18,6 +19,7 @@ from orbslam2py import _core as core
 from orbslam2py._files import describe_error
 from orbslam2py.datasets.base import Images, LiveSource, Sequence
 from orbslam2py.errors import DatasetError, ImageError, OrbSlamError
+from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.feeds import FedFrame, LiveFeed, RecordedFeed, is_sequence
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.result import DROPPED, FrameRow, RunResult
@@ -35,6 +37,10 @@ _WAIT_SLICE = 0.2
 
 #: Called after every frame with the row and the system.
 Progress = Callable[[FrameRow, System], None]
+
+#: Called with the system before the first frame; what it returns is entered then, and left when the
+#: system has been shut down.
+Watch = Callable[[System], AbstractContextManager[object]]
 
 
 class SequenceRunner:
@@ -79,7 +85,12 @@ class SequenceRunner:
         )
 
     def run(
-        self, progress: Progress | None = None, stop: threading.Event | None = None
+        self,
+        progress: Progress | None = None,
+        stop: threading.Event | None = None,
+        *,
+        control: RunControl | None = None,
+        watch: Watch | None = None,
     ) -> RunResult:
         """Process the frames.
 
@@ -90,6 +101,11 @@ class SequenceRunner:
         stop : threading.Event, optional
             Ends the run after the present frame when it is set: the only end of a camera's run
             unless `RunOptions.max_frames` tells one.
+        control : RunControl, optional
+            In place of `stop`: also holds the run and lets single frames through.
+        watch : callable, optional
+            Called with the system; what it returns is entered before the first frame, and left when
+            the system has been shut down. For viewers, recordings, videos.
 
         Returns
         -------
@@ -102,27 +118,32 @@ class SequenceRunner:
         in_time = options.realtime or self._feed.is_live
         how = replace(options.system, wait_for_mapping=not in_time)
         system = System(result.settings, options.sensor, self._vocabulary, **asdict(how))
-        stop = stop or threading.Event()
-        try:
-            self._process(system, progress, stop)
-            self._wait_for_mapping(system, stop)
-        except KeyboardInterrupt:
-            stop.set()
-        except Exception as error:
-            self._take_note(error)
-        result.interrupted = stop.is_set() and not result.is_live
-        if result.interrupted:
-            seen = f"{len(result.rows)} of {result.n_frames} frames"
-            _log.warning("interrupted; saving what was done so far (%s)", seen)
-        self._shut_down(system)
+        control = control or RunControl(stop)
+        stop = control.stop
+        with contextlib.ExitStack() as watching:
+            try:
+                if watch is not None:
+                    watching.enter_context(watch(system))
+                self._process(system, progress, control)
+                self._wait_for_mapping(system, stop)
+            except KeyboardInterrupt:
+                stop.set()
+            except Exception as error:
+                self._take_note(error)
+            result.interrupted = stop.is_set() and not result.is_live
+            if result.interrupted:
+                seen = f"{len(result.rows)} of {result.n_frames} frames"
+                _log.warning("interrupted; saving what was done so far (%s)", seen)
+            self._shut_down(system)
         self._collect(system)
         result.seconds = time.perf_counter() - begin
         return result
 
     # ---- one pass over the frames ----------------------------------------------------------------
-    def _process(self, system: System, progress: Progress | None, stop: threading.Event) -> None:
-        result = self.result
+    def _process(self, system: System, progress: Progress | None, control: RunControl) -> None:
+        result, stop = self.result, control.stop
         try:
+            control.wait()
             with contextlib.closing(self._feed.frames(stop)) as frames:
                 for position, frame in enumerate(frames):
                     if position == self._options.localize_after:
@@ -133,6 +154,7 @@ class SequenceRunner:
                     result.rows.append(row)
                     if progress is not None:
                         progress(row, system)
+                    self._feed.delay(control.wait())
         finally:
             if result.is_live:
                 result.n_frames = len(result.rows)

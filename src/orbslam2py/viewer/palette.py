@@ -33,7 +33,21 @@ POINTS: Colour = (214, 196, 160)
 COVISIBILITY: Colour = (58, 92, 118)
 KEYFRAME: Colour = (110, 186, 240)
 PATH: Colour = (240, 243, 247)
+#: The path as it was when the images came.
+ONLINE_PATH: Colour = (178, 150, 214)
+#: Points of the local map, which the present image is matched with.
+LOCAL_POINTS: Colour = (255, 122, 72)
+SPANNING_TREE: Colour = (86, 180, 233)
 CAMERA: Colour = MAPPED
 LOOP: Colour = (238, 140, 200)
 TRUTH: Colour = (120, 150, 40)
 NOW: Colour = (255, 255, 255)
+
+#: Stages of tracking, in plots.
+STAGES: dict[str, Colour] = {
+    "extract": (86, 180, 233),
+    "stereo": (0, 158, 115),
+    "predict": (240, 228, 66),
+    "local_map": (230, 159, 0),
+    "keyframe": (204, 121, 167),
+}
