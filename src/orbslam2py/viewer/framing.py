@@ -74,6 +74,9 @@ class Framing:
         off = self.state - goal
         decay = np.exp(-_SPEED * seconds)
         pull = self.speed + _SPEED * off
+        unit = np.array([*(2 * [self.unit_per_pixel]), 1.0 / max(self.size)])
+        if (np.abs(off) + np.abs(self.speed) < 0.2 * unit).all():  # nobody sees the rest
+            return replace(self, state=goal, speed=np.zeros(3), goal=goal)
         return replace(
             self,
             state=goal + (off + pull * seconds) * decay,

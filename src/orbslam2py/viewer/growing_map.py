@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
@@ -30,6 +32,7 @@ class GrowingMap:
         self._parents = _Table(1, np.int64)
         self._covisibility = self._loops = _NO_EDGES
         self._path = _Path()
+        self._told: MapPicture | None = None
 
     @property
     def n_keyframes(self) -> int:
@@ -67,21 +70,28 @@ class GrowingMap:
         if record.map_index == self.map_index:
             self._path.hang(self._poses)
 
-    def picture(self, local_points: IntArray | None = None) -> MapPicture:
+    def picture(
+        self, local_points: IntArray | None = None, *, renew: bool = True
+    ) -> MapPicture:
         """Tell the whole as it is now.
 
         Parameters
         ----------
         local_points : array of int64, (l,), optional
             Ids of points to be lit up.
+        renew : bool
+            Points, keyframes and covisibility too, else these are as they were told last.
         """
-        poses = self._poses.values().reshape(-1, 4, 4)
+        if renew or self._told is None:
+            self._told = MapPicture(
+                points=self._points.values(),
+                keyframes=self._poses.values().reshape(-1, 4, 4),
+                covisibility=self._edges(self._covisibility),
+            )
         path, gaps = self._path.positions(self.map_index, self._poses)
-        return MapPicture(
-            points=self._points.values(),
+        return replace(
+            self._told,
             local_points=self._points.some(local_points),
-            keyframes=poses,
-            covisibility=self._edges(self._covisibility),
             loop_edges=self._edges(self._loops),
             path=path,
             path_gaps=gaps,

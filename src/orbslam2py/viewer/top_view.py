@@ -37,6 +37,8 @@ _SHIFT = 4
 _SAMPLE = 4000
 #: From so many keyframes on, they are drawn smaller.
 _MANY_KEYFRAMES = 150
+#: From so many edges on, they are drawn without smoothing.
+_MANY_EDGES = 2000
 #: Camera seen from above: its place, then the ends of what it sees, ahead is up.
 _WEDGE = np.array([(0.0, 0.0), (-0.62, 1.0), (0.62, 1.0)])
 
@@ -104,6 +106,7 @@ def draw_top_view(
     lost: bool = False,
     unit: str = "m",
     text: int = 14,
+    ground: ByteArray | None = None,
 ) -> ByteArray:
     """Draw the map from above.
 
@@ -121,18 +124,18 @@ def draw_top_view(
         Unit of length, for the scale bar.
     text : int
         Height of the letters [px]; lines and marks grow with it.
+    ground : array of uint8, (h, w, 3), optional
+        What `draw_ground` has drawn before, with the same framing; stays as it is.
 
     Returns
     -------
     array of uint8, (h, w, 3)
         Red, green, blue.
     """
-    picture = _draw_points(scene, framing)
     size = text / 14.0
     thin = max(1, round(size))
-    _lines(picture, _edge_pixels(scene.covisibility, framing), COVISIBILITY, thin)
-    _draw_path(picture, scene.truth, None, framing, TRUTH, 3 * thin)
-    _draw_keyframes(picture, scene.keyframes, framing, size)
+    picture = draw_ground(scene, framing, text=text) if ground is None else ground.copy()
+    _light_up(picture, scene.local_points, framing)
     _draw_path(picture, scene.path, scene.path_gaps, framing, PATH, thin + 1)
     loops = _edge_pixels(scene.loop_edges, framing)
     _lines(picture, loops, LOOP, 2 * thin)
@@ -144,6 +147,22 @@ def draw_top_view(
     return picture
 
 
+def draw_ground(scene: MapPicture, framing: Framing, *, text: int = 14) -> ByteArray:
+    """Draw what lies below: points, covisibility, ground truth and keyframes.
+
+    It takes the most time, and little of it changes from image to image.
+    """
+    size = text / 14.0
+    thin = max(1, round(size))
+    picture = _draw_points(scene.points, framing)
+    # Thousands of thin lines: smooth ones take five times as long.
+    edges = _edge_pixels(scene.covisibility, framing)
+    _lines(picture, edges, COVISIBILITY, thin, smooth=len(edges) < _MANY_EDGES)
+    _draw_path(picture, scene.truth, None, framing, TRUTH, 3 * thin)
+    _draw_keyframes(picture, scene.keyframes, framing, size)
+    return picture
+
+
 def nice_length(at_most: float) -> float:
     """Largest of 1, 2, 5, 10, 20 ... (and 0.5, 0.2 ...) that is not above a length."""
     power = 10.0 ** np.floor(np.log10(at_most))
@@ -151,26 +170,40 @@ def nice_length(at_most: float) -> float:
 
 
 # ---- layers --------------------------------------------------------------------------------------
-def _draw_points(scene: MapPicture, framing: Framing) -> ByteArray:
-    """The ground: points as density, those of the local map lit up."""
-    everywhere = _density(scene.points, framing)
+def _draw_points(points: npt.NDArray[np.floating], framing: Framing) -> ByteArray:
+    """The ground: points as density."""
+    density = _density(points, framing)
     # A single point can be seen, and thousands on a pixel do not outshine the rest.
-    cover = np.clip(0.2 * np.log2(1.0 + 8.0 * everywhere), 0.0, 0.9)[..., None]
-    ground = np.array(PANEL, np.float32) * (1 - cover) + np.array(POINTS, np.float32) * cover
-    if len(scene.local_points):
-        near = np.clip(0.3 * np.log2(1.0 + 8.0 * _density(scene.local_points, framing)), 0, 0.8)
-        ground += near[..., None] * (np.array(MAPPED, np.float32) - ground)
-    return np.asarray(ground, np.uint8)
+    return np.asarray(cv2.LUT(cv2.merge([density] * 3), _POINT_COLOURS), np.uint8)
 
 
-def _density(points: npt.NDArray[np.floating], framing: Framing) -> npt.NDArray[np.float32]:
-    """Points a pixel, a little blurred, (h, w)."""
+def _light_up(
+    picture: ByteArray, points: npt.NDArray[np.floating], framing: Framing
+) -> None:
+    """Draw the points of the local map over the others."""
+    density = _density(points, framing)
+    where = np.nonzero(density)
+    cover = _COVER[density[where]][:, None]
+    picture[where] = picture[where] * (1 - cover) + np.array(MAPPED) * cover
+
+
+def _density(points: npt.NDArray[np.floating], framing: Framing) -> ByteArray:
+    """Points a pixel, a little blurred, in 1 / `_PER_POINT`, (h, w)."""
     width, height = framing.size
     pixels = np.rint(framing.to_pixels(points[:, [0, 2]]))
     seen = ((pixels >= 0) & (pixels < (width, height))).all(axis=1)
     x, y = pixels[seen].astype(np.intp).T
     counts = np.bincount(y * width + x, minlength=width * height).reshape(height, width)
-    return np.asarray(cv2.GaussianBlur(counts.astype(np.float32), (0, 0), 0.8), np.float32)
+    levels = (np.minimum(counts, 255 // _PER_POINT) * _PER_POINT).astype(np.uint8)
+    return np.asarray(cv2.GaussianBlur(levels, (3, 3), 0.7), np.uint8)
+
+
+#: Levels of density for each point on a pixel, and how much of the ground each level covers.
+_PER_POINT = 20
+_COVER = np.clip(0.2 * np.log2(1.0 + 8.0 * np.arange(256) / _PER_POINT), 0.0, 0.85)
+_POINT_COLOURS = np.rint(
+    np.array(PANEL) * (1 - _COVER[:, None]) + np.array(POINTS) * _COVER[:, None]
+).astype(np.uint8)[None]
 
 
 def _draw_keyframes(
@@ -178,7 +211,8 @@ def _draw_keyframes(
 ) -> None:
     many = len(T_wc) > _MANY_KEYFRAMES
     wedges = _wedges(T_wc, framing, (5.0 if many else 8.0) * size)
-    _lines(picture, wedges, KEYFRAME, max(1, round(size)), closed=True)
+    smooth = len(T_wc) < _MANY_EDGES
+    _lines(picture, wedges, KEYFRAME, max(1, round(size)), closed=True, smooth=smooth)
 
 
 def _draw_camera(
@@ -265,9 +299,14 @@ def _whole(pixels: FloatArray) -> npt.NDArray[np.int32]:
 
 
 def _lines(
-    picture: ByteArray, pixels: FloatArray, colour: Colour, thickness: int, *, closed: bool = False
+    picture: ByteArray,
+    pixels: FloatArray,
+    colour: Colour,
+    thickness: int,
+    *,
+    closed: bool = False,
+    smooth: bool = True,
 ) -> None:
     if len(pixels):
-        cv2.polylines(
-            picture, list(_whole(pixels)), closed, colour, thickness, cv2.LINE_AA, _SHIFT
-        )
+        kind = cv2.LINE_AA if smooth else cv2.LINE_8
+        cv2.polylines(picture, list(_whole(pixels)), closed, colour, thickness, kind, _SHIFT)

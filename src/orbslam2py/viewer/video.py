@@ -19,12 +19,14 @@ from orbslam2py.viewer.framing import Framing, frame_all
 from orbslam2py.viewer.growing_map import GrowingMap
 from orbslam2py.viewer.overlay import Marks, Status, draw_overlay, draw_status
 from orbslam2py.viewer.time_line import GrowingHistory, draw_time_line
-from orbslam2py.viewer.top_view import bounds, draw_top_view
+from orbslam2py.viewer.top_view import bounds, draw_ground, draw_top_view
 from orbslam2py.viewer.video_file import VideoFile
 from orbslam2py.viewer.watching import FrameView
 
 #: A pause of a stream of images is shown by at most so many pictures.
 _LONGEST_PAUSE = 300
+#: Keyframes, edges and tens of points that are drawn anew for each image.
+_DRAWN_AT_ONCE = 4000
 
 
 class VideoWriter:
@@ -82,6 +84,8 @@ class VideoWriter:
         self._composition: Composition | None = None
         self._framing: Framing | None = None
         self._picture: ByteArray | None = None
+        self._ground: ByteArray | None = None
+        self._ground_cost = self._age = 0
         self._status = Status(TrackingState.NO_IMAGES_YET)
         self._shown = np.zeros((1, 1, 3), np.uint8)
         self._local_points: IntArray | None = None
@@ -186,7 +190,9 @@ class VideoWriter:
                 self._write(self._composition)
 
     def _write(self, composition: Composition) -> None:
-        picture = composition.ground()
+        picture = self._picture
+        if picture is None:
+            picture = self._picture = composition.ground()
         composition.image.put(picture, self._shown)
         composition.status.put(picture, draw_status(composition.status.width, self._status))
         composition.map.put(picture, self._draw_map(composition))
@@ -194,16 +200,21 @@ class VideoWriter:
             self._history.picture(), composition.time_line.size, text=composition.text
         )
         composition.time_line.put(picture, line)
-        self._picture = picture
         self._file.write(picture)
 
     def _draw_map(self, composition: Composition) -> ByteArray:
-        scene = self._map.picture(self._local_points)
+        # A large map takes long to draw, and one image more changes little of it.
+        due = self._ground is None or self._age > self._ground_cost // _DRAWN_AT_ONCE
+        scene = self._map.picture(self._local_points, renew=due)
         low, high = bounds(scene)
-        if self._framing is None:
-            framing = frame_all(low, high, composition.map.size)
-        else:
+        framing = frame_all(low, high, composition.map.size)
+        if self._framing is not None:
             framing = self._framing.follow(low, high, 1.0 / self._frames_per_second)
+        if due or self._framing is None or (framing.state != self._framing.state).any():
+            self._ground = draw_ground(scene, framing, text=composition.text)
+            self._ground_cost = len(scene.keyframes) + len(scene.covisibility)
+            self._ground_cost += len(scene.points) // 10
+        self._age = 0 if due else self._age + 1
         if len(scene.keyframes):  # a first look that shows nothing has no say in the next
             self._framing = framing
         pose = self._last_pose
@@ -214,11 +225,12 @@ class VideoWriter:
             lost=self._status.state is not TrackingState.OK,
             unit=self._unit,
             text=composition.text,
+            ground=self._ground,
         )
 
     def _catch_up(self, timestamp: float) -> None:
         """Repeat the last picture for the time until an image came."""
-        if self._begin is None or self._picture is None:
+        if self._picture is None or self._begin is None:
             self._begin = timestamp
             return
         due = round((timestamp - self._begin) * self._frames_per_second)
