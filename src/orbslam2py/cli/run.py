@@ -21,14 +21,17 @@ from orbslam2py.cli.display import (
 )
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.interrupts import StopOnInterrupt
+from orbslam2py.cli.watching import VideoOption, file_watchers
 from orbslam2py.datasets import open_input
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.outputs import new_output_folder
 from orbslam2py.runs.remedies import why_nothing_was_tracked
+from orbslam2py.runs.result import FrameRow
 from orbslam2py.runs.run import FinishedRun, run_sequence
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.options import SystemOptions
+from orbslam2py.slam.system import System
 from orbslam2py.vocabulary.vocabulary import load_vocabulary
 
 EXAMPLE = """
@@ -131,6 +134,7 @@ def run(
         ),
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of all random draws.", min=0)] = 0,
+    video: VideoOption = None,
     force: Annotated[
         bool, typer.Option("--force", help="Write into an output folder that is not empty.")
     ] = False,
@@ -155,7 +159,13 @@ def run(
         localize_after=localize,
     )
     code = run_and_show(
-        images, options, vocabulary=vocabulary, output=output, force=force, quiet=quiet
+        images,
+        options,
+        vocabulary=vocabulary,
+        output=output,
+        force=force,
+        quiet=quiet,
+        video=video,
     )
     raise typer.Exit(code)
 
@@ -171,6 +181,7 @@ def run_and_show(
     output: Path | None = None,
     force: bool = False,
     quiet: bool = False,
+    video: Path | None = None,
 ) -> ExitCode:
     """Run, with a progress bar and a table at the end; returns the exit code."""
     console = Console(quiet=quiet)
@@ -178,15 +189,23 @@ def run_and_show(
     log_to(errors, quiet=quiet)
     n_frames = options.n_frames(sequence)
     words = load_vocabulary(vocabulary)  # until here a Ctrl-C leaves nothing behind
+    files = file_watchers(sequence, options, video=video)
     with StopOnInterrupt() as interrupt, progress_bar(console) as bar:
+        display = Display(bar, n_frames)
+
+        def show(row: FrameRow, system: System) -> None:
+            files.show(row)
+            display.show(row, system)
+
         done = run_sequence(
             sequence,
             options,
             vocabulary=words,
             output=output or new_output_folder(sequence.name),
             force=force,
-            progress=Display(bar, n_frames).show,
+            progress=show,
             stop=interrupt.event,
+            watch=files.watch if files.watchers else None,
         )
     tell_repeated()
     console.print(report_table(done.report))

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.maps import MapChanges
+from orbslam2py.pictures.top_view import MapPicture
 from orbslam2py.slam.records import TrackingRecord
-from orbslam2py.viewer.top_view import MapPicture
 
 _NO_EDGES = np.zeros((0, 2), np.int64)
 
@@ -70,9 +70,7 @@ class GrowingMap:
         if record.map_index == self.map_index:
             self._path.hang(self._poses)
 
-    def picture(
-        self, local_points: IntArray | None = None, *, renew: bool = True
-    ) -> MapPicture:
+    def picture(self, local_points: IntArray | None = None, *, renew: bool = True) -> MapPicture:
         """Tell the whole as it is now.
 
         Parameters
@@ -97,10 +95,12 @@ class GrowingMap:
             path_gaps=gaps,
         )
 
-    def _edges(self, pairs: IntArray) -> FloatArray:
+    def _edges(self, pairs: IntArray) -> npt.NDArray[np.floating]:
         """Positions of both ends (e, 2, 3) of pairs of keyframes."""
         known = self._poses.holds(pairs).all(axis=1)
-        ends: FloatArray = self._poses.rows(pairs[known].ravel())[:, [3, 7, 11]].reshape(-1, 2, 3)
+        ends: npt.NDArray[np.floating] = self._poses.rows(pairs[known].ravel())[
+            :, [3, 7, 11]
+        ].reshape(-1, 2, 3)
         return ends
 
 
@@ -205,9 +205,7 @@ class _Path:
         turned = np.einsum("nij,nj->ni", T_wk[:, :3, :3], self._places[which, 3:])
         return np.asarray(turned + T_wk[:, :3, 3], np.float64)
 
-    def positions(
-        self, map_index: int, poses: _Table
-    ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+    def positions(self, map_index: int, poses: _Table) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
         """Positions (n, 3) of the frames of a map that have one; whether there is a gap before."""
         marks = self._marks[: self._n]
         places = self._places[: self._n, :3].copy()

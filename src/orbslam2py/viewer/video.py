@@ -12,14 +12,14 @@ import numpy as np
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
 from orbslam2py.errors import OrbSlamError
 from orbslam2py.maps import MapChanges
+from orbslam2py.pictures.composition import Composition, compose
+from orbslam2py.pictures.framing import Framing, frame_all
+from orbslam2py.pictures.overlay import Marks, Status, draw_overlay, draw_status
+from orbslam2py.pictures.time_line import GrowingHistory, draw_time_line
+from orbslam2py.pictures.top_view import bounds, draw_ground, draw_top_view
 from orbslam2py.slam.events import Event, LoopClosed
 from orbslam2py.slam.records import TrackingState
-from orbslam2py.viewer.composition import Composition, compose
-from orbslam2py.viewer.framing import Framing, frame_all
 from orbslam2py.viewer.growing_map import GrowingMap
-from orbslam2py.viewer.overlay import Marks, Status, draw_overlay, draw_status
-from orbslam2py.viewer.time_line import GrowingHistory, draw_time_line
-from orbslam2py.viewer.top_view import bounds, draw_ground, draw_top_view
 from orbslam2py.viewer.video_file import VideoFile
 from orbslam2py.viewer.watching import FrameView
 

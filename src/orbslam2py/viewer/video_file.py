@@ -109,7 +109,8 @@ class VideoFile:
                 )
             self._temporary.replace(self._target)
         except OSError as error:
-            raise VideoFileError(f"cannot write the video {self.path}: {reason_of(error)}") from error
+            why = f"cannot write the video {self.path}: {reason_of(error)}"
+            raise VideoFileError(why) from error
         finally:
             self.discard()
 
@@ -139,9 +140,11 @@ def check_video_path(path: str | os.PathLike[str]) -> None:
     if path.is_dir():
         raise VideoFileError(f"{path} is a folder; give the name of a file")
     if not folder.is_dir():
-        raise VideoFileError(f"there is no folder {folder} for the video {path.name}; make it first")
+        raise VideoFileError(
+            f"there is no folder {folder} for the video {path.name}; make it first"
+        )
     if not os.access(folder, os.W_OK):
-        raise VideoFileError(f"cannot write into the folder {folder}; take another for {path.name}")
+        raise VideoFileError(f"cannot write into {folder}; take another folder for {path.name}")
     if free_bytes(folder) < RESERVE:
         raise VideoFileError(_no_room(path))
 

@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py._arrays import ByteArray, FloatArray
-from orbslam2py.viewer.framing import Framing
-from orbslam2py.viewer.lettering import draw_text, text_width
-from orbslam2py.viewer.palette import (
+from orbslam2py.pictures.framing import Framing
+from orbslam2py.pictures.lettering import draw_text, text_width
+from orbslam2py.pictures.palette import (
     CAMERA,
     COVISIBILITY,
     FAINT_TEXT,
@@ -63,11 +63,11 @@ class MapPicture:
     """(p, 3) map points."""
     local_points: npt.NDArray[np.floating] = field(default_factory=_no_places)
     """(l, 3) those around the camera, lit up."""
-    keyframes: FloatArray = field(default_factory=lambda: np.zeros((0, 4, 4)))
+    keyframes: npt.NDArray[np.floating] = field(default_factory=lambda: np.zeros((0, 4, 4)))
     """(k, 4, 4) camera to world."""
-    covisibility: FloatArray = field(default_factory=_no_edges)
+    covisibility: npt.NDArray[np.floating] = field(default_factory=_no_edges)
     """(e, 2, 3) both ends of every edge."""
-    loop_edges: FloatArray = field(default_factory=_no_edges)
+    loop_edges: npt.NDArray[np.floating] = field(default_factory=_no_edges)
     """(c, 2, 3) both ends of every edge."""
     path: FloatArray = field(default_factory=_no_places)
     """(n, 3) camera positions so far."""
@@ -177,9 +177,7 @@ def _draw_points(points: npt.NDArray[np.floating], framing: Framing) -> ByteArra
     return np.asarray(cv2.LUT(cv2.merge([density] * 3), _POINT_COLOURS), np.uint8)
 
 
-def _light_up(
-    picture: ByteArray, points: npt.NDArray[np.floating], framing: Framing
-) -> None:
+def _light_up(picture: ByteArray, points: npt.NDArray[np.floating], framing: Framing) -> None:
     """Draw the points of the local map over the others."""
     density = _density(points, framing)
     where = np.nonzero(density)
@@ -207,7 +205,7 @@ _POINT_COLOURS = np.rint(
 
 
 def _draw_keyframes(
-    picture: ByteArray, T_wc: FloatArray, framing: Framing, size: float
+    picture: ByteArray, T_wc: npt.NDArray[np.floating], framing: Framing, size: float
 ) -> None:
     many = len(T_wc) > _MANY_KEYFRAMES
     wedges = _wedges(T_wc, framing, (5.0 if many else 8.0) * size)
@@ -230,8 +228,14 @@ def _draw_camera(
     if lost:
         x, y = framing.to_pixels(T_wc[[0, 2], 3])
         place = (round(float(np.clip(x, -999, 9999))), round(float(np.clip(y, -999, 9999))))
-        draw_text(picture, "last seen here", (place[0], place[1] + round(16 * size)),
-                  round(13 * size), LOST, anchor="centre")
+        draw_text(
+            picture,
+            "last seen here",
+            (place[0], place[1] + round(16 * size)),
+            round(13 * size),
+            LOST,
+            anchor="centre",
+        )
 
 
 def _draw_path(
@@ -244,7 +248,7 @@ def _draw_path(
 ) -> None:
     if len(positions):
         pixels = framing.to_pixels(positions[:, [0, 2]])
-        where = np.flatnonzero(gaps) if gaps is not None and len(gaps) else []
+        where = np.flatnonzero(gaps if gaps is not None else ())
         for part in np.split(pixels, where):
             _lines(picture, part[None], colour, thickness)
 
@@ -279,7 +283,7 @@ def _draw_legend(picture: ByteArray, scene: MapPicture, text: int) -> None:
 
 
 # ---- many lines at a time ------------------------------------------------------------------------
-def _wedges(T_wc: FloatArray, framing: Framing, length: float) -> FloatArray:
+def _wedges(T_wc: npt.NDArray[np.floating], framing: Framing, length: float) -> FloatArray:
     """Cameras from above, (k, 3, 2) pixels, of one length on the picture."""
     ahead = T_wc[:, [0, 2], 2] * (1.0, -1.0)
     # One that looks up or down has no direction from above: it becomes small, not wild.
@@ -290,7 +294,7 @@ def _wedges(T_wc: FloatArray, framing: Framing, length: float) -> FloatArray:
     return np.asarray(framing.to_pixels(T_wc[:, [0, 2], 3])[:, None] + corners)
 
 
-def _edge_pixels(edges: FloatArray, framing: Framing) -> FloatArray:
+def _edge_pixels(edges: npt.NDArray[np.floating], framing: Framing) -> FloatArray:
     return framing.to_pixels(edges[..., [0, 2]])
 
 

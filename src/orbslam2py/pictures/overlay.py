@@ -13,9 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py._arrays import ByteArray
-from orbslam2py.slam.records import TrackingState
-from orbslam2py.viewer.lettering import draw_text, text_width
-from orbslam2py.viewer.palette import (
+from orbslam2py.pictures.lettering import draw_text, text_width
+from orbslam2py.pictures.palette import (
     FAINT_TEXT,
     HALO,
     LOST,
@@ -28,6 +27,7 @@ from orbslam2py.viewer.palette import (
     VISUAL_ODOMETRY,
     Colour,
 )
+from orbslam2py.slam.records import TrackingState
 
 Pixels = npt.NDArray[np.floating]
 

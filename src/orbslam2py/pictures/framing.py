@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from orbslam2py._arrays import FloatArray
 
@@ -42,7 +43,7 @@ class Framing:
         """Length of the plane that a pixel shows."""
         return float(np.exp(self.state[2]))
 
-    def to_pixels(self, places: FloatArray) -> FloatArray:
+    def to_pixels(self, places: npt.NDArray[np.floating]) -> FloatArray:
         """Pixels (..., 2) of places (..., 2) in the plane, whose y goes up."""
         middle = 0.5 * (np.array(self.size) - 1)
         scale = np.array([1.0, -1.0]) / self.unit_per_pixel
@@ -70,7 +71,7 @@ class Framing:
         """
         goal = self.goal
         if not self.shows(low, high, goal):
-            goal = _fit(low, high, self.size) + (0, 0, np.log(_HEADROOM))
+            goal = _fit(low, high, self.size, _HEADROOM)
         off = self.state - goal
         decay = np.exp(-_SPEED * seconds)
         pull = self.speed + _SPEED * off
@@ -95,11 +96,13 @@ def frame_all(low: FloatArray, high: FloatArray, size: tuple[int, int]) -> Frami
     size : (int, int)
         Width and height of the picture [px].
     """
-    state = _fit(low, high, size) + (0, 0, np.log(_HEADROOM))
+    state = _fit(low, high, size, _HEADROOM)
     return Framing(state=state, speed=np.zeros(3), goal=state, size=size)
 
 
-def _fit(low: FloatArray, high: FloatArray, size: tuple[int, int]) -> FloatArray:
+def _fit(
+    low: FloatArray, high: FloatArray, size: tuple[int, int], headroom: float = 1.0
+) -> FloatArray:
     extent = np.maximum(high - low, _SMALLEST) / (1 - 2 * _MARGIN)
     middle = 0.5 * (low + high)
-    return np.array([middle[0], middle[1], np.log((extent / size).max())])
+    return np.array([middle[0], middle[1], np.log(headroom * (extent / size).max())])

@@ -10,10 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py._arrays import ByteArray, FloatArray
-from orbslam2py.slam.records import TrackingRecord, TrackingState
-from orbslam2py.viewer.lettering import draw_text, text_width
-from orbslam2py.viewer.overlay import state_colour
-from orbslam2py.viewer.palette import (
+from orbslam2py.pictures.lettering import draw_text, text_width
+from orbslam2py.pictures.overlay import state_colour
+from orbslam2py.pictures.palette import (
     FAINT_TEXT,
     FRAME,
     KEYFRAME,
@@ -24,6 +23,7 @@ from orbslam2py.viewer.palette import (
     TEXT,
     Colour,
 )
+from orbslam2py.slam.records import TrackingRecord, TrackingState
 
 _SHIFT = 4
 #: State of an image that was not used, beside those of `TrackingState`.
@@ -138,7 +138,8 @@ def draw_time_line(history: History, size: tuple[int, int], *, text: int = 14) -
     if curve[1] - curve[0] > 4:
         _draw_curve(picture, history, axis, curve, text)
     for name, rows in (("state", strip), ("keyframes", ticks), ("inliers", curve)):
-        draw_text(picture, name, (left - text // 2, sum(rows) // 2), text, FAINT_TEXT, anchor="right")
+        place = (left - text // 2, sum(rows) // 2)
+        draw_text(picture, name, place, text, FAINT_TEXT, anchor="right")
     _draw_loops(picture, history.loops, axis, (strip[0], curve[1]), text)
     _draw_seconds(picture, now, duration, axis, height - round(0.85 * text), text)
     x = axis.pixel(now)
@@ -160,9 +161,7 @@ class _Axis:
         return int(self.pixels(np.array([seconds]))[0])
 
 
-def _draw_states(
-    picture: ByteArray, history: History, axis: _Axis, rows: tuple[int, int]
-) -> None:
+def _draw_states(picture: ByteArray, history: History, axis: _Axis, rows: tuple[int, int]) -> None:
     columns = np.empty((axis.right - axis.left, 3), np.uint8)
     columns[:] = FRAME
     part = picture[rows[0] : rows[1], axis.left : axis.right]
@@ -222,8 +221,14 @@ def _draw_curve(
         _fill(picture, area, tuple(channel // 3 for channel in _CURVE))
         whole = np.rint(line * (1 << _SHIFT)).astype(np.int32)
         cv2.polylines(picture, [whole], False, _CURVE, max(1, text // 9), cv2.LINE_AA, _SHIFT)
-    draw_text(picture, f"{top:.0f}", (axis.right, rows[0] + text // 3), max(9, text - 3),
-              FAINT_TEXT, anchor="right")
+    draw_text(
+        picture,
+        f"{top:.0f}",
+        (axis.right, rows[0] + text // 3),
+        max(9, text - 3),
+        FAINT_TEXT,
+        anchor="right",
+    )
 
 
 _CURVE: Colour = (196, 206, 218)

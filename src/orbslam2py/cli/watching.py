@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a run is asked to keep of what could be seen: a video, a recording."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+
+from orbslam2py.datasets.base import LiveSource, Sequence
+from orbslam2py.runs.feeds import is_sequence
+from orbslam2py.runs.options import RunOptions
+from orbslam2py.runs.result import FrameRow
+from orbslam2py.slam.system import System
+
+if TYPE_CHECKING:
+    from orbslam2py.viewer import Watcher
+    from orbslam2py.viewer.video import VideoWriter
+
+VideoOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="Write a video: image and keypoints, map from above, time line (.mp4, .mov, .mkv, "
+        ".avi; .webm for browsers).",
+        metavar="FILE.mp4",
+    ),
+]
+#: How fast a camera's video is played: what its images are repeated or left out for [1/s].
+_LIVE_RATE = 30.0
+
+
+@dataclass
+class FileWatchers:
+    """Watchers that write files, and how they take part in a run.
+
+    Parameters
+    ----------
+    in_time : bool
+        The run goes in real time: images that come too fast are left out.
+    """
+
+    in_time: bool
+    watchers: list[Watcher] = field(default_factory=list)
+    video: VideoWriter | None = None
+    _n_tracked: int = 0
+
+    @contextlib.contextmanager
+    def watch(self, system: System) -> Iterator[None]:
+        """Watch a system from its first image to its last."""
+        with contextlib.ExitStack() as stack:
+            if self.watchers:
+                # In every image of a recording the map is to be as it was then.
+                rates: dict[str, Any] = {"frame_rate": 1e6, "map_rate": 1e6}
+                if self.in_time:
+                    rates = {"frame_rate": _LIVE_RATE, "map_rate": 10.0}
+                publisher = Publisher(system, self.watchers, every_frame=not self.in_time, **rates)
+                stack.enter_context(publisher)
+            yield
+
+    def tell(self, console: Console) -> None:
+        """Say where the files are."""
+        for watcher in self.watchers:
+            path = escape(str(watcher.path))
+            if watcher.path.is_file():
+                console.print(f"{watcher.name.capitalize()} is in [bold]{path}[/]",
+                              highlight=False, soft_wrap=True)
+
+    def show(self, row: FrameRow) -> None:
+        """Take note of images that were not tracked."""
+        if row.record is not None:
+            self._n_tracked += 1
+        elif self.video is not None:
+            with contextlib.suppress(ValueError):
+                self.video.add_unused(self._n_tracked, float(row.timestamp), row.reason)
+
+
+def file_watchers(
+    source: Sequence | LiveSource, options: RunOptions, *, video: Path | None = None
+) -> FileWatchers:
+    """Make what writes the files that were asked for, and see that they can be written.
+
+    Raises
+    ------
+    OrbSlamError
+        Naming the file that cannot be written.
+    """
+    in_time = options.realtime or not is_sequence(source)
+    watchers = FileWatchers(in_time)
+    unit = "m" if options.sensor.has_depth else "units"
+    if video is not None:
+        from orbslam2py.viewer.video import VideoWriter  # noqa: PLC0415
+
+        rate, duration = _LIVE_RATE, None
+        if is_sequence(source):
+            times = np.asarray(source.timestamps)[options.indices(len(source))]
+            duration = float(times[-1] - times[0])
+            if duration > 0:
+                rate = 1.0 / float(np.median(np.diff(times)))
+        watchers.video = VideoWriter(
+            video, frames_per_second=rate, duration=duration, in_time=in_time, unit=unit
+        )
+        watchers.watchers.append(watchers.video)
+    return watchers
