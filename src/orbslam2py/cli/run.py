@@ -211,6 +211,7 @@ def run_and_show(
     console.print(report_table(done.report))
     folder = escape(str(done.folder))
     console.print(f"Results are in [bold]{folder}[/]", highlight=False, soft_wrap=True)
+    files.tell(console)
     code = _conclude(done, errors)
     interrupted = interrupt.event.is_set() and not done.result.is_live  # also while writing
     if code is not ExitCode.FAILED and interrupted:

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
+from rich.console import Console
+from rich.markup import escape
 
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.runs.feeds import is_sequence
@@ -46,29 +48,27 @@ class FileWatchers:
 
     in_time: bool
     watchers: list[Watcher] = field(default_factory=list)
+    files: dict[str, Path] = field(default_factory=dict)
     video: VideoWriter | None = None
     _n_tracked: int = 0
 
     @contextlib.contextmanager
     def watch(self, system: System) -> Iterator[None]:
         """Watch a system from its first image to its last."""
-        with contextlib.ExitStack() as stack:
-            if self.watchers:
-                # In every image of a recording the map is to be as it was then.
-                rates: dict[str, Any] = {"frame_rate": 1e6, "map_rate": 1e6}
-                if self.in_time:
-                    rates = {"frame_rate": _LIVE_RATE, "map_rate": 10.0}
-                publisher = Publisher(system, self.watchers, every_frame=not self.in_time, **rates)
-                stack.enter_context(publisher)
+        from orbslam2py.viewer import Publisher  # noqa: PLC0415
+
+        rates: dict[str, Any] = {"frame_rate": _LIVE_RATE, "map_rate": 10.0}
+        if not self.in_time:  # in every image of a recording the map is to be as it was then
+            rates = {"every_frame": True, "map_rate": 1e6}
+        with Publisher(system, self.watchers, **rates):
             yield
 
     def tell(self, console: Console) -> None:
         """Say where the files are."""
-        for watcher in self.watchers:
-            path = escape(str(watcher.path))
-            if watcher.path.is_file():
-                console.print(f"{watcher.name.capitalize()} is in [bold]{path}[/]",
-                              highlight=False, soft_wrap=True)
+        for what, path in self.files.items():
+            if path.is_file():
+                where = escape(str(path))
+                console.print(f"The {what} is [bold]{where}[/]", highlight=False, soft_wrap=True)
 
     def show(self, row: FrameRow) -> None:
         """Take note of images that were not tracked."""
@@ -105,4 +105,5 @@ def file_watchers(
             video, frames_per_second=rate, duration=duration, in_time=in_time, unit=unit
         )
         watchers.watchers.append(watchers.video)
+        watchers.files["video"] = video
     return watchers
