@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from orbslam2py.cli.run import run_and_show
-from orbslam2py.cli.watching import VideoOption
+from orbslam2py.cli.watching import RecordOption, VideoOption
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.settings import Sensor
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
@@ -24,6 +24,7 @@ def demo(
     ] = None,
     output: Annotated[Path, typer.Option(help="Folder for the results.")] = DEFAULT_OUTPUT,
     video: VideoOption = None,
+    record: RecordOption = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
 ) -> None:
     """Track a camera once around a synthetic corridor: needs no data.
@@ -37,7 +38,13 @@ def demo(
     # Results of an earlier demo are replaced, other files are not.
     force = output == DEFAULT_OUTPUT or (output / "report.json").is_file()
     code = run_and_show(
-        sequence, RunOptions(sensor), output=output, force=force, quiet=quiet, video=video
+        sequence,
+        RunOptions(sensor),
+        output=output,
+        force=force,
+        quiet=quiet,
+        video=video,
+        record=record,
     )
     if not quiet:
         typer.echo(f"Look at {output / 'trajectory.png'}.")

@@ -21,7 +21,7 @@ from orbslam2py.cli.display import (
 )
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.interrupts import StopOnInterrupt
-from orbslam2py.cli.watching import VideoOption, file_watchers
+from orbslam2py.cli.watching import RecordOption, VideoOption, file_watchers
 from orbslam2py.datasets import open_input
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.runs.options import RunOptions
@@ -135,6 +135,7 @@ def run(
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of all random draws.", min=0)] = 0,
     video: VideoOption = None,
+    record: RecordOption = None,
     force: Annotated[
         bool, typer.Option("--force", help="Write into an output folder that is not empty.")
     ] = False,
@@ -166,6 +167,7 @@ def run(
         force=force,
         quiet=quiet,
         video=video,
+        record=record,
     )
     raise typer.Exit(code)
 
@@ -182,6 +184,7 @@ def run_and_show(
     force: bool = False,
     quiet: bool = False,
     video: Path | None = None,
+    record: Path | None = None,
 ) -> ExitCode:
     """Run, with a progress bar and a table at the end; returns the exit code."""
     console = Console(quiet=quiet)
@@ -189,7 +192,7 @@ def run_and_show(
     log_to(errors, quiet=quiet)
     n_frames = options.n_frames(sequence)
     words = load_vocabulary(vocabulary)  # until here a Ctrl-C leaves nothing behind
-    files = file_watchers(sequence, options, video=video)
+    files = file_watchers(sequence, options, video=video, record=record)
     with StopOnInterrupt() as interrupt, progress_bar(console) as bar:
         display = Display(bar, n_frames)
 

@@ -32,6 +32,13 @@ VideoOption = Annotated[
         metavar="FILE.mp4",
     ),
 ]
+RecordOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="Record images, map, plots and events for Rerun's viewer (needs orbslam2py[rerun]).",
+        metavar="FILE.rrd",
+    ),
+]
 #: How fast a camera's video is played: what its images are repeated or left out for [1/s].
 _LIVE_RATE = 30.0
 
@@ -80,14 +87,18 @@ class FileWatchers:
 
 
 def file_watchers(
-    source: Sequence | LiveSource, options: RunOptions, *, video: Path | None = None
+    source: Sequence | LiveSource,
+    options: RunOptions,
+    *,
+    video: Path | None = None,
+    record: Path | None = None,
 ) -> FileWatchers:
     """Make what writes the files that were asked for, and see that they can be written.
 
     Raises
     ------
     OrbSlamError
-        Naming the file that cannot be written.
+        Naming the file that cannot be written, or what has to be installed.
     """
     in_time = options.realtime or not is_sequence(source)
     watchers = FileWatchers(in_time)
@@ -106,4 +117,16 @@ def file_watchers(
         )
         watchers.watchers.append(watchers.video)
         watchers.files["video"] = video
+    if record is not None:
+        from orbslam2py.viewer.rerun_recorder import RerunRecorder  # noqa: PLC0415
+
+        truth = source.ground_truth() if is_sequence(source) else None
+        recorder = RerunRecorder(
+            record,
+            settings=source.settings,
+            ground_truth=truth,
+            with_scale=not options.sensor.has_depth,
+        )
+        watchers.watchers.append(recorder)
+        watchers.files["recording"] = record
     return watchers

@@ -30,6 +30,10 @@ _SHIFT = 4
 NOT_USED = -2
 #: State of an image that was tracked by visual odometry, outside of the map.
 WANDERING = -3
+#: With so many lines of text of room there are two curves.
+_ROOM_FOR_TWO = 8
+_INLIERS: Colour = (196, 206, 218)
+_MILLISECONDS: Colour = (168, 150, 205)
 
 
 def _no_times() -> FloatArray:
@@ -46,6 +50,8 @@ class History:
     """(n,) `TrackingState`, `NOT_USED` or `WANDERING`."""
     inliers: FloatArray = field(default_factory=_no_times)
     """(n,) matches that the pose was accepted with."""
+    milliseconds: FloatArray = field(default_factory=_no_times)
+    """(n,) that tracking took."""
     keyframes: FloatArray = field(default_factory=_no_times)
     """(k,) seconds of the images that became keyframes."""
     loops: FloatArray = field(default_factory=_no_times)
@@ -67,17 +73,18 @@ class GrowingHistory:
         self._duration = duration
         self._begin: float | None = None
         self._n = 0
-        self._rows = np.zeros((256, 4))
+        self._rows = np.zeros((256, 5))
         self._loops: list[float] = []
 
     def add(self, record: TrackingRecord, *, wanders: bool = False) -> None:
         """Continue with an image that was tracked, or that this was tried with."""
         state = WANDERING if wanders else int(record.state)
-        self._append(record.timestamp, state, record.n_inliers, record.is_keyframe)
+        took = record.milliseconds.get("track", 0.0)
+        self._append(record.timestamp, state, record.n_inliers, took, record.is_keyframe)
 
     def add_unused(self, timestamp: float) -> None:
         """Continue with an image that was not used."""
-        self._append(timestamp, NOT_USED, 0, False)
+        self._append(timestamp, NOT_USED, 0, 0.0, False)
 
     def add_loop(self, timestamp: float) -> None:
         """Note a loop that was closed with the image of a time [s]."""
@@ -85,23 +92,37 @@ class GrowingHistory:
 
     def picture(self) -> History:
         """All of it so far."""
-        seconds, states, inliers, is_keyframe = self._rows[: self._n].T
+        seconds, states, inliers, milliseconds, is_keyframe = self._rows[: self._n].T
         begin = self._begin or 0.0
         return History(
             seconds=seconds.copy(),
             states=states.astype(np.int64),
             inliers=inliers.copy(),
+            milliseconds=milliseconds.copy(),
             keyframes=seconds[is_keyframe > 0],
             loops=np.array(self._loops) - begin,
             duration=self._duration,
         )
 
-    def _append(self, timestamp: float, state: int, n_inliers: int, is_keyframe: bool) -> None:
+    def _append(
+        self,
+        timestamp: float,
+        state: int,
+        n_inliers: int,
+        milliseconds: float,
+        is_keyframe: bool,
+    ) -> None:
         if self._begin is None:
             self._begin = timestamp
         if self._n == len(self._rows):
             self._rows = np.pad(self._rows, ((0, self._n), (0, 0)))
-        self._rows[self._n] = (timestamp - self._begin, state, n_inliers, is_keyframe)
+        self._rows[self._n] = (
+            timestamp - self._begin,
+            state,
+            n_inliers,
+            milliseconds,
+            is_keyframe,
+        )
         self._n += 1
 
 
@@ -132,18 +153,26 @@ def draw_time_line(history: History, size: tuple[int, int], *, text: int = 14) -
     letter = 0.9 * text
     strip = (round(0.7 * text), round(0.7 * text + letter))
     ticks = (strip[1] + text // 3, strip[1] + text // 3 + round(letter))
-    curve = (ticks[1] + text // 3, height - round(1.9 * text))
+    lowest = height - round(1.9 * text)
+    curves = [("inliers", history.inliers, _INLIERS)]
+    if lowest - ticks[1] > _ROOM_FOR_TWO * text:
+        curves.append(("ms", history.milliseconds, _MILLISECONDS))
+    edges = np.linspace(ticks[1] + text // 3, lowest, len(curves) + 1).round().astype(int).tolist()
     _draw_states(picture, history, axis, strip)
     _draw_ticks(picture, history.keyframes, axis, ticks)
-    if curve[1] - curve[0] > 4:
-        _draw_curve(picture, history, axis, curve, text)
-    for name, rows in (("state", strip), ("keyframes", ticks), ("inliers", curve)):
-        place = (left - text // 2, sum(rows) // 2)
+    rows = [("state", strip), ("keyframes", ticks)]
+    for i, (name, values, colour) in enumerate(curves):
+        curve = (edges[i] + (text // 2 if i else 0), edges[i + 1])
+        rows.append((name, curve))
+        if curve[1] - curve[0] > 4:
+            _draw_curve(picture, history.seconds, values, colour, axis, curve, text)
+    for name, ends in rows:
+        place = (left - text // 2, sum(ends) // 2)
         draw_text(picture, name, place, text, FAINT_TEXT, anchor="right")
-    _draw_loops(picture, history.loops, axis, (strip[0], curve[1]), text)
+    _draw_loops(picture, history.loops, axis, (strip[0], lowest), text)
     _draw_seconds(picture, now, duration, axis, height - round(0.85 * text), text)
     x = axis.pixel(now)
-    picture[max(0, strip[0] - text // 3) : curve[1] + 2, x : x + max(2, text // 7)] = NOW
+    picture[max(0, strip[0] - text // 3) : lowest + 2, x : x + max(2, text // 7)] = NOW
     return picture
 
 
@@ -209,29 +238,26 @@ def _draw_ticks(
 
 
 def _draw_curve(
-    picture: ByteArray, history: History, axis: _Axis, rows: tuple[int, int], text: int
+    picture: ByteArray,
+    seconds: FloatArray,
+    values: FloatArray,
+    colour: Colour,
+    axis: _Axis,
+    rows: tuple[int, int],
+    text: int,
 ) -> None:
     picture[rows[1] : rows[1] + 1, axis.left : axis.right] = FRAME
-    top = _round_up(float(history.inliers.max(initial=1.0)))
-    if len(history.seconds):
-        x = axis.pixels(history.seconds).astype(np.float64)
-        y = rows[1] - history.inliers / top * (rows[1] - rows[0])
+    top = _round_up(float(values.max(initial=1.0)))
+    if len(seconds):
+        x = axis.pixels(seconds).astype(np.float64)
+        y = rows[1] - values / top * (rows[1] - rows[0])
         line = np.stack([x, y], axis=1)
         area = np.concatenate([line, [(x[-1], rows[1]), (x[0], rows[1])]])
-        _fill(picture, area, tuple(channel // 3 for channel in _CURVE))
+        _fill(picture, area, tuple(channel // 3 for channel in colour))
         whole = np.rint(line * (1 << _SHIFT)).astype(np.int32)
-        cv2.polylines(picture, [whole], False, _CURVE, max(1, text // 9), cv2.LINE_AA, _SHIFT)
-    draw_text(
-        picture,
-        f"{top:.0f}",
-        (axis.right, rows[0] + text // 3),
-        max(9, text - 3),
-        FAINT_TEXT,
-        anchor="right",
-    )
-
-
-_CURVE: Colour = (196, 206, 218)
+        cv2.polylines(picture, [whole], False, colour, max(1, text // 9), cv2.LINE_AA, _SHIFT)
+    place = (axis.right, rows[0] + text // 3)
+    draw_text(picture, f"{top:.0f}", place, max(9, text - 3), FAINT_TEXT, anchor="right")
 
 
 def _fill(picture: ByteArray, corners: FloatArray, colour: tuple[int, ...]) -> None:
@@ -264,10 +290,12 @@ def _draw_seconds(
     picture: ByteArray, now: float, duration: float, axis: _Axis, y: int, text: int
 ) -> None:
     whole = f"{duration:.1f} s"
-    draw_text(picture, whole, (axis.right, y), text, FAINT_TEXT, anchor="right")
     said = f"{now:.1f} s"
     half = text_width(said, text) // 2
+    if now >= duration:  # they are the same
+        draw_text(picture, whole, (axis.right, y), text, TEXT, anchor="right")
+        return
     last = axis.right - text_width(whole, text) - text - half
     x = min(max(axis.pixel(now), axis.left + half), max(last, axis.left + half))
-    if now < duration or last > axis.left + half:
-        draw_text(picture, said, (x, y), text, TEXT, anchor="centre")
+    draw_text(picture, whole, (axis.right, y), text, FAINT_TEXT, anchor="right")
+    draw_text(picture, said, (x, y), text, TEXT, anchor="centre")

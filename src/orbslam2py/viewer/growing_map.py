@@ -12,6 +12,7 @@ from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.maps import MapChanges
 from orbslam2py.pictures.top_view import MapPicture
 from orbslam2py.slam.records import TrackingRecord
+from orbslam2py.trajectory import Trajectory
 
 _NO_EDGES = np.zeros((0, 2), np.int64)
 
@@ -95,6 +96,21 @@ class GrowingMap:
             path_gaps=gaps,
         )
 
+    def trajectory(self) -> Trajectory:
+        """The path so far, as the map is now; without rotations."""
+        positions, _ = self._path.positions(self.map_index, self._poses)
+        T_wc = np.tile(np.eye(4), (len(positions), 1, 1))
+        T_wc[:, :3, 3] = positions
+        return Trajectory(timestamps=self._path.times(self.map_index), T_wc=T_wc)
+
+    def points_between(self, first: int, end: int) -> npt.NDArray[np.floating]:
+        """Positions (p, 3) of the points with ids from `first` to before `end`."""
+        return self._points.between(first, end)
+
+    def keyframes_between(self, first: int, end: int) -> npt.NDArray[np.floating]:
+        """Poses (k, 4, 4), camera to world, of the keyframes with such ids."""
+        return self._poses.between(first, end).reshape(-1, 4, 4)
+
     def _edges(self, pairs: IntArray) -> npt.NDArray[np.floating]:
         """Positions of both ends (e, 2, 3) of pairs of keyframes."""
         known = self._poses.holds(pairs).all(axis=1)
@@ -137,6 +153,9 @@ class _Table:
     def values(self) -> npt.NDArray[np.floating]:
         return self._rows[self._alive]
 
+    def between(self, first: int, end: int) -> npt.NDArray[np.floating]:
+        return self._rows[first:end][self._alive[first:end]]
+
     def rows(self, ids: IntArray) -> npt.NDArray[np.floating]:
         return self._rows[ids]
 
@@ -153,14 +172,17 @@ class _Path:
         self._marks = np.zeros((256, 3), np.int64)
         #: In the world as tracked, then in the camera of the reference keyframe.
         self._places = np.zeros((256, 6))
+        self._seconds = np.zeros(256)
 
     def add(self, record: TrackingRecord) -> None:
         if self._n == len(self._marks):
             self._marks = np.pad(self._marks, ((0, self._n), (0, 0)))
             self._places = np.pad(self._places, ((0, self._n), (0, 0)))
+            self._seconds = np.pad(self._seconds, (0, self._n))
         T_wc = record.T_wc
         self._marks[self._n] = (record.map_index, record.reference_keyframe, 0)
         self._places[self._n] = np.nan if T_wc is None else np.tile(T_wc[:3, 3], 2)
+        self._seconds[self._n] = record.timestamp
         self._n += 1
 
     def of_map(self, map_index: int) -> _Path:
@@ -171,6 +193,7 @@ class _Path:
         spare = ((0, 256), (0, 0))
         path._marks = np.pad(self._marks[chosen], spare)
         path._places = np.pad(self._places[chosen], spare)
+        path._seconds = np.pad(self._seconds[chosen], (0, 256))
         return path
 
     def hang(self, poses: _Table) -> None:
@@ -204,6 +227,12 @@ class _Path:
         T_wk = poses.rows(self._marks[which, 1]).reshape(-1, 4, 4)
         turned = np.einsum("nij,nj->ni", T_wk[:, :3, :3], self._places[which, 3:])
         return np.asarray(turned + T_wk[:, :3, 3], np.float64)
+
+    def times(self, map_index: int) -> FloatArray:
+        """Time stamps (n,) that belong to `positions`."""
+        found = self._marks[: self._n, 0] == map_index
+        found &= np.isfinite(self._places[: self._n, 0])
+        return self._seconds[: self._n][found]
 
     def positions(self, map_index: int, poses: _Table) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
         """Positions (n, 3) of the frames of a map that have one; whether there is a gap before."""

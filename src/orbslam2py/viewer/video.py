@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import threading
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -56,7 +57,7 @@ class VideoWriter:
 
     Raises
     ------
-    VideoFileError
+    OutputFileError
         If it can be told already that there will be no video.
     """
 
@@ -94,6 +95,11 @@ class VideoWriter:
         self._unused: list[_Unused] = []
         self._n_seen = 0
         self._lock = threading.Lock()
+
+    @property
+    def path(self) -> Path:
+        """Where it will be."""
+        return self._file.path
 
     @property
     def n_frames(self) -> int:
