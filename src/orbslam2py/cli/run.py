@@ -192,8 +192,11 @@ def run_and_show(
     log_to(errors, quiet=quiet)
     n_frames = options.n_frames(sequence)
     words = load_vocabulary(vocabulary)  # until here a Ctrl-C leaves nothing behind
-    files = file_watchers(sequence, options, video=video, record=record)
-    with StopOnInterrupt() as interrupt, progress_bar(console) as bar:
+    with (
+        file_watchers(sequence, options, video=video, record=record) as files,
+        StopOnInterrupt() as interrupt,
+        progress_bar(console) as bar,
+    ):
         display = Display(bar, n_frames)
 
         def show(row: FrameRow, system: System) -> None:

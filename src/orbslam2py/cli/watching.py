@@ -14,6 +14,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
+from orbslam2py._arrays import FloatArray
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.runs.feeds import is_sequence
 from orbslam2py.runs.options import RunOptions
@@ -59,6 +60,46 @@ class FileWatchers:
     video: VideoWriter | None = None
     _n_tracked: int = 0
 
+    def add_video(self, path: Path, source: Sequence | LiveSource, options: RunOptions) -> None:
+        """Write a video."""
+        from orbslam2py.viewer.video import VideoWriter  # noqa: PLC0415
+
+        times = _times(source, options)
+        duration, rate = None, _LIVE_RATE
+        if times is not None:
+            duration = float(times[-1] - times[0])
+            rate = 1.0 / float(np.median(np.diff(times))) if duration > 0 else rate
+        self.video = VideoWriter(
+            path,
+            frames_per_second=rate,
+            duration=duration,
+            in_time=self.in_time,
+            unit="m" if options.sensor.has_depth else "units",
+        )
+        self.watchers.append(self.video)
+        self.files["video"] = path
+
+    def add_recording(self, path: Path, source: Sequence | LiveSource, options: RunOptions) -> None:
+        """Write a recording for Rerun."""
+        from orbslam2py.viewer.rerun_recorder import RerunRecorder  # noqa: PLC0415
+
+        recorder = RerunRecorder(
+            path,
+            settings=source.settings,
+            ground_truth=source.ground_truth() if is_sequence(source) else None,
+            with_scale=not options.sensor.has_depth,
+        )
+        self.watchers.append(recorder)
+        self.files["recording"] = path
+
+    def __enter__(self) -> FileWatchers:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Close what the run has not, since it did not begin."""
+        for watcher in self.watchers:
+            watcher.close()
+
     @contextlib.contextmanager
     def watch(self, system: System) -> Iterator[None]:
         """Watch a system from its first image to its last."""
@@ -101,32 +142,18 @@ def file_watchers(
         Naming the file that cannot be written, or what has to be installed.
     """
     in_time = options.realtime or not is_sequence(source)
-    watchers = FileWatchers(in_time)
-    unit = "m" if options.sensor.has_depth else "units"
-    if video is not None:
-        from orbslam2py.viewer.video import VideoWriter  # noqa: PLC0415
+    with contextlib.ExitStack() as stack:
+        files = stack.enter_context(FileWatchers(in_time))
+        if video is not None:
+            files.add_video(video, source, options)
+        if record is not None:
+            files.add_recording(record, source, options)
+        stack.pop_all()
+    return files
 
-        rate, duration = _LIVE_RATE, None
-        if is_sequence(source):
-            times = np.asarray(source.timestamps)[options.indices(len(source))]
-            duration = float(times[-1] - times[0])
-            if duration > 0:
-                rate = 1.0 / float(np.median(np.diff(times)))
-        watchers.video = VideoWriter(
-            video, frames_per_second=rate, duration=duration, in_time=in_time, unit=unit
-        )
-        watchers.watchers.append(watchers.video)
-        watchers.files["video"] = video
-    if record is not None:
-        from orbslam2py.viewer.rerun_recorder import RerunRecorder  # noqa: PLC0415
 
-        truth = source.ground_truth() if is_sequence(source) else None
-        recorder = RerunRecorder(
-            record,
-            settings=source.settings,
-            ground_truth=truth,
-            with_scale=not options.sensor.has_depth,
-        )
-        watchers.watchers.append(recorder)
-        watchers.files["recording"] = record
-    return watchers
+def _times(source: Sequence | LiveSource, options: RunOptions) -> FloatArray | None:
+    """Time stamps of the images of a recording that are taken."""
+    if not is_sequence(source):
+        return None
+    return np.asarray(source.timestamps)[options.indices(len(source))]

@@ -232,7 +232,7 @@ class _Path:
         """Time stamps (n,) that belong to `positions`."""
         found = self._marks[: self._n, 0] == map_index
         found &= np.isfinite(self._places[: self._n, 0])
-        return self._seconds[: self._n][found]
+        return np.array(self._seconds[: self._n][found])
 
     def positions(self, map_index: int, poses: _Table) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
         """Positions (n, 3) of the frames of a map that have one; whether there is a gap before."""

@@ -97,6 +97,7 @@ class RerunRecorder:
         self._begin: float | None = None
         self._now = 0.0
         self._n_images = 0
+        self._closed = False
         self._map_due = self._paths_due = 0.0
         self._stale_points: set[int] = set()
         self._stale_keyframes: set[int] = set()
@@ -142,6 +143,9 @@ class RerunRecorder:
 
     def close(self) -> None:
         """Finish the file; it appears under its name."""
+        if self._closed:
+            return
+        self._closed = True
         try:
             if self._n_images:
                 self._write_map()
@@ -166,7 +170,7 @@ class RerunRecorder:
             stream.log(
                 "world/camera/image",
                 rr.Pinhole(
-                    image_from_camera=camera.K,
+                    image_from_camera=camera.matrix,
                     resolution=(camera.width, camera.height) if known else None,
                     camera_xyz=rr.ViewCoordinates.RDF,
                 ),
