@@ -30,7 +30,8 @@ from .slam.records import TrackingRecord as TrackingRecord
 from .slam.records import TrackingState as TrackingState
 from .slam.system import System as System
 from .trajectory import Trajectory as Trajectory
-from .viewer.publisher import Publisher as Publisher
-from .viewer.rerun_recorder import RerunRecorder as RerunRecorder
-from .viewer.video import VideoWriter as VideoWriter
+from .viewer import Publisher as Publisher
+from .viewer import RerunRecorder as RerunRecorder
+from .viewer import VideoWriter as VideoWriter
+from .viewer import Viewer as Viewer
 from .vocabulary import load_vocabulary as load_vocabulary

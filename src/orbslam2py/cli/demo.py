@@ -9,6 +9,13 @@ from typing import Annotated
 import typer
 
 from orbslam2py.cli.run import run_and_show
+from orbslam2py.cli.viewing import (
+    ViewerExit,
+    ViewerFlag,
+    ViewerHost,
+    ViewerOptions,
+    ViewerPort,
+)
 from orbslam2py.cli.watching import RecordOption, VideoOption
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.settings import Sensor
@@ -23,6 +30,10 @@ def demo(
         int | None, typer.Option(help="Number of images [one lap and a bit].", min=10)
     ] = None,
     output: Annotated[Path, typer.Option(help="Folder for the results.")] = DEFAULT_OUTPUT,
+    viewer: ViewerFlag = False,
+    viewer_port: ViewerPort = None,
+    viewer_host: ViewerHost = None,
+    viewer_exit: ViewerExit = False,
     video: VideoOption = None,
     record: RecordOption = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
@@ -32,7 +43,10 @@ def demo(
     **Example**
 
         orbslam2py demo --sensor rgbd
+
+        orbslam2py demo --viewer
     """
+    look = ViewerOptions(viewer, viewer_port, viewer_host, viewer_exit)
     options = SyntheticOptions(world="corridor", sensor=sensor, frames=frames, speed=1.4, noise=2)
     sequence = SyntheticSequence(options)
     # Results of an earlier demo are replaced, other files are not.
@@ -42,10 +56,13 @@ def demo(
         RunOptions(sensor),
         output=output,
         force=force,
-        quiet=quiet,
+        viewer=look,
         video=video,
         record=record,
+        quiet=quiet,
     )
     if not quiet:
         typer.echo(f"Look at {output / 'trajectory.png'}.")
+        if not viewer:
+            typer.echo("To see it while it runs: orbslam2py demo --viewer")
     raise typer.Exit(code)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import Annotated
 
@@ -21,7 +22,15 @@ from orbslam2py.cli.display import (
 )
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.interrupts import StopOnInterrupt
-from orbslam2py.cli.watching import RecordOption, VideoOption, file_watchers
+from orbslam2py.cli.viewing import (
+    ViewerExit,
+    ViewerFlag,
+    ViewerHost,
+    ViewerOptions,
+    ViewerPort,
+    Viewing,
+)
+from orbslam2py.cli.watching import RecordOption, VideoOption, file_watchers, watch_all
 from orbslam2py.datasets import open_input
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.runs.options import RunOptions
@@ -139,9 +148,14 @@ def run(
     force: Annotated[
         bool, typer.Option("--force", help="Write into an output folder that is not empty.")
     ] = False,
+    viewer: ViewerFlag = False,
+    viewer_port: ViewerPort = None,
+    viewer_host: ViewerHost = None,
+    viewer_exit: ViewerExit = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
 ) -> None:
     """Track a recorded sequence, a video or a camera; write trajectory, map and report."""
+    look = ViewerOptions(viewer, viewer_port, viewer_host, viewer_exit)
     log_to(Console(stderr=True), quiet=quiet)  # opening warns already
     images = open_input(sequence, sensor, settings=settings, fps=fps, times=times, mask=mask)
     options = RunOptions(
@@ -165,9 +179,10 @@ def run(
         vocabulary=vocabulary,
         output=output,
         force=force,
-        quiet=quiet,
+        viewer=look,
         video=video,
         record=record,
+        quiet=quiet,
     )
     raise typer.Exit(code)
 
@@ -182,6 +197,7 @@ def run_and_show(
     vocabulary: Path | None = None,
     output: Path | None = None,
     force: bool = False,
+    viewer: ViewerOptions | None = None,
     quiet: bool = False,
     video: Path | None = None,
     record: Path | None = None,
@@ -192,33 +208,36 @@ def run_and_show(
     log_to(errors, quiet=quiet)
     n_frames = options.n_frames(sequence)
     words = load_vocabulary(vocabulary)  # until here a Ctrl-C leaves nothing behind
-    with (
-        file_watchers(sequence, options, video=video, record=record) as files,
-        StopOnInterrupt() as interrupt,
-        progress_bar(console) as bar,
-    ):
-        display = Display(bar, n_frames)
+    with contextlib.ExitStack() as page:
+        with StopOnInterrupt() as interrupt:
+            files = page.enter_context(file_watchers(sequence, options, video, record))
+            viewing = Viewing(viewer or ViewerOptions(), sequence, interrupt.event)
+            page.enter_context(viewing)
+            with progress_bar(console) as bar:
+                display = Display(bar, n_frames)
 
-        def show(row: FrameRow, system: System) -> None:
-            files.show(row)
-            display.show(row, system)
+                def progress(row: FrameRow, system: System) -> None:
+                    display.show(row, system)
+                    viewing.count(row)
+                    files.count(row)
 
-        done = run_sequence(
-            sequence,
-            options,
-            vocabulary=words,
-            output=output or new_output_folder(sequence.name),
-            force=force,
-            progress=show,
-            stop=interrupt.event,
-            watch=files.watch if files.watchers else None,
-        )
-    tell_repeated()
-    console.print(report_table(done.report))
-    folder = escape(str(done.folder))
-    console.print(f"Results are in [bold]{folder}[/]", highlight=False, soft_wrap=True)
-    files.tell(console)
-    code = _conclude(done, errors)
+                done = run_sequence(
+                    sequence,
+                    options,
+                    vocabulary=words,
+                    output=output or new_output_folder(sequence.name),
+                    force=force,
+                    progress=progress,
+                    control=viewing.control,
+                    watch=watch_all(viewing.watch, files.watch),
+                )
+        tell_repeated()
+        console.print(report_table(done.report))
+        folder = escape(str(done.folder))
+        console.print(f"Results are in [bold]{folder}[/]", highlight=False, soft_wrap=True)
+        files.tell(console)
+        code = _conclude(done, errors)
+        viewing.stay(console, done.folder)
     interrupted = interrupt.event.is_set() and not done.result.is_live  # also while writing
     if code is not ExitCode.FAILED and interrupted:
         return ExitCode.INTERRUPTED

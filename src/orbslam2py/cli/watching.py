@@ -7,7 +7,7 @@ import contextlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
@@ -16,10 +16,13 @@ from rich.markup import escape
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py.datasets.base import LiveSource, Sequence
+from orbslam2py.errors import OrbSlamError
 from orbslam2py.runs.feeds import is_sequence
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.result import FrameRow
+from orbslam2py.runs.runner import Watch
 from orbslam2py.slam.system import System
+from orbslam2py.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from orbslam2py.viewer import Watcher
@@ -42,6 +45,8 @@ RecordOption = Annotated[
 ]
 #: How fast a camera's video is played: what its images are repeated or left out for [1/s].
 _LIVE_RATE = 30.0
+#: Looks at the map a second, in real time.
+_LIVE_MAP_RATE = 10.0
 
 
 @dataclass
@@ -86,7 +91,7 @@ class FileWatchers:
         recorder = RerunRecorder(
             path,
             settings=source.settings,
-            ground_truth=source.ground_truth() if is_sequence(source) else None,
+            ground_truth=_truth(source),
             with_scale=not options.sensor.has_depth,
         )
         self.watchers.append(recorder)
@@ -103,12 +108,18 @@ class FileWatchers:
     @contextlib.contextmanager
     def watch(self, system: System) -> Iterator[None]:
         """Watch a system from its first image to its last."""
+        if not self.watchers:
+            yield
+            return
         from orbslam2py.viewer import Publisher  # noqa: PLC0415
 
-        rates: dict[str, Any] = {"frame_rate": _LIVE_RATE, "map_rate": 10.0}
-        if not self.in_time:  # in every image of a recording the map is to be as it was then
-            rates = {"every_frame": True, "map_rate": 1e6}
-        with Publisher(system, self.watchers, **rates):
+        with Publisher(
+            system,
+            self.watchers,
+            frame_rate=_LIVE_RATE,
+            map_rate=_LIVE_MAP_RATE,
+            every_frame=not self.in_time,
+        ):
             yield
 
     def tell(self, console: Console) -> None:
@@ -118,7 +129,7 @@ class FileWatchers:
                 where = escape(str(path))
                 console.print(f"The {what} is [bold]{where}[/]", highlight=False, soft_wrap=True)
 
-    def show(self, row: FrameRow) -> None:
+    def count(self, row: FrameRow) -> None:
         """Take note of images that were not tracked."""
         if row.record is not None:
             self._n_tracked += 1
@@ -130,9 +141,8 @@ class FileWatchers:
 def file_watchers(
     source: Sequence | LiveSource,
     options: RunOptions,
-    *,
-    video: Path | None = None,
-    record: Path | None = None,
+    video: Path | None,
+    record: Path | None,
 ) -> FileWatchers:
     """Make what writes the files that were asked for, and see that they can be written.
 
@@ -150,6 +160,26 @@ def file_watchers(
             files.add_recording(record, source, options)
         stack.pop_all()
     return files
+
+
+def watch_all(*watches: Watch) -> Watch:
+    """Let several watch the same system."""
+
+    @contextlib.contextmanager
+    def watch(system: System) -> Iterator[None]:
+        with contextlib.ExitStack() as stack:
+            for each in watches:
+                stack.enter_context(each(system))
+            yield
+
+    return watch
+
+
+def _truth(source: Sequence | LiveSource) -> Trajectory | None:
+    try:
+        return source.ground_truth()
+    except (OrbSlamError, OSError):
+        return None  # the report says why
 
 
 def _times(source: Sequence | LiveSource, options: RunOptions) -> FloatArray | None:

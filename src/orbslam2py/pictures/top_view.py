@@ -261,7 +261,8 @@ def _draw_scale_bar(picture: ByteArray, framing: Framing, unit: str, text: int) 
     thick = max(1, text // 8)
     cv2.polylines(picture, [corners], False, HALO, thick + 2)
     cv2.polylines(picture, [corners], False, TEXT, thick)
-    draw_text(picture, f"{length:g} {unit}", (x + text // 3, y - round(0.8 * text)), text, TEXT)
+    said = unit.removesuffix("s") if length == 1 else unit
+    draw_text(picture, f"{length:g} {said}", (x + text // 3, y - round(0.8 * text)), text, TEXT)
 
 
 def _draw_legend(picture: ByteArray, scene: MapPicture, text: int) -> None:

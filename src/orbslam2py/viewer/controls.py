@@ -83,6 +83,10 @@ class ViewActions(Protocol):
         """Move the view with the camera, or not."""
         ...
 
+    def set_distance(self, factor: float) -> None:
+        """Follow from farther away, or nearer."""
+        ...
+
     def show_all(self, client: viser.ClientHandle) -> None:
         """Let a browser see the whole map."""
         ...
@@ -103,6 +107,7 @@ def add_view_controls(server: viser.ViserServer, view: ViewActions) -> None:
         follow = gui.add_dropdown(
             "Follow", [str(mode) for mode in Follow], initial_value=str(Follow.BEHIND)
         )
+        distance = gui.add_slider("Distance", min=0.2, max=5.0, step=0.1, initial_value=1.0)
         colour = gui.add_dropdown(
             "Colour", [str(what) for what in ColourBy], initial_value=str(ColourBy.IMAGE)
         )
@@ -115,6 +120,7 @@ def add_view_controls(server: viser.ViserServer, view: ViewActions) -> None:
         gui.add_html(_legend())
 
     follow.on_update(lambda _: view.follow(Follow(follow.value)))
+    distance.on_update(lambda _: view.set_distance(distance.value))
     colour.on_update(lambda _: view.colour_by(ColourBy(colour.value)))
     size.on_update(lambda _: view.set_point_size(size.value))
 

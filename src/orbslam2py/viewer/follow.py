@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from enum import Enum
 from typing import TYPE_CHECKING
 
@@ -19,8 +18,6 @@ _UP = np.array([0.0, -1.0, 0.0])  # that of the first camera
 _BEHIND, _AHEAD, _RAISED, _ABOVE = 24.0, 14.0, 10.0, 110.0
 #: Part of the way that the view turns to where the camera looks, with every image.
 _TURN = 0.25
-#: Distances that were set and may come back from a browser later.
-_ECHOES = 30
 
 
 class Follow(str, Enum):
@@ -36,18 +33,20 @@ class Follow(str, Enum):
 
 
 class Follower:
-    """Moves the views of all browsers with the camera; how far away stays with each person."""
+    """Moves the views of all browsers with the camera.
+
+    Attributes
+    ----------
+    mode : Follow
+        How.
+    distance : float
+        From how far away, 1 as usual.
+    """
 
     def __init__(self) -> None:
         self.mode = Follow.BEHIND
+        self.distance = 1.0
         self._forward: FloatArray | None = None
-        self._distances: dict[int, deque[float]] = {}
-        self._zoom: dict[int, float] = {}
-
-    def forget(self, client_id: int) -> None:
-        """A browser has gone, or its view is to begin anew."""
-        self._distances.pop(client_id, None)
-        self._zoom.pop(client_id, None)
 
     def move(self, client: viser.ClientHandle, T_wc: FloatArray, size: float) -> None:
         """Move the view of a browser to where the camera is.
@@ -64,14 +63,11 @@ class Follower:
         if self.mode is Follow.FREE or size <= 0:
             return
         eye, target, up = self._view(T_wc, size)
-        zoom = self._zoom_of(client)
-        eye = target + zoom * (eye - target)
+        eye = target + self.distance * (eye - target)
         with client.atomic():
             client.camera.up_direction = up
             client.camera.position = eye
             client.camera.look_at = target
-        set_before = self._distances.setdefault(client.client_id, deque(maxlen=_ECHOES))
-        set_before.append(float(np.linalg.norm(eye - target)))
 
     def turn(self, T_wc: FloatArray) -> None:
         """Take note of where the camera looks, once for every image."""
@@ -91,18 +87,6 @@ class Follower:
         eye = place - size * _BEHIND * forward + size * _RAISED * _UP
         upright = abs(float(forward @ _UP)) < 0.95
         return eye, place + size * _AHEAD * forward, _UP if upright else -T_wc[:3, 1]
-
-    def _zoom_of(self, client: viser.ClientHandle) -> float:
-        number = client.client_id
-        zoom = self._zoom.get(number, 1.0)
-        set_before = np.array(self._distances.get(number, ()))
-        if len(set_before):
-            now = float(np.linalg.norm(client.camera.position - client.camera.look_at))
-            # The browser tells its view after a while: an older one of ours is no wish.
-            if (np.abs(now / set_before - 1) > 0.02).all():
-                zoom = float(np.clip(zoom * now / set_before[-1], 0.1, 10.0))
-        self._zoom[number] = zoom
-        return zoom
 
 
 def whole_view(points: FloatArray) -> tuple[FloatArray, FloatArray]:

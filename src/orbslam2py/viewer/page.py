@@ -78,7 +78,6 @@ class Page:
         self.scene = Scene(self.server, self.model, self._colours, self._select)
         add_view_controls(self.server, self)
         self.server.on_client_connect(self._connected)
-        self.server.on_client_disconnect(lambda client: self._follower.forget(client.client_id))
 
     @property
     def is_watched(self) -> bool:
@@ -164,8 +163,7 @@ class Page:
             return
         self._T_wc = T_wc
         self._follower.turn(T_wc)
-        for client in self.server.get_clients().values():
-            self._follower.move(client, T_wc, self.scene.size)
+        self._move_views()
 
     def keep_keyframe(
         self, keyframe: int, image: ByteArray, n_keypoints: int, n_matched: int
@@ -184,11 +182,20 @@ class Page:
         with self.lock:
             self._follower.mode = mode
             for client in self.server.get_clients().values():
-                self._follower.forget(client.client_id)
                 if mode is Follow.FREE:
                     client.camera.up_direction = (0.0, -1.0, 0.0)
-                elif self._T_wc is not None:
-                    self._follower.move(client, self._T_wc, self.scene.size)
+            self._move_views()
+
+    def set_distance(self, factor: float) -> None:
+        """Follow from farther away, or nearer."""
+        with self.lock:
+            self._follower.distance = factor
+            self._move_views()
+
+    def _move_views(self) -> None:
+        if self._T_wc is not None:
+            for client in self.server.get_clients().values():
+                self._follower.move(client, self._T_wc, self.scene.size)
 
     def show_all(self, client: viser.ClientHandle) -> None:
         """Let a browser see the whole map."""

@@ -23,7 +23,7 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py._arrays import ByteArray
 from orbslam2py._files import describe_error
-from orbslam2py.maps.changes import MapFollower
+from orbslam2py.maps.changes import MapChanges, MapFollower
 from orbslam2py.slam.events import Event
 from orbslam2py.slam.pipeline import WatchedFrame
 from orbslam2py.slam.records import TrackingRecord
@@ -60,8 +60,8 @@ class Publisher:
     map_rate : float
         At most so many looks at the map a second.
     every_frame : bool
-        Pass over no frame: the track call waits until there is room for one. For a video of a
-        recorded sequence.
+        Pass over no frame, and look at the map with each: the track call waits until there is room
+        for one. For a video of a recorded sequence.
     """
 
     def __init__(
@@ -82,7 +82,8 @@ class Publisher:
         self._every_frame = every_frame
         self._follower = MapFollower(system.pipeline.back_end.map)
         self._condition = threading.Condition()
-        self._views: deque[FrameView] = deque()
+        #: With the changes of the map that were seen with the image, when none is passed over.
+        self._views: deque[tuple[MapChanges | None, FrameView]] = deque()
         self._events: deque[Event] = deque()
         self._earlier: deque[TrackingRecord] = deque(maxlen=_EARLIER_RECORDS)
         self._seen_at: deque[float] = deque(maxlen=_RATE_IMAGES)
@@ -140,18 +141,20 @@ class Publisher:
             return
         self._next_view_at = now + self._frame_period
         view = self._view(frame)
+        # Who passes over no image sees with each the map of its time, not of when it is drawn.
+        changes = self._follower.update() if self._every_frame and self._works() else None
         with self._condition:
             if self._every_frame:
                 self._condition.wait_for(
                     lambda: len(self._views) < _WAITING_VIEWS or not self._works()
                 )
             elif self._views:
-                late = self._views.pop()
+                _, late = self._views.pop()
                 self._n_not_shown += 1
                 earlier = (*late.earlier, late.record, *view.earlier)
                 view = replace(view, earlier=earlier)
             if self._works():
-                self._views.append(view)
+                self._views.append((changes, view))
             self._condition.notify_all()
 
     def _pass_over(self, record: TrackingRecord) -> None:
@@ -202,11 +205,16 @@ class Publisher:
                 self._views.clear()
                 self._events.clear()
                 self._condition.notify_all()
-            self._look_at_map(now=closing)
+            if not self._every_frame:
+                self._look_at_map(now=closing)
             for event in events:
                 self._tell(methodcaller("on_event", event))
-            for view in views:
+            for changes, view in views:
+                if changes:
+                    self._tell(methodcaller("on_map", changes))
                 self._tell(methodcaller("on_frame", view))
+        if self._every_frame:
+            self._look_at_map(now=True)
         self._tell(methodcaller("close"))
         self._watchers = []
 
@@ -214,7 +222,9 @@ class Publisher:
         return self._closing or bool(self._views) or bool(self._events)
 
     def _seconds_to_look(self) -> float | None:
-        return max(0.0, self._next_look_at - time.perf_counter()) if self._watchers else None
+        if not self._watchers or self._every_frame:
+            return None
+        return max(0.0, self._next_look_at - time.perf_counter())
 
     def _look_at_map(self, *, now: bool) -> None:
         begin = time.perf_counter()

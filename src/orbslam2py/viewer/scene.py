@@ -53,7 +53,7 @@ _SIZE = 0.03
 #: That size stays until the fitting one differs by so much: all keyframes are drawn anew then.
 _SIZE_TOLERANCE = 1.6
 #: Diameter of a point at size 1, in those sizes.
-_POINT = 0.14
+_POINT = 0.12
 #: A frustum: its apex, then the corners of its image.
 _CORNERS = np.array([(0, 0, 0), (-1, -0.75, 0.6), (1, -0.75, 0.6), (1, 0.75, 0.6), (-1, 0.75, 0.6)])
 _EDGES = np.array([(0, 1), (0, 2), (0, 3), (0, 4), (1, 2), (2, 3), (3, 4), (4, 1)])
@@ -105,6 +105,7 @@ class Scene:
         self.size = 0.0
         self.fov = _FOV
         self._scene.set_up_direction("-y")  # that of the first camera
+        self._scene.configure_environment_map(None)  # nothing here mirrors, and it takes a while
         self._scene.configure_default_lights(enabled=True, cast_shadow=False)
         self._layers = {
             name: self._scene.add_frame(f"/{name}", show_axes=False, visible=name not in HIDDEN)

@@ -40,6 +40,7 @@ NAMES = {
     "TrackingRecord",
     "TrackingState",
     "Trajectory",
+    "Viewer",
     "VocabularyError",
     "WorkerError",
     "__version__",
@@ -57,6 +58,7 @@ ROOMS = {
     "runs": ["RunOptions", "RunResult", "SequenceRunner", "SystemOptions", "run_sequence"],
     "settings": ["CameraSettings", "DepthSettings", "OrbSettings", "Settings", "builtin_settings"],
     "synthetic": ["SyntheticOptions", "SyntheticSequence"],
+    "viewer": ["LiveView", "Publisher", "Viewer", "Watcher"],
     "trajectory": [
         *("Trajectory", "associate", "read_euroc", "read_kitti", "read_trajectory", "read_tum"),
         *("write_kitti", "write_tum"),
