@@ -114,9 +114,9 @@ class Status:
     def numbers(self) -> str:
         """Sizes and speed."""
         parts = [
-            f"{_thousands(self.n_keyframes)} keyframes",
-            f"{_thousands(self.n_points)} points",
-            f"{_thousands(self.n_matches)} matches",
+            _counted(self.n_keyframes, "keyframe", "keyframes"),
+            _counted(self.n_points, "point", "points"),
+            _counted(self.n_matches, "match", "matches"),
         ]
         if self.n_visual_odometry:
             parts.append(f"{_thousands(self.n_visual_odometry)} visual odometry")
@@ -315,6 +315,10 @@ def _shortened(text: str, room: int, size: int) -> str:
     while text and text_width(text + "…", size) > room:
         text = text[:-1]
     return text.rstrip() + "…"
+
+
+def _counted(number: int, one: str, many: str) -> str:
+    return f"{_thousands(number)} {one if number == 1 else many}"
 
 
 def _thousands(number: int) -> str:

@@ -96,7 +96,7 @@ class RerunRecorder:
         self._stream = self._open(settings)
         self._begin: float | None = None
         self._now = 0.0
-        self._n_images = 0
+        self._n_images = self._n_records = 0
         self._closed = False
         self._map_due = self._paths_due = 0.0
         self._stale_points: set[int] = set()
@@ -112,7 +112,8 @@ class RerunRecorder:
     def on_map(self, changes: MapChanges) -> None:
         """Take over what has changed; it is written a few times a second."""
         if changes.restarted:
-            self._log("world/map", self._rr.Clear(recursive=True))
+            if self._n_records:
+                self._log("world/map", self._rr.Clear(recursive=True))
             self._stale_points, self._stale_keyframes = set(), set()
         self._map.apply(changes)
         points = np.concatenate([changes.points_set.ids, changes.points_removed])
@@ -188,7 +189,8 @@ class RerunRecorder:
             self._begin = record.timestamp
         self._now = record.timestamp - self._begin
         self._stream.set_time("time", duration=self._now)
-        self._stream.set_time("frame", sequence=record.frame_id)
+        self._stream.set_time("frame", sequence=self._n_records)
+        self._n_records += 1
         self._map.add_frame(record)
         self._log("plots/inliers", rr.Scalars(record.n_inliers))
         self._log("plots/matches", rr.Scalars(record.n_matches))

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
-from orbslam2py.errors import OrbSlamError
+from orbslam2py.errors import OutputFileError
 from orbslam2py.maps import MapChanges
 from orbslam2py.pictures.composition import Composition, compose
 from orbslam2py.pictures.framing import Framing, frame_all
@@ -74,7 +74,10 @@ class VideoWriter:
         size: tuple[int, int] = (1280, 720),
     ) -> None:
         if size[0] < 320 or size[1] < 240 or size[0] % 2 or size[1] % 2:
-            raise OrbSlamError(f"a video of {size[0]} x {size[1]} pixels is too small, or odd")
+            raise OutputFileError(
+                f"a video cannot be {size[0]} x {size[1]} pixels large; take even numbers from "
+                "320 x 240 on"
+            )
         self._frames_per_second = float(np.clip(frames_per_second, 1.0, 240.0))
         self._file = VideoFile(path, size, self._frames_per_second)
         self._in_time = in_time
