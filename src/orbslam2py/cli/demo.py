@@ -16,6 +16,7 @@ from orbslam2py.cli.viewing import (
     ViewerOptions,
     ViewerPort,
 )
+from orbslam2py.cli.watching import RecordOption, VideoOption
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.settings import Sensor
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
@@ -33,6 +34,8 @@ def demo(
     viewer_port: ViewerPort = None,
     viewer_host: ViewerHost = None,
     viewer_exit: ViewerExit = False,
+    video: VideoOption = None,
+    record: RecordOption = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
 ) -> None:
     """Track a camera once around a synthetic corridor: needs no data.
@@ -49,7 +52,14 @@ def demo(
     # Results of an earlier demo are replaced, other files are not.
     force = output == DEFAULT_OUTPUT or (output / "report.json").is_file()
     code = run_and_show(
-        sequence, RunOptions(sensor), output=output, force=force, viewer=look, quiet=quiet
+        sequence,
+        RunOptions(sensor),
+        output=output,
+        force=force,
+        viewer=look,
+        video=video,
+        record=record,
+        quiet=quiet,
     )
     if not quiet:
         typer.echo(f"Look at {output / 'trajectory.png'}.")

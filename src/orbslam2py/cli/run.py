@@ -30,6 +30,7 @@ from orbslam2py.cli.viewing import (
     ViewerPort,
     Viewing,
 )
+from orbslam2py.cli.watching import RecordOption, VideoOption, file_watchers, watch_all
 from orbslam2py.datasets import open_input
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.runs.options import RunOptions
@@ -142,6 +143,8 @@ def run(
         ),
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of all random draws.", min=0)] = 0,
+    video: VideoOption = None,
+    record: RecordOption = None,
     force: Annotated[
         bool, typer.Option("--force", help="Write into an output folder that is not empty.")
     ] = False,
@@ -177,6 +180,8 @@ def run(
         output=output,
         force=force,
         viewer=look,
+        video=video,
+        record=record,
         quiet=quiet,
     )
     raise typer.Exit(code)
@@ -194,6 +199,8 @@ def run_and_show(
     force: bool = False,
     viewer: ViewerOptions | None = None,
     quiet: bool = False,
+    video: Path | None = None,
+    record: Path | None = None,
 ) -> ExitCode:
     """Run, with a progress bar and a table at the end; returns the exit code."""
     console = Console(quiet=quiet)
@@ -203,6 +210,7 @@ def run_and_show(
     words = load_vocabulary(vocabulary)  # until here a Ctrl-C leaves nothing behind
     with contextlib.ExitStack() as page:
         with StopOnInterrupt() as interrupt:
+            files = page.enter_context(file_watchers(sequence, options, video, record))
             viewing = Viewing(viewer or ViewerOptions(), sequence, interrupt.event)
             page.enter_context(viewing)
             with progress_bar(console) as bar:
@@ -211,6 +219,7 @@ def run_and_show(
                 def progress(row: FrameRow, system: System) -> None:
                     display.show(row, system)
                     viewing.count(row)
+                    files.count(row)
 
                 done = run_sequence(
                     sequence,
@@ -220,12 +229,13 @@ def run_and_show(
                     force=force,
                     progress=progress,
                     control=viewing.control,
-                    watch=viewing.watch,
+                    watch=watch_all(viewing.watch, files.watch),
                 )
         tell_repeated()
         console.print(report_table(done.report))
         folder = escape(str(done.folder))
         console.print(f"Results are in [bold]{folder}[/]", highlight=False, soft_wrap=True)
+        files.tell(console)
         code = _conclude(done, errors)
         viewing.stay(console, done.folder)
     interrupted = interrupt.event.is_set() and not done.result.is_live  # also while writing

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
+from orbslam2py.pictures.palette import MAPPED, STAGE_COLOURS, TEXT, Colour
 from orbslam2py.slam.records import TrackingRecord, TrackingState
-from orbslam2py.viewer.palette import MAPPED, STAGE_COLOURS, TEXT, Colour
 
 if TYPE_CHECKING:
     import viser

@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 import weakref
@@ -23,7 +24,7 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py._arrays import ByteArray
 from orbslam2py._files import describe_error
-from orbslam2py.maps.changes import MapFollower
+from orbslam2py.maps.changes import MapChanges, MapFollower
 from orbslam2py.slam.events import Event
 from orbslam2py.slam.pipeline import WatchedFrame
 from orbslam2py.slam.system import System
@@ -57,8 +58,8 @@ class Publisher:
     map_rate : float
         At most so many looks at the map a second.
     every_frame : bool
-        Pass over no frame: the track call waits until there is room for one. For a video of a
-        recorded sequence.
+        Pass over no frame, and look at the map with each: the track call waits until there is room
+        for one. For a video of a recorded sequence.
     """
 
     def __init__(
@@ -79,7 +80,8 @@ class Publisher:
         self._every_frame = every_frame
         self._follower = MapFollower(system.pipeline.back_end.map)
         self._condition = threading.Condition()
-        self._views: deque[FrameView] = deque()
+        #: With the changes of the map that were seen with the image, when none is passed over.
+        self._views: deque[tuple[MapChanges | None, FrameView]] = deque()
         self._events: deque[Event] = deque()
         self._seen_at: deque[float] = deque(maxlen=_RATE_IMAGES)
         self._next_view_at = 0.0
@@ -133,6 +135,8 @@ class Publisher:
         self._n_frames += 1
         self._seen_at.append(time.perf_counter())
         view = self._view(frame)
+        # Who passes over no image sees with each the map of its time, not of when it is drawn.
+        changes = self._follower.update() if self._every_frame and self._works() else None
         with self._condition:
             if self._every_frame:
                 self._condition.wait_for(
@@ -141,16 +145,16 @@ class Publisher:
             else:
                 view = self._make_room(view)
             if self._works():
-                self._views.append(view)
+                self._views.append((changes, view))
             self._condition.notify_all()
 
     def _make_room(self, view: FrameView) -> FrameView:
         """Pass over the image before, unless it is a keyframe, of which some may wait."""
         if not self._views:
             return view
-        if self._views[-1].record.is_keyframe and len(self._views) < _WAITING_VIEWS:
+        if self._views[-1][1].record.is_keyframe and len(self._views) < _WAITING_VIEWS:
             return view
-        late = self._views.pop()
+        _, late = self._views.pop()
         self._n_not_shown += 1
         queue = replace(view.queue, n_not_shown=self._n_not_shown)
         return replace(view, earlier=(*late.earlier, late.record, *view.earlier), queue=queue)
@@ -196,11 +200,16 @@ class Publisher:
                 views, events = self._take_views(), list(self._events)
                 self._events.clear()
                 self._condition.notify_all()
-            self._look_at_map(now=closing)
+            if not self._every_frame:
+                self._look_at_map(now=closing)
             for event in events:
                 self._tell(methodcaller("on_event", event))
-            for view in views:
+            for changes, view in views:
+                if changes:
+                    self._tell(methodcaller("on_map", changes))
                 self._tell(methodcaller("on_frame", view))
+        if self._every_frame:
+            self._look_at_map(now=True)
         self._tell(methodcaller("close"))
         self._watchers = []
 
@@ -212,10 +221,14 @@ class Publisher:
         """Seconds until something is to be done without being called."""
         if not self._watchers:
             return None
-        due = min(self._next_look_at, self._next_view_at if self._views else float("inf"))
+        due = self._next_view_at if self._views else math.inf
+        if not self._every_frame:
+            due = min(due, self._next_look_at)
+        if due == math.inf:
+            return None
         return max(0.0, due - time.perf_counter())
 
-    def _take_views(self) -> list[FrameView]:
+    def _take_views(self) -> list[tuple[MapChanges | None, FrameView]]:
         now = time.perf_counter()
         if not self._views or (now < self._next_view_at and not self._closing):
             return []

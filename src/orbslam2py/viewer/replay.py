@@ -20,11 +20,11 @@ from orbslam2py.datasets import Sequence
 from orbslam2py.errors import DatasetError, OrbSlamError, SettingsError
 from orbslam2py.maps.changes import KeyframesSet, MapChanges, PointsSet
 from orbslam2py.maps.map_arrays import MapArrays
+from orbslam2py.pictures.overlay import Status, fit_size, to_rgb
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.records import TrackingState
 from orbslam2py.trajectory import Trajectory, read_tum
 from orbslam2py.viewer.left_panel import thumbnail
-from orbslam2py.viewer.overlay import Status, fit_size, to_rgb
 from orbslam2py.viewer.page import Page
 from orbslam2py.viewer.paths import lay_truth, pieces
 from orbslam2py.viewer.plots import SPAN, STAGES

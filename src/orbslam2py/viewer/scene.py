@@ -13,9 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
-from orbslam2py.trajectory.rotations import quaternions_from_rotations
-from orbslam2py.viewer.map_model import MapModel, Stale
-from orbslam2py.viewer.palette import (
+from orbslam2py.pictures.palette import (
     CAMERA,
     COVISIBILITY,
     KEYFRAME,
@@ -28,6 +26,8 @@ from orbslam2py.viewer.palette import (
     TRUTH,
     Colour,
 )
+from orbslam2py.trajectory.rotations import quaternions_from_rotations
+from orbslam2py.viewer.map_model import MapModel, Stale
 from orbslam2py.viewer.point_colours import PointColours
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ import pytest
 
 from orbslam2py import DatasetError, MapFileError, Sensor, run_sequence
 from orbslam2py.maps import MapArrays
+from orbslam2py.pictures.palette import KEYFRAME
 from orbslam2py.runs import RunOptions, SystemOptions
-from orbslam2py.viewer.palette import KEYFRAME
 from orbslam2py.viewer.replay import Replay, RunFolder
 from support.browser import Browser
 from support.small_sequences import sequence

@@ -13,9 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py._arrays import ByteArray
-from orbslam2py.slam.records import TrackingState
-from orbslam2py.viewer.lettering import draw_text, text_width
-from orbslam2py.viewer.palette import (
+from orbslam2py.pictures.lettering import draw_text, text_width
+from orbslam2py.pictures.palette import (
     FAINT_TEXT,
     HALO,
     LOST,
@@ -28,6 +27,7 @@ from orbslam2py.viewer.palette import (
     VISUAL_ODOMETRY,
     Colour,
 )
+from orbslam2py.slam.records import TrackingState
 
 Pixels = npt.NDArray[np.floating]
 
@@ -114,9 +114,9 @@ class Status:
     def numbers(self) -> str:
         """Sizes and speed."""
         parts = [
-            f"{_thousands(self.n_keyframes)} keyframes",
-            f"{_thousands(self.n_points)} points",
-            f"{_thousands(self.n_matches)} matches",
+            _counted(self.n_keyframes, "keyframe", "keyframes"),
+            _counted(self.n_points, "point", "points"),
+            _counted(self.n_matches, "match", "matches"),
         ]
         if self.n_visual_odometry:
             parts.append(f"{_thousands(self.n_visual_odometry)} visual odometry")
@@ -305,7 +305,7 @@ def draw_status(width: int, status: Status) -> ByteArray:
 
 
 def _status_size(width: int) -> int:
-    return int(np.clip(round(width / 54), 11, 30))
+    return int(np.clip(round(width / 50), 11, 30))
 
 
 def _shortened(text: str, room: int, size: int) -> str:
@@ -315,6 +315,10 @@ def _shortened(text: str, room: int, size: int) -> str:
     while text and text_width(text + "…", size) > room:
         text = text[:-1]
     return text.rstrip() + "…"
+
+
+def _counted(number: int, one: str, many: str) -> str:
+    return f"{_thousands(number)} {one if number == 1 else many}"
 
 
 def _thousands(number: int) -> str:

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from orbslam2py import TrackingState
-from orbslam2py.viewer.overlay import (
+from orbslam2py.pictures.overlay import (
     Marks,
     Status,
     draw_overlay,
@@ -13,7 +13,7 @@ from orbslam2py.viewer.overlay import (
     status_height,
     to_rgb,
 )
-from orbslam2py.viewer.palette import (
+from orbslam2py.pictures.palette import (
     LOST,
     MAPPED,
     NOT_TRACKED,
