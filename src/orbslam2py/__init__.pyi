@@ -7,6 +7,7 @@ from .errors import DatasetError as DatasetError
 from .errors import ImageError as ImageError
 from .errors import MapFileError as MapFileError
 from .errors import OrbSlamError as OrbSlamError
+from .errors import OutputFileError as OutputFileError
 from .errors import SettingsError as SettingsError
 from .errors import StateError as StateError
 from .errors import VocabularyError as VocabularyError
@@ -33,4 +34,8 @@ from .slam.records import TrackingRecord as TrackingRecord
 from .slam.records import TrackingState as TrackingState
 from .slam.system import System as System
 from .trajectory import Trajectory as Trajectory
+from .viewer import Publisher as Publisher
+from .viewer import RerunRecorder as RerunRecorder
+from .viewer import VideoWriter as VideoWriter
+from .viewer import Viewer as Viewer
 from .vocabulary import load_vocabulary as load_vocabulary

@@ -20,6 +20,7 @@ from orbslam2py.cli import (
     run,
     settings,
     synthesize,
+    view,
     vocabulary,
 )
 from orbslam2py.cli.display import print_error, tell_repeated
@@ -70,6 +71,7 @@ def _options(
 app.command("run", cls=RunCommand)(run.run)
 app.command("demo")(demo.demo)
 app.command("synthesize")(synthesize.synthesize)
+app.command("view")(view.view)
 app.command("evaluate")(evaluate.evaluate)
 app.command("report")(report.report)
 app.command("compare")(report.compare)

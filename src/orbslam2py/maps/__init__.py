@@ -13,6 +13,7 @@ from orbslam2py.maps.contents import (
     restore_contents,
     take_contents,
 )
+from orbslam2py.maps.map_arrays import MapArrays
 from orbslam2py.maps.map_file import save_map
 from orbslam2py.maps.map_reader import load_map
 from orbslam2py.maps.ply import write_ply
@@ -24,6 +25,7 @@ __all__ = [
     "Covisibility",
     "Keyframes",
     "KeyframesSet",
+    "MapArrays",
     "MapChanges",
     "MapContents",
     "MapFollower",

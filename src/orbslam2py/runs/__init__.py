@@ -2,6 +2,7 @@
 """A sequence in, a folder of results out."""
 
 from orbslam2py.runs.calibration_watch import check_calibration
+from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.result import FrameRow, RunResult
 from orbslam2py.runs.run import FinishedRun, run_sequence
@@ -11,6 +12,7 @@ from orbslam2py.slam.options import SystemOptions
 __all__ = [
     "FinishedRun",
     "FrameRow",
+    "RunControl",
     "RunOptions",
     "RunResult",
     "SequenceRunner",

@@ -10,6 +10,7 @@ import numpy as np
 
 from orbslam2py._arrays import IntArray
 from orbslam2py.datasets.base import Source
+from orbslam2py.maps.map_arrays import MapArrays
 from orbslam2py.maps.snapshot import MapSnapshot
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.settings.settings import Settings
@@ -75,6 +76,8 @@ class RunResult:
     """The last map."""
     sightings: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
     """(o, 2) ids of a point of the last map and of a keyframe that observes it."""
+    drawing: MapArrays | None = None
+    """What is drawn of the last map."""
     stages: dict[str, dict[str, float]] = field(default_factory=dict)
     seconds: float = 0.0
     slam_seconds: float = 0.0

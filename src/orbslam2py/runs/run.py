@@ -15,12 +15,13 @@ from orbslam2py.datasets import RecordedSequence
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.maps.map_writer import check_map_target
+from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.losses import find_losses, last_loss_warning
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.outputs import OutputWriter, link_latest, prepare_output_folder
 from orbslam2py.runs.report import RunEvaluation, evaluate_run, make_report
 from orbslam2py.runs.result import RunResult
-from orbslam2py.runs.runner import Progress, SequenceRunner
+from orbslam2py.runs.runner import Progress, SequenceRunner, Watch
 from orbslam2py.trajectory.trajectory import Trajectory
 from orbslam2py.vocabulary.vocabulary import load_vocabulary
 
@@ -59,6 +60,8 @@ def run_sequence(
     stop: threading.Event | None = None,
     report_page: bool = True,
     command: str | None = None,
+    control: RunControl | None = None,
+    watch: Watch | None = None,
 ) -> FinishedRun:
     """Run the system over a sequence, judge the result and write its files.
 
@@ -82,6 +85,11 @@ def run_sequence(
         Write ``report.html`` and the images for it as well.
     command : str, optional
         The line that started the run, for its report.
+    control : RunControl, optional
+        In place of `stop`: also holds the run and lets single frames through.
+    watch : callable, optional
+        Called with the system; what it returns is entered before the first frame, and left when the
+        system has been shut down. For viewers, recordings, videos.
 
     Returns
     -------
@@ -123,7 +131,7 @@ def run_sequence(
     if folder is not None:
         folder = prepare_output_folder(folder, force=force)
         link_latest(folder)
-    result = runner.run(progress, stop)
+    result = runner.run(progress, stop, control=control, watch=watch)
     warning = last_loss_warning(find_losses(result.rows))
     if warning is not None:
         _log.warning("%s", warning)

@@ -8,6 +8,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import asdict, replace
 from datetime import datetime
 from typing import Any, cast
@@ -19,7 +20,9 @@ from orbslam2py import _core as core
 from orbslam2py._files import describe_error
 from orbslam2py.datasets.base import Images, LiveSource, Sequence
 from orbslam2py.errors import DatasetError, ImageError, OrbSlamError
+from orbslam2py.maps.map_arrays import MapArrays
 from orbslam2py.runs.calibration_watch import CalibrationWatch, settings_beside
+from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.feeds import FedFrame, LiveFeed, RecordedFeed, is_sequence
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.result import DROPPED, FrameRow, RunResult
@@ -37,6 +40,10 @@ _WAIT_SLICE = 0.2
 
 #: Called after every frame with the row and the system.
 Progress = Callable[[FrameRow, System], None]
+
+#: Called with the system before the first frame; what it returns is entered then, and left when the
+#: system has been shut down.
+Watch = Callable[[System], AbstractContextManager[object]]
 
 
 class SequenceRunner:
@@ -82,7 +89,12 @@ class SequenceRunner:
         )
 
     def run(
-        self, progress: Progress | None = None, stop: threading.Event | None = None
+        self,
+        progress: Progress | None = None,
+        stop: threading.Event | None = None,
+        *,
+        control: RunControl | None = None,
+        watch: Watch | None = None,
     ) -> RunResult:
         """Process the frames.
 
@@ -93,6 +105,11 @@ class SequenceRunner:
         stop : threading.Event, optional
             Ends the run after the present frame when it is set: the only end of a camera's run
             unless `RunOptions.max_frames` tells one.
+        control : RunControl, optional
+            In place of `stop`: also holds the run and lets single frames through.
+        watch : callable, optional
+            Called with the system; what it returns is entered before the first frame, and left when
+            the system has been shut down. For viewers, recordings, videos.
 
         Returns
         -------
@@ -118,19 +135,23 @@ class SequenceRunner:
         )
         if options.save_map is not None and options.autosave is not None:
             system.autosave(options.save_map, options.autosave)
-        stop = stop or threading.Event()
-        try:
-            self._process(system, progress, stop)
-            self._wait_for_mapping(system, stop)
-        except KeyboardInterrupt:
-            stop.set()
-        except Exception as error:
-            self._take_note(error)
-        result.interrupted = stop.is_set() and not result.is_live
-        if result.interrupted:
-            seen = f"{len(result.rows)} of {result.n_frames} frames"
-            _log.warning("interrupted; saving what was done so far (%s)", seen)
-        self._shut_down(system)
+        control = control or RunControl(stop)
+        stop = control.stop
+        with contextlib.ExitStack() as watching:
+            try:
+                if watch is not None:
+                    watching.enter_context(watch(system))
+                self._process(system, progress, control)
+                self._wait_for_mapping(system, stop)
+            except KeyboardInterrupt:
+                stop.set()
+            except Exception as error:
+                self._take_note(error)
+            result.interrupted = stop.is_set() and not result.is_live
+            if result.interrupted:
+                seen = f"{len(result.rows)} of {result.n_frames} frames"
+                _log.warning("interrupted; saving what was done so far (%s)", seen)
+            self._shut_down(system)
         self._save_map(system)
         if self._watch is not None:
             misfit = self._watch.finish()
@@ -150,9 +171,10 @@ class SequenceRunner:
         )
 
     # ---- one pass over the frames ----------------------------------------------------------------
-    def _process(self, system: System, progress: Progress | None, stop: threading.Event) -> None:
-        result = self.result
+    def _process(self, system: System, progress: Progress | None, control: RunControl) -> None:
+        result, stop = self.result, control.stop
         try:
+            control.wait()
             with contextlib.closing(self._feed.frames(stop)) as frames:
                 for position, frame in enumerate(frames):
                     if position == self._options.localize_after:
@@ -163,6 +185,7 @@ class SequenceRunner:
                     result.rows.append(row)
                     if progress is not None:
                         progress(row, system)
+                    self._feed.delay(control.wait())
         finally:
             if result.is_live:
                 result.n_frames = len(result.rows)
@@ -266,6 +289,7 @@ class SequenceRunner:
         seen = core.snapshot_observations(system.pipeline.back_end.map)
         points = np.repeat(seen.ids, np.diff(seen.offsets))
         result.sightings = np.stack([points, seen.keyframes], axis=1)
+        result.drawing = MapArrays.of(system.pipeline.back_end.map)
         result.stages = system.stage_statistics()
         result.n_resets = system.n_resets
         result.n_relocalizations = system.n_relocalizations

@@ -182,20 +182,25 @@ class EventDispatcher:
             "callbacks", lambda deliver: deliver(), threaded=threaded
         )
 
+        #: Told of every event, like the callbacks; assign another tuple to add one.
+        self.watchers: tuple[Callable[[Event], None], ...] = ()
+
     def wanted(self, kind: type[Event]) -> bool:
         """Whether anybody listens to events of a type: others need not be made."""
-        return self._listeners[kind] is not None
+        return self._listeners[kind] is not None or bool(self.watchers)
 
     def post(self, event: Event) -> None:
-        """Queue an event for the function that listens to its type; nothing if there is none."""
+        """Queue an event for those who listen to its type; nothing if there are none."""
         listener = self._listeners[type(event)]
-        if listener is None:
+        listeners = (*(() if listener is None else (listener,)), *self.watchers)
+        if not listeners:
             return
 
         def deliver() -> None:
-            try:
-                listener(event)
-            except Exception:
-                _log.exception("a callback failed on %s", type(event).__name__)
+            for tell in listeners:
+                try:
+                    tell(event)
+                except Exception:
+                    _log.exception("a callback failed on %s", type(event).__name__)
 
         self.worker.offer(deliver)  # a shutdown ends the deliveries

@@ -332,7 +332,7 @@ class System:
         with self._guard():
             if self._shut_down:
                 raise StateError("the system has been shut down; make a new one")
-            record = self.pipeline.process(timestamp, build, details=details)
+            record = self.pipeline.process(timestamp, build, image, details=details)
             if self.options.keyframe_images and record.is_keyframe:
                 self._keeper.keep_image(record.reference_keyframe, encode_image(image))
             return record
