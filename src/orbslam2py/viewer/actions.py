@@ -67,7 +67,7 @@ class ActionsOnSystem:
         path = self._folder / time.strftime("map-%Y%m%d-%H%M%S.orbmap")
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
-            self._system.save_map(path)  # type: ignore[attr-defined]
+            self._system.save_map(path)
         except (OrbSlamError, OSError) as error:
             return f"The map was not saved: {describe_error(error)}"
         return f"The map is in {path}."
