@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import asdict, replace
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -201,6 +202,18 @@ def test_the_check_changes_no_byte_and_can_be_left_out(caplog: pytest.LogCapture
     points = [one.result.snapshot.point_positions for one in (with_check, without)]
     assert points[0].tobytes() == points[1].tobytes()
     assert len(misfits(caplog)) == len(with_check.report["warnings"])
+
+
+def test_doubts_about_the_file_beside_the_images_are_told_once(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    options = SyntheticOptions(world="room", sensor="mono", frames=2, size=(320, 240))
+    folder = SyntheticSequence(options).write(tmp_path / "room", "tum")
+    path = folder / "settings.yaml"
+    path.write_text(path.read_text().replace("nFeatures: 1000", "nFeatures: 150"))
+    finished = run_sequence(orb.open_sequence(folder, "mono"))
+    assert finished.report["warnings"] == []
+    assert sum("is very few" in record.getMessage() for record in caplog.records) == 1
 
 
 # ---- systems, and without either -----------------------------------------------------------------
