@@ -12,7 +12,16 @@ from rich.console import Console
 
 from orbslam2py._files import describe_error
 from orbslam2py._version import __version__
-from orbslam2py.cli import calibrate, demo, evaluate, run, settings, synthesize, vocabulary
+from orbslam2py.cli import (
+    calibrate,
+    demo,
+    evaluate,
+    run,
+    settings,
+    synthesize,
+    view,
+    vocabulary,
+)
 from orbslam2py.cli.display import print_error, tell_repeated
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.errors import OrbSlamError
@@ -60,6 +69,7 @@ def _options(
 app.command("run")(run.run)
 app.command("demo")(demo.demo)
 app.command("synthesize")(synthesize.synthesize)
+app.command("view")(view.view)
 app.command("evaluate")(evaluate.evaluate)
 app.command("calibrate")(calibrate.calibrate)
 app.command("import-camera")(calibrate.import_camera)

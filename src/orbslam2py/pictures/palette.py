@@ -44,7 +44,7 @@ TRUTH: Colour = (120, 150, 40)
 NOW: Colour = (255, 255, 255)
 
 #: Stages of tracking, in plots.
-STAGES: dict[str, Colour] = {
+STAGE_COLOURS: dict[str, Colour] = {
     "extract": (86, 180, 233),
     "stereo": (0, 158, 115),
     "predict": (240, 228, 66),

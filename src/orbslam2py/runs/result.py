@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from orbslam2py.datasets.base import Source
+from orbslam2py.maps.map_arrays import MapArrays
 from orbslam2py.maps.snapshot import MapSnapshot
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.settings.settings import Settings
@@ -71,6 +72,8 @@ class RunResult:
     """Keyframes of the last map."""
     snapshot: MapSnapshot = field(default_factory=empty_snapshot)
     """The last map."""
+    drawing: MapArrays | None = None
+    """What is drawn of the last map."""
     stages: dict[str, dict[str, float]] = field(default_factory=dict)
     seconds: float = 0.0
     slam_seconds: float = 0.0

@@ -19,6 +19,7 @@ from orbslam2py import _core as core
 from orbslam2py._files import describe_error
 from orbslam2py.datasets.base import Images, LiveSource, Sequence
 from orbslam2py.errors import DatasetError, ImageError, OrbSlamError
+from orbslam2py.maps.map_arrays import MapArrays
 from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.feeds import FedFrame, LiveFeed, RecordedFeed, is_sequence
 from orbslam2py.runs.options import RunOptions
@@ -238,6 +239,7 @@ class SequenceRunner:
             keyframes, [by_time.get(float(t), -1) for t in keyframes.timestamps]
         )
         result.snapshot = system.map_snapshot()
+        result.drawing = MapArrays.of(system.pipeline.back_end.map)
         result.stages = system.stage_statistics()
         result.n_resets = system.n_resets
         result.n_relocalizations = system.n_relocalizations

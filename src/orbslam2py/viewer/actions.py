@@ -11,6 +11,9 @@ from orbslam2py._files import describe_error
 from orbslam2py.errors import OrbSlamError
 from orbslam2py.slam.system import System
 
+#: Ids of keyframes, and how many points they share with one; None if nobody knows.
+Neighbours = list[tuple[int, int | None]]
+
 _log = logging.getLogger(__name__)
 
 
@@ -69,7 +72,7 @@ class ActionsOnSystem:
             return f"The map was not saved: {describe_error(error)}"
         return f"The map is in {path}."
 
-    def neighbours(self, keyframe: int) -> list[tuple[int, int]]:
+    def neighbours(self, keyframe: int) -> Neighbours:
         """Keyframes that share points with one, and how many, most first."""
         slam_map = self._system.pipeline.back_end.map
         try:

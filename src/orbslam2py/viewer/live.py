@@ -32,6 +32,8 @@ _log = logging.getLogger(__name__)
 
 #: Seconds between two drawings of what need not be drawn with every image.
 _PATHS, _PLOTS, _LOCAL = 1.0, 0.5, 0.3
+#: Seconds without news after which all of it is drawn.
+_STILL = 0.4
 #: What takes a second is done again after so many.
 _REST = 15.0
 
@@ -73,6 +75,10 @@ class LiveView:
         self._note = ""
         self._n_dropped = 0
         self._next: dict[str, float] = {}
+        self._shown_at: float | None = None
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._catch_up, name="viewer page", daemon=True)
+        self._thread.start()
 
     @property
     def address(self) -> str:
@@ -118,6 +124,7 @@ class LiveView:
     def on_frame(self, view: FrameView) -> None:
         """Show an image, and where it was taken."""
         with self._lock:
+            self._shown_at = time.perf_counter()
             for record in (*view.earlier, view.record):
                 self._minute.add(record)
                 self._online.add(record)
@@ -136,6 +143,7 @@ class LiveView:
     def on_map(self, changes: MapChanges) -> None:
         """Show what has become of the map."""
         with self._lock:
+            self._shown_at = time.perf_counter()
             self.page.model.apply(changes)
             if changes.restarted:
                 self.page.restart()
@@ -172,7 +180,18 @@ class LiveView:
 
     def stop(self) -> None:
         """End the page."""
+        self._stopping.set()
+        self._thread.join()
         self.page.stop()
+
+    def _catch_up(self) -> None:
+        """When nothing comes any more, draw what was left out for want of time."""
+        while not self._stopping.wait(_STILL):
+            with self._lock:
+                still = self._shown_at is not None and time.perf_counter() > self._shown_at + _STILL
+                if still and self.page.is_watched:
+                    self._shown_at = None
+                    self._refresh()
 
     # ---- drawing ---------------------------------------------------------------------------------
     def _refresh(self) -> None:

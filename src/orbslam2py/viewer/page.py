@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
+from orbslam2py.viewer.actions import Neighbours
 from orbslam2py.viewer.album import Album, KeyframePicture
 from orbslam2py.viewer.controls import add_view_controls
 from orbslam2py.viewer.follow import Follow, Follower, whole_view
@@ -68,7 +69,7 @@ class Page:
         self._selected: int | None = None
         self._T_wc: FloatArray | None = None
         self._on_client = on_client
-        self.neighbours: Callable[[int], list[tuple[int, int]]] = lambda keyframe: []
+        self.neighbours: Callable[[int], Neighbours] = lambda keyframe: []
         gui = self.server.gui
         gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
         gui.set_panel_label(title)
@@ -150,6 +151,9 @@ class Page:
     def fit_size(self, local_points: IntArray, T_wc: FloatArray | None) -> None:
         """Make cameras and points as large as the distance of what is seen asks for."""
         places = self.model.positions_of(local_points)
+        if not len(places):  # as in the first image
+            pages = self.model.points.values()
+            places = np.concatenate([places, *(page.positions for page in pages)])
         if T_wc is None or not len(places):
             return
         distance = float(np.median(np.linalg.norm(places - T_wc[:3, 3], axis=1)))
@@ -236,7 +240,7 @@ class Page:
         self.left.show_keyframe(self._describe(keyframe, near, picture), picture)
 
     def _describe(
-        self, keyframe: int, near: list[tuple[int, int]], picture: KeyframePicture | None
+        self, keyframe: int, near: Neighbours, picture: KeyframePicture | None
     ) -> list[str]:
         row = np.flatnonzero(self.model.keyframe_ids == keyframe)
         if not len(row):
@@ -248,7 +252,10 @@ class Page:
                 f"{picture.n_keypoints} keypoints, {picture.n_matched} matched to the map then"
             )
         if near:
-            named = ", ".join(f"{other} ({weight})" for other, weight in near[:_NAMED])
+            named = ", ".join(
+                f"{other}" if weight is None else f"{other} ({weight})"
+                for other, weight in near[:_NAMED]
+            )
             more = f" and {len(near) - _NAMED} more" if len(near) > _NAMED else ""
             lines.append(f"Neighbours (points shared): {named}{more}")
         return lines

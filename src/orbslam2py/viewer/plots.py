@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
-from orbslam2py.pictures.palette import MAPPED, STAGES, TEXT, Colour
+from orbslam2py.pictures.palette import MAPPED, STAGE_COLOURS, TEXT, Colour
 from orbslam2py.slam.records import TrackingRecord, TrackingState
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ SPAN = 60.0
 #: Images that are kept; of those beyond, every other one is left out.
 _CAPACITY = 4096
 #: Stages of tracking that are shown if there are such.
-_STAGES = ("extract", "stereo", "predict", "local_map", "keyframe")
+STAGES = ("extract", "stereo", "predict", "local_map", "keyframe")
 
 
 class LastMinute:
@@ -34,14 +34,14 @@ class LastMinute:
     def add(self, record: TrackingRecord, now: float | None = None) -> None:
         """Take the figures of an image."""
         inliers = float(record.n_inliers) if record.state is TrackingState.OK else 0.0
-        milliseconds = [record.milliseconds.get(stage, 0.0) for stage in _STAGES]
+        milliseconds = [record.milliseconds.get(stage, 0.0) for stage in STAGES]
         total = record.milliseconds.get("track", sum(milliseconds))
         seen = time.perf_counter() if now is None else now
         self._rows.append((seen, inliers, total, *milliseconds))
 
     def table(self, now: float | None = None) -> FloatArray:
         """Figures by image (n, 8): seconds (0 is now), inliers, milliseconds in all, by stage."""
-        rows = np.array(self._rows) if self._rows else np.zeros((0, 3 + len(_STAGES)))
+        rows = np.array(self._rows) if self._rows else np.zeros((0, 3 + len(STAGES)))
         rows[:, 0] -= time.perf_counter() if now is None else now
         return rows[rows[:, 0] > -SPAN]
 
@@ -71,11 +71,11 @@ class Plots:
             height=120,
         )
         self._stages = server.gui.add_uplot(
-            tuple(none for _ in range(2 + len(_STAGES))),
+            tuple(none for _ in range(2 + len(STAGES))),
             (
                 {"label": "s"},
                 _series("all", TEXT),
-                *(_series(name.replace("_", " "), STAGES[name]) for name in _STAGES),
+                *(_series(name.replace("_", " "), STAGE_COLOURS[name]) for name in STAGES),
             ),
             title="Tracking, milliseconds",
             scales=scales,

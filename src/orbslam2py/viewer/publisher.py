@@ -26,7 +26,6 @@ from orbslam2py._files import describe_error
 from orbslam2py.maps.changes import MapChanges, MapFollower
 from orbslam2py.slam.events import Event
 from orbslam2py.slam.pipeline import WatchedFrame
-from orbslam2py.slam.records import TrackingRecord
 from orbslam2py.slam.system import System
 from orbslam2py.viewer.watching import FrameView, QueueState, Watcher
 
@@ -34,8 +33,6 @@ _log = logging.getLogger(__name__)
 
 #: Views that wait for the watchers when every frame is wanted.
 _WAITING_VIEWS = 4
-#: Records kept for the next view; more come only if a watcher hangs.
-_EARLIER_RECORDS = 10_000
 #: After a look at the map that took a second, the next one waits for so many: loops move all of it.
 _REST = 4.0
 #: Images over which the rate is measured.
@@ -45,9 +42,9 @@ _RATE_IMAGES = 30
 class Publisher:
     """Takes frames and changes of the map from a system, and gives them to watchers.
 
-    The system is delayed by copying an image now and then, by nothing else: what watchers do
-    happens in the publisher's thread. Frames that come faster than they are wanted are passed over;
-    their records are not.
+    The system is delayed by copying the image and its keypoints, by nothing else: what watchers do
+    happens in the publisher's thread. Frames that come faster than they are wanted are passed over,
+    but for the last one, keyframes, and the records of all.
 
     Parameters
     ----------
@@ -85,7 +82,6 @@ class Publisher:
         #: With the changes of the map that were seen with the image, when none is passed over.
         self._views: deque[tuple[MapChanges | None, FrameView]] = deque()
         self._events: deque[Event] = deque()
-        self._earlier: deque[TrackingRecord] = deque(maxlen=_EARLIER_RECORDS)
         self._seen_at: deque[float] = deque(maxlen=_RATE_IMAGES)
         self._next_view_at = 0.0
         self._next_look_at = 0.0
@@ -104,7 +100,9 @@ class Publisher:
 
     def show_next(self) -> None:
         """The next image is wanted however soon it comes, as when single ones are stepped."""
-        self._next_view_at = 0.0
+        with self._condition:
+            self._next_view_at = 0.0
+            self._condition.notify_all()
 
     def close(self) -> None:
         """Give the watchers what is left, and end; may be called again."""
@@ -133,13 +131,8 @@ class Publisher:
 
     # ---- in the system's threads -----------------------------------------------------------------
     def _see(self, frame: WatchedFrame) -> None:
-        now = time.perf_counter()
         self._n_frames += 1
-        self._seen_at.append(now)
-        if now < self._next_view_at:
-            self._pass_over(frame.record)
-            return
-        self._next_view_at = now + self._frame_period
+        self._seen_at.append(time.perf_counter())
         view = self._view(frame)
         # Who passes over no image sees with each the map of its time, not of when it is drawn.
         changes = self._follower.update() if self._every_frame and self._works() else None
@@ -148,29 +141,31 @@ class Publisher:
                 self._condition.wait_for(
                     lambda: len(self._views) < _WAITING_VIEWS or not self._works()
                 )
-            elif self._views:
-                _, late = self._views.pop()
-                self._n_not_shown += 1
-                earlier = (*late.earlier, late.record, *view.earlier)
-                view = replace(view, earlier=earlier)
+            else:
+                view = self._make_room(view)
             if self._works():
                 self._views.append((changes, view))
             self._condition.notify_all()
 
-    def _pass_over(self, record: TrackingRecord) -> None:
-        self._earlier.append(record)
+    def _make_room(self, view: FrameView) -> FrameView:
+        """Pass over the image before, unless it is a keyframe, of which some may wait."""
+        if not self._views:
+            return view
+        if self._views[-1][1].record.is_keyframe and len(self._views) < _WAITING_VIEWS:
+            return view
+        _, late = self._views.pop()
         self._n_not_shown += 1
+        queue = replace(view.queue, n_not_shown=self._n_not_shown)
+        return replace(view, earlier=(*late.earlier, late.record, *view.earlier), queue=queue)
 
     def _view(self, frame: WatchedFrame) -> FrameView:
-        earlier = tuple(self._earlier)
-        self._earlier.clear()
         features = frame.features()
         ids = features.map_point_ids
         temporary = (ids < 0) | (ids >= core.FIRST_TEMPORARY_POINT)
         return FrameView(
             image=_copied(frame.image, rgb=self._rgb),
             record=frame.record,
-            earlier=earlier,
+            earlier=(),
             features=features,
             pixels=frame.pixels(),
             visual_odometry=features.inliers & temporary,
@@ -199,10 +194,9 @@ class Publisher:
         closing = False
         while not closing:
             with self._condition:
-                self._condition.wait_for(self._has_news, self._seconds_to_look())
+                self._condition.wait_for(self._has_news, self._patience())
                 closing = self._closing
-                views, events = list(self._views), list(self._events)
-                self._views.clear()
+                views, events = self._take_views(), list(self._events)
                 self._events.clear()
                 self._condition.notify_all()
             if not self._every_frame:
@@ -219,12 +213,27 @@ class Publisher:
         self._watchers = []
 
     def _has_news(self) -> bool:
-        return self._closing or bool(self._views) or bool(self._events)
+        view_wanted = bool(self._views) and time.perf_counter() >= self._next_view_at
+        return self._closing or view_wanted or bool(self._events)
 
-    def _seconds_to_look(self) -> float | None:
-        if not self._watchers or self._every_frame:
+    def _patience(self) -> float | None:
+        """Seconds until something is to be done without being called."""
+        if not self._watchers:
             return None
-        return max(0.0, self._next_look_at - time.perf_counter())
+        due = min(
+            float("inf") if self._every_frame else self._next_look_at,
+            self._next_view_at if self._views else float("inf"),
+        )
+        return None if due == float("inf") else max(0.0, due - time.perf_counter())
+
+    def _take_views(self) -> list[tuple[MapChanges | None, FrameView]]:
+        now = time.perf_counter()
+        if not self._views or (now < self._next_view_at and not self._closing):
+            return []
+        views = list(self._views)
+        self._views.clear()
+        self._next_view_at = now + self._frame_period
+        return views
 
     def _look_at_map(self, *, now: bool) -> None:
         begin = time.perf_counter()

@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 import json
+import tempfile
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -14,7 +16,7 @@ from orbslam2py._arrays import ByteArray
 from support.browser import Browser, BrowserError, Page
 
 #: Seconds until something must be seen, on a computer that draws without graphics hardware.
-PATIENCE = 60.0
+PATIENCE = 30.0
 WIDTH, HEIGHT = 1200, 800
 #: Where the map is seen: between the two panels.
 _MAP = slice(470, 890)
@@ -50,6 +52,16 @@ def click_on(page: Page, text: str) -> None:
     page.mouse("mouseReleased", *place)
 
 
+def wait_until_checked(page: Page, text: str, *, checked: bool = True) -> None:
+    """Wait until the switch with a text is on, or off."""
+    page.wait_for(
+        f"""[...document.querySelectorAll("label")]
+        .filter(e => e.innerText.trim() === {json.dumps(text)})
+        .some(e => document.getElementById(e.htmlFor)?.checked === {json.dumps(checked)})""",
+        PATIENCE,
+    )
+
+
 def picture(page: Page) -> ByteArray:
     """What is seen, (h, w, 3) red, green, blue."""
     decoded = cv2.imdecode(np.frombuffer(page.screenshot(), np.uint8), cv2.IMREAD_COLOR)
@@ -76,7 +88,9 @@ def wait_until_seen(page: Page, condition: Callable[[ByteArray], bool], what: st
         if condition(seen):
             return seen
         page.evaluate("new Promise(requestAnimationFrame)")
-    raise BrowserError(f"not seen within {PATIENCE} s: {what}")
+    path = Path(tempfile.mkdtemp(prefix="viewer-")) / "seen.png"
+    page.screenshot(path)
+    raise BrowserError(f"not seen within {PATIENCE} s: {what}; what was seen is in {path}")
 
 
 def wait_until(condition: Callable[[], bool], what: str) -> None:

@@ -44,5 +44,6 @@ def worker_threads() -> list[str]:
         "image loader",
         "worker under test",
         "viewer publisher",
+        "viewer page",
     }
     return [thread.name for thread in threading.enumerate() if thread.name in names]

@@ -21,6 +21,7 @@ from support.viewer_pages import (
     open_viewer,
     picture,
     wait_until,
+    wait_until_checked,
     wait_until_seen,
 )
 
@@ -65,7 +66,7 @@ def test_image_map_cameras_and_figures_are_seen(show: Show, tmp_path: Path) -> N
     def complete(seen: np.ndarray) -> bool:
         middle = map_part(seen)
         points, cameras = amount(middle, LOCAL_POINTS), amount(middle, KEYFRAME, 40)
-        return points > 300 and cameras > 60 and amount(middle, MAPPED, 60) > 60
+        return points > 300 and cameras > 60 and amount(middle, MAPPED, 50) > 60
 
     seen = wait_until_seen(show.page, complete, "points, keyframes and camera")
     left = seen[:, :430]
@@ -113,7 +114,7 @@ def test_localization_mode_is_switched(show: Show) -> None:
     # And the page shows what somebody else switches.
     show.system.localization_mode = True
     play(show.system, 3, first=N_FRAMES + 3)
-    show.page.wait_for("document.querySelectorAll('input[type=checkbox]')[0].checked", 60)
+    wait_until_checked(show.page, "Localization")
 
 
 def test_reset_begins_a_new_map_and_the_page_goes_on(show: Show) -> None:
@@ -132,7 +133,7 @@ def test_reset_begins_a_new_map_and_the_page_goes_on(show: Show) -> None:
 def test_optimize_is_told(show: Show) -> None:
     click_on(show.page, "Optimize")
     wait_until(lambda: len(show.system.full_adjustments) == 1, "a full adjustment")
-    show.page.wait_for("document.body.innerText.includes('Optimized: ')", 60)
+    show.page.wait_for("document.body.innerText.includes('Optimized: ')", 50)
 
 
 def test_stop_is_told_to_the_loop_that_reads_images(show: Show) -> None:
@@ -152,7 +153,7 @@ def test_a_keyframe_that_is_clicked_is_shown(show: Show) -> None:
     show.page.mouse("mousePressed", *place)
     show.page.mouse("mouseReleased", *place)
     click_on(show.page, "Keyframe")
-    show.page.wait_for("document.body.innerText.includes('Neighbours (points shared)')", 60)
+    show.page.wait_for("document.body.innerText.includes('Neighbours (points shared)')", 50)
     assert "matched to the map then" in show.page.evaluate("document.body.innerText")
 
 
@@ -176,5 +177,5 @@ def test_a_page_left_open_over_the_end_stays(browser: Browser) -> None:
         viewer.close()
         play(system, 2, first=5)  # nobody looks any more
         assert system.pipeline.frame_watchers == ()
-    page.wait_for("document.body.innerText.includes('Whole map')", 60)
+    page.wait_for("document.body.innerText.includes('Whole map')", 50)
     page.close()

@@ -69,18 +69,22 @@ def test_the_changes_add_up_to_the_map() -> None:
     assert np.array_equal([points[i] for i in sorted(points)], snapshot.point_positions)
 
 
-def test_records_of_frames_that_were_passed_over_come_with_the_next() -> None:
+def test_frames_come_at_the_rate_and_none_of_their_records_is_lost() -> None:
     notebook = Notebook()
     with new_system(Sensor.RGBD, deterministic=True) as system:
         with Publisher(system, [notebook], frame_rate=0.001) as publisher:
-            play(system, 3)
+            track(system, 0)
+            notebook.wait_for(lambda book: len(book.views) == 1)
+            play(system, 3, first=1)
             publisher.show_next()
-            track(system, 3)
-        first, second = notebook.views
-        assert first.record.frame_id == 0
-        assert [record.frame_id for record in second.earlier] == [1, 2]
-        assert second.record.frame_id == 3
-        assert second.queue.n_not_shown == 2
+            notebook.wait_for(lambda book: len(book.views) == 2)
+            play(system, 2, first=4)  # shown at the end
+        seen = [
+            [record.frame_id for record in (*view.earlier, view.record)] for view in notebook.views
+        ]
+    assert seen == [[0], [1, 2, 3], [4, 5]]
+    assert notebook.views[-1].queue.n_frames == 6
+    assert notebook.views[-1].queue.n_not_shown == 3
 
 
 def test_a_slow_watcher_delays_nobody() -> None:
