@@ -29,7 +29,7 @@ from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 ROOT = Path(__file__).resolve().parents[1]
 
 #: Where in the corridor it is dark: part of the way, then images.
-DARK_AT, DARK_FOR = 0.35, 5
+DARK_AT, DARK_FOR = 0.2, 5
 
 
 @dataclass

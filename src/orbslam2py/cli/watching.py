@@ -25,8 +25,8 @@ from orbslam2py.slam.system import System
 from orbslam2py.trajectory import Trajectory
 
 if TYPE_CHECKING:
+    from orbslam2py.recordings.video import VideoWriter
     from orbslam2py.viewer import Watcher
-    from orbslam2py.viewer.video import VideoWriter
 
 VideoOption = Annotated[
     Path | None,
@@ -67,7 +67,7 @@ class FileWatchers:
 
     def add_video(self, path: Path, source: Sequence | LiveSource, options: RunOptions) -> None:
         """Write a video."""
-        from orbslam2py.viewer.video import VideoWriter  # noqa: PLC0415
+        from orbslam2py.recordings.video import VideoWriter  # noqa: PLC0415
 
         times = _times(source, options)
         duration, rate = None, _LIVE_RATE
@@ -86,7 +86,7 @@ class FileWatchers:
 
     def add_recording(self, path: Path, source: Sequence | LiveSource, options: RunOptions) -> None:
         """Write a recording for Rerun."""
-        from orbslam2py.viewer.rerun_recorder import RerunRecorder  # noqa: PLC0415
+        from orbslam2py.recordings.rerun_recorder import RerunRecorder  # noqa: PLC0415
 
         recorder = RerunRecorder(
             path,
