@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 
 from orbslam2py._arrays import ByteArray
+from orbslam2py.pictures.album import KeyframePicture
 from orbslam2py.pictures.overlay import Marks, Status, draw_overlay, fit_size
-from orbslam2py.viewer.album import KeyframePicture
 from orbslam2py.viewer.plots import Plots
 from orbslam2py.viewer.watching import FrameView
 

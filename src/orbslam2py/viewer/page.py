@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
+from orbslam2py.pictures.album import Album, KeyframePicture
 from orbslam2py.viewer.actions import Neighbours
-from orbslam2py.viewer.album import Album, KeyframePicture
 from orbslam2py.viewer.controls import add_view_controls
 from orbslam2py.viewer.follow import Follow, Follower, whole_view
 from orbslam2py.viewer.left_panel import LeftPanel

@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 import weakref
@@ -220,11 +221,12 @@ class Publisher:
         """Seconds until something is to be done without being called."""
         if not self._watchers:
             return None
-        due = min(
-            float("inf") if self._every_frame else self._next_look_at,
-            self._next_view_at if self._views else float("inf"),
-        )
-        return None if due == float("inf") else max(0.0, due - time.perf_counter())
+        due = self._next_view_at if self._views else math.inf
+        if not self._every_frame:
+            due = min(due, self._next_look_at)
+        if due == math.inf:
+            return None
+        return max(0.0, due - time.perf_counter())
 
     def _take_views(self) -> list[tuple[MapChanges | None, FrameView]]:
         now = time.perf_counter()
