@@ -13,6 +13,8 @@ from .errors import StateError as StateError
 from .errors import VocabularyError as VocabularyError
 from .errors import WorkerError as WorkerError
 from .maps import MapSnapshot as MapSnapshot
+from .recordings import RerunRecorder as RerunRecorder
+from .recordings import VideoWriter as VideoWriter
 from .runs import check_calibration as check_calibration
 from .runs import run_sequence as run_sequence
 from .settings import CameraSettings as CameraSettings
@@ -35,7 +37,5 @@ from .slam.records import TrackingState as TrackingState
 from .slam.system import System as System
 from .trajectory import Trajectory as Trajectory
 from .viewer import Publisher as Publisher
-from .viewer import RerunRecorder as RerunRecorder
-from .viewer import VideoWriter as VideoWriter
 from .viewer import Viewer as Viewer
 from .vocabulary import load_vocabulary as load_vocabulary

@@ -25,8 +25,8 @@ from orbslam2py.slam.system import System
 from orbslam2py.trajectory import Trajectory
 
 if TYPE_CHECKING:
+    from orbslam2py.recordings.video import VideoWriter
     from orbslam2py.viewer import Watcher
-    from orbslam2py.viewer.video import VideoWriter
 
 VideoOption = Annotated[
     Path | None,
@@ -64,12 +64,14 @@ class FileWatchers:
     files: dict[str, Path] = field(default_factory=dict)
     video: VideoWriter | None = None
     _n_tracked: int = 0
+    _seconds: FloatArray | None = None
 
     def add_video(self, path: Path, source: Sequence | LiveSource, options: RunOptions) -> None:
         """Write a video."""
-        from orbslam2py.viewer.video import VideoWriter  # noqa: PLC0415
+        from orbslam2py.recordings.video import VideoWriter  # noqa: PLC0415
 
         times = _times(source, options)
+        self._seconds = np.asarray(source.timestamps) if is_sequence(source) else None
         duration, rate = None, _LIVE_RATE
         if times is not None:
             duration = float(times[-1] - times[0])
@@ -86,7 +88,7 @@ class FileWatchers:
 
     def add_recording(self, path: Path, source: Sequence | LiveSource, options: RunOptions) -> None:
         """Write a recording for Rerun."""
-        from orbslam2py.viewer.rerun_recorder import RerunRecorder  # noqa: PLC0415
+        from orbslam2py.recordings.rerun_recorder import RerunRecorder  # noqa: PLC0415
 
         recorder = RerunRecorder(
             path,
@@ -133,9 +135,9 @@ class FileWatchers:
         """Take note of images that were not tracked."""
         if row.record is not None:
             self._n_tracked += 1
-        elif self.video is not None:
-            with contextlib.suppress(ValueError):
-                self.video.add_unused(self._n_tracked, float(row.timestamp), row.reason)
+        elif self.video is not None and self._seconds is not None:
+            seconds = float(self._seconds[row.index])  # the row's text may count nanoseconds
+            self.video.add_unused(self._n_tracked, seconds, row.reason)
 
 
 def file_watchers(

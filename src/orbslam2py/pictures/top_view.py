@@ -142,6 +142,10 @@ def draw_top_view(
     _lines(picture, loops.reshape(-1, 1, 2), LOOP, round(6 * size), closed=True)
     if T_wc is not None:
         _draw_camera(picture, T_wc, framing, size, lost=lost)
+    if not len(scene.keyframes) and not len(scene.path):
+        middle = (picture.shape[1] // 2, picture.shape[0] // 2)
+        draw_text(picture, "no map yet", middle, text, FAINT_TEXT, anchor="centre")
+        return picture
     _draw_scale_bar(picture, framing, unit, text)
     _draw_legend(picture, scene, text)
     return picture

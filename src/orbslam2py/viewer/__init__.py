@@ -3,8 +3,6 @@
 
 from orbslam2py.viewer.live import LiveView, Viewer
 from orbslam2py.viewer.publisher import Publisher
-from orbslam2py.viewer.rerun_recorder import RerunRecorder
-from orbslam2py.viewer.video import VideoWriter
 from orbslam2py.viewer.watching import FrameView, QueueState, Watcher
 
 __all__ = [
@@ -12,8 +10,6 @@ __all__ = [
     "LiveView",
     "Publisher",
     "QueueState",
-    "RerunRecorder",
-    "VideoWriter",
     "Viewer",
     "Watcher",
 ]

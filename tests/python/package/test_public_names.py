@@ -67,7 +67,8 @@ ROOMS = {
     "settings": ["CameraSettings", "DepthSettings", "OrbSettings", "Settings", "builtin_settings"],
     "synthetic": ["SyntheticOptions", "SyntheticSequence"],
     "pictures": ["MapPicture", "Marks", "Status", "draw_overlay", "draw_top_view"],
-    "viewer": ["LiveView", "Publisher", "RerunRecorder", "VideoWriter", "Viewer", "Watcher"],
+    "recordings": ["RerunRecorder", "VideoWriter"],
+    "viewer": ["LiveView", "Publisher", "Viewer", "Watcher"],
     "trajectory": [
         *("Trajectory", "associate", "read_euroc", "read_kitti", "read_trajectory", "read_tum"),
         *("write_kitti", "write_tum"),

@@ -5,7 +5,17 @@ import numpy as np
 import pytest
 
 from orbslam2py.pictures import MapPicture, bounds, draw_ground, draw_top_view, frame_all
-from orbslam2py.pictures.palette import CAMERA, COVISIBILITY, KEYFRAME, LOOP, LOST, PANEL, PATH
+from orbslam2py.pictures.palette import (
+    CAMERA,
+    COVISIBILITY,
+    FAINT_TEXT,
+    KEYFRAME,
+    LOOP,
+    LOST,
+    PANEL,
+    PATH,
+    TEXT,
+)
 from orbslam2py.pictures.top_view import nice_length
 
 SIZE = (400, 300)
@@ -137,3 +147,11 @@ def test_any_shape_of_the_picture(size):
 )
 def test_the_scale_bar_has_a_round_length(at_most, length):
     assert nice_length(at_most) == pytest.approx(length)
+
+
+def test_without_a_map_there_is_no_scale():
+    empty = draw_top_view(MapPicture(), WINDOW)
+    begun = draw_top_view(MapPicture(path=np.zeros((1, 3))), WINDOW)
+    assert has(begun[-20:, :200], TEXT)
+    assert not has(empty[-20:, :200], TEXT)
+    assert has(empty[130:170], FAINT_TEXT), "it is said in words"

@@ -26,6 +26,7 @@ RUN_FILES = frozenset(
         "trajectory_kitti.txt",
         "frames.csv",
         "points.ply",
+        "map.npz",
         "trajectory.png",
         "report.json",
         "report.html",

@@ -27,6 +27,8 @@ from orbslam2py.pictures.palette import (
     VISUAL_ODOMETRY,
     Colour,
 )
+from orbslam2py.recordings.growing_map import GrowingMap
+from orbslam2py.recordings.output_file import OutputFile
 from orbslam2py.settings import Settings
 from orbslam2py.slam.events import (
     Event,
@@ -38,8 +40,6 @@ from orbslam2py.slam.events import (
 )
 from orbslam2py.slam.records import TrackingRecord
 from orbslam2py.trajectory import Trajectory
-from orbslam2py.viewer.growing_map import GrowingMap
-from orbslam2py.viewer.output_file import OutputFile
 from orbslam2py.viewer.paths import lay_truth
 from orbslam2py.viewer.watching import FrameView
 

@@ -15,8 +15,9 @@ import pytest
 from orbslam2py import OutputFileError, Reason, Sensor, TrackingRecord, TrackingState, VideoWriter
 from orbslam2py.pictures import compose
 from orbslam2py.pictures.palette import LOST, MAPPED, NOT_TRACKED, STARTING
+from orbslam2py.recordings import output_file, video_file
 from orbslam2py.slam.records import FrameFeatures
-from orbslam2py.viewer import FrameView, Publisher, QueueState, output_file, video_file
+from orbslam2py.viewer import FrameView, Publisher, QueueState
 from support.files import names_in
 from support.small_sequences import black, new_system, play, track
 from support.videos import read_video, share_of

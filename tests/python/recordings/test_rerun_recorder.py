@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from orbslam2py import OrbSlamError, OutputFileError, RerunRecorder, Sensor, System
-from orbslam2py.viewer import Publisher, output_file
+from orbslam2py.recordings import output_file
+from orbslam2py.viewer import Publisher
 from support.files import names_in
 from support.small_sequences import new_system, play, sequence
 

@@ -18,10 +18,10 @@ from orbslam2py.pictures.framing import Framing, frame_all
 from orbslam2py.pictures.overlay import Marks, Status, draw_overlay, draw_status
 from orbslam2py.pictures.time_line import GrowingHistory, draw_time_line
 from orbslam2py.pictures.top_view import bounds, draw_ground, draw_top_view
+from orbslam2py.recordings.growing_map import GrowingMap
+from orbslam2py.recordings.video_file import VideoFile
 from orbslam2py.slam.events import Event, LoopClosed
 from orbslam2py.slam.records import TrackingState
-from orbslam2py.viewer.growing_map import GrowingMap
-from orbslam2py.viewer.video_file import VideoFile
 from orbslam2py.viewer.watching import FrameView
 
 #: A pause of a stream of images is shown by at most so many pictures.

@@ -10,7 +10,7 @@ import cv2
 
 from orbslam2py._arrays import ByteArray
 from orbslam2py.datasets.images import quiet_opencv
-from orbslam2py.viewer.output_file import OutputFile
+from orbslam2py.recordings.output_file import OutputFile
 
 #: Codecs by the ending of the name, as FFmpeg calls them. All wheels of OpenCV have them.
 CODECS = {".mp4": "mp4v", ".mov": "mp4v", ".mkv": "mp4v", ".avi": "MJPG", ".webm": "VP80"}
