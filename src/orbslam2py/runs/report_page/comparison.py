@@ -100,12 +100,17 @@ class Comparison:
 
     def _row(self, figure: Figure) -> Row:
         found = [run.report.get(figure.key) for run in self.runs]
+        # A run that tracked nothing is best at nothing: it was never lost either.
         numbers = np.array(
-            [value if isinstance(value, (int, float)) else np.nan for value in found], np.float64
+            [
+                value if isinstance(value, (int, float)) and run.report.get("tracked") else np.nan
+                for value, run in zip(found, self.runs, strict=True)
+            ],
+            np.float64,
         )
         best = np.zeros(len(found), bool)
         known = numbers[np.isfinite(numbers)]
-        if figure.best and len(known) == len(found) and known.min() < known.max():
+        if figure.best and len(known) > 1 and known.min() < known.max():
             best = numbers == (known.max() if figure.best > 0 else known.min())
         return Row(figure, [figure.value(run.report) for run in self.runs], best.tolist())
 

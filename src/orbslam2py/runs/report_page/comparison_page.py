@@ -52,22 +52,29 @@ def look(number: int) -> str:
 
 
 def _figures(comparison: Comparison) -> Markup:
-    parts = []
     names = [
         join(element("i", class_=look(k)), " ", name) for k, name in enumerate(comparison.names)
     ]
+    lines: list[list[str | Markup]] = []
     for group, rows in comparison.rows().items():
-        lines = [_cells(row) for row in rows]
-        if lines:
-            parts.append(table([group, "unit", *names], lines, class_="compared numbers"))
-    note = "★ marks the best. Names in full: point at them."
-    return section("figures", "Figures", *parts, element("p", note, class_="note"))
+        if rows:
+            heading = element("span", group, class_="group")
+            lines.append([heading, *[""] * len(names)])
+            lines += [_cells(row) for row in rows]
+    note = "The star marks the best of those that tracked anything. What a figure is: point at it, "
+    note += "or see the page of one run."
+    shown = table(["", *names], lines, class_="compared numbers")
+    return section("figures", "Figures", shown, element("p", note, class_="note"))
 
 
 def _cells(row: Row) -> list[str | Markup]:
     cells: list[str | Markup] = [
-        element("span", row.figure.name, title=f"{row.figure.text} ({row.figure.key})"),
-        row.figure.unit,
+        element(
+            "span",
+            row.figure.name,
+            element("small", f" [{row.figure.unit}]") if row.figure.unit else None,
+            title=f"{row.figure.text} ({row.figure.key})",
+        ),
     ]
     for value, best in zip(row.values, row.best, strict=True):
         cells.append(element("span", value, class_="best") if best else value)

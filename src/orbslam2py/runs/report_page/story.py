@@ -133,7 +133,7 @@ def _what_happened(run: RunFolder, events: list[Event], position: int, place: in
     usual = float(np.nanmedian(frames.inliers[tracked])) if tracked.any() else 0.0
     fewest = float(np.nanmin(frames.inliers[near & tracked], initial=np.inf))
     if fewest < _FEW_INLIERS * usual:
-        said.append(f"few inliers: {fewest:.0f}, usual are {usual:.0f}")
+        said.append(f"down to {fewest:.0f} inliers")
     turn = _fastest_turn(run.path, place)
     if turn > _FAST_TURN:
         said.append(f"fast turn: {turn:.0f}°/s")
