@@ -6,17 +6,17 @@ from __future__ import annotations
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
-from orbslam2py.runs.plane_view import FROM_ABOVE, choose_view
 from orbslam2py.runs.report_page import above
 from orbslam2py.runs.report_page.comparison import Comparison, Row
 from orbslam2py.runs.report_page.explained import STAGES
 from orbslam2py.runs.report_page.markup import Markup, element, join, section, table
 from orbslam2py.runs.report_page.page import whole_page
+from orbslam2py.runs.report_page.plane_view import FROM_ABOVE, choose_view
 from orbslam2py.runs.report_page.plot import Line, TimePlot, figures, strip
+from orbslam2py.runs.report_page.round_numbers import NONE
 from orbslam2py.runs.report_page.run_plots import state_spans
 from orbslam2py.runs.report_page.scene import as_script, rounded
 from orbslam2py.runs.report_page.story import Story
-from orbslam2py.runs.round_numbers import NONE
 from orbslam2py.runs.timeline import gaps_in_time
 
 #: Colours there are; the seventh run has that of the first, dashed.

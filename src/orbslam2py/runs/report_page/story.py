@@ -9,8 +9,8 @@ import numpy as np
 
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.runs.frame_errors import position_errors, worst_places
+from orbslam2py.runs.report_page.round_numbers import short
 from orbslam2py.runs.report_page.run_folder import RunFolder
-from orbslam2py.runs.round_numbers import short
 from orbslam2py.trajectory import Trajectory
 from orbslam2py.trajectory.rotations import rotation_angles
 
