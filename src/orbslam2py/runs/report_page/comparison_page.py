@@ -114,8 +114,8 @@ def _paths(comparison: Comparison) -> Markup | None:
         class_="plot",
     )  # fmt: skip
     plane = above.plane(window, marks, view, first.unit)
-    note = f"Each path is moved onto that of {comparison.names[0]} as a whole, by poses at the "
-    note += "same times."
+    note = f"Each path is moved onto that of {comparison.names[0]} as a whole, by the "
+    note += "ground truth where both have it, else by poses at the same times."
     return section(
         "path", "Paths",
         element("div", solid, element("figure", caption, plane, class_="plot"), class_="pair"),
