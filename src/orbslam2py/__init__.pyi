@@ -7,12 +7,17 @@ from .errors import DatasetError as DatasetError
 from .errors import ImageError as ImageError
 from .errors import MapFileError as MapFileError
 from .errors import OrbSlamError as OrbSlamError
+from .errors import OutputFileError as OutputFileError
 from .errors import SettingsError as SettingsError
 from .errors import StateError as StateError
 from .errors import VocabularyError as VocabularyError
 from .errors import WorkerError as WorkerError
 from .maps import MapSnapshot as MapSnapshot
+from .runs import check_calibration as check_calibration
 from .runs import run_sequence as run_sequence
+from .settings import CameraSettings as CameraSettings
+from .settings import DepthSettings as DepthSettings
+from .settings import OrbSettings as OrbSettings
 from .settings import Sensor as Sensor
 from .settings import Settings as Settings
 from .slam.events import Callbacks as Callbacks
@@ -29,4 +34,8 @@ from .slam.records import TrackingRecord as TrackingRecord
 from .slam.records import TrackingState as TrackingState
 from .slam.system import System as System
 from .trajectory import Trajectory as Trajectory
+from .viewer import Publisher as Publisher
+from .viewer import RerunRecorder as RerunRecorder
+from .viewer import VideoWriter as VideoWriter
+from .viewer import Viewer as Viewer
 from .vocabulary import load_vocabulary as load_vocabulary

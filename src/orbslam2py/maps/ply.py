@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from orbslam2py._arguments import array_of
 from orbslam2py._arrays import FloatArray
 from orbslam2py._files import atomic_write
 from orbslam2py.errors import DatasetError
@@ -36,15 +37,18 @@ def write_ply(path: str | Path, points: FloatArray, *, unit: str = "m") -> None:
     ------
     OSError
         If the file cannot be written; an existing file is kept then.
+    DatasetError
+        If the points are no such array.
     """
+    positions = array_of(points, "points", (-1, 3), finite=False)
     header = (
         "ply\nformat binary_little_endian 1.0\ncomment camera frame of keyframe 0: "
-        f"x right, y down, z forward [{unit}]\nelement vertex {len(points)}\n"
+        f"x right, y down, z forward [{unit}]\nelement vertex {len(positions)}\n"
         "property float x\nproperty float y\nproperty float z\nend_header\n"
     )
     with atomic_write(path, binary=True) as stream:
         stream.write(header.encode())
-        stream.write(np.ascontiguousarray(points, dtype="<f4").tobytes())
+        stream.write(np.ascontiguousarray(positions, dtype="<f4").tobytes())
 
 
 def read_points(path: str | Path) -> FloatArray:

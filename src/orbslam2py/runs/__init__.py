@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A sequence in, a folder of results out."""
 
+from orbslam2py.runs.calibration_watch import check_calibration
+from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.report_page import (
     Comparison,
@@ -17,10 +19,12 @@ __all__ = [
     "Comparison",
     "FinishedRun",
     "FrameRow",
+    "RunControl",
     "RunOptions",
     "RunResult",
     "SequenceRunner",
     "SystemOptions",
+    "check_calibration",
     "compare_runs",
     "run_sequence",
     "write_comparison",

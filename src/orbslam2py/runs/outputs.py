@@ -124,6 +124,8 @@ class OutputWriter:
         points = anchored_points(result)
         unit = "units" if result.options.sensor is Sensor.MONOCULAR else "m"
         self._write("points.ply", lambda path: write_ply(path, points, unit=unit))
+        if result.drawing is not None:
+            self._write("map.npz", result.drawing.save)
         if len(result.tracked_trajectory()):
             self._write("trajectory.png", lambda path: draw_run(path, result, evaluation, report))
         self._write(

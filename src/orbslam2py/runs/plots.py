@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py._files import atomic_write
+from orbslam2py.runs.gravity import Height
 from orbslam2py.runs.report_page.plane_view import FROM_ABOVE, View, choose_view
 from orbslam2py.runs.report_page.round_numbers import round_down, short
 from orbslam2py.runs.timeline import Timeline, gaps_in_time
@@ -47,6 +48,7 @@ def draw_trajectory(
     timeline: Timeline | None = None,
     subtitle: str = "",
     unit: str = "m",
+    height: Height | None = None,
 ) -> None:
     """Draw the path from above, and how high it goes over time, into a PNG file.
 
@@ -81,6 +83,8 @@ def draw_trajectory(
         Of the whole recording; by default that of the positions.
     unit : str
         Unit of length of all positions, for the axes.
+    height : Height, optional
+        Which way is up; by default as the first camera was held.
     """
     # The object interface keeps the process-wide state of pyplot untouched.
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
@@ -88,7 +92,7 @@ def draw_trajectory(
 
     figure = Figure(figsize=(10, 8), dpi=110, layout="constrained")
     FigureCanvasAgg(figure)
-    above, height = figure.subplots(2, 1, height_ratios=[3.2, 1])
+    above, below = figure.subplots(2, 1, height_ratios=[3.2, 1])
     figure.suptitle(f"{title}\n{subtitle}" if subtitle else title, fontsize=11)
 
     estimate = _Path(seconds, positions, gaps_in_time(seconds) if gaps is None else gaps)
@@ -103,10 +107,11 @@ def draw_trajectory(
         _draw_loops(above, view, loops)
     above.legend(loc="best", fontsize=9, framealpha=0.9, markerscale=1.2)
     _say_where_up_is(above, view, unit)
-    _draw_height(height, estimate, true, timeline)
-    height.set_xlabel("time since the first image [s]")
-    height.set_ylabel(f"up in the\nfirst keyframe [{unit}]")
-    for axes in (above, height):
+    height = height or Height.of_first_keyframe()
+    _draw_height(below, estimate, true, height, timeline)
+    below.set_xlabel("time since the first image [s]")
+    below.set_ylabel(f"{height.label} [{unit}]")
+    for axes in (above, below):
         axes.grid(color="#eeeeee", linewidth=0.8)
         axes.set_axisbelow(True)
         for side in ("top", "right"):
@@ -134,11 +139,17 @@ class _Path:
 
 
 def _draw_height(
-    axes: Axes, estimate: _Path, truth: _Path | None, timeline: Timeline | None
+    axes: Axes,
+    estimate: _Path,
+    truth: _Path | None,
+    height: Height,
+    timeline: Timeline | None,
 ) -> None:
     if truth is not None:
-        truth.draw(axes, truth.seconds, -truth.positions[:, 1], color=_TRUTH, linewidth=5.0)
-    estimate.draw(axes, estimate.seconds, -estimate.positions[:, 1], color=_ESTIMATE, linewidth=1.2)
+        up = height.of(truth.positions)
+        truth.draw(axes, truth.seconds, up, color=_TRUTH, linewidth=5.0)
+    up = height.of(estimate.positions)
+    estimate.draw(axes, estimate.seconds, up, color=_ESTIMATE, linewidth=1.2)
     low, high = axes.get_ylim()
     if high - low < 0.1:  # a level path should look level
         middle = 0.5 * (low + high)

@@ -80,6 +80,7 @@ def draw_run(
         errors=errors,
         timeline=timeline,
         unit=unit,
+        height=None if evaluation is None else evaluation.height,
     )
 
 

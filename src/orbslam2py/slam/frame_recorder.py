@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
+from orbslam2py.maps.saved_map import RecordedFrames
 from orbslam2py.slam.records import FrameFeatures
 from orbslam2py.trajectory.trajectory import Trajectory
 
@@ -47,6 +48,31 @@ class FrameRecorder:
         with self._lock:
             return [*self._ended, self._present()]
 
+    def recorded(self, map_index: int, known: npt.NDArray[np.int64]) -> RecordedFrames:
+        """The frames of the present map relative to their keyframes, as map files keep them.
+
+        Parameters
+        ----------
+        map_index : int
+            Which map is meant; no frames of another one.
+        known : array of int64 (m,)
+            Ids of the keyframes that are in the file: frames from the first on that hangs on
+            another one are left for the next time.
+        """
+        with self._lock:
+            if self._map.epoch != map_index or not len(self._recorder):
+                return RecordedFrames.none()
+            entries = self._recorder.entries()
+        unknown = ~np.isin(entries["keyframes"], known) & (entries["keyframes"] >= 0)
+        n = int(np.argmax(unknown)) if unknown.any() else len(unknown)
+        return RecordedFrames(
+            timestamps=entries["timestamps"][:n],
+            ids=entries["frames"][:n],
+            keyframes=entries["keyframes"][:n],
+            T_cr=entries["T_cr"][:n],
+            lost=entries["lost"][:n].astype(np.uint8),
+        )
+
     def _present(self) -> Trajectory:
         poses = self._recorder.rebuild(self._map)
         return Trajectory(
@@ -58,6 +84,12 @@ def accepted_keypoints(frame: core.TrackedFrame) -> npt.NDArray[np.bool_]:
     """Which keypoints have a point that agrees with the pose, (n,)."""
     accepted: npt.NDArray[np.bool_] = (frame.map_points >= 0) & (frame.outlier == 0)
     return accepted
+
+
+def pixels_as_given(frame: core.Frame) -> npt.NDArray[np.float32]:
+    """Where the keypoints lie in the image as it came, not undistorted, (n, 2)."""
+    raw = frame.raw_keypoints
+    return raw if len(raw) else frame.keypoints
 
 
 def frame_features(
@@ -79,4 +111,5 @@ def frame_features(
         depths=features.depth,
         map_point_ids=frame.map_points,
         inliers=accepted_keypoints(frame) if inliers is None else inliers,
+        colours=features.colours,
     )
