@@ -17,10 +17,10 @@ from orbslam2py._files import atomic_write, reason_of
 from orbslam2py.errors import DatasetError
 from orbslam2py.maps.ply import write_ply
 from orbslam2py.runs.frame_errors import truth_of_frames, worst_frames
-from orbslam2py.runs.frame_images import choose_frames, has_images, write_frame_images
 from orbslam2py.runs.frame_table import write_frames
 from orbslam2py.runs.report import RunEvaluation
 from orbslam2py.runs.report_page import write_report_page
+from orbslam2py.runs.report_page.frame_images import choose_frames, has_images, write_frame_images
 from orbslam2py.runs.result import RunResult
 from orbslam2py.runs.run_picture import anchored_points, draw_run
 from orbslam2py.settings.sensor import Sensor

@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from orbslam2py._files import atomic_write
 from orbslam2py.runs.gravity import Height
-from orbslam2py.runs.plane_view import FROM_ABOVE, View, choose_view
-from orbslam2py.runs.round_numbers import round_down, short
+from orbslam2py.runs.report_page.plane_view import FROM_ABOVE, View, choose_view
+from orbslam2py.runs.report_page.round_numbers import round_down, short
 from orbslam2py.runs.timeline import Timeline, gaps_in_time
 
 if TYPE_CHECKING:

@@ -77,8 +77,15 @@ def test_best_is_marked_only_where_there_is_a_better(tmp_path: Path) -> None:
     comparison = compare_runs(runs)
     best = {row.figure.key: row.best for rows in comparison.rows().values() for row in rows}
     assert best["tracked"] == [False] * 3, "all alike"
-    assert best["ate_rmse_m"] == [False] * 3, "not known of all"
+    assert best["ate_rmse_m"] == [True, False, False], "not known of the last"
     assert best["keyframes"] == [False] * 3, "neither is better"
+
+
+def test_a_run_without_poses_is_best_at_nothing(tmp_path: Path) -> None:
+    runs = [made_up_run(tmp_path / "a", "k" * 20 + "rl" + "k" * 9)]
+    runs.append(made_up_run(tmp_path / "b", "n" * 31))
+    best = [row.best for rows in compare_runs(runs).rows().values() for row in rows]
+    assert not any(flags[1] for flags in best)
 
 
 def test_names_tell_the_runs_apart(tmp_path: Path) -> None:

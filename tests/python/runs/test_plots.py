@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from orbslam2py.runs import plots
-from orbslam2py.runs.plane_view import choose_view
 from orbslam2py.runs.plots import draw_trajectory
+from orbslam2py.runs.report_page.plane_view import choose_view
 from orbslam2py.runs.timeline import Timeline
 from support.files import names_in
 from support.made_up_rows import FPS, rows_of

@@ -19,9 +19,15 @@ from orbslam2py.runs.frame_errors import worst_places
 from orbslam2py.runs.report_page import write_report_page
 from orbslam2py.runs.report_page.explained import FIGURES, STAGES
 from orbslam2py.runs.report_page.markup import element, join
+from orbslam2py.runs.report_page.round_numbers import (
+    path_data,
+    round_down,
+    round_ticks,
+    short,
+    thin,
+)
 from orbslam2py.runs.report_page.run_folder import read_run
 from orbslam2py.runs.report_page.story import Story
-from orbslam2py.runs.round_numbers import path_data, round_down, round_ticks, short, thin
 from support.documents import ROOT, cells_of, read
 from support.made_up_runs import made_up_run
 

@@ -85,7 +85,7 @@ class Solid {
   projector() {
     const { width, height } = this.canvas;
     const [a, b, c] = this.axes(), m = this.middle;
-    const scale = (0.85 * Math.min(width, 1.15 * height) / this.extent) * this.zoom;
+    const scale = (1.0 * Math.min(width, 1.15 * height) / this.extent) * this.zoom;
     const far = 2.5 * this.extent / this.zoom;
     const ratio = devicePixelRatio;
     return (x, y, z) => {

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from orbslam2py._arrays import FloatArray, IntArray
-from orbslam2py.runs.plane_view import View
 from orbslam2py.runs.report_page.markup import Markup, element, join
-from orbslam2py.runs.round_numbers import (
+from orbslam2py.runs.report_page.plane_view import View
+from orbslam2py.runs.report_page.round_numbers import (
     dots_data,
     path_data,
     round_down,

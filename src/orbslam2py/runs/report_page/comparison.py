@@ -100,12 +100,17 @@ class Comparison:
 
     def _row(self, figure: Figure) -> Row:
         found = [run.report.get(figure.key) for run in self.runs]
+        # A run that tracked nothing is best at nothing: it was never lost either.
         numbers = np.array(
-            [value if isinstance(value, (int, float)) else np.nan for value in found], np.float64
+            [
+                value if isinstance(value, (int, float)) and run.report.get("tracked") else np.nan
+                for value, run in zip(found, self.runs, strict=True)
+            ],
+            np.float64,
         )
         best = np.zeros(len(found), bool)
         known = numbers[np.isfinite(numbers)]
-        if figure.best and len(known) == len(found) and known.min() < known.max():
+        if figure.best and len(known) > 1 and known.min() < known.max():
             best = numbers == (known.max() if figure.best > 0 else known.min())
         return Row(figure, [figure.value(run.report) for run in self.runs], best.tolist())
 
@@ -125,10 +130,14 @@ def _in_frame_of(first: RunFolder, run: RunFolder) -> FloatArray | None:
     positions = first.metres * first.path.positions
     if run is first:
         return positions if len(positions) else None
-    i, j = associate(run.path.timestamps, first.path.timestamps, MAX_DIFFERENCE)
+    # By the truth, if both have one: then the picture shows the errors that are plotted.
+    own, other = (run.truth, first.truth) if run.truth and first.truth else (run.path, first.path)
+    i, j = associate(own.timestamps, other.timestamps, MAX_DIFFERENCE)
     if len(i) < _FEWEST or run.name != first.name:
         return None
-    own = run.metres * run.path.positions
     # Where both are in metres, a difference in scale is an error to be seen.
     with_scale = run.unit != "m" or first.unit != "m"
-    return align(own[i], positions[j], with_scale=with_scale).apply(own)
+    moved = align(
+        run.metres * own.positions[i], first.metres * other.positions[j], with_scale=with_scale
+    )
+    return moved.apply(run.metres * run.path.positions)

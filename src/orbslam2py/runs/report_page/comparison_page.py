@@ -6,17 +6,17 @@ from __future__ import annotations
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
-from orbslam2py.runs.plane_view import FROM_ABOVE, choose_view
 from orbslam2py.runs.report_page import above
 from orbslam2py.runs.report_page.comparison import Comparison, Row
 from orbslam2py.runs.report_page.explained import STAGES
 from orbslam2py.runs.report_page.markup import Markup, element, join, section, table
 from orbslam2py.runs.report_page.page import whole_page
+from orbslam2py.runs.report_page.plane_view import FROM_ABOVE, choose_view
 from orbslam2py.runs.report_page.plot import Line, TimePlot, figures, strip
+from orbslam2py.runs.report_page.round_numbers import NONE
 from orbslam2py.runs.report_page.run_plots import state_spans
 from orbslam2py.runs.report_page.scene import as_script, rounded
 from orbslam2py.runs.report_page.story import Story
-from orbslam2py.runs.round_numbers import NONE
 from orbslam2py.runs.timeline import gaps_in_time
 
 #: Colours there are; the seventh run has that of the first, dashed.
@@ -52,22 +52,29 @@ def look(number: int) -> str:
 
 
 def _figures(comparison: Comparison) -> Markup:
-    parts = []
     names = [
         join(element("i", class_=look(k)), " ", name) for k, name in enumerate(comparison.names)
     ]
+    lines: list[list[str | Markup]] = []
     for group, rows in comparison.rows().items():
-        lines = [_cells(row) for row in rows]
-        if lines:
-            parts.append(table([group, "unit", *names], lines, class_="compared numbers"))
-    note = "★ marks the best. Names in full: point at them."
-    return section("figures", "Figures", *parts, element("p", note, class_="note"))
+        if rows:
+            heading = element("span", group, class_="group")
+            lines.append([heading, *[""] * len(names)])
+            lines += [_cells(row) for row in rows]
+    note = "The star marks the best of those that tracked anything. What a figure is: point at it, "
+    note += "or see the page of one run."
+    shown = table(["", *names], lines, class_="compared numbers")
+    return section("figures", "Figures", shown, element("p", note, class_="note"))
 
 
 def _cells(row: Row) -> list[str | Markup]:
     cells: list[str | Markup] = [
-        element("span", row.figure.name, title=f"{row.figure.text} ({row.figure.key})"),
-        row.figure.unit,
+        element(
+            "span",
+            row.figure.name,
+            element("small", f" [{row.figure.unit}]") if row.figure.unit else None,
+            title=f"{row.figure.text} ({row.figure.key})",
+        ),
     ]
     for value, best in zip(row.values, row.best, strict=True):
         cells.append(element("span", value, class_="best") if best else value)
@@ -107,8 +114,8 @@ def _paths(comparison: Comparison) -> Markup | None:
         class_="plot",
     )  # fmt: skip
     plane = above.plane(window, marks, view, first.unit)
-    note = f"Each path is moved onto that of {comparison.names[0]} as a whole, by poses at the "
-    note += "same times."
+    note = f"Each path is moved onto that of {comparison.names[0]} as a whole, by the "
+    note += "ground truth where both have it, else by poses at the same times."
     return section(
         "path", "Paths",
         element("div", solid, element("figure", caption, plane, class_="plot"), class_="pair"),

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from orbslam2py.runs.round_numbers import NONE, short
+from orbslam2py.runs.report_page.round_numbers import NONE, short
 
 
 @dataclass(frozen=True)

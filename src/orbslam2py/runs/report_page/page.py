@@ -12,10 +12,10 @@ from orbslam2py._version import __version__
 from orbslam2py.runs.report_page import sections
 from orbslam2py.runs.report_page.markup import Markup, element, join, section, table
 from orbslam2py.runs.report_page.path_section import path_section
+from orbslam2py.runs.report_page.round_numbers import NONE
 from orbslam2py.runs.report_page.run_folder import RunFolder
 from orbslam2py.runs.report_page.scene import script_data
 from orbslam2py.runs.report_page.story import Story
-from orbslam2py.runs.round_numbers import NONE
 
 _FOLDER = Path(__file__).parents[2] / "data" / "report_page"
 

@@ -6,12 +6,12 @@ from __future__ import annotations
 import numpy as np
 
 from orbslam2py._arrays import IntArray
-from orbslam2py.runs.plane_view import FROM_ABOVE, View, choose_view
 from orbslam2py.runs.report_page import above
 from orbslam2py.runs.report_page.markup import Markup, element, join, section
+from orbslam2py.runs.report_page.plane_view import FROM_ABOVE, View, choose_view
+from orbslam2py.runs.report_page.round_numbers import short
 from orbslam2py.runs.report_page.scene import loop_ends
 from orbslam2py.runs.report_page.story import Story
-from orbslam2py.runs.round_numbers import short
 from orbslam2py.runs.timeline import gaps_in_time
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py.runs.report_page.markup import Markup, element, join
-from orbslam2py.runs.round_numbers import (
+from orbslam2py.runs.report_page.round_numbers import (
     dots_data,
     path_data,
     round_ticks,

@@ -11,9 +11,9 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py.runs.report_page.explained import STAGES
 from orbslam2py.runs.report_page.markup import Markup, element
 from orbslam2py.runs.report_page.plot import Line, Mark, Span, TimePlot, strip
+from orbslam2py.runs.report_page.round_numbers import short
 from orbslam2py.runs.report_page.run_folder import Frames
 from orbslam2py.runs.report_page.story import Story, positions_of
-from orbslam2py.runs.round_numbers import short
 
 #: Class and name of every state, in the order of the legend.
 STATES = {

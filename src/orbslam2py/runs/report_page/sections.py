@@ -8,15 +8,15 @@ import base64
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
-from orbslam2py.runs.plane_view import choose_view
 from orbslam2py.runs.remedies import what_helps
 from orbslam2py.runs.report_page import above, run_plots, stages
 from orbslam2py.runs.report_page.explained import FIGURES
 from orbslam2py.runs.report_page.markup import Markup, element, join, section, table
 from orbslam2py.runs.report_page.path_section import frame_link
+from orbslam2py.runs.report_page.plane_view import choose_view
 from orbslam2py.runs.report_page.plot import figures
+from orbslam2py.runs.report_page.round_numbers import short
 from orbslam2py.runs.report_page.story import Story, positions_of
-from orbslam2py.runs.round_numbers import short
 from orbslam2py.runs.timeline import gaps_in_time
 from orbslam2py.trajectory import Trajectory
 

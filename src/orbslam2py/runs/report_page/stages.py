@@ -10,8 +10,8 @@ import numpy as np
 from orbslam2py._arrays import FloatArray
 from orbslam2py.runs.report_page.explained import STAGES
 from orbslam2py.runs.report_page.markup import Markup, element, join, table
+from orbslam2py.runs.report_page.round_numbers import round_ticks, short, tick_texts
 from orbslam2py.runs.report_page.run_folder import Frames
-from orbslam2py.runs.round_numbers import round_ticks, short, tick_texts
 
 _BINS = 60
 _HEIGHT = 200.0

@@ -9,8 +9,8 @@ import numpy as np
 
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.runs.frame_errors import position_errors, worst_places
+from orbslam2py.runs.report_page.round_numbers import short
 from orbslam2py.runs.report_page.run_folder import RunFolder
-from orbslam2py.runs.round_numbers import short
 from orbslam2py.trajectory import Trajectory
 from orbslam2py.trajectory.rotations import rotation_angles
 
@@ -133,7 +133,7 @@ def _what_happened(run: RunFolder, events: list[Event], position: int, place: in
     usual = float(np.nanmedian(frames.inliers[tracked])) if tracked.any() else 0.0
     fewest = float(np.nanmin(frames.inliers[near & tracked], initial=np.inf))
     if fewest < _FEW_INLIERS * usual:
-        said.append(f"few inliers: {fewest:.0f}, usual are {usual:.0f}")
+        said.append(f"down to {fewest:.0f} inliers")
     turn = _fastest_turn(run.path, place)
     if turn > _FAST_TURN:
         said.append(f"fast turn: {turn:.0f}°/s")

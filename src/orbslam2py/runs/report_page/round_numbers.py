@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import numpy as np
@@ -85,16 +84,21 @@ def thin(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     """
     if len(x) <= 2 * _BUCKETS:
         return x, y
-    edges = np.linspace(0, len(x), _BUCKETS + 1).astype(int)
-    kept: list[int] = []
-    for begin, end in itertools.pairwise(edges.tolist()):
-        part = y[begin:end]
-        gaps = np.flatnonzero(np.isnan(part))
-        if len(gaps):
-            kept.append(begin + int(gaps[0]))
-        if len(gaps) < len(part):
-            kept += [begin + int(np.nanargmin(part)), begin + int(np.nanargmax(part))]
-    chosen = np.unique(kept)
+    width = -(-len(x) // _BUCKETS)
+    padded = np.full(width * -(-len(x) // width), np.nan)
+    padded[: len(y)] = y
+    rows = padded.reshape(-1, width)
+    gaps = np.isnan(rows)
+    first = width * np.arange(len(rows))
+    known = first[~gaps.all(axis=1)]
+    inside = rows[~gaps.all(axis=1)]
+    kept = [
+        known + np.where(np.isnan(inside), np.inf, inside).argmin(axis=1),
+        known + np.where(np.isnan(inside), -np.inf, inside).argmax(axis=1),
+        (first + gaps.argmax(axis=1))[gaps.any(axis=1)],
+    ]
+    chosen = np.unique(np.concatenate(kept))
+    chosen = chosen[chosen < len(x)]
     return x[chosen], y[chosen]
 
 
