@@ -13,7 +13,11 @@ from .errors import StateError as StateError
 from .errors import VocabularyError as VocabularyError
 from .errors import WorkerError as WorkerError
 from .maps import MapSnapshot as MapSnapshot
+from .runs import check_calibration as check_calibration
 from .runs import run_sequence as run_sequence
+from .settings import CameraSettings as CameraSettings
+from .settings import DepthSettings as DepthSettings
+from .settings import OrbSettings as OrbSettings
 from .settings import Sensor as Sensor
 from .settings import Settings as Settings
 from .slam.events import Callbacks as Callbacks

@@ -16,6 +16,7 @@ from orbslam2py.cli import (
     calibrate,
     demo,
     evaluate,
+    report,
     run,
     settings,
     synthesize,
@@ -24,6 +25,7 @@ from orbslam2py.cli import (
 )
 from orbslam2py.cli.display import print_error, tell_repeated
 from orbslam2py.cli.exit_codes import ExitCode
+from orbslam2py.cli.run_arguments import RunCommand
 from orbslam2py.errors import OrbSlamError
 
 
@@ -66,11 +68,13 @@ def _options(
     """Visual SLAM for one camera, a stereo pair or RGB-D: images in, path and map out."""
 
 
-app.command("run")(run.run)
+app.command("run", cls=RunCommand)(run.run)
 app.command("demo")(demo.demo)
 app.command("synthesize")(synthesize.synthesize)
 app.command("view")(view.view)
 app.command("evaluate")(evaluate.evaluate)
+app.command("report")(report.report)
+app.command("compare")(report.compare)
 app.command("calibrate")(calibrate.calibrate)
 app.command("import-camera")(calibrate.import_camera)
 app.add_typer(settings.app, name="settings")
@@ -82,6 +86,7 @@ def run_app() -> None:
     try:
         app()
     except (OrbSlamError, OSError) as error:
+        tell_repeated()  # warnings before what they led to
         print_error(Console(stderr=True), "Error", describe_error(error))
         sys.exit(ExitCode.BAD_INPUT)
     finally:

@@ -25,11 +25,14 @@ DEFAULT_OUTPUT = Path("runs/demo")
 
 
 def demo(
-    sensor: Annotated[Sensor, typer.Option(help="stereo or rgbd.")] = Sensor.STEREO,
+    sensor: Annotated[Sensor, typer.Option(help="What delivers the images.")] = Sensor.STEREO,
     frames: Annotated[
         int | None, typer.Option(help="Number of images [one lap and a bit].", min=10)
     ] = None,
     output: Annotated[Path, typer.Option(help="Folder for the results.")] = DEFAULT_OUTPUT,
+    no_report: Annotated[
+        bool, typer.Option("--no-report", help="Do not write the page report.html.")
+    ] = False,
     viewer: ViewerFlag = False,
     viewer_port: ViewerPort = None,
     viewer_host: ViewerHost = None,
@@ -56,6 +59,7 @@ def demo(
         RunOptions(sensor),
         output=output,
         force=force,
+        report_page=not no_report,
         viewer=look,
         video=video,
         record=record,

@@ -4,10 +4,13 @@
 from __future__ import annotations
 
 import contextlib
+import shlex
+import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
+import typer.core
 from rich.console import Console
 from rich.markup import escape
 
@@ -22,6 +25,7 @@ from orbslam2py.cli.display import (
 )
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.interrupts import StopOnInterrupt
+from orbslam2py.cli.run_arguments import read_initial_pose
 from orbslam2py.cli.viewing import (
     ViewerExit,
     ViewerFlag,
@@ -33,11 +37,14 @@ from orbslam2py.cli.viewing import (
 from orbslam2py.cli.watching import RecordOption, VideoOption, file_watchers, watch_all
 from orbslam2py.datasets import open_input
 from orbslam2py.datasets.base import LiveSource, Sequence
+from orbslam2py.maps import load_map
+from orbslam2py.maps.setup_check import check_sensor
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.outputs import new_output_folder
 from orbslam2py.runs.remedies import why_nothing_was_tracked
 from orbslam2py.runs.result import FrameRow
 from orbslam2py.runs.run import FinishedRun, run_sequence
+from orbslam2py.settings import Settings
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.options import SystemOptions
 from orbslam2py.slam.system import System
@@ -53,6 +60,10 @@ EXAMPLE = """
     orbslam2py run video.mp4 --sensor mono --settings my.yaml
 
     orbslam2py run 0 --sensor mono --settings my.yaml
+
+    orbslam2py run monday.mp4 --sensor mono --settings my.yaml --save office.orbmap
+
+    orbslam2py run tuesday.mp4 --load office.orbmap --localize
 """
 
 
@@ -115,14 +126,48 @@ def run(
             metavar="FILE_OR_FOLDER",
         ),
     ] = None,
+    load: Annotated[
+        Path | None,
+        typer.Option(
+            help="Begin in a map that was saved before; its settings serve if --settings gives no "
+            "others.",
+            metavar="FILE",
+        ),
+    ] = None,
+    initial_pose: Annotated[
+        str | None,
+        typer.Option(
+            help="Where in the loaded map the camera may be: tried before all else.",
+            metavar="X,Y,Z[,QX,QY,QZ,QW]",
+        ),
+    ] = None,
+    allow_other_setup: Annotated[
+        bool,
+        typer.Option(
+            "--allow-other-setup",
+            help="Load the map although it is of another camera or other visual words.",
+        ),
+    ] = False,
     localize: Annotated[
         int | None,
         typer.Option(
-            help="Switch to localization mode after so many frames: the map stays as it is.",
-            min=1,
-            metavar="N",
+            help="Localization mode, in which the map stays as it is: after so many frames; "
+            "without a number from the first on, in a loaded map.",
+            min=0,
+            metavar="[N]",
         ),
     ] = None,
+    save: Annotated[
+        Path | None, typer.Option(help="Save the last map in this file.", metavar="FILE")
+    ] = None,
+    autosave: Annotated[
+        float | None,
+        typer.Option(help="Save it every so many seconds on the way as well.", metavar="SECONDS"),
+    ] = None,
+    save_images: Annotated[
+        bool,
+        typer.Option("--save-images", help="Keep a small grey image of every keyframe in the map."),
+    ] = False,
     loop_closing: Annotated[
         bool,
         typer.Option(
@@ -148,6 +193,9 @@ def run(
     force: Annotated[
         bool, typer.Option("--force", help="Write into an output folder that is not empty.")
     ] = False,
+    no_report: Annotated[
+        bool, typer.Option("--no-report", help="Do not write the page report.html.")
+    ] = False,
     viewer: ViewerFlag = False,
     viewer_port: ViewerPort = None,
     viewer_host: ViewerHost = None,
@@ -157,7 +205,13 @@ def run(
     """Track a recorded sequence, a video or a camera; write trajectory, map and report."""
     look = ViewerOptions(viewer, viewer_port, viewer_host, viewer_exit)
     log_to(Console(stderr=True), quiet=quiet)  # opening warns already
-    images = open_input(sequence, sensor, settings=settings, fps=fps, times=times, mask=mask)
+    loaded = None if load is None else load_map(load, images=True)
+    chosen: Settings | str | None = settings
+    if loaded is not None and settings is None:
+        if sensor is not None:
+            check_sensor(loaded, sensor)
+        sensor, chosen = loaded.sensor, loaded.settings
+    images = open_input(sequence, sensor, settings=chosen, fps=fps, times=times, mask=mask)
     options = RunOptions(
         images.sensor,
         SystemOptions(
@@ -165,6 +219,7 @@ def run(
             loop_closing=loop_closing,
             full_adjustment=full_adjustment,
             full_adjustment_time_limit=full_adjustment_time_limit,
+            keyframe_images=save_images,
             seed=seed,
         ),
         realtime=realtime,
@@ -172,6 +227,11 @@ def run(
         stride=stride,
         max_frames=max_frames,
         localize_after=localize,
+        load_map=loaded,
+        initial_pose=None if initial_pose is None else read_initial_pose(initial_pose),
+        allow_other_setup=allow_other_setup,
+        save_map=save,
+        autosave=autosave,
     )
     code = run_and_show(
         images,
@@ -179,6 +239,7 @@ def run(
         vocabulary=vocabulary,
         output=output,
         force=force,
+        report_page=not no_report,
         viewer=look,
         video=video,
         record=record,
@@ -197,6 +258,7 @@ def run_and_show(
     vocabulary: Path | None = None,
     output: Path | None = None,
     force: bool = False,
+    report_page: bool = True,
     viewer: ViewerOptions | None = None,
     quiet: bool = False,
     video: Path | None = None,
@@ -227,6 +289,8 @@ def run_and_show(
                     vocabulary=words,
                     output=output or new_output_folder(sequence.name),
                     force=force,
+                    report_page=report_page,
+                    command=shlex.join(["orbslam2py", *sys.argv[1:]]),
                     progress=progress,
                     control=viewing.control,
                     watch=watch_all(viewing.watch, files.watch),
@@ -235,6 +299,10 @@ def run_and_show(
         console.print(report_table(done.report))
         folder = escape(str(done.folder))
         console.print(f"Results are in [bold]{folder}[/]", highlight=False, soft_wrap=True)
+        html = done.folder / "report.html" if done.folder is not None else None
+        if report_page and html is not None and html.is_file():
+            text = f"To look at them: [bold]{escape(str(html))}[/]"
+            console.print(text, highlight=False, soft_wrap=True)
         files.tell(console)
         code = _conclude(done, errors)
         viewing.stay(console, done.folder)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A sequence in, a folder of results out."""
 
+from orbslam2py.runs.calibration_watch import check_calibration
 from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.result import FrameRow, RunResult
@@ -16,5 +17,6 @@ __all__ = [
     "RunResult",
     "SequenceRunner",
     "SystemOptions",
+    "check_calibration",
     "run_sequence",
 ]

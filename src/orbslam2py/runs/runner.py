@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import asdict, replace
+from datetime import datetime
 from typing import Any, cast
 
 import numpy as np
@@ -20,6 +21,7 @@ from orbslam2py._files import describe_error
 from orbslam2py.datasets.base import Images, LiveSource, Sequence
 from orbslam2py.errors import DatasetError, ImageError, OrbSlamError
 from orbslam2py.maps.map_arrays import MapArrays
+from orbslam2py.runs.calibration_watch import CalibrationWatch, settings_beside
 from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.feeds import FedFrame, LiveFeed, RecordedFeed, is_sequence
 from orbslam2py.runs.options import RunOptions
@@ -70,6 +72,7 @@ class SequenceRunner:
     ) -> None:
         self._vocabulary = vocabulary
         self._options = options
+        self._watch: CalibrationWatch | None = None
         self._feed: RecordedFeed | LiveFeed
         if is_sequence(sequence):
             indices = options.indices(len(sequence))
@@ -116,9 +119,22 @@ class SequenceRunner:
         """
         result, options = self.result, self._options
         begin = time.perf_counter()
+        result.started = datetime.now().astimezone().isoformat(timespec="seconds")
         in_time = options.realtime or self._feed.is_live
-        how = replace(options.system, wait_for_mapping=not in_time)
-        system = System(result.settings, options.sensor, self._vocabulary, **asdict(how))
+        # Told by the watch, which knows more, or by nobody.
+        how = replace(options.system, wait_for_mapping=not in_time, check_calibration=False)
+        self._watch = self._calibration_watch(in_time)
+        system = System(
+            result.settings,
+            options.sensor,
+            self._vocabulary,
+            load_map=options.load_map,
+            initial_pose=options.initial_pose,
+            allow_other_setup=options.allow_other_setup,
+            **asdict(how),
+        )
+        if options.save_map is not None and options.autosave is not None:
+            system.autosave(options.save_map, options.autosave)
         control = control or RunControl(stop)
         stop = control.stop
         with contextlib.ExitStack() as watching:
@@ -136,9 +152,23 @@ class SequenceRunner:
                 seen = f"{len(result.rows)} of {result.n_frames} frames"
                 _log.warning("interrupted; saving what was done so far (%s)", seen)
             self._shut_down(system)
+        self._save_map(system)
+        if self._watch is not None:
+            misfit = self._watch.finish()
+            result.warnings += [] if misfit is None else [str(misfit)]
         self._collect(system)
         result.seconds = time.perf_counter() - begin
         return result
+
+    def _calibration_watch(self, in_time: bool) -> CalibrationWatch | None:
+        if not self._options.system.check_calibration:
+            return None
+        return CalibrationWatch(
+            self.result.settings,
+            self._options.sensor,
+            known=settings_beside(self.result.sequence),
+            in_background=in_time,
+        )
 
     # ---- one pass over the frames ----------------------------------------------------------------
     def _process(self, system: System, progress: Progress | None, control: RunControl) -> None:
@@ -175,6 +205,8 @@ class SequenceRunner:
             return self._skip(frame, error)
         finally:
             self.result.slam_seconds += time.perf_counter() - begin
+        if self._watch is not None:
+            self._watch.look(frame.item)
         return _row(frame, record, str(record.reason))
 
     def _call(self, system: System, images: Images, timestamp: float) -> TrackingRecord:
@@ -214,6 +246,21 @@ class SequenceRunner:
             if self.result.error is None:
                 self._take_note(error)
 
+    def _save_map(self, system: System) -> None:
+        path = self._options.save_map
+        if path is None:
+            return
+        if system.n_keyframes == 0:
+            _log.warning("there is no map to save: %s is not written", path)
+            return
+        try:
+            if self._options.autosave is None:
+                system.save_map(path)
+            self.result.saved_map = path
+        except Exception as error:
+            if self.result.error is None:
+                self._take_note(error)
+
     def _take_note(self, error: Exception) -> None:
         self.result.error = error
         if not isinstance(error, OrbSlamError):
@@ -239,6 +286,9 @@ class SequenceRunner:
             keyframes, [by_time.get(float(t), -1) for t in keyframes.timestamps]
         )
         result.snapshot = system.map_snapshot()
+        seen = core.snapshot_observations(system.pipeline.back_end.map)
+        points = np.repeat(seen.ids, np.diff(seen.offsets))
+        result.sightings = np.stack([points, seen.keyframes], axis=1)
         result.drawing = MapArrays.of(system.pipeline.back_end.map)
         result.stages = system.stage_statistics()
         result.n_resets = system.n_resets

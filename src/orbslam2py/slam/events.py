@@ -12,11 +12,13 @@ from __future__ import annotations
 import enum
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
+from orbslam2py._arguments import shown
 from orbslam2py._arrays import FloatArray
-from orbslam2py.slam.worker import Worker
+from orbslam2py._worker import Worker
+from orbslam2py.errors import SettingsError
 
 _log = logging.getLogger(__name__)
 
@@ -116,6 +118,11 @@ class Callbacks:
     They run one after the other in a thread of their own (in deterministic mode: in the thread of
     the track call), so that a slow one delays neither tracking nor mapping, and hold no lock of the
     system; they may call the system's methods. An exception is logged and goes no further.
+
+    Raises
+    ------
+    SettingsError
+        If one of them cannot be called.
     """
 
     on_loop: Callable[[LoopClosed], None] | None = None
@@ -123,6 +130,30 @@ class Callbacks:
     on_lost: Callable[[TrackingLost], None] | None = None
     on_relocalized: Callable[[Relocalized], None] | None = None
     on_map_change: Callable[[MapChanged], None] | None = None
+
+    def __post_init__(self) -> None:
+        for listener in fields(self):
+            function = getattr(self, listener.name)
+            if function is not None and not callable(function):
+                raise SettingsError(
+                    f"{listener.name} is {shown(function)}; give a function that takes the event, "
+                    "or None"
+                )
+
+    @classmethod
+    def of(cls, value: Callbacks | None) -> Callbacks:
+        """Take callbacks, or nobody who wants to know.
+
+        Raises
+        ------
+        SettingsError
+            For anything else.
+        """
+        if value is not None and not isinstance(value, Callbacks):
+            raise SettingsError(
+                f"callbacks is {shown(value)}; give orbslam2py.Callbacks(on_loop=...)"
+            )
+        return value or cls()
 
 
 Event = LoopClosed | KeyframeAdded | TrackingLost | Relocalized | MapChanged

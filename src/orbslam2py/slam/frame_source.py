@@ -4,13 +4,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from orbslam2py.errors import StateError
+from orbslam2py._arguments import shown
+from orbslam2py.errors import ImageError, StateError
 from orbslam2py.settings.sensor import Sensor
+
+_Array = TypeVar("_Array", npt.NDArray[np.uint8], npt.NDArray[np.generic])
 
 
 class SomeImages(Protocol):
@@ -62,6 +65,12 @@ def timed_images(source: FrameSource, sensor: Sensor) -> Iterator[tuple[float, S
     StateError
         If the source was opened for another sensor.
     """
+    is_recording = hasattr(source, "timestamps") and hasattr(source, "load")
+    if not is_recording and (not isinstance(source, Iterable) or isinstance(source, str | bytes)):
+        raise StateError(
+            f"the images come from {shown(source)}; give a sequence, as open_sequence returns, or "
+            "anything that yields frames with a timestamp and images"
+        )
     opened_for: Any = getattr(source, "sensor", sensor)
     if opened_for != sensor:
         raise StateError(
@@ -70,7 +79,19 @@ def timed_images(source: FrameSource, sensor: Sensor) -> Iterator[tuple[float, S
         )
     if isinstance(source, Iterable):
         for frame in source:
+            if not (hasattr(frame, "timestamp") and hasattr(frame, "images")):
+                raise StateError(
+                    f"a frame is {shown(frame)}; it must have a timestamp and images, as those of "
+                    "orbslam2py.datasets.Frame"
+                )
             yield frame.timestamp, frame.images
     else:
         for index, timestamp in enumerate(source.timestamps.tolist()):
             yield timestamp, source.load(index)
+
+
+def present(array: _Array | None, what: str, timestamp: float) -> _Array:
+    """Return an image that must be there; raises `ImageError` if it is None."""
+    if array is None:
+        raise ImageError(f"the frame of {timestamp:.6f} s has no {what}, which this sensor needs")
+    return array

@@ -6,18 +6,22 @@ Mur-Artal and Tardos, "ORB-SLAM2", 2017, figure 2; ``docs/method/index.md``.
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import math
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
+from orbslam2py._arguments import is_number, shown
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
 from orbslam2py._timing import StageStatistics, StageTimer
-from orbslam2py.errors import ImageError
+from orbslam2py.errors import ImageError, MapFileError, StateError
+from orbslam2py.maps.contents import restore_contents
+from orbslam2py.maps.saved_map import SavedMap
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
 from orbslam2py.slam.back_end import BackEnd
@@ -27,6 +31,7 @@ from orbslam2py.slam.front_end import FrontEnd
 from orbslam2py.slam.initialization import DepthInitializer, Initializer, MonocularInitializer
 from orbslam2py.slam.keyframe_decision import KeyframeDecision
 from orbslam2py.slam.localization_mode import LocalizationSwitch
+from orbslam2py.slam.map_keeper import MapKeeper
 from orbslam2py.slam.options import SystemOptions
 from orbslam2py.slam.pose_search import PoseSearch
 from orbslam2py.slam.records import (
@@ -47,6 +52,24 @@ RESET_PATIENCE = 60.0
 
 #: Makes a frame of images: takes its id and a timer.
 BuildFrame = Callable[[int, StageTimer], core.Frame]
+
+
+class CallGuard:
+    """Allows one call at a time; a second one raises instead of waiting."""
+
+    def __init__(self, what: str) -> None:
+        self._what = what
+        self._lock = threading.Lock()
+
+    @contextlib.contextmanager
+    def __call__(self) -> Iterator[None]:
+        """Enter the guarded call."""
+        if not self._lock.acquire(blocking=False):
+            raise StateError(f"{self._what} is already running in another thread")
+        try:
+            yield
+        finally:
+            self._lock.release()
 
 
 class WatchedFrame:
@@ -145,7 +168,7 @@ class Pipeline:
     ) -> None:
         self._sensor = sensor
         self._waits_for_mapping = options.wait_for_mapping and not options.deterministic
-        self.front_end = FrontEnd(settings, sensor)
+        self.front_end = FrontEnd(settings, sensor, check_calibration=options.check_calibration)
         self.back_end = back_end = BackEnd(sensor, options, callbacks)
         self.tracking = _make_tracking(settings, sensor, vocabulary, back_end, options.seed)
         self.localization = LocalizationSwitch(
@@ -164,6 +187,24 @@ class Pipeline:
         """Start the workers' threads, now that everything refers to everything it needs."""
         for worker in self.back_end.workers:
             worker.start()
+
+    def begin_in(
+        self, saved: SavedMap, vocabulary: core.Vocabulary, initial_pose: core.Pose | None
+    ) -> None:
+        """Take over a saved map, before `start`: tracking is lost and searches it.
+
+        Parameters
+        ----------
+        saved : SavedMap
+            The map.
+        vocabulary : orbslam2py._core.Vocabulary
+            Describes its keyframes.
+        initial_pose : Pose or None
+            ``T_cw`` where the camera may be.
+        """
+        back_end = self.back_end
+        restore_contents(saved.contents, back_end.map, vocabulary, back_end.keyframe_index)
+        self.tracking.begin_in_loaded_map(initial_pose)
 
     # ---- one image -------------------------------------------------------------------------------
     def process(
@@ -215,8 +256,10 @@ class Pipeline:
         return record
 
     def _check_timestamp(self, timestamp: float) -> None:
-        if not math.isfinite(timestamp):
-            raise ImageError(f"the time stamp must be a finite number of seconds, got {timestamp}")
+        if not (is_number(timestamp) and math.isfinite(timestamp)):
+            raise ImageError(
+                f"the time stamp must be a finite number of seconds, got {shown(timestamp)}"
+            )
         if timestamp <= self._last_timestamp:
             raise ImageError(
                 f"time stamps must grow: {timestamp!r} came after {self._last_timestamp!r}"
@@ -294,12 +337,23 @@ class Pipeline:
         _log.info("resetting: map %d ends", self.back_end.map.epoch)
         self.back_end.reset(RESET_PATIENCE, keep=self.recorder.end_map)
         self.tracking.reset()
+        self.front_end.reset()
         self._next_frame_id = 0
         self._last_timestamp = -math.inf
         self.reset_requested.clear()
         # A map that never began was not given up.
         self.n_resets += not self._start_failed
         self._start_failed = False
+
+
+def abandon(back_end: BackEnd, keeper: MapKeeper) -> None:
+    """End the threads of a system that was dropped without shutdown."""
+    try:
+        keeper.stop_autosave()
+    except MapFileError as unsaved:
+        _log.error("while a system was dropped: %s", unsaved)
+    for error in back_end.finish(drain=False, wait_for_adjustment=False, timeout=RESET_PATIENCE):
+        _log.error("while a system was dropped", exc_info=error)
 
 
 def _make_tracking(

@@ -15,7 +15,6 @@ from orbslam2py._arrays import FloatArray, IntArray
 class TrackingState(enum.IntEnum):
     """State of the tracker after an image."""
 
-    SYSTEM_NOT_READY = -1
     NO_IMAGES_YET = 0
     NOT_INITIALIZED = 1
     OK = 2
@@ -35,6 +34,7 @@ class Reason(str, enum.Enum):
     DEGENERATE_VIEWS = "degenerate views: planar scene, pure rotation or wrong matches"
     INITIAL_MAP_FAILED = "the first map was too small or had no depth"
     NOT_FOUND_IN_MAP = "not found in the map"
+    SEARCHING_LOADED_MAP = "searching the loaded map"
     FEW_MATCHES_LAST_FRAME = "too few matches with the last frame"
     FEW_MATCHES_REFERENCE = "too few matches with the reference keyframe"
     FEW_INLIERS_REFERENCE = "too few inliers from the reference keyframe"
@@ -58,6 +58,8 @@ class FrameFeatures:
     """(n,) id of the matched map point, -1 for none; in a keyframe also of points made from it."""
     inliers: npt.NDArray[np.bool_]
     """(n,) matched and accepted by the pose optimisation: as many as `TrackingRecord.n_inliers`."""
+    colours: npt.NDArray[np.uint8]
+    """(n, 3) red, green, blue of the image at the keypoints; (0, 3) for a grey image."""
 
 
 @dataclass(frozen=True)

@@ -208,13 +208,13 @@ class Page:
         self.mouse("mouseReleased", x, y)
 
     def middle_of(self, selector: str) -> tuple[float, float]:
-        """Scroll an element into view; returns its middle [CSS px]."""
+        """Scroll an element into view; returns the middle of its first box [CSS px]."""
         found = self.evaluate(
             f"""(() => {{
               const element = document.querySelector({json.dumps(selector)});
               if (!element) return null;
               element.scrollIntoView({{block: "center", behavior: "instant"}});
-              const box = element.getBoundingClientRect();
+              const box = element.getClientRects()[0] ?? element.getBoundingClientRect();
               return [box.x + box.width / 2, box.y + box.height / 2];
             }})()"""
         )

@@ -29,6 +29,9 @@ RUN_FILES = frozenset(
         "map.npz",
         "trajectory.png",
         "report.json",
+        "report.html",
+        "frame_images.zip",
+        "groundtruth_aligned.txt",
         "settings.yaml",
     ]
 )
