@@ -33,11 +33,6 @@ class ActionsOnSystem:
         self._folder = folder
 
     @property
-    def can_save(self) -> bool:
-        """Whether maps can be saved."""
-        return hasattr(self._system, "save_map")
-
-    @property
     def localization(self) -> bool:
         """The mode that the next image will be tracked in."""
         return self._system.localization_mode
@@ -67,7 +62,7 @@ class ActionsOnSystem:
         path = self._folder / time.strftime("map-%Y%m%d-%H%M%S.orbmap")
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
-            self._system.save_map(path)  # type: ignore[attr-defined]
+            self._system.save_map(path)
         except (OrbSlamError, OSError) as error:
             return f"The map was not saved: {describe_error(error)}"
         return f"The map is in {path}."

@@ -117,9 +117,7 @@ class LiveView:
             self.page.neighbours = self._actions.neighbours
             if control is not None or stop is not None:
                 self._run_controls = RunControls(self.page.server, control, stop)
-            self._system_controls = SystemControls(
-                self.page.server, self._actions, can_save=self._actions.can_save
-            )
+            self._system_controls = SystemControls(self.page.server, self._actions)
 
     # ---- as a watcher ----------------------------------------------------------------------------
     def on_frame(self, view: FrameView) -> None:
