@@ -33,11 +33,6 @@ class ActionsOnSystem:
         self._folder = folder
 
     @property
-    def can_save(self) -> bool:
-        """Whether maps can be saved."""
-        return hasattr(self._system, "save_map")
-
-    @property
     def localization(self) -> bool:
         """The mode that the next image will be tracked in."""
         return self._system.localization_mode

@@ -158,13 +158,9 @@ class SystemControls:
         The page.
     actions : SystemActions
         What is asked for.
-    can_save : bool
-        Whether maps can be saved.
     """
 
-    def __init__(
-        self, server: viser.ViserServer, actions: SystemActions, *, can_save: bool
-    ) -> None:
+    def __init__(self, server: viser.ViserServer, actions: SystemActions) -> None:
         gui = server.gui
         with gui.add_folder("System", order=-1.0):
             self._localization = gui.add_checkbox(
@@ -174,7 +170,7 @@ class SystemControls:
             )
             optimize = gui.add_button("Optimize", hint="Refine all keyframes and points together.")
             reset = gui.add_button("Reset", color="red", hint="Begin a new map.")
-            save = gui.add_button("Save map", visible=can_save)
+            save = gui.add_button("Save map", hint="Write it into the folder runs.")
         self._localization.on_update(
             lambda event: _ask(event, lambda: actions.set_localization(self._localization.value))
         )

@@ -12,6 +12,7 @@ from pathlib import Path
 from types import TracebackType
 
 import numpy as np
+import numpy.typing as npt
 
 from orbslam2py._arrays import ByteArray
 from orbslam2py.maps.changes import MapChanges
@@ -116,9 +117,7 @@ class LiveView:
             self.page.neighbours = self._actions.neighbours
             if control is not None or stop is not None:
                 self._run_controls = RunControls(self.page.server, control, stop)
-            self._system_controls = SystemControls(
-                self.page.server, self._actions, can_save=self._actions.can_save
-            )
+            self._system_controls = SystemControls(self.page.server, self._actions)
 
     # ---- as a watcher ----------------------------------------------------------------------------
     def on_frame(self, view: FrameView) -> None:
@@ -341,6 +340,10 @@ class Viewer:
         self._view.attach(system, truth=truth, stop=self.stopped.set)
         self._publisher = Publisher(system, [self._view])
         announce(self.address, open_browser=open_browser)
+
+    def look_from(self, eye: npt.ArrayLike, target: npt.ArrayLike) -> None:
+        """Let all browsers look from a place (3,) to another, in the world of the map."""
+        self._view.page.look_from(np.asarray(eye, float), np.asarray(target, float))
 
     def wait(self) -> None:
         """Keep the page until Ctrl-C."""

@@ -207,11 +207,14 @@ class Page:
             places = [page.positions for page in self.model.points.values() if len(page.ids)]
             if not places:
                 return
-            eye, target = whole_view(np.concatenate(places).astype(np.float64))
-            with client.atomic():
-                client.camera.up_direction = (0.0, -1.0, 0.0)
-                client.camera.position = eye
-                client.camera.look_at = target
+            _look(client, *whole_view(np.concatenate(places).astype(np.float64)))
+
+    def look_from(self, eye: FloatArray, target: FloatArray) -> None:
+        """Let all browsers look from one place to another, and stay there."""
+        with self.lock:
+            self._follower.mode = Follow.FREE
+            for client in self.server.get_clients().values():
+                _look(client, eye, target)
 
     def set_point_size(self, factor: float) -> None:
         """Draw points larger or smaller."""
@@ -259,3 +262,10 @@ class Page:
             more = f" and {len(near) - _NAMED} more" if len(near) > _NAMED else ""
             lines.append(f"Neighbours (points shared): {named}{more}")
         return lines
+
+
+def _look(client: viser.ClientHandle, eye: FloatArray, target: FloatArray) -> None:
+    with client.atomic():
+        client.camera.up_direction = (0.0, -1.0, 0.0)
+        client.camera.position = eye
+        client.camera.look_at = target

@@ -53,7 +53,7 @@ _SIZE = 0.03
 #: That size stays until the fitting one differs by so much: all keyframes are drawn anew then.
 _SIZE_TOLERANCE = 1.6
 #: Diameter of a point at size 1, in those sizes.
-_POINT = 0.12
+_POINT = 0.15
 #: A frustum: its apex, then the corners of its image.
 _CORNERS = np.array([(0, 0, 0), (-1, -0.75, 0.6), (1, -0.75, 0.6), (1, 0.75, 0.6), (-1, 0.75, 0.6)])
 _EDGES = np.array([(0, 1), (0, 2), (0, 3), (0, 4), (1, 2), (2, 3), (3, 4), (4, 1)])

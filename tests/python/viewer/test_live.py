@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from orbslam2py import Sensor, System, TrackingState, Viewer
+from orbslam2py.maps import load_map
 from orbslam2py.pictures.palette import KEYFRAME, LOCAL_POINTS, MAPPED
 from support.browser import Browser, Page
 from support.small_sequences import new_system, play, sequence
@@ -134,6 +135,17 @@ def test_optimize_is_told(show: Show) -> None:
     click_on(show.page, "Optimize")
     wait_until(lambda: len(show.system.full_adjustments) == 1, "a full adjustment")
     show.page.wait_for("document.body.innerText.includes('Optimized: ')", 50)
+
+
+def test_the_map_is_saved(
+    show: Show, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    click_on(show.page, "Save map")
+    show.page.wait_for("document.body.innerText.includes('The map is in ')", 50)
+    saved = list(tmp_path.glob("map-*.orbmap"))
+    assert len(saved) == 1
+    assert len(load_map(saved[0]).contents.keyframes.ids) == show.system.n_keyframes
 
 
 def test_stop_is_told_to_the_loop_that_reads_images(show: Show) -> None:
