@@ -12,10 +12,10 @@ import numpy as np
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import DatasetError
-from orbslam2py.evaluation.alignment import Similarity, align
+from orbslam2py.evaluation.alignment import align
 from orbslam2py.evaluation.matching import match_poses
 from orbslam2py.evaluation.metrics import relative_errors
-from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory
+from orbslam2py.trajectory import MAX_DIFFERENCE, Similarity, Trajectory
 
 
 @dataclass(frozen=True)

@@ -8,15 +8,18 @@ from orbslam2py.trajectory.files import (
     read_kitti,
     read_trajectory,
     read_tum,
+    write_euroc,
     write_kitti,
     write_tum,
 )
 from orbslam2py.trajectory.frame_times import FrameTable, read_frame_table, read_times
+from orbslam2py.trajectory.similarity import Similarity
 from orbslam2py.trajectory.trajectory import Trajectory
 
 __all__ = [
     "MAX_DIFFERENCE",
     "FrameTable",
+    "Similarity",
     "Trajectory",
     "TrajectoryFormat",
     "associate",
@@ -26,6 +29,7 @@ __all__ = [
     "read_times",
     "read_trajectory",
     "read_tum",
+    "write_euroc",
     "write_kitti",
     "write_tum",
 ]
