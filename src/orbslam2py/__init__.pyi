@@ -12,6 +12,11 @@ from .errors import StateError as StateError
 from .errors import VocabularyError as VocabularyError
 from .errors import WorkerError as WorkerError
 from .maps import MapSnapshot as MapSnapshot
+from .maps import export_colmap as export_colmap
+from .maps import export_g2o as export_g2o
+from .maps import export_nerfstudio as export_nerfstudio
+from .maps import export_points as export_points
+from .maps import export_trajectory as export_trajectory
 from .runs import run_sequence as run_sequence
 from .settings import Sensor as Sensor
 from .settings import Settings as Settings

@@ -10,6 +10,13 @@ from orbslam2py.maps.contents import (
     Points,
     RemovedKeyframes,
 )
+from orbslam2py.maps.exports.colmap import export_colmap
+from orbslam2py.maps.exports.colours import with_colours
+from orbslam2py.maps.exports.g2o import export_g2o
+from orbslam2py.maps.exports.images import ImageOfKeyframe, ImageSequence, images_of
+from orbslam2py.maps.exports.nerfstudio import export_nerfstudio
+from orbslam2py.maps.exports.points import export_points
+from orbslam2py.maps.exports.trajectories import export_trajectory, keyframe_path
 from orbslam2py.maps.pcd import write_pcd
 from orbslam2py.maps.ply import write_ply
 from orbslam2py.maps.snapshot import MapSnapshot, keyframe_trajectory, take_snapshot
@@ -17,14 +24,24 @@ from orbslam2py.maps.snapshot import MapSnapshot, keyframe_trajectory, take_snap
 __all__ = [
     "Cameras",
     "Covisibility",
+    "ImageOfKeyframe",
+    "ImageSequence",
     "Keyframes",
     "MapContents",
     "MapSnapshot",
     "Observations",
     "Points",
     "RemovedKeyframes",
+    "export_colmap",
+    "export_g2o",
+    "export_nerfstudio",
+    "export_points",
+    "export_trajectory",
+    "images_of",
+    "keyframe_path",
     "keyframe_trajectory",
     "take_snapshot",
+    "with_colours",
     "write_pcd",
     "write_ply",
 ]

@@ -10,6 +10,8 @@ import numpy as np
 from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py._files import atomic_write
 
+_FRAME = "camera frame of keyframe 0: x right, y down, z forward"
+
 _HEADER = """\
 # .PCD v0.7 - Point Cloud Data file format
 # {comment}
@@ -32,6 +34,7 @@ def write_pcd(
     *,
     colours: ByteArray | None = None,
     unit: str = "m",
+    frame: str = _FRAME,
 ) -> None:
     """Write points as a binary PCD file, version 0.7, an unordered cloud.
 
@@ -49,6 +52,8 @@ def write_pcd(
         Red, green and blue of every point, uint8 (p, 3); no such field if None.
     unit
         Of the positions, for the comment in the file.
+    frame
+        What the axes are, for the comment in the file.
 
     Raises
     ------
@@ -68,7 +73,7 @@ def write_pcd(
         table = np.column_stack([table, packed])
     count = len(names)
     header = _HEADER.format(
-        comment=f"camera frame of keyframe 0: x right, y down, z forward [{unit}]",
+        comment=f"{frame} [{unit}]",
         fields=" ".join(names),
         fours=" ".join(["4"] * count),
         types=" ".join(["F"] * count),
