@@ -10,6 +10,7 @@ from orbslam2py.maps.contents import (
     Points,
     RemovedKeyframes,
 )
+from orbslam2py.maps.crop import crop_to_box, crop_to_times, keep_keyframes
 from orbslam2py.maps.exports.colmap import export_colmap
 from orbslam2py.maps.exports.colours import with_colours
 from orbslam2py.maps.exports.g2o import export_g2o
@@ -20,6 +21,7 @@ from orbslam2py.maps.exports.trajectories import export_trajectory, keyframe_pat
 from orbslam2py.maps.pcd import write_pcd
 from orbslam2py.maps.ply import write_ply
 from orbslam2py.maps.snapshot import MapSnapshot, keyframe_trajectory, take_snapshot
+from orbslam2py.maps.transform import transform_map
 
 __all__ = [
     "Cameras",
@@ -32,15 +34,19 @@ __all__ = [
     "Observations",
     "Points",
     "RemovedKeyframes",
+    "crop_to_box",
+    "crop_to_times",
     "export_colmap",
     "export_g2o",
     "export_nerfstudio",
     "export_points",
     "export_trajectory",
     "images_of",
+    "keep_keyframes",
     "keyframe_path",
     "keyframe_trajectory",
     "take_snapshot",
+    "transform_map",
     "with_colours",
     "write_pcd",
     "write_ply",
