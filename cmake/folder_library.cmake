@@ -12,6 +12,9 @@ else()
   # Where fused multiply-add is part of the baseline, contraction would change results.
   target_compile_options(orbslam_options INTERFACE -ffp-contract=off)
 endif()
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  target_compile_options(orbslam_options INTERFACE -fpch-preprocess) # lets ccache see them
+endif()
 if(ORBSLAM2PY_SANITIZE)
   target_compile_options(orbslam_options INTERFACE
     -fsanitize=${ORBSLAM2PY_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer
@@ -21,6 +24,9 @@ if(ORBSLAM2PY_SANITIZE)
   # without: what one allocates the other could not free.
   target_compile_definitions(orbslam_options INTERFACE EIGEN_MALLOC_ALREADY_ALIGNED=1)
 endif()
+
+# Parsing Eigen is most of what a small file costs the compiler.
+set(ORBSLAM2PY_EIGEN_HEADERS <Eigen/Core> <Eigen/Geometry> <Eigen/LU>)
 
 # orbslam_folder(NAME [DEPENDS folder...] [PUBLIC lib...] [PRIVATE lib...] [AVX2 source...])
 function(orbslam_folder NAME)
@@ -33,6 +39,11 @@ function(orbslam_folder NAME)
     target_link_libraries(orbslam_${NAME} PUBLIC ${depends} ${ARG_PUBLIC}
       PRIVATE orbslam_options ${ARG_PRIVATE})
     target_include_directories(orbslam_${NAME} PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})
+    if(NAME STREQUAL "base")
+      target_precompile_headers(orbslam_base PRIVATE ${ORBSLAM2PY_EIGEN_HEADERS})
+    else()
+      target_precompile_headers(orbslam_${NAME} REUSE_FROM orbslam_base)
+    endif()
     if(ORBSLAM2PY_SANITIZE)
       target_link_options(orbslam_${NAME} PUBLIC -fsanitize=${ORBSLAM2PY_SANITIZE})
     endif()
@@ -43,6 +54,6 @@ function(orbslam_folder NAME)
   endif()
   foreach(source ${ARG_AVX2})
     set_source_files_properties(${CMAKE_CURRENT_SOURCE_DIR}/${NAME}/${source}
-      PROPERTIES COMPILE_OPTIONS "-mavx2")
+      PROPERTIES COMPILE_OPTIONS "-mavx2" SKIP_PRECOMPILE_HEADERS ON)
   endforeach()
 endfunction()
