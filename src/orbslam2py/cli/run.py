@@ -130,6 +130,12 @@ def run(
             help="Seconds after which that ends with what it has reached.", metavar="SECONDS"
         ),
     ] = None,
+    final_adjustment: Annotated[
+        bool,
+        typer.Option(
+            "--final-adjustment", help="At the end, refine the finished map before it is written."
+        ),
+    ] = False,
     seed: Annotated[int, typer.Option(help="Seed of all random draws.", min=0)] = 0,
     force: Annotated[
         bool, typer.Option("--force", help="Write into an output folder that is not empty.")
@@ -153,6 +159,7 @@ def run(
         stride=stride,
         max_frames=max_frames,
         localize_after=localize,
+        final_adjustment=final_adjustment,
     )
     code = run_and_show(
         images, options, vocabulary=vocabulary, output=output, force=force, quiet=quiet

@@ -32,9 +32,16 @@ class RunOptions:
     """Take at most so many frames."""
     localize_after: int | None = None
     """Switch to localization mode after so many frames."""
+    final_adjustment: bool = False
+    """Refine the finished map as a whole (`System.optimize`) before the results are written."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sensor", Sensor(self.sensor))
+        if self.final_adjustment and self.localize_after is not None:
+            raise DatasetError(
+                "--final-adjustment changes the map, which --localize leaves as it is; leave out one "
+                "of them"
+            )
 
     def n_frames(self, source: Sequence | LiveSource) -> int | None:
         """How many frames a run over the source will take; None for a camera without an end.

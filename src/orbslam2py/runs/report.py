@@ -115,6 +115,9 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "losses": each_loss,
         "loops": [loop_entry(loop) for loop in result.loops],
         "full_adjustments": [adjustment_entry(a) for a in result.full_adjustments],
+        "final_adjustment": None
+        if result.final_adjustment is None
+        else adjustment_entry(result.final_adjustment),
     }
     if evaluation is not None:
         report |= evaluation.figures.as_dict()

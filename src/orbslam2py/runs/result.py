@@ -81,6 +81,8 @@ class RunResult:
     """Loops closed, over all maps."""
     full_adjustments: list[FullAdjustmentRecord] = field(default_factory=list)
     """Full bundle adjustments, also those that were given up."""
+    final_adjustment: FullAdjustmentRecord | None = None
+    """The one of the finished map, if it was asked for; the last of these."""
     n_lost_by_camera: int = 0
     """Images of a camera that came while an earlier one was being tracked."""
     is_live: bool = False
