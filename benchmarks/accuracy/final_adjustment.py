@@ -3,8 +3,8 @@
 
 Every sequence with ground truth, recorded and made up, several times from different first frames
 and with different seeds, deterministic: with and without, a run differs in nothing but its end. The
-adjustment is on by default for recorded data only if it makes no sequence worse by more than 2 % and
-helps the median.
+adjustment is on by default for recorded data only if it makes no sequence worse by more than 2 %
+and helps the median.
 
     python -m benchmarks.accuracy.final_adjustment --starts 5
 """
@@ -139,8 +139,8 @@ def main() -> None:
     middle = statistics.median(ratios)
     met = max(ratios) <= WORST_RATIO and middle < 1
     console.print(
-        f"Median ratio {middle:.3f}, worst {max(ratios):.3f}: the condition for being on by default "
-        f"is {in_words(met)}."
+        f"Median ratio {middle:.3f}, worst {max(ratios):.3f}: the condition for being on by "
+        f"default is {in_words(met)}."
     )
 
 

@@ -39,8 +39,8 @@ class RunOptions:
         object.__setattr__(self, "sensor", Sensor(self.sensor))
         if self.final_adjustment and self.localize_after is not None:
             raise DatasetError(
-                "--final-adjustment changes the map, which --localize leaves as it is; leave out one "
-                "of them"
+                "--final-adjustment changes the map, which --localize leaves as it is; leave out "
+                "one of them"
             )
 
     def n_frames(self, source: Sequence | LiveSource) -> int | None:

@@ -344,8 +344,8 @@ class System:
         Parameters
         ----------
         stop : threading.Event, optional
-            Gives up when it is set, as a Ctrl-C does. In the deterministic mode nothing does once it
-            has begun.
+            Gives up when it is set, as a Ctrl-C does. In the deterministic mode nothing does once
+            it has begun.
 
         Returns
         -------
