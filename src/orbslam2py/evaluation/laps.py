@@ -12,10 +12,9 @@ import numpy as np
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import DatasetError
-from orbslam2py.evaluation.alignment import align
 from orbslam2py.evaluation.matching import match_poses
 from orbslam2py.evaluation.metrics import relative_errors
-from orbslam2py.trajectory import MAX_DIFFERENCE, Similarity, Trajectory
+from orbslam2py.trajectory import MAX_DIFFERENCE, Similarity, Trajectory, align
 
 
 @dataclass(frozen=True)

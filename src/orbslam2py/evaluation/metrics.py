@@ -14,9 +14,9 @@ from typing import Any, TypeVar
 import numpy as np
 
 from orbslam2py._arrays import FloatArray, IntArray
-from orbslam2py.evaluation.alignment import Alignment, align, differ_in_unit
+from orbslam2py.evaluation.alignment import Alignment, differ_in_unit
 from orbslam2py.evaluation.matching import Matched, describe_match, match_poses
-from orbslam2py.trajectory import MAX_DIFFERENCE, Similarity, Trajectory
+from orbslam2py.trajectory import MAX_DIFFERENCE, Similarity, Trajectory, align
 from orbslam2py.trajectory.rotations import inverse_poses, rotation_angles
 
 #: Lengths of KITTI's path segments [m].

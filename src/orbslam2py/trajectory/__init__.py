@@ -13,7 +13,7 @@ from orbslam2py.trajectory.files import (
     write_tum,
 )
 from orbslam2py.trajectory.frame_times import FrameTable, read_frame_table, read_times
-from orbslam2py.trajectory.similarity import Similarity
+from orbslam2py.trajectory.similarity import Similarity, align
 from orbslam2py.trajectory.trajectory import Trajectory
 
 __all__ = [
@@ -22,6 +22,7 @@ __all__ = [
     "Similarity",
     "Trajectory",
     "TrajectoryFormat",
+    "align",
     "associate",
     "read_euroc",
     "read_frame_table",
