@@ -19,6 +19,12 @@ from orbslam2py.maps.exports.nerfstudio import export_nerfstudio
 from orbslam2py.maps.exports.points import export_points
 from orbslam2py.maps.exports.trajectories import export_trajectory, keyframe_path
 from orbslam2py.maps.pcd import write_pcd
+from orbslam2py.maps.placement import (
+    Placement,
+    place_by_length,
+    place_by_points,
+    place_by_trajectory,
+)
 from orbslam2py.maps.ply import write_ply
 from orbslam2py.maps.snapshot import MapSnapshot, keyframe_trajectory, take_snapshot
 from orbslam2py.maps.transform import transform_map
@@ -32,6 +38,7 @@ __all__ = [
     "MapContents",
     "MapSnapshot",
     "Observations",
+    "Placement",
     "Points",
     "RemovedKeyframes",
     "crop_to_box",
@@ -45,6 +52,9 @@ __all__ = [
     "keep_keyframes",
     "keyframe_path",
     "keyframe_trajectory",
+    "place_by_length",
+    "place_by_points",
+    "place_by_trajectory",
     "take_snapshot",
     "transform_map",
     "with_colours",
