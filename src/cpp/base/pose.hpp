@@ -26,6 +26,14 @@ class Pose {
 
   /// From a 4x4 homogeneous matrix; the rotation is projected onto SO(3).
   static Pose from_matrix(const Eigen::Matrix4d& matrix);
+  /// Takes a quaternion of unit length as it is, so that a pose that was written down comes back
+  /// bit by bit. The caller has checked its length.
+  static Pose from_unit(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation) {
+    Pose pose;
+    pose.rotation_ = rotation;
+    pose.translation_ = translation;
+    return pose;
+  }
   /// Exponential map; stable for small rotations.
   static Pose exp(const Vector6d& xi);
 

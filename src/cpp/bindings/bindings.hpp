@@ -13,6 +13,7 @@ void bind_camera(pybind11::module_& module);
 void bind_frame(pybind11::module_& module);
 void bind_map(pybind11::module_& module);
 void bind_places(pybind11::module_& module);
+void bind_map_contents(pybind11::module_& module);
 void bind_geometry(pybind11::module_& module);
 void bind_matching(pybind11::module_& module);
 void bind_optimize(pybind11::module_& module);

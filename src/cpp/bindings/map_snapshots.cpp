@@ -125,6 +125,21 @@ void bind_trajectory(py::module_& module) {
            "Append a frame; without a pose it repeats the last relative pose.")
       .def("rebuild", &TrajectoryRecorder::rebuild, "map"_a, Release(),
            "All poses from the present keyframe poses, anchored at keyframe 0.")
+      .def(
+          "entries",
+          [](const TrajectoryRecorder& self) {
+            const TrajectoryRecorder::Entries entries = self.entries();
+            py::dict arrays;
+            arrays["timestamps"] = to_array(entries.timestamps);
+            arrays["frames"] = to_array(entries.frames);
+            arrays["keyframes"] = to_array(entries.references);
+            arrays["T_cr"] = rows(entries.T_cr);
+            arrays["lost"] = flags(entries.lost);
+            return arrays;
+          },
+          "All frames relative to their reference keyframes: arrays timestamps (n,) [s], frames\n"
+          "(n,) ids, keyframes (n,) ids or -1, T_cr (n, 7): x, y, z, w of a unit quaternion, then\n"
+          "the translation at the keyframe's first scale; lost (n,).")
       .def("clear", &TrajectoryRecorder::clear, "Forget all frames.")
       .def_property_readonly("n_bytes", &TrajectoryRecorder::n_bytes, "Allocated memory.");
 }

@@ -12,6 +12,7 @@ PYBIND11_MODULE(_core, module) {
   bind_frame(module);
   bind_map(module);
   bind_places(module);
+  bind_map_contents(module);
   bind_geometry(module);
   bind_matching(module);
   bind_optimize(module);

@@ -86,6 +86,7 @@ class Camera {
   /// not finite, bf is negative, or there is a baseline without a positive depth_ratio.
   explicit Camera(const CameraOptions& options);
 
+  const CameraOptions& options() const { return options_; }
   const Pinhole& pinhole() const { return pinhole_; }
   const LensModel& lens() const { return *lens_; }
   const ImageBounds& bounds() const { return bounds_; }
@@ -101,6 +102,7 @@ class Camera {
   double right_column(double u, double z) const { return u - bf_ / z; }
 
  private:
+  CameraOptions options_;
   Pinhole pinhole_;
   std::shared_ptr<const LensModel> lens_;
   ImageBounds bounds_;

@@ -34,6 +34,8 @@ struct ScaledPose {
 ///
 /// See docs/method/map.md#keyframes and what follows it, docs/method/threads.md#locks.
 class Map {
+  friend class MapContentsAccess;  // map/contents.cpp, restore.cpp: the map as a whole
+
  public:
   // See docs/method/map.md#covisibility and docs/method/loops.md#essential-graph.
   static constexpr int kCovisibilityThreshold = 15;  ///< shared points that make a neighbour

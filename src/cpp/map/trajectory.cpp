@@ -77,6 +77,15 @@ Trajectory TrajectoryRecorder::rebuild(const Map& map) const {
   return trajectory;
 }
 
+TrajectoryRecorder::Entries TrajectoryRecorder::entries() const {
+  Entries entries{timestamps_, frames_, references_, {}, lost_};
+  entries.T_cr.reserve(size());
+  for (const RelativePose& r : T_cr_) {
+    entries.T_cr.push_back({r.qx, r.qy, r.qz, r.qw, r.x, r.y, r.z});
+  }
+  return entries;
+}
+
 void TrajectoryRecorder::clear() { *this = TrajectoryRecorder(); }
 
 std::size_t TrajectoryRecorder::n_bytes() const {

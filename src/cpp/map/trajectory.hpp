@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -29,6 +30,18 @@ class TrajectoryRecorder {
   /// All poses, through culled keyframes as well, anchored at keyframe 0. Takes the map's read
   /// lock. Frames recorded before the first pose have the identity. Throws StateError as above.
   Trajectory rebuild(const Map& map) const;
+
+  /// Everything recorded, relative to the keyframes, as map files keep it.
+  struct Entries {
+    std::vector<double> timestamps;  ///< seconds
+    std::vector<FrameId> frames;
+    std::vector<KeyFrameId> references;  ///< invalid before the first pose
+    /// T_cr of camera and reference keyframe at the keyframe's first scale: x, y, z, w of the unit
+    /// quaternion, then the translation.
+    std::vector<std::array<double, 7>> T_cr;
+    std::vector<std::uint8_t> lost;
+  };
+  Entries entries() const;
 
   void clear();
   std::size_t size() const { return timestamps_.size(); }

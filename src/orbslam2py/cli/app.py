@@ -57,7 +57,7 @@ def _options(
     """Visual SLAM for one camera, a stereo pair or RGB-D: images in, path and map out."""
 
 
-app.command("run")(run.run)
+app.command("run", cls=run.RunCommand)(run.run)
 app.command("demo")(demo.demo)
 app.command("synthesize")(synthesize.synthesize)
 app.command("evaluate")(evaluate.evaluate)

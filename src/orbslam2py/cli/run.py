@@ -4,12 +4,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
+import numpy as np
 import typer
+import typer.core
 from rich.console import Console
 from rich.markup import escape
 
+from orbslam2py._arrays import FloatArray
 from orbslam2py._files import describe_error
 from orbslam2py.cli.display import (
     Display,
@@ -23,13 +26,21 @@ from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.interrupts import StopOnInterrupt
 from orbslam2py.datasets import open_input
 from orbslam2py.datasets.base import LiveSource, Sequence
+from orbslam2py.errors import DatasetError
+from orbslam2py.maps import load_map
+from orbslam2py.maps.setup_check import check_sensor
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.outputs import new_output_folder
 from orbslam2py.runs.remedies import why_nothing_was_tracked
 from orbslam2py.runs.run import FinishedRun, run_sequence
+from orbslam2py.settings import Settings
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.options import SystemOptions
+from orbslam2py.trajectory.rotations import poses_from, rotations_from_quaternions
 from orbslam2py.vocabulary.vocabulary import load_vocabulary
+
+#: Numbers of a position, and of a position with a quaternion.
+_POSITION, _POSE = 3, 7
 
 EXAMPLE = """
 **Example**
@@ -41,6 +52,10 @@ EXAMPLE = """
     orbslam2py run video.mp4 --sensor mono --settings my.yaml
 
     orbslam2py run 0 --sensor mono --settings my.yaml
+
+    orbslam2py run monday.mp4 --sensor mono --settings my.yaml --save office.orbmap
+
+    orbslam2py run tuesday.mp4 --load office.orbmap --localize
 """
 
 
@@ -103,14 +118,48 @@ def run(
             metavar="FILE_OR_FOLDER",
         ),
     ] = None,
+    load: Annotated[
+        Path | None,
+        typer.Option(
+            help="Begin in a map that was saved before; its settings serve if --settings gives no "
+            "others.",
+            metavar="FILE",
+        ),
+    ] = None,
+    initial_pose: Annotated[
+        str | None,
+        typer.Option(
+            help="Where in the loaded map the camera may be: tried before all else.",
+            metavar="X,Y,Z[,QX,QY,QZ,QW]",
+        ),
+    ] = None,
+    allow_other_setup: Annotated[
+        bool,
+        typer.Option(
+            "--allow-other-setup",
+            help="Load the map although it is of another camera or other visual words.",
+        ),
+    ] = False,
     localize: Annotated[
         int | None,
         typer.Option(
-            help="Switch to localization mode after so many frames: the map stays as it is.",
-            min=1,
-            metavar="N",
+            help="Localization mode, in which the map stays as it is: after so many frames; "
+            "without a number from the first on, in a loaded map.",
+            min=0,
+            metavar="[N]",
         ),
     ] = None,
+    save: Annotated[
+        Path | None, typer.Option(help="Save the last map in this file.", metavar="FILE")
+    ] = None,
+    autosave: Annotated[
+        float | None,
+        typer.Option(help="Save it every so many seconds on the way as well.", metavar="SECONDS"),
+    ] = None,
+    save_images: Annotated[
+        bool,
+        typer.Option("--save-images", help="Keep a small grey image of every keyframe in the map."),
+    ] = False,
     loop_closing: Annotated[
         bool,
         typer.Option(
@@ -144,7 +193,13 @@ def run(
 ) -> None:
     """Track a recorded sequence, a video or a camera; write trajectory, map and report."""
     log_to(Console(stderr=True), quiet=quiet)  # opening warns already
-    images = open_input(sequence, sensor, settings=settings, fps=fps, times=times, mask=mask)
+    loaded = None if load is None else load_map(load, images=True)
+    chosen: Settings | str | None = settings
+    if loaded is not None and settings is None:
+        if sensor is not None:
+            check_sensor(loaded, sensor)
+        sensor, chosen = loaded.sensor, loaded.settings
+    images = open_input(sequence, sensor, settings=chosen, fps=fps, times=times, mask=mask)
     options = RunOptions(
         images.sensor,
         SystemOptions(
@@ -152,6 +207,7 @@ def run(
             loop_closing=loop_closing,
             full_adjustment=full_adjustment,
             full_adjustment_time_limit=full_adjustment_time_limit,
+            keyframe_images=save_images,
             seed=seed,
         ),
         realtime=realtime,
@@ -160,6 +216,11 @@ def run(
         max_frames=max_frames,
         localize_after=localize,
         final_adjustment=final_adjustment,
+        load_map=loaded,
+        initial_pose=None if initial_pose is None else read_initial_pose(initial_pose),
+        allow_other_setup=allow_other_setup,
+        save_map=save,
+        autosave=autosave,
     )
     code = run_and_show(
         images, options, vocabulary=vocabulary, output=output, force=force, quiet=quiet
@@ -168,6 +229,47 @@ def run(
 
 
 run.__doc__ = f"{run.__doc__}\n{EXAMPLE}"
+
+
+class RunCommand(typer.core.TyperCommand):
+    """Takes ``--localize`` with and without a number."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Give ``--localize`` its number 0 where none follows."""
+        complete: list[str] = []
+        for argument, following in zip(args, [*args[1:], ""], strict=True):
+            complete.append(argument)
+            if argument == "--localize" and not following.lstrip("-").isdecimal():
+                complete.append("0")
+        return super().parse_args(ctx, complete)
+
+
+def read_initial_pose(text: str) -> FloatArray:
+    """Read the pose of a camera in the world: a position, and a unit quaternion if it is turned.
+
+    Returns
+    -------
+    array (4, 4)
+        Camera to world.
+
+    Raises
+    ------
+    DatasetError
+        If it is neither three nor seven numbers.
+    """
+    try:
+        numbers = np.array([float(number) for number in text.split(",")])
+    except ValueError:
+        numbers = np.zeros(0)
+    if len(numbers) == _POSITION:
+        numbers = np.append(numbers, [0, 0, 0, 1])
+    if len(numbers) != _POSE or not np.isfinite(numbers).all() or not numbers[3:].any():
+        raise DatasetError(
+            f"--initial-pose {text} is not a pose; give three numbers x,y,z or seven "
+            "x,y,z,qx,qy,qz,qw"
+        )
+    T_wc = poses_from(rotations_from_quaternions(numbers[None, 3:]), numbers[None, :3])
+    return np.asarray(T_wc[0])
 
 
 def run_and_show(

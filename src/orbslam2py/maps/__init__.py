@@ -9,8 +9,17 @@ from orbslam2py.maps.contents import (
     Observations,
     Points,
     RemovedKeyframes,
+    restore_contents,
+    take_contents,
 )
-from orbslam2py.maps.crop import crop_to_box, crop_to_times, keep_keyframes
+from orbslam2py.maps.edits.crop import crop_to_box, crop_to_times, keep_keyframes
+from orbslam2py.maps.edits.placement import (
+    Placement,
+    place_by_length,
+    place_by_points,
+    place_by_trajectory,
+)
+from orbslam2py.maps.edits.transform import transform_map
 from orbslam2py.maps.exports.colmap import export_colmap
 from orbslam2py.maps.exports.colours import with_colours
 from orbslam2py.maps.exports.g2o import export_g2o
@@ -18,16 +27,12 @@ from orbslam2py.maps.exports.images import ImageOfKeyframe, ImageSequence, image
 from orbslam2py.maps.exports.nerfstudio import export_nerfstudio
 from orbslam2py.maps.exports.points import export_points
 from orbslam2py.maps.exports.trajectories import export_trajectory, keyframe_path
+from orbslam2py.maps.map_file import save_map
+from orbslam2py.maps.map_reader import load_map
 from orbslam2py.maps.pcd import write_pcd
-from orbslam2py.maps.placement import (
-    Placement,
-    place_by_length,
-    place_by_points,
-    place_by_trajectory,
-)
 from orbslam2py.maps.ply import write_ply
+from orbslam2py.maps.saved_map import RecordedFrames, Run, SavedMap, VocabularyIdentity
 from orbslam2py.maps.snapshot import MapSnapshot, keyframe_trajectory, take_snapshot
-from orbslam2py.maps.transform import transform_map
 
 __all__ = [
     "Cameras",
@@ -40,7 +45,11 @@ __all__ = [
     "Observations",
     "Placement",
     "Points",
+    "RecordedFrames",
     "RemovedKeyframes",
+    "Run",
+    "SavedMap",
+    "VocabularyIdentity",
     "crop_to_box",
     "crop_to_times",
     "export_colmap",
@@ -52,9 +61,13 @@ __all__ = [
     "keep_keyframes",
     "keyframe_path",
     "keyframe_trajectory",
+    "load_map",
     "place_by_length",
     "place_by_points",
     "place_by_trajectory",
+    "restore_contents",
+    "save_map",
+    "take_contents",
     "take_snapshot",
     "transform_map",
     "with_colours",

@@ -18,6 +18,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from orbslam2py import _core as core
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
 from orbslam2py.trajectory.rotations import (
     inverse_poses,
@@ -334,6 +335,15 @@ class MapContents:
             elif isinstance(value, np.ndarray):
                 yield field.name, value
 
+    def as_dict(self) -> dict[str, Any]:
+        """All arrays and numbers by name, as the C++ core takes them."""
+        numbers = {
+            "map_index": self.map_index,
+            "next_keyframe": self.next_keyframe,
+            "next_point": self.next_point,
+        }
+        return {**numbers, **dict(self.arrays())}
+
     def first_difference(self, other: MapContents) -> str | None:
         """Name the first array in which two maps differ, bit by bit; None if they are equal.
 
@@ -356,6 +366,64 @@ class MapContents:
             digest.update(f"\n{name} {array.dtype.str} {array.shape}\n".encode())
             digest.update(np.ascontiguousarray(array).data)
         return digest.hexdigest()
+
+
+def take_contents(slam_map: core.Map, known: IntArray | None = None) -> MapContents:
+    """Copy everything of a map, as of one moment, while the system may be running.
+
+    Keyframes that local mapping has not taken in yet, and what only they see, are not part of it.
+
+    Parameters
+    ----------
+    slam_map
+        The map.
+    known
+        Ids (m,), ascending, of keyframes whose keypoints, which never change, are left out.
+    """
+    arrays = core.map_contents(slam_map, np.zeros(0, np.int64) if known is None else known)
+    groups: dict[str, dict[str, NDArray[Any]]] = {}
+    for name, array in arrays.items():
+        group, _, field = name.rpartition(".")
+        groups.setdefault(group, {})[field] = array
+    return MapContents(
+        **groups[""],  # type: ignore[arg-type]  # the numbers, and the loop edges
+        cameras=Cameras(**groups["cameras"]),
+        keyframes=Keyframes(**groups["keyframes"]),
+        removed_keyframes=RemovedKeyframes(**groups["removed_keyframes"]),
+        points=Points(**groups["points"]),
+        observations=Observations(**groups["observations"]),
+        covisibility=Covisibility(**groups["covisibility"]),
+    )
+
+
+def restore_contents(
+    contents: MapContents,
+    slam_map: core.Map | None = None,
+    vocabulary: core.Vocabulary | None = None,
+    index: core.KeyFrameIndex | None = None,
+) -> core.Map:
+    """Make a map of its contents.
+
+    Parameters
+    ----------
+    contents
+        Everything that the map is.
+    slam_map
+        An empty map to fill; a new one by default.
+    vocabulary
+        Describes the keyframes by words, which recognising places needs.
+    index
+        Gets the keyframes, once they are described.
+
+    Raises
+    ------
+    MapFileError
+        If the contents are impossible; names the thing. Nothing was changed then.
+    """
+    if slam_map is None:
+        slam_map = core.Map()
+    core.restore_map(slam_map, contents.as_dict(), vocabulary, index)
+    return slam_map
 
 
 def _row_of(ids: IntArray, wanted: int, what: str) -> int:

@@ -3,10 +3,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
+from pathlib import Path
 
+from orbslam2py._arrays import FloatArray
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.errors import DatasetError
+from orbslam2py.maps.saved_map import SavedMap
 from orbslam2py.runs.feeds import is_sequence
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.options import SystemOptions
@@ -31,17 +35,38 @@ class RunOptions:
     max_frames: int | None = None
     """Take at most so many frames."""
     localize_after: int | None = None
-    """Switch to localization mode after so many frames."""
+    """Switch to localization mode after so many frames; 0, in a loaded map: from the first on."""
     final_adjustment: bool = False
     """Refine the finished map as a whole (`System.optimize`) before the results are written."""
+    load_map: SavedMap | None = None
+    """Begin in this map."""
+    initial_pose: FloatArray | None = None
+    """Where in the loaded map the camera may be, (4, 4) camera to world."""
+    allow_other_setup: bool = False
+    """Load the map although it was made with another camera or other visual words."""
+    save_map: Path | None = None
+    """Save the last map in this file at the end ..."""
+    autosave: float | None = None
+    """... and every so many seconds on the way."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sensor", Sensor(self.sensor))
+        if self.localize_after == 0 and self.load_map is None:
+            raise DatasetError(
+                "--localize needs a map from the beginning: load one with --load, or say after how "
+                "many frames the map is to stay as it is"
+            )
         if self.final_adjustment and self.localize_after is not None:
             raise DatasetError(
                 "--final-adjustment changes the map, which --localize leaves as it is; leave out "
                 "one of them"
             )
+        if self.initial_pose is not None and self.load_map is None:
+            raise DatasetError("--initial-pose says where in a map the camera is; load one: --load")
+        if self.autosave is not None and self.save_map is None:
+            raise DatasetError("--autosave needs the file to save to: --save FILE")
+        if self.autosave is not None and not (math.isfinite(self.autosave) and self.autosave > 0):
+            raise DatasetError(f"--autosave must be more than 0 seconds, got {self.autosave:g}")
 
     def n_frames(self, source: Sequence | LiveSource) -> int | None:
         """How many frames a run over the source will take; None for a camera without an end.

@@ -15,6 +15,7 @@ from orbslam2py._files import describe_error
 from orbslam2py._version import __version__
 from orbslam2py.errors import OrbSlamError
 from orbslam2py.evaluation import Alignment, Evaluation, evaluate_trajectory
+from orbslam2py.maps.saved_map import SavedMap
 from orbslam2py.runs.losses import losses_report
 from orbslam2py.runs.result import RunResult
 from orbslam2py.settings.sensor import Sensor
@@ -101,6 +102,8 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "dropped_frames": result.n_dropped,
         "keyframes": len(result.keyframes),
         "map_points": len(result.snapshot.point_ids),
+        "loaded_map": loaded_map_entry(options.load_map),
+        "saved_map": None if result.saved_map is None else str(result.saved_map),
         "loops_closed": len(result.loops),
         "relocalisations": result.n_relocalizations,
         "resets": result.n_resets,
@@ -123,6 +126,18 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         report |= evaluation.figures.as_dict()
         report["ate_keyframes_rmse_m"] = evaluation.keyframes_ate_rmse
     return report
+
+
+def loaded_map_entry(loaded: SavedMap | None) -> dict[str, Any] | None:
+    """What report.json says about the map that the run began in."""
+    if loaded is None:
+        return None
+    return {
+        "file": loaded.source,
+        "keyframes": len(loaded.contents.keyframes),
+        "map_points": len(loaded.contents.points),
+        "runs": len(loaded.runs),
+    }
 
 
 def loop_entry(loop: LoopClosed) -> dict[str, Any]:

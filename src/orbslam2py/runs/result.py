@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -87,6 +88,8 @@ class RunResult:
     """Images of a camera that came while an earlier one was being tracked."""
     is_live: bool = False
     """The images came from a camera."""
+    saved_map: Path | None = None
+    """The file that the last map was saved in."""
     interrupted: bool = False
     """The run was stopped before its end; never for a camera, which has none."""
     error: Exception | None = None

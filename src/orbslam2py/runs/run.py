@@ -12,6 +12,7 @@ from typing import Any
 from orbslam2py import _core as core
 from orbslam2py.datasets import RecordedSequence
 from orbslam2py.datasets.base import LiveSource, Sequence
+from orbslam2py.maps.map_writer import check_map_target
 from orbslam2py.runs.losses import find_losses, last_loss_warning
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.outputs import OutputWriter, link_latest, prepare_output_folder
@@ -85,8 +86,8 @@ def run_sequence(
     DatasetError
         If the options make no sense for the sequence, none of its first images is there, or the
         folder cannot take results.
-    SettingsError, VocabularyError
-        If these cannot be used.
+    SettingsError, VocabularyError, MapFileError
+        If these cannot be used, or the map could not be saved at the end.
 
     Examples
     --------
@@ -99,6 +100,8 @@ def run_sequence(
     options = options or RunOptions(sequence.settings.sensor)
     if not isinstance(vocabulary, core.Vocabulary):
         vocabulary = load_vocabulary(vocabulary)
+    if options.save_map is not None:
+        check_map_target(options.save_map)
     runner = SequenceRunner(sequence, sequence.settings, vocabulary, options)
     folder = None
     if output is not None:

@@ -101,7 +101,17 @@ class SequenceRunner:
         begin = time.perf_counter()
         in_time = options.realtime or self._feed.is_live
         how = replace(options.system, wait_for_mapping=not in_time)
-        system = System(result.settings, options.sensor, self._vocabulary, **asdict(how))
+        system = System(
+            result.settings,
+            options.sensor,
+            self._vocabulary,
+            load_map=options.load_map,
+            initial_pose=options.initial_pose,
+            allow_other_setup=options.allow_other_setup,
+            **asdict(how),
+        )
+        if options.save_map is not None and options.autosave is not None:
+            system.autosave(options.save_map, options.autosave)
         stop = stop or threading.Event()
         try:
             self._process(system, progress, stop)
@@ -116,6 +126,7 @@ class SequenceRunner:
             seen = f"{len(result.rows)} of {result.n_frames} frames"
             _log.warning("interrupted; saving what was done so far (%s)", seen)
         self._shut_down(system)
+        self._save_map(system)
         self._collect(system)
         result.seconds = time.perf_counter() - begin
         return result
@@ -195,6 +206,21 @@ class SequenceRunner:
     def _shut_down(self, system: System) -> None:
         try:
             system.shutdown(drain=not self.result.interrupted and self.result.error is None)
+        except Exception as error:
+            if self.result.error is None:
+                self._take_note(error)
+
+    def _save_map(self, system: System) -> None:
+        path = self._options.save_map
+        if path is None:
+            return
+        if system.n_keyframes == 0:
+            _log.warning("there is no map to save: %s is not written", path)
+            return
+        try:
+            if self._options.autosave is None:
+                system.save_map(path)
+            self.result.saved_map = path
         except Exception as error:
             if self.result.error is None:
                 self._take_note(error)

@@ -89,7 +89,18 @@ def read_groups(
         If the file cannot be read, or listing everything that is wrong: file, line, key, allowed
         values, nearest key.
     """
-    text = read_text(path)
+    return groups_of_text(read_text(path), path, sensor, allow_unknown=allow_unknown, warn=warn)
+
+
+def groups_of_text(
+    text: str,
+    path: Path,
+    sensor: Sensor,
+    *,
+    allow_unknown: bool,
+    warn: Callable[[str], None] = _log.warning,
+) -> SettingsGroups:
+    """Read the text of a settings file; the path says where it is from. See `read_groups`."""
     document = scan(text)
     if not any(map(schema.is_known, document.entries)):
         _refuse_camera_file(path, text, sensor)

@@ -25,7 +25,7 @@ from orbslam2py.settings.groups import (
     ViewerSettings,
     raise_if_any,
 )
-from orbslam2py.settings.reader import read_groups
+from orbslam2py.settings.reader import groups_of_text, read_groups
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.writer import format_settings
 
@@ -157,6 +157,28 @@ class Settings:
             viewer=self.viewer,
         )
         return format_settings(self.sensor, groups)
+
+    @classmethod
+    def from_yaml(cls, text: str, sensor: Sensor | str, *, source: str = "settings") -> Settings:
+        """Read the text of a settings file, such as `to_yaml` makes.
+
+        Parameters
+        ----------
+        text
+            In OpenCV's YAML dialect.
+        sensor
+            What to read it for.
+        source
+            Where it is from, for messages.
+
+        Raises
+        ------
+        SettingsError
+            As for `load`.
+        """
+        sensor = Sensor(sensor)
+        groups = groups_of_text(text, Path(source), sensor, allow_unknown=False)
+        return cls(sensor=sensor, **groups)
 
     def describe(self) -> list[str]:
         """Say line by line what a log should hold about these settings."""

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from orbslam2py import _core as core
+from orbslam2py._worker import Worker
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.events import (
     Callbacks,
@@ -20,7 +21,6 @@ from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord, FullBun
 from orbslam2py.slam.local_mapping import LocalMapping
 from orbslam2py.slam.loop_closing import LoopClosing
 from orbslam2py.slam.options import SystemOptions
-from orbslam2py.slam.worker import Worker
 
 
 class BackEnd:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from orbslam2py._arrays import FloatArray
-from orbslam2py.slam.worker import Worker
+from orbslam2py._worker import Worker
 
 _log = logging.getLogger(__name__)
 

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
+from orbslam2py.maps.saved_map import RecordedFrames
 from orbslam2py.slam.records import FrameFeatures
 from orbslam2py.trajectory.trajectory import Trajectory
 
@@ -46,6 +47,31 @@ class FrameRecorder:
         """One trajectory a map, relative to its keyframe 0: those ended, then the present one."""
         with self._lock:
             return [*self._ended, self._present()]
+
+    def recorded(self, map_index: int, known: npt.NDArray[np.int64]) -> RecordedFrames:
+        """The frames of the present map relative to their keyframes, as map files keep them.
+
+        Parameters
+        ----------
+        map_index : int
+            Which map is meant; no frames of another one.
+        known : array of int64 (m,)
+            Ids of the keyframes that are in the file: frames from the first on that hangs on
+            another one are left for the next time.
+        """
+        with self._lock:
+            if self._map.epoch != map_index or not len(self._recorder):
+                return RecordedFrames.none()
+            entries = self._recorder.entries()
+        unknown = ~np.isin(entries["keyframes"], known) & (entries["keyframes"] >= 0)
+        n = int(np.argmax(unknown)) if unknown.any() else len(unknown)
+        return RecordedFrames(
+            timestamps=entries["timestamps"][:n],
+            ids=entries["frames"][:n],
+            keyframes=entries["keyframes"][:n],
+            T_cr=entries["T_cr"][:n],
+            lost=entries["lost"][:n].astype(np.uint8),
+        )
 
     def _present(self) -> Trajectory:
         poses = self._recorder.rebuild(self._map)

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 
 from orbslam2py import _core as core
 from orbslam2py._timing import StageStatistics, StageTimer
-from orbslam2py.slam.worker import Worker, WorkerState
+from orbslam2py._worker import Worker, WorkerState
 
 _log = logging.getLogger(__name__)
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from orbslam2py import _core as core
+from orbslam2py._worker import Worker
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.thresholds import KeyframeThresholds
-from orbslam2py.slam.worker import Worker
 
 
 @dataclass(frozen=True)

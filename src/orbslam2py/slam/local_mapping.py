@@ -10,9 +10,9 @@ from collections.abc import Callable
 
 from orbslam2py import _core as core
 from orbslam2py._timing import StageStatistics, StageTimer
+from orbslam2py._worker import Worker
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.thresholds import MappingThresholds
-from orbslam2py.slam.worker import Worker
 
 
 class LocalMapping:

@@ -14,9 +14,9 @@ from dataclasses import replace
 import numpy as np
 
 from orbslam2py import _core as core
+from orbslam2py._worker import PauseTicket, Worker
 from orbslam2py.slam.pose_search import PoseSearch
 from orbslam2py.slam.records import PoseEstimate, Reason
-from orbslam2py.slam.worker import PauseTicket, Worker
 
 _log = logging.getLogger(__name__)
 

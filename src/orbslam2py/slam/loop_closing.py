@@ -17,13 +17,13 @@ from dataclasses import dataclass
 
 from orbslam2py import _core as core
 from orbslam2py._timing import StageStatistics, StageTimer
+from orbslam2py._worker import Worker
 from orbslam2py.errors import StateError
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.events import LoopClosed
 from orbslam2py.slam.full_bundle_adjustment import FullBundleAdjustment
 from orbslam2py.slam.options import SystemOptions
 from orbslam2py.slam.thresholds import LoopThresholds
-from orbslam2py.slam.worker import Worker
 
 _log = logging.getLogger(__name__)
 

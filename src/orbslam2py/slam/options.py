@@ -5,8 +5,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 
+import numpy as np
+import numpy.typing as npt
+
+from orbslam2py import _core as core
 from orbslam2py.errors import SettingsError
+from orbslam2py.maps.map_reader import load_map
+from orbslam2py.maps.saved_map import SavedMap, VocabularyIdentity
+from orbslam2py.maps.setup_check import check_camera, check_sensor, check_vocabulary
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings.settings import Settings, resolve_settings
+from orbslam2py.vocabulary.vocabulary import load_vocabulary, vocabulary_name
 
 
 @dataclass(frozen=True)
@@ -24,6 +35,7 @@ class SystemOptions:
     loop_closing: bool = True
     full_adjustment: bool = True
     full_adjustment_time_limit: float | None = None
+    keyframe_images: bool = False
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -39,3 +51,62 @@ class SystemOptions:
                 "deterministic mode takes no time limit for the full adjustment: what is reached "
                 "in a given time differs from run to run"
             )
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What a system is made of: given, or taken from the map that it loads."""
+
+    sensor: Sensor
+    settings: Settings
+    vocabulary: core.Vocabulary
+    identity: VocabularyIdentity
+    loaded: SavedMap | None
+
+    @classmethod
+    def of(
+        cls,
+        settings: Settings | str | Path | None,
+        sensor: Sensor | str | None,
+        vocabulary: core.Vocabulary | str | Path | None,
+        map_to_load: SavedMap | str | Path | None,
+        allow_other: bool,
+    ) -> Setup:
+        """Put together what was given and what the map brings; `System` describes the arguments."""
+        if map_to_load is None or isinstance(map_to_load, SavedMap):
+            loaded = map_to_load
+        else:
+            loaded = load_map(map_to_load, images=True)
+        if sensor is None:
+            sensor = settings.sensor if isinstance(settings, Settings) else None
+            sensor = loaded.sensor if loaded is not None else sensor
+        if sensor is None:
+            raise SettingsError("say what the images come from: sensor='mono', 'stereo' or 'rgbd'")
+        sensor = Sensor(sensor)
+        if settings is None:
+            if loaded is None:
+                raise SettingsError("settings are missing; give them, or a map that holds them")
+            settings = loaded.settings
+        if loaded is not None:
+            check_sensor(loaded, sensor)
+        settings = resolve_settings(settings, sensor)
+        words = (
+            vocabulary if isinstance(vocabulary, core.Vocabulary) else load_vocabulary(vocabulary)
+        )
+        identity = VocabularyIdentity.of(words, vocabulary_name(vocabulary))
+        if loaded is not None and not allow_other:
+            check_camera(loaded, settings)
+            check_vocabulary(loaded, identity)
+        return cls(sensor, settings, words, identity, loaded)
+
+
+def pose_given(T_wc: npt.ArrayLike | None) -> core.Pose | None:
+    """``T_cw`` of the pose that a user gave."""
+    if T_wc is None:
+        return None
+    try:
+        return core.Pose.from_matrix(np.asarray(T_wc, np.float64)).inverse()
+    except (TypeError, ValueError) as error:
+        raise SettingsError(
+            "initial_pose must be camera to world, a finite 4x4 matrix with the last row 0 0 0 1"
+        ) from error

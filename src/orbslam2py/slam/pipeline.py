@@ -14,6 +14,8 @@ from collections.abc import Callable
 from orbslam2py import _core as core
 from orbslam2py._timing import StageStatistics, StageTimer
 from orbslam2py.errors import ImageError
+from orbslam2py.maps.contents import restore_contents
+from orbslam2py.maps.saved_map import SavedMap
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
 from orbslam2py.slam.back_end import BackEnd
@@ -97,6 +99,24 @@ class Pipeline:
         """Start the workers' threads, now that everything refers to everything it needs."""
         for worker in self.back_end.workers:
             worker.start()
+
+    def begin_in(
+        self, saved: SavedMap, vocabulary: core.Vocabulary, initial_pose: core.Pose | None
+    ) -> None:
+        """Take over a saved map, before `start`: tracking is lost and searches it.
+
+        Parameters
+        ----------
+        saved : SavedMap
+            The map.
+        vocabulary : orbslam2py._core.Vocabulary
+            Describes its keyframes.
+        initial_pose : Pose or None
+            ``T_cw`` where the camera may be.
+        """
+        back_end = self.back_end
+        restore_contents(saved.contents, back_end.map, vocabulary, back_end.keyframe_index)
+        self.tracking.begin_in_loaded_map(initial_pose)
 
     # ---- one image -------------------------------------------------------------------------------
     def process(self, timestamp: float, build: BuildFrame, *, details: bool) -> TrackingRecord:

@@ -33,6 +33,11 @@ class MotionModel:
         self._last_tracked = False
 
     @property
+    def has_last(self) -> bool:
+        """Whether any frame had a pose."""
+        return self._last is not None
+
+    @property
     def last(self) -> core.TrackedFrame:
         """The last frame that had a pose; stays where tracking was lost."""
         assert self._last is not None
@@ -113,6 +118,9 @@ class PoseSearch:
     last_relocalization : int
         Id of the frame in which the camera was last found again. 0 at the beginning, as if the
         first frame had been: a young map has to prove itself.
+    initial_pose : Pose or None
+        ``T_cw`` that the user gave for the beginning in a loaded map; tried before all else until
+        a frame is found.
     """
 
     def __init__(
@@ -137,6 +145,12 @@ class PoseSearch:
         self.motion = MotionModel()
         self.reference_keyframe = -1
         self.last_relocalization = 0
+        self.initial_pose: core.Pose | None = None
+
+    @property
+    def has_last_frame(self) -> bool:
+        """Whether any frame had a pose yet; if not, the map was loaded."""
+        return self.motion.has_last
 
     def follow_map(self) -> None:
         """Bring the last frame and the reference keyframe up to date with the map."""
@@ -188,14 +202,20 @@ class PoseSearch:
         return self._optimize(frame, n_matches, Reason.FEW_INLIERS_REFERENCE)
 
     def by_relocalization(self, frame: core.TrackedFrame) -> PoseEstimate:
-        """From any keyframe that looks like the frame, without a guess."""
+        """From the user's guess, if any; else from any keyframe that looks like the frame."""
+        not_found = Reason.NOT_FOUND_IN_MAP if self.has_last_frame else Reason.SEARCHING_LOADED_MAP
         if self._relocalizer is None:
-            return PoseEstimate(Reason.NOT_FOUND_IN_MAP)
-        core.describe(frame.features, self._vocabulary)
-        n_inliers = self._relocalizer.relocalize(frame)
+            return PoseEstimate(not_found)
+        n_inliers = 0
+        if self.initial_pose is not None:
+            n_inliers = self._relocalizer.relocalize_near(frame, self.initial_pose)
         if n_inliers == 0:
-            return PoseEstimate(Reason.NOT_FOUND_IN_MAP)
-        core.anchor_frame(self._map, frame, self.reference_keyframe)
+            core.describe(frame.features, self._vocabulary)
+            n_inliers = self._relocalizer.relocalize(frame)
+        if n_inliers == 0:
+            return PoseEstimate(not_found)
+        # Keyframe 0 always lives: any anchor serves until the local map has been searched.
+        core.anchor_frame(self._map, frame, max(0, self.reference_keyframe))
         return PoseEstimate(n_matches=n_inliers, n_inliers=n_inliers, relocalized=True)
 
     def _optimize(self, frame: core.TrackedFrame, n_matches: int, too_few: Reason) -> PoseEstimate:

@@ -35,6 +35,7 @@ class Reason(str, enum.Enum):
     DEGENERATE_VIEWS = "degenerate views: planar scene, pure rotation or wrong matches"
     INITIAL_MAP_FAILED = "the first map was too small or had no depth"
     NOT_FOUND_IN_MAP = "not found in the map"
+    SEARCHING_LOADED_MAP = "searching the loaded map"
     FEW_MATCHES_LAST_FRAME = "too few matches with the last frame"
     FEW_MATCHES_REFERENCE = "too few matches with the reference keyframe"
     FEW_INLIERS_REFERENCE = "too few inliers from the reference keyframe"

@@ -82,6 +82,56 @@ class Relocalizer:
         frame.T_cw = None
         return 0
 
+    def relocalize_near(self, frame: core.TrackedFrame, T_cw: core.Pose) -> int:
+        """Find pose and associations of a frame near a guess, without words.
+
+        The points of the nearest keyframes that look the same way are searched where the guess
+        puts them.
+
+        Parameters
+        ----------
+        frame : orbslam2py._core.TrackedFrame
+            The frame.
+        T_cw : Pose
+            The guess.
+
+        Returns
+        -------
+        int
+            As for `relocalize`.
+        """
+        limits = self._limits
+        nothing = np.zeros(0, np.int64)
+        for keyframe in self._keyframes_near(T_cw):
+            frame.clear_associations()
+            frame.T_cw = T_cw
+            n_matches = core.match_keyframe_by_projection(
+                self._map, keyframe, frame, nothing, limits.guess_window, limits.guess_distance
+            )
+            if n_matches < limits.matches or self._optimize(frame) < limits.inliers:
+                continue
+            # Again from the better pose, in a narrower window.
+            found = np.unique(frame.map_points[frame.map_points >= 0])
+            core.match_keyframe_by_projection(
+                self._map, keyframe, frame, found, limits.wide_window, limits.wide_distance
+            )
+            n_inliers = self._optimize(frame)
+            if n_inliers >= limits.enough:
+                return n_inliers
+        frame.clear_associations()
+        frame.T_cw = None
+        return 0
+
+    def _keyframes_near(self, T_cw: core.Pose) -> list[int]:
+        keyframes = core.snapshot_keyframes(self._map)
+        T_wc = T_cw.inverse().matrix
+        distances = np.linalg.norm(keyframes.T_wc[:, :3, 3] - T_wc[:3, 3], axis=1)
+        # The optical axes; whoever looks the other way sees other points.
+        cosines = keyframes.T_wc[:, :3, 2] @ T_wc[:3, 2]
+        distances[cosines < self._limits.guess_cosine] = np.inf
+        nearest = np.argsort(distances, kind="stable")[: self._limits.guess_keyframes]
+        return [int(keyframes.ids[i]) for i in nearest if np.isfinite(distances[i])]
+
     def _candidates(self, frame: core.TrackedFrame) -> list[_Candidate]:
         found = core.find_relocalization_candidates(self._keyframe_index, self._map, frame.features)
         candidates = []

@@ -16,20 +16,22 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
-from orbslam2py.errors import ImageError, StateError, WorkerError
+from orbslam2py.errors import ImageError, MapFileError, SettingsError, StateError, WorkerError
+from orbslam2py.maps.contents import MapContents, take_contents
+from orbslam2py.maps.saved_map import SavedMap
 from orbslam2py.maps.snapshot import MapSnapshot, keyframe_trajectory, take_snapshot
 from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import Settings, resolve_settings
+from orbslam2py.settings.settings import Settings
 from orbslam2py.slam.back_end import BackEnd
 from orbslam2py.slam.events import Callbacks, LoopClosed
 from orbslam2py.slam.frame_source import FrameSource, SomeImages, timed_images
 from orbslam2py.slam.front_end import Mask, PairMask
 from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
-from orbslam2py.slam.options import SystemOptions
+from orbslam2py.slam.map_keeper import MapKeeper, encode_image
+from orbslam2py.slam.options import Setup, SystemOptions, pose_given
 from orbslam2py.slam.pipeline import RESET_PATIENCE, BuildFrame, Pipeline
 from orbslam2py.slam.records import TrackingRecord, TrackingState
 from orbslam2py.trajectory.trajectory import Trajectory
-from orbslam2py.vocabulary.vocabulary import load_vocabulary
 
 _log = logging.getLogger(__name__)
 
@@ -43,11 +45,20 @@ class System:
     ----------
     settings : Settings or str or path
         Calibration and extractor settings: an object, the name of a built-in (``"tum1"``,
-        ``"kitti04-12"``, ``"euroc"``...), or a file in the ORB-SLAM YAML format.
+        ``"kitti04-12"``, ``"euroc"``...), or a file in the ORB-SLAM YAML format. May be left out
+        with `load_map`: a map file holds its own.
     sensor : Sensor or str
-        ``"mono"``, ``"stereo"`` or ``"rgbd"``.
+        ``"mono"``, ``"stereo"`` or ``"rgbd"``. May be left out with `load_map`.
     vocabulary : Vocabulary or path, optional
         Visual words; the one shipped with the package if None.
+    load_map : SavedMap or path, optional
+        Begin in a map that was saved before: lost at first, every image is searched in it. It is
+        never given up for a new one, unless you `reset`.
+    initial_pose : array (4, 4), optional
+        Camera to world: where in the loaded map the camera may be; tried before all else until the
+        first image is found.
+    allow_other_setup : bool
+        Load the map although it was made with another camera or other visual words.
     deterministic : bool
         Run mapping and loop closing inline after each keyframe: two runs give the same bytes.
     wait_for_mapping : bool
@@ -64,6 +75,8 @@ class System:
         mode, whose results must not depend on the clock.
     callbacks : Callbacks, optional
         Functions that are told of loops, keyframes, losses and changes of the map.
+    keyframe_images : bool
+        Keep a small grey JPEG of every keyframe for map files.
     seed : int
         Seed of all random draws.
 
@@ -77,8 +90,9 @@ class System:
 
     Raises
     ------
-    SettingsError, VocabularyError
-        If these cannot be read or are inconsistent; no thread is left running.
+    SettingsError, VocabularyError, MapFileError
+        If these cannot be read or are inconsistent, or the loaded map is one of another camera,
+        sensor or vocabulary; no thread is left running.
 
     Examples
     --------
@@ -89,16 +103,20 @@ class System:
 
     def __init__(
         self,
-        settings: Settings | str | Path,
-        sensor: Sensor | str,
+        settings: Settings | str | Path | None = None,
+        sensor: Sensor | str | None = None,
         vocabulary: core.Vocabulary | str | Path | None = None,
         *,
+        load_map: SavedMap | str | Path | None = None,
+        initial_pose: npt.ArrayLike | None = None,
+        allow_other_setup: bool = False,
         deterministic: bool = False,
         wait_for_mapping: bool = False,
         loop_closing: bool = True,
         full_adjustment: bool = True,
         full_adjustment_time_limit: float | None = None,
         callbacks: Callbacks | None = None,
+        keyframe_images: bool = False,
         seed: int = 0,
     ) -> None:
         self.options = SystemOptions(
@@ -107,20 +125,30 @@ class System:
             loop_closing=loop_closing,
             full_adjustment=full_adjustment,
             full_adjustment_time_limit=full_adjustment_time_limit,
+            keyframe_images=keyframe_images,
             seed=seed,
         )
-        self.sensor = Sensor(sensor)
-        self.settings = resolve_settings(settings, self.sensor)
-        if not isinstance(vocabulary, core.Vocabulary):
-            vocabulary = load_vocabulary(vocabulary)
-        self.vocabulary = vocabulary
+        setup = Setup.of(settings, sensor, vocabulary, load_map, allow_other_setup)
+        self.sensor, self.settings, self.vocabulary = setup.sensor, setup.settings, setup.vocabulary
         self.pipeline = Pipeline(
-            self.settings, self.sensor, vocabulary, self.options, callbacks or Callbacks()
+            self.settings, self.sensor, self.vocabulary, self.options, callbacks or Callbacks()
+        )
+        if setup.loaded is not None:
+            self.pipeline.begin_in(setup.loaded, self.vocabulary, pose_given(initial_pose))
+        elif initial_pose is not None:
+            raise SettingsError("initial_pose says where in a loaded map the camera is; load one")
+        self._keeper = MapKeeper(
+            self.pipeline.back_end.map,
+            self.pipeline.recorder,
+            self.settings,
+            setup.identity,
+            self.options,
+            setup.loaded,
         )
         self._guard = CallGuard("tracking")
         self._shut_down = False
         self.pipeline.start()
-        self._finalizer = weakref.finalize(self, _abandon, self.pipeline.back_end)
+        self._finalizer = weakref.finalize(self, _abandon, self.pipeline.back_end, self._keeper)
 
     # ---- tracking --------------------------------------------------------------------------------
     def track_stereo(
@@ -163,6 +191,7 @@ class System:
         self._require(Sensor.STEREO, "track_stereo")
         return self._track(
             timestamp,
+            left,
             details,
             lambda i, timer: self.pipeline.front_end.stereo(left, right, i, timestamp, timer, mask),
         )
@@ -204,6 +233,7 @@ class System:
         self._require(Sensor.RGBD, "track_rgbd")
         return self._track(
             timestamp,
+            image,
             details,
             lambda i, timer: self.pipeline.front_end.rgbd(image, depth, i, timestamp, timer, mask),
         )
@@ -244,6 +274,7 @@ class System:
         self._require(Sensor.MONOCULAR, "track_monocular")
         return self._track(
             timestamp,
+            image,
             details,
             lambda i, timer: self.pipeline.front_end.monocular(
                 image, i, timestamp, timer, mask, initializing=self.pipeline.tracking.initializing
@@ -303,11 +334,16 @@ class System:
                 f"this one is for '{self.sensor.value}'"
             )
 
-    def _track(self, timestamp: float, details: bool, build: BuildFrame) -> TrackingRecord:
+    def _track(
+        self, timestamp: float, image: npt.NDArray[np.uint8], details: bool, build: BuildFrame
+    ) -> TrackingRecord:
         with self._guard():
             if self._shut_down:
                 raise StateError("the system has been shut down; make a new one")
-            return self.pipeline.process(timestamp, build, details=details)
+            record = self.pipeline.process(timestamp, build, details=details)
+            if self.options.keyframe_images and record.is_keyframe:
+                self._keeper.keep_image(record.reference_keyframe, encode_image(image))
+            return record
 
     # ---- control ---------------------------------------------------------------------------------
     @property
@@ -403,6 +439,8 @@ class System:
         ------
         WorkerError
             If a worker has failed, or does not end in time.
+        MapFileError
+            If the last autosave could not be written.
         """
         self._shut_down = True
         if not self._finalizer.alive:
@@ -413,11 +451,56 @@ class System:
         errors = back_end.finish(
             drain=drain, wait_for_adjustment=wait_for_adjustment, timeout=timeout
         )
+        try:
+            self._keeper.stop_autosave()
+        except MapFileError as unsaved:
+            errors.append(unsaved)
         # Only now: should a Ctrl-C come before, the threads are still ended with the interpreter.
         if all(worker.ended for worker in back_end.workers):
             self._finalizer.detach()
         if errors:
             raise errors[0]
+
+    # ---- map files -------------------------------------------------------------------------------
+    def save_map(self, path: str | Path) -> None:
+        """Save the map as it is at this moment; from any thread, also while images are tracked.
+
+        Parameters
+        ----------
+        path : str or path
+            The file, by custom with the suffix ``.orbmap``. It appears under its name when all of
+            it has been written.
+
+        Raises
+        ------
+        MapFileError
+            If the map has no keyframes yet, or the file cannot be written; a file that was there is
+            kept.
+        """
+        self._keeper.save(path)
+
+    def autosave(self, path: str | Path, every: float = 10.0) -> None:
+        """Keep a map file up to date from now on: only what has changed is written.
+
+        Whatever ends the program, the file opens and is the map of the last time. `shutdown` saves
+        once more. After a `reset` the new map is saved beside it, as ``<name>-1.orbmap``.
+
+        Parameters
+        ----------
+        path : str or path
+            The file; replaced by the first save, which follows after `every` seconds.
+        every : float
+            Seconds from one save to the next.
+        """
+        self._keeper.autosave(path, every)
+
+    def saved_map(self) -> SavedMap:
+        """Everything that `save_map` would write at this moment."""
+        return self._keeper.saved_map()
+
+    def map_contents(self) -> MapContents:
+        """Everything that the map is, as arrays; may be called while the system runs."""
+        return take_contents(self.pipeline.back_end.map)
 
     # ---- results ---------------------------------------------------------------------------------
     @property
@@ -537,7 +620,11 @@ class CallGuard:
             self._lock.release()
 
 
-def _abandon(back_end: BackEnd) -> None:
+def _abandon(back_end: BackEnd, keeper: MapKeeper) -> None:
     """End the threads of a system that was dropped without shutdown."""
+    try:
+        keeper.stop_autosave()
+    except MapFileError as unsaved:
+        _log.error("while a system was dropped: %s", unsaved)
     for error in back_end.finish(drain=False, wait_for_adjustment=False, timeout=RESET_PATIENCE):
         _log.error("while a system was dropped", exc_info=error)

@@ -118,6 +118,14 @@ class RelocalizationThresholds:
     """Search radius of the second widening ..."""
     narrow_distance: int = 64
     """... and its most differing bits."""
+    guess_keyframes: int = 5
+    """So many keyframes nearest to a pose given by the user are tried ..."""
+    guess_cosine: float = 0.5
+    """... which look in nearly the same direction: least cosine of the angle ..."""
+    guess_window: float = 30.0
+    """... their points searched in this radius, pixels at level 0 ..."""
+    guess_distance: int = 64
+    """... with at most so many differing bits."""
 
 
 @dataclass(frozen=True)

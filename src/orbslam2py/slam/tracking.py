@@ -63,7 +63,7 @@ class FirstEstimateInGrowingMap:
         search = self._search
         if lost:
             estimate = search.by_relocalization(frame)
-            if estimate.found:
+            if estimate.found or not search.has_last_frame:
                 return estimate
         search.follow_map()
         if search.motion.velocity is not None and not search.just_relocalized(frame):
@@ -128,11 +128,23 @@ class Tracking:
         """Forget the map's past; the map itself is cleared by the pipeline."""
         self.state = TrackingState.NO_IMAGES_YET
         self._last_keyframe_frame_id = 0
-        # Whether localization mode has been on in this map.
+        # Whether the map was loaded, or localization mode has been on in it.
         self._map_is_kept = False
         self._search.reset()
         self._in_fixed_map.reset()
         self._initializer.reset()
+
+    def begin_in_loaded_map(self, initial_pose: core.Pose | None) -> None:
+        """Start lost in the map as it is: every image is searched in it, and it is kept.
+
+        Parameters
+        ----------
+        initial_pose : Pose or None
+            ``T_cw`` where the camera may be; tried before all else.
+        """
+        self.state = TrackingState.LOST
+        self._map_is_kept = True
+        self._search.initial_pose = initial_pose
 
     @property
     def initializing(self) -> bool:
@@ -182,6 +194,7 @@ class Tracking:
 
         if self.state is TrackingState.LOST:
             self.n_relocalizations += 1
+            self._search.initial_pose = None
         self.state = TrackingState.OK
         self._search.motion.update_velocity(frame)
         # Before temporary points go, and a keyframe's keypoints become points.
@@ -255,7 +268,7 @@ class Tracking:
         self._in_fixed_map.reset()
         frame.clear_associations()
         frame.T_cw = None
-        # A map that was used for localization is the user's, however small.
+        # A map that was loaded, or used for localization, is the user's, however small.
         small = self._map.n_keyframes <= self._search.limits.small_map
         return TrackingOutcome(self.state, estimate, reset_needed=small and not self._map_is_kept)
 

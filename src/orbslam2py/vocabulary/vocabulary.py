@@ -86,6 +86,17 @@ def load_vocabulary(
     return _keep(vocabulary, chosen, source) or vocabulary
 
 
+def vocabulary_name(choice: core.Vocabulary | str | os.PathLike[str] | None) -> str:
+    """Name the file of a vocabulary, as `load_vocabulary` chooses it.
+
+    One in memory has the name of the package's own if it is equal, else none.
+    """
+    if isinstance(choice, core.Vocabulary):
+        own = default_vocabulary_path()
+        return own.name if core.Vocabulary.open(str(own)).hash == choice.hash else ""
+    return Path(choice or os.environ.get(ENVIRONMENT_VARIABLE) or default_vocabulary_path()).name
+
+
 def _stamp(path: Path) -> core.VocabularySource:
     """Size, time and samples of a file: a change is noticed without reading all of it."""
     sample = 1 << 20

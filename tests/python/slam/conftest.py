@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import pytest
 
 from orbslam2py import Sensor, System
+from orbslam2py._worker import Worker
 from orbslam2py.slam import keyframe_decision, localization_mode, pose_search, tracking
-from orbslam2py.slam.worker import Worker
 from support.interleaving import LIMIT, Stage
 from support.small_sequences import new_system, play
 from support.tracking_scene import FakeCore, Scene

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from orbslam2py import LoopClosed, Sensor, StateError, _core
+from orbslam2py._worker import Worker
 from orbslam2py.slam import loop_closing
 from orbslam2py.slam.loop_closing import LoopClosing
 from orbslam2py.slam.options import SystemOptions
-from orbslam2py.slam.worker import Worker
 
 
 @dataclass(frozen=True)

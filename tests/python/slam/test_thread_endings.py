@@ -8,7 +8,7 @@ import threading
 import pytest
 
 from orbslam2py import Callbacks, KeyframeAdded, Sensor, StateError, System, WorkerError, _core
-from orbslam2py.slam.worker import WorkerState
+from orbslam2py._worker import WorkerState
 from support.interleaving import LIMIT, Call, Stage, last_keyframe, refine
 from support.scripts import run_to_the_end
 from support.small_sequences import new_system, play, track

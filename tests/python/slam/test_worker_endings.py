@@ -8,7 +8,7 @@ import threading
 import pytest
 
 from orbslam2py import Sensor, StateError, WorkerError
-from orbslam2py.slam.worker import Worker, WorkerState
+from orbslam2py._worker import Worker, WorkerState
 from support.interleaving import LIMIT
 from support.small_sequences import new_system, play
 from support.worker_steps import NAME, Gate, eventually

@@ -8,7 +8,7 @@ import threading
 import pytest
 
 from orbslam2py import StateError, WorkerError
-from orbslam2py.slam.worker import Worker, WorkerState
+from orbslam2py._worker import Worker, WorkerState
 from support.worker_steps import NAME, failing
 
 pytestmark = pytest.mark.watchdog(10)

@@ -8,8 +8,8 @@ import threading
 import pytest
 
 from orbslam2py import OrbSlamError, StateError, WorkerError
+from orbslam2py._worker import Worker, WorkerState
 from orbslam2py.slam.system import CallGuard
-from orbslam2py.slam.worker import Worker, WorkerState
 from support.worker_steps import NAME, Gate, eventually
 
 pytestmark = pytest.mark.watchdog(10)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from orbslam2py.slam.worker import Worker, WorkerState
+from orbslam2py._worker import Worker, WorkerState
 from support.worker_steps import NAME, Gate, eventually
 
 pytestmark = pytest.mark.watchdog(10)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from orbslam2py import System, _core
-from orbslam2py.slam.worker import Worker
+from orbslam2py._worker import Worker
 
 #: Seconds after which something that should happen is held to have hung.
 LIMIT = 15.0

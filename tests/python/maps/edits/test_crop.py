@@ -19,7 +19,7 @@ from orbslam2py.maps import (
     crop_to_times,
     keep_keyframes,
 )
-from orbslam2py.maps.spanning_tree import count_covisibility
+from orbslam2py.maps.edits.spanning_tree import count_covisibility
 from support.made_up_map import FIRST_TIME, STEP, counted, made_up_map
 from support.map_invariants import check_invariants
 

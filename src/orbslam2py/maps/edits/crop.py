@@ -18,7 +18,7 @@ from orbslam2py.maps.contents import (
     Observations,
     RemovedKeyframes,
 )
-from orbslam2py.maps.spanning_tree import count_covisibility, spanning_parents
+from orbslam2py.maps.edits.spanning_tree import count_covisibility, spanning_parents
 
 BoolArray = NDArray[np.bool_]
 

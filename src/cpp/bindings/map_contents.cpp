@@ -1,0 +1,344 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A map as arrays and back: what map files keep.
+#include <pybind11/stl.h>
+
+#include <algorithm>
+
+#include "base/errors.hpp"
+#include "base/parallel.hpp"
+#include "bindings/arrays.hpp"
+#include "bindings/bindings.hpp"
+#include "map/contents.hpp"
+#include "map/stored_map.hpp"
+#include "places/keyframe_index.hpp"
+#include "places/vocabulary.hpp"
+
+namespace orbslam::bindings {
+namespace {
+
+using namespace py::literals;
+
+/// An array that takes the items over instead of copying them.
+template <class Item, class Row>
+py::array_t<Item> owned(std::vector<Row>&& rows, std::vector<py::ssize_t> row_shape = {}) {
+  row_shape.insert(row_shape.begin(), static_cast<py::ssize_t>(rows.size()));
+  auto* const kept = new std::vector<Row>(std::move(rows));
+  const py::capsule owner(kept, [](void* p) { delete static_cast<std::vector<Row>*>(p); });
+  return py::array_t<Item>(row_shape, reinterpret_cast<const Item*>(kept->data()), owner);
+}
+
+py::array_t<bool> flags(std::vector<std::uint8_t>&& values) {
+  return owned<bool>(std::move(values));
+}
+
+void put_cameras(py::dict& arrays, const std::vector<CameraContents>& cameras) {
+  const auto put = [&](const char* name, auto value_of) {
+    using Item = decltype(value_of(cameras.front()));
+    py::array_t<Item> array(static_cast<py::ssize_t>(cameras.size()));
+    std::transform(cameras.begin(), cameras.end(), array.mutable_data(), value_of);
+    arrays[name] = array;
+  };
+  using C = CameraContents;
+  put("cameras.fx", [](const C& c) { return c.camera.pinhole.fx; });
+  put("cameras.fy", [](const C& c) { return c.camera.pinhole.fy; });
+  put("cameras.cx", [](const C& c) { return c.camera.pinhole.cx; });
+  put("cameras.cy", [](const C& c) { return c.camera.pinhole.cy; });
+  std::vector<std::array<double, 5>> distortion;
+  for (const C& c : cameras) distortion.push_back(c.camera.distortion);
+  arrays["cameras.distortion"] = owned<double>(std::move(distortion), {5});
+  put("cameras.bf", [](const C& c) { return c.camera.bf; });
+  put("cameras.depth_ratio", [](const C& c) { return c.camera.depth_ratio; });
+  put("cameras.width", [](const C& c) { return std::int64_t{c.camera.image_size.width}; });
+  put("cameras.height", [](const C& c) { return std::int64_t{c.camera.image_size.height}; });
+  put("cameras.scale_factor", [](const C& c) { return c.scale_factor; });
+  put("cameras.n_levels", [](const C& c) { return std::int64_t{c.n_levels}; });
+}
+
+void put_keyframes(py::dict& arrays, KeyFrameRows&& rows) {
+  arrays["keyframes.ids"] = owned<std::int64_t>(std::move(rows.ids));
+  arrays["keyframes.frame_ids"] = owned<std::int64_t>(std::move(rows.frame_ids));
+  arrays["keyframes.timestamps"] = owned<double>(std::move(rows.timestamps));
+  arrays["keyframes.camera"] = owned<std::int64_t>(std::move(rows.camera));
+  arrays["keyframes.rotations"] = owned<double>(std::move(rows.rotations), {4});
+  arrays["keyframes.translations"] = owned<double>(std::move(rows.translations), {3});
+  arrays["keyframes.scale"] = owned<double>(std::move(rows.scale));
+  arrays["keyframes.parent"] = owned<std::int64_t>(std::move(rows.parent));
+  arrays["keyframes.provisional_parent"] = flags(std::move(rows.provisional_parent));
+  arrays["keyframes.processed"] = flags(std::move(rows.processed));
+}
+
+void put_keypoints(py::dict& arrays, const std::vector<std::shared_ptr<const Frame>>& frames,
+                   const std::vector<bool>& is_known) {
+  std::vector<std::int64_t> offsets{0};
+  bool distorts = false;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const std::size_t n = is_known[i] ? 0 : frames[i]->size();
+    offsets.push_back(offsets.back() + static_cast<std::int64_t>(n));
+    distorts |= !frames[i]->camera->lens().is_identity();
+  }
+  const auto n = static_cast<py::ssize_t>(offsets.back());
+  using Shape = std::vector<py::ssize_t>;
+  py::array_t<float> keypoints(Shape{n, 2}), raw(Shape{distorts ? n : 0, 2}), angle(n), response(n),
+      depth(n), right_u(n);
+  py::array_t<std::uint8_t> octave(n), descriptors(Shape{n, 32}), colours(Shape{0, 3});
+  const KeypointColumns<float, std::uint8_t> columns{
+      keypoints.mutable_data(),   distorts ? raw.mutable_data() : nullptr,
+      octave.mutable_data(),      angle.mutable_data(),
+      response.mutable_data(),    descriptors.mutable_data(),
+      depth.mutable_data(),       right_u.mutable_data(),
+      nullptr};
+  std::vector<std::uint8_t> has_colours(frames.size(), 0);
+  {
+    const py::gil_scoped_release release;
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      if (is_known[i]) continue;
+      copy_keypoints(*frames[i], columns, static_cast<std::size_t>(offsets[i]));
+    }
+  }
+  arrays["keyframes.has_colours"] = flags(std::move(has_colours));
+  arrays["keyframes.offsets"] = owned<std::int64_t>(std::move(offsets));
+  arrays["keyframes.keypoints"] = keypoints;
+  arrays["keyframes.raw_keypoints"] = raw;
+  arrays["keyframes.octave"] = octave;
+  arrays["keyframes.angle"] = angle;
+  arrays["keyframes.response"] = response;
+  arrays["keyframes.descriptors"] = descriptors;
+  arrays["keyframes.depth"] = depth;
+  arrays["keyframes.right_u"] = right_u;
+  arrays["keyframes.colours"] = colours;
+}
+
+void put_the_rest(py::dict& arrays, MapContents&& contents) {
+  auto& removed = contents.removed_keyframes;
+  arrays["removed_keyframes.ids"] = owned<std::int64_t>(std::move(removed.ids));
+  arrays["removed_keyframes.parent"] = owned<std::int64_t>(std::move(removed.parent));
+  arrays["removed_keyframes.rotations"] = owned<double>(std::move(removed.rotations), {4});
+  arrays["removed_keyframes.translations"] = owned<double>(std::move(removed.translations), {3});
+  arrays["removed_keyframes.scale"] = owned<double>(std::move(removed.scale));
+  arrays["removed_keyframes.parent_scale"] = owned<double>(std::move(removed.parent_scale));
+  auto& points = contents.points;
+  arrays["points.ids"] = owned<std::int64_t>(std::move(points.ids));
+  arrays["points.positions"] = owned<double>(std::move(points.positions), {3});
+  arrays["points.mean_directions"] = owned<double>(std::move(points.mean_directions), {3});
+  arrays["points.min_distance"] = owned<double>(std::move(points.min_distance));
+  arrays["points.max_distance"] = owned<double>(std::move(points.max_distance));
+  arrays["points.descriptors"] = owned<std::uint8_t>(std::move(points.descriptors), {32});
+  arrays["points.n_visible"] = owned<std::int32_t>(std::move(points.n_visible));
+  arrays["points.n_found"] = owned<std::int32_t>(std::move(points.n_found));
+  arrays["points.reference_keyframe"] =
+      owned<std::int64_t>(std::move(points.reference_keyframe));
+  arrays["points.first_keyframe"] = owned<std::int64_t>(std::move(points.first_keyframe));
+  arrays["points.first_frame"] = owned<std::int64_t>(std::move(points.first_frame));
+  arrays["observations.point"] = owned<std::int64_t>(std::move(contents.observations.point));
+  arrays["observations.keyframe"] = owned<std::int64_t>(std::move(contents.observations.keyframe));
+  arrays["observations.keypoint"] = owned<std::int32_t>(std::move(contents.observations.keypoint));
+  arrays["covisibility.a"] = owned<std::int64_t>(std::move(contents.covisibility.a));
+  arrays["covisibility.b"] = owned<std::int64_t>(std::move(contents.covisibility.b));
+  arrays["covisibility.weight"] = owned<std::int32_t>(std::move(contents.covisibility.weight));
+  arrays["loop_edges"] = owned<std::int64_t>(std::move(contents.loop_edges), {2});
+}
+
+py::dict map_contents(const Map& map, const py::array_t<std::int64_t, py::array::c_style>& known) {
+  MapContents contents;
+  std::vector<bool> is_known;
+  {
+    const std::vector<std::int64_t> ids(known.data(), known.data() + known.size());
+    const py::gil_scoped_release release;
+    contents = take_contents(map);
+    for (const KeyFrameId id : contents.keyframes.ids) {
+      is_known.push_back(std::binary_search(ids.begin(), ids.end(), id.value));
+    }
+  }
+  py::dict arrays;
+  arrays["map_index"] = contents.epoch;
+  arrays["next_keyframe"] = contents.next_keyframe.value;
+  arrays["next_point"] = contents.next_point.value;
+  put_cameras(arrays, contents.cameras);
+  put_keyframes(arrays, std::move(contents.keyframes));
+  put_keypoints(arrays, contents.frames, is_known);
+  put_the_rest(arrays, std::move(contents));
+  return arrays;
+}
+
+/// Takes arrays out of a dictionary, checks type and shape, and keeps them alive.
+class Arrays {
+ public:
+  explicit Arrays(const py::dict& arrays) : arrays_(arrays) {}
+
+  /// (n, Width) items, or (n,) when Width is 0; n is any number if `count` is negative.
+  template <class Item, py::ssize_t Width = 0>
+  const Item* items(const char* name, py::ssize_t& count) {
+    if (!arrays_.contains(name)) throw MapFileError(std::string(name) + " is missing");
+    const auto array = py::array::ensure(arrays_[name]);
+    const bool fits =
+        array && py::isinstance<py::array_t<Item>>(array) && array.ndim() == (Width ? 2 : 1) &&
+        (!Width || array.shape(1) == Width) && (count < 0 || array.shape(0) == count);
+    if (!fits) throw MapFileError(std::string(name) + " has the wrong type or length");
+    kept_.push_back(py::array_t<Item, py::array::c_style>::ensure(array));
+    count = array.shape(0);
+    return static_cast<const Item*>(kept_.back().data());
+  }
+  template <class Row, class Item = Row, py::ssize_t Width = 0>
+  Column<Row> column(const char* name, py::ssize_t& count) {
+    const Item* const data = items<Item, Width>(name, count);
+    return {reinterpret_cast<const Row*>(data), static_cast<std::size_t>(count)};
+  }
+  Column<std::uint8_t> flags(const char* name, py::ssize_t& count) {
+    return column<std::uint8_t, bool>(name, count);
+  }
+  std::int64_t number(const char* name) const { return arrays_[name].cast<std::int64_t>(); }
+
+ private:
+  const py::dict& arrays_;
+  std::vector<py::array> kept_;
+};
+
+void read_cameras(Arrays& arrays, StoredMap& stored) {
+  py::ssize_t n = -1;
+  const auto fx = arrays.column<double>("cameras.fx", n), fy = arrays.column<double>("cameras.fy", n),
+             cx = arrays.column<double>("cameras.cx", n), cy = arrays.column<double>("cameras.cy", n),
+             bf = arrays.column<double>("cameras.bf", n),
+             ratio = arrays.column<double>("cameras.depth_ratio", n);
+  const auto distortion =
+      arrays.column<std::array<double, 5>, double, 5>("cameras.distortion", n);
+  const auto width = arrays.column<std::int64_t>("cameras.width", n),
+             height = arrays.column<std::int64_t>("cameras.height", n),
+             levels = arrays.column<std::int64_t>("cameras.n_levels", n);
+  const auto factor = arrays.column<float>("cameras.scale_factor", n);
+  const auto small = [](std::int64_t value) {  // out of range stays out of range
+    return static_cast<int>(std::clamp<std::int64_t>(value, -1, 1 << 20));
+  };
+  for (std::size_t i = 0; i < fx.size; ++i) {
+    CameraOptions camera;
+    camera.pinhole = {fx[i], fy[i], cx[i], cy[i]};
+    camera.distortion = distortion[i];
+    camera.bf = bf[i];
+    camera.depth_ratio = ratio[i];
+    camera.image_size = {small(width[i]), small(height[i])};
+    stored.cameras.push_back({camera, factor[i], small(levels[i])});
+  }
+}
+
+void read_keyframes(Arrays& arrays, StoredMap& stored) {
+  py::ssize_t k = -1;
+  auto& rows = stored.keyframes;
+  rows.ids = arrays.column<std::int64_t>("keyframes.ids", k);
+  rows.frame_ids = arrays.column<std::int64_t>("keyframes.frame_ids", k);
+  rows.timestamps = arrays.column<double>("keyframes.timestamps", k);
+  rows.camera = arrays.column<std::int64_t>("keyframes.camera", k);
+  rows.rotations = arrays.column<Quaternion, double, 4>("keyframes.rotations", k);
+  rows.translations = arrays.column<Vector3, double, 3>("keyframes.translations", k);
+  rows.scale = arrays.column<double>("keyframes.scale", k);
+  rows.parent = arrays.column<std::int64_t>("keyframes.parent", k);
+  rows.provisional_parent = arrays.flags("keyframes.provisional_parent", k);
+  rows.processed = arrays.flags("keyframes.processed", k);
+  rows.has_colours = arrays.flags("keyframes.has_colours", k);
+  py::ssize_t ends = k + 1;
+  rows.offsets = arrays.column<std::int64_t>("keyframes.offsets", ends);
+
+  py::ssize_t n = -1, n_raw = -1, n_colours = -1;
+  auto& columns = stored.keypoints;
+  columns.keypoints = arrays.items<float, 2>("keyframes.keypoints", n);
+  stored.n_keypoints = static_cast<std::size_t>(n);
+  columns.octave = arrays.items<std::uint8_t>("keyframes.octave", n);
+  columns.angle = arrays.items<float>("keyframes.angle", n);
+  columns.response = arrays.items<float>("keyframes.response", n);
+  columns.descriptors = arrays.items<std::uint8_t, 32>("keyframes.descriptors", n);
+  columns.depth = arrays.items<float>("keyframes.depth", n);
+  columns.right_u = arrays.items<float>("keyframes.right_u", n);
+  const float* const raw = arrays.items<float, 2>("keyframes.raw_keypoints", n_raw);
+  const std::uint8_t* const colours = arrays.items<std::uint8_t, 3>("keyframes.colours", n_colours);
+  if ((n_raw != 0 && n_raw != n) || (n_colours != 0 && n_colours != n)) {
+    throw MapFileError("raw keypoints or colours are not as many as keypoints");
+  }
+  if (n_raw == n && n > 0) columns.raw_keypoints = raw;
+  if (n_colours == n && n > 0) columns.colours = colours;
+}
+
+void read_the_rest(Arrays& arrays, StoredMap& stored) {
+  py::ssize_t r = -1, p = -1, o = -1, e = -1, l = -1;
+  auto& removed = stored.removed_keyframes;
+  removed.ids = arrays.column<std::int64_t>("removed_keyframes.ids", r);
+  removed.parent = arrays.column<std::int64_t>("removed_keyframes.parent", r);
+  removed.rotations = arrays.column<Quaternion, double, 4>("removed_keyframes.rotations", r);
+  removed.translations = arrays.column<Vector3, double, 3>("removed_keyframes.translations", r);
+  removed.scale = arrays.column<double>("removed_keyframes.scale", r);
+  removed.parent_scale = arrays.column<double>("removed_keyframes.parent_scale", r);
+  auto& points = stored.points;
+  points.ids = arrays.column<std::int64_t>("points.ids", p);
+  points.positions = arrays.column<Vector3, double, 3>("points.positions", p);
+  points.mean_directions = arrays.column<Vector3, double, 3>("points.mean_directions", p);
+  points.min_distance = arrays.column<double>("points.min_distance", p);
+  points.max_distance = arrays.column<double>("points.max_distance", p);
+  points.descriptors = arrays.items<std::uint8_t, 32>("points.descriptors", p);
+  points.n_visible = arrays.column<std::int32_t>("points.n_visible", p);
+  points.n_found = arrays.column<std::int32_t>("points.n_found", p);
+  points.reference_keyframe = arrays.column<std::int64_t>("points.reference_keyframe", p);
+  points.first_keyframe = arrays.column<std::int64_t>("points.first_keyframe", p);
+  points.first_frame = arrays.column<std::int64_t>("points.first_frame", p);
+  stored.observations.point = arrays.column<std::int64_t>("observations.point", o);
+  stored.observations.keyframe = arrays.column<std::int64_t>("observations.keyframe", o);
+  stored.observations.keypoint = arrays.column<std::int32_t>("observations.keypoint", o);
+  stored.covisibility.a = arrays.column<std::int64_t>("covisibility.a", e);
+  stored.covisibility.b = arrays.column<std::int64_t>("covisibility.b", e);
+  stored.covisibility.weight = arrays.column<std::int32_t>("covisibility.weight", e);
+  stored.loop_edges =
+      arrays.column<std::array<std::int64_t, 2>, std::int64_t, 2>("loop_edges", l);
+}
+
+StoredMap read_stored(Arrays& arrays) {
+  StoredMap stored;
+  stored.next_keyframe = arrays.number("next_keyframe");
+  stored.next_point = arrays.number("next_point");
+  read_cameras(arrays, stored);
+  read_keyframes(arrays, stored);
+  read_the_rest(arrays, stored);
+  return stored;
+}
+
+void restore(Map& map, const py::dict& contents, const Vocabulary* vocabulary,
+             KeyFrameIndex* index) {
+  Arrays arrays(contents);
+  const StoredMap stored = read_stored(arrays);
+  const py::gil_scoped_release release;
+  check_stored_map(stored);
+  const auto cameras = restore_cameras(stored);
+  const auto scales = restore_scales(stored);
+  std::vector<std::shared_ptr<const Frame>> frames(stored.keyframes.ids.size);
+  for_each_in_parallel(frames.size(), [&](std::size_t i) {
+    const std::shared_ptr<Frame> frame = restore_frame(stored, i, cameras, scales);
+    if (vocabulary) describe(*frame, *vocabulary);
+    frames[i] = frame;
+  });
+  restore_map(map, stored, frames);
+  if (!index) return;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    index->add(KeyFrameId(stored.keyframes.ids[i]), frames[i]);
+  }
+}
+
+}  // namespace
+
+void bind_map_contents(py::module_& module) {
+  module.def("map_contents", &map_contents, "map"_a,
+             "known"_a = py::array_t<std::int64_t>(py::ssize_t{0}),
+             "Everything that a map is at one moment, as arrays by name: see\n"
+             "orbslam2py.maps.MapContents. The keypoints of the keyframes `known` ((m,) int64\n"
+             "ascending), which never change, are left out.");
+  module.def(
+      "check_map_contents",
+      [](const py::dict& contents) {
+        Arrays arrays(contents);
+        const StoredMap stored = read_stored(arrays);
+        const py::gil_scoped_release release;
+        check_stored_map(stored);
+      },
+      "contents"_a, "Raises MapFileError, naming the thing, unless a map can be made of them.");
+  module.def("restore_map", &restore, "map"_a, "contents"_a, "vocabulary"_a = nullptr,
+             "index"_a = nullptr,
+             "Fill an empty map with contents as of map_contents(). With a vocabulary keyframes\n"
+             "are described by words, and added to the index if there is one. Raises MapFileError,\n"
+             "naming the thing, before anything was changed.");
+}
+
+}  // namespace orbslam::bindings

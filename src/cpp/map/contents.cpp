@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "map/contents.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+#include "map/contents_access.hpp"
+
+namespace orbslam {
+namespace {
+
+Quaternion quaternion_of(const Pose& pose) {
+  const Eigen::Quaterniond& q = pose.rotation();
+  return {q.x(), q.y(), q.z(), q.w()};
+}
+
+Vector3 row_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+bool is_published(const Map& map, KeyFrameId id) {
+  const KeyFrame* keyframe = map.find(id);
+  return keyframe && keyframe->published;
+}
+
+bool same(const CameraContents& known, const Frame& frame) {
+  const CameraOptions& a = known.camera;
+  const CameraOptions& b = frame.camera->options();
+  return a.pinhole.fx == b.pinhole.fx && a.pinhole.fy == b.pinhole.fy &&
+         a.pinhole.cx == b.pinhole.cx && a.pinhole.cy == b.pinhole.cy &&
+         a.distortion == b.distortion && a.bf == b.bf && a.depth_ratio == b.depth_ratio &&
+         a.image_size.width == b.image_size.width && a.image_size.height == b.image_size.height &&
+         known.scale_factor == frame.scales->factor() && known.n_levels == frame.scales->levels();
+}
+
+/// The frames' cameras, each once, in the order in which they first appear.
+void list_cameras(MapContents& contents) {
+  auto& cameras = contents.cameras;
+  const Frame* before = nullptr;
+  std::int64_t row = 0;
+  for (const auto& frame : contents.frames) {
+    const bool known =
+        before && before->camera == frame->camera && before->scales == frame->scales;
+    if (!known) {
+      const auto found = std::find_if(cameras.begin(), cameras.end(),
+                                      [&](const CameraContents& c) { return same(c, *frame); });
+      row = found - cameras.begin();
+      if (found == cameras.end()) {
+        cameras.push_back(
+            {frame->camera->options(), frame->scales->factor(), frame->scales->levels()});
+      }
+    }
+    before = frame.get();
+    contents.keyframes.camera.push_back(row);
+  }
+}
+
+/// The nearest ancestor in the spanning tree that is part of the contents.
+KeyFrameId published_parent(const Map& map, const KeyFrame& keyframe) {
+  KeyFrameId parent = keyframe.parent;
+  while (parent.valid() && !is_published(map, parent)) parent = map.find(parent)->parent;
+  return parent.valid() || keyframe.id.value == 0 ? parent : KeyFrameId(0);
+}
+
+void copy_keyframes(const Map& map, MapContents& contents) {
+  KeyFrameRows& rows = contents.keyframes;
+  EdgeRows& edges = contents.covisibility;
+  map.for_each_keyframe([&](const KeyFrame& keyframe) {
+    if (!keyframe.published) return;
+    contents.frames.push_back(keyframe.frame);
+    rows.ids.push_back(keyframe.id);
+    rows.frame_ids.push_back(keyframe.frame->id);
+    rows.timestamps.push_back(keyframe.frame->timestamp);
+    rows.rotations.push_back(quaternion_of(keyframe.T_cw));
+    rows.translations.push_back(row_of(keyframe.T_cw.translation()));
+    rows.scale.push_back(keyframe.scale);
+    rows.parent.push_back(published_parent(map, keyframe));
+    rows.provisional_parent.push_back(keyframe.provisional_parent ? 1 : 0);
+    rows.processed.push_back(keyframe.processed ? 1 : 0);
+    for (auto it = keyframe.weights.upper_bound(keyframe.id); it != keyframe.weights.end(); ++it) {
+      if (!is_published(map, it->first)) continue;
+      edges.a.push_back(keyframe.id);
+      edges.b.push_back(it->first);
+      edges.weight.push_back(it->second);
+    }
+    for (const KeyFrameId other : keyframe.loop_edges) {
+      if (other > keyframe.id) contents.loop_edges.push_back({keyframe.id, other});
+    }
+  });
+}
+
+void reserve(PointRows& rows, ObservationRows& observations, std::size_t n) {
+  rows.ids.reserve(n);
+  rows.positions.reserve(n);
+  rows.mean_directions.reserve(n);
+  rows.min_distance.reserve(n);
+  rows.max_distance.reserve(n);
+  rows.descriptors.reserve(n);
+  rows.n_visible.reserve(n);
+  rows.n_found.reserve(n);
+  rows.reference_keyframe.reserve(n);
+  rows.first_keyframe.reserve(n);
+  rows.first_frame.reserve(n);
+  observations.point.reserve(4 * n);
+  observations.keyframe.reserve(4 * n);
+  observations.keypoint.reserve(4 * n);
+}
+
+void copy_points(const Map& map, MapContents& contents) {
+  PointRows& rows = contents.points;
+  ObservationRows& observations = contents.observations;
+  reserve(rows, observations, map.n_points());
+  map.for_each_point([&](const MapPoint& point) {
+    KeyFrameId reference;
+    for (const Observation& observation : point.observations) {
+      if (!is_published(map, observation.keyframe)) continue;
+      observations.point.push_back(point.id);
+      observations.keyframe.push_back(observation.keyframe);
+      observations.keypoint.push_back(static_cast<std::int32_t>(observation.index));
+      if (!reference.valid() || observation.keyframe == point.reference_keyframe) {
+        reference = observation.keyframe;
+      }
+    }
+    if (!reference.valid()) return;
+    rows.ids.push_back(point.id);
+    rows.positions.push_back(row_of(point.position));
+    rows.mean_directions.push_back(row_of(point.mean_direction));
+    rows.min_distance.push_back(point.min_distance);
+    rows.max_distance.push_back(point.max_distance);
+    rows.descriptors.push_back(point.descriptor);
+    rows.n_visible.push_back(point.n_visible);
+    rows.n_found.push_back(point.n_found);
+    rows.reference_keyframe.push_back(reference);
+    rows.first_keyframe.push_back(point.first_keyframe);
+    rows.first_frame.push_back(point.first_frame);
+  });
+}
+
+void copy_removed(const Map& map, MapContents& contents) {
+  const auto archive = MapContentsAccess::archived(map);
+  RemovedKeyFrameRows& rows = contents.removed_keyframes;
+  for (const auto& removed : archive) {
+    const bool hangs_on_unpublished =
+        map.find(removed.parent) && !is_published(map, removed.parent);
+    const ArchivedPose& kept =
+        hangs_on_unpublished ? MapContentsAccess::relative_to_root(map, removed.id) : removed;
+    rows.ids.push_back(kept.id);
+    rows.parent.push_back(kept.parent);
+    rows.rotations.push_back(quaternion_of(kept.T_kp));
+    rows.translations.push_back(row_of(kept.T_kp.translation()));
+    rows.scale.push_back(kept.scale);
+    rows.parent_scale.push_back(kept.parent_scale);
+  }
+}
+
+}  // namespace
+
+std::vector<ArchivedPose> MapContentsAccess::archived(const Map& map) {
+  std::vector<ArchivedPose> all;
+  all.reserve(map.archive_.size());
+  for (const auto& [id, entry] : map.archive_) {
+    all.push_back({id, entry.parent, entry.T_kp, entry.scale, entry.parent_scale});
+  }
+  std::sort(all.begin(), all.end(),
+            [](const ArchivedPose& a, const ArchivedPose& b) { return a.id < b.id; });
+  return all;
+}
+
+ArchivedPose MapContentsAccess::relative_to_root(const Map& map, KeyFrameId id) {
+  const ScaledPose pose = map.scaled_pose(id);
+  const ScaledPose root = map.scaled_pose(KeyFrameId(0));
+  return {id, KeyFrameId(0), pose.T_cw * root.T_cw.inverse(), pose.scale, root.scale};
+}
+
+MapContents take_contents(const Map& map) {
+  MapContents contents;
+  {
+    const auto lock = map.read_lock();
+    contents.epoch = map.epoch();
+    contents.next_keyframe = MapContentsAccess::next_keyframe(map);
+    contents.next_point = MapContentsAccess::next_point(map);
+    copy_keyframes(map, contents);
+    copy_points(map, contents);
+    copy_removed(map, contents);
+  }
+  list_cameras(contents);
+  return contents;
+}
+
+void copy_keypoints(const Frame& frame, const KeypointColumns<float, std::uint8_t>& into,
+                    std::size_t first) {
+  const std::size_t n = frame.size();
+  const auto& raw = frame.raw_keypoints.empty() ? frame.keypoints : frame.raw_keypoints;
+  for (std::size_t i = 0; i < n; ++i) {
+    const Keypoint& keypoint = frame.keypoints[i];
+    into.keypoints[2 * (first + i)] = keypoint.x;
+    into.keypoints[2 * (first + i) + 1] = keypoint.y;
+    if (into.raw_keypoints) {
+      into.raw_keypoints[2 * (first + i)] = raw[i].x;
+      into.raw_keypoints[2 * (first + i) + 1] = raw[i].y;
+    }
+    into.octave[first + i] = static_cast<std::uint8_t>(keypoint.level);
+    into.angle[first + i] = keypoint.angle;
+    into.response[first + i] = keypoint.response;
+  }
+  if (n == 0) return;
+  static_assert(sizeof(Descriptor) == 32);
+  std::memcpy(into.descriptors + 32 * first, frame.descriptors.data(), 32 * n);
+  std::memcpy(into.depth + first, frame.depth.data(), sizeof(float) * n);
+  std::memcpy(into.right_u + first, frame.right_u.data(), sizeof(float) * n);
+}
+
+}  // namespace orbslam

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "map/map.hpp"
+
+namespace orbslam {
+
+/// A camera and the pyramid its images were searched with.
+struct CameraContents {
+  CameraOptions camera;
+  float scale_factor = 0;
+  int n_levels = 0;
+};
+
+using Quaternion = std::array<double, 4>;  ///< x, y, z, w
+using Vector3 = std::array<double, 3>;
+
+/// A keyframe without its keypoints.
+struct KeyFrameRows {
+  std::vector<KeyFrameId> ids;
+  std::vector<FrameId> frame_ids;
+  std::vector<double> timestamps;
+  std::vector<std::int64_t> camera;  ///< rows of MapContents::cameras
+  std::vector<Quaternion> rotations;
+  std::vector<Vector3> translations;
+  std::vector<double> scale;
+  std::vector<KeyFrameId> parent;
+  std::vector<std::uint8_t> provisional_parent, processed;
+};
+
+struct RemovedKeyFrameRows {
+  std::vector<KeyFrameId> ids, parent;
+  std::vector<Quaternion> rotations;  ///< of T_kp
+  std::vector<Vector3> translations;
+  std::vector<double> scale, parent_scale;
+};
+
+struct PointRows {
+  std::vector<MapPointId> ids;
+  std::vector<Vector3> positions, mean_directions;
+  std::vector<double> min_distance, max_distance;
+  std::vector<Descriptor> descriptors;
+  std::vector<std::int32_t> n_visible, n_found;
+  std::vector<KeyFrameId> reference_keyframe, first_keyframe;
+  std::vector<FrameId> first_frame;
+};
+
+struct ObservationRows {
+  std::vector<MapPointId> point;
+  std::vector<KeyFrameId> keyframe;
+  std::vector<std::int32_t> keypoint;
+};
+
+struct EdgeRows {
+  std::vector<KeyFrameId> a, b;
+  std::vector<std::int32_t> weight;
+};
+
+/// Everything that a map is, of one moment, ordered by id. Keyframes that local mapping has not
+/// taken in yet are not part of it, nor what only they see. See docs/reference/map_file.md.
+struct MapContents {
+  std::uint64_t epoch = 0;
+  KeyFrameId next_keyframe;
+  MapPointId next_point;
+  std::vector<CameraContents> cameras;
+  KeyFrameRows keyframes;
+  std::vector<std::shared_ptr<const Frame>> frames;  ///< one a keyframe: what they never change
+  RemovedKeyFrameRows removed_keyframes;
+  PointRows points;
+  ObservationRows observations;
+  EdgeRows covisibility;
+  std::vector<std::array<KeyFrameId, 2>> loop_edges;
+};
+
+/// Copies the map. Takes the read lock; the frames' keypoints are not copied under it.
+MapContents take_contents(const Map& map);
+
+/// The keypoints of many frames, one after the other, borrowed for reading or writing. Colours
+/// and raw positions may be null.
+template <class Float, class Byte>
+struct KeypointColumns {
+  Float* keypoints = nullptr;      ///< (n, 2)
+  Float* raw_keypoints = nullptr;  ///< (n, 2)
+  Byte* octave = nullptr;
+  Float* angle = nullptr;
+  Float* response = nullptr;
+  Byte* descriptors = nullptr;  ///< (n, 32)
+  Float* depth = nullptr;
+  Float* right_u = nullptr;
+  Byte* colours = nullptr;  ///< (n, 3)
+};
+
+/// Writes the keypoints of a frame into the columns, from row `first` on.
+void copy_keypoints(const Frame& frame, const KeypointColumns<float, std::uint8_t>& into,
+                    std::size_t first);
+
+}  // namespace orbslam

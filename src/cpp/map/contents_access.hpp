@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "map/map.hpp"
+
+namespace orbslam {
+
+/// Where a culled keyframe was relative to its parent in the spanning tree.
+struct ArchivedPose {
+  KeyFrameId id, parent;
+  Pose T_kp;
+  double scale = 1, parent_scale = 1;
+};
+
+/// What copying and restoring a map as a whole need beside its public methods. The caller holds
+/// the map's lock.
+class MapContentsAccess {
+ public:
+  static KeyFrameId next_keyframe(const Map& map) { return map.next_keyframe_; }
+  static MapPointId next_point(const Map& map) { return map.next_point_; }
+  /// Ascending ids.
+  static std::vector<ArchivedPose> archived(const Map& map);
+  /// The same for one culled keyframe, relative to keyframe 0.
+  static ArchivedPose relative_to_root(const Map& map, KeyFrameId id);
+
+  // Filling an empty map. Nothing is checked: see check_stored_map().
+  static void set_next_ids(Map& map, KeyFrameId keyframe, MapPointId point);
+  /// A published keyframe; its observations come with the points.
+  static KeyFrame& add(Map& map, std::unique_ptr<KeyFrame> keyframe);
+  /// A point with observations of which `has_depth` and the slots are still to be set.
+  static MapPoint& add(Map& map, std::unique_ptr<MapPoint> point);
+  static void add(Map& map, const ArchivedPose& removed);
+  static void set_weight(Map& map, KeyFrameId a, KeyFrameId b, int weight);
+  /// Children of all keyframes, and their neighbours by weight.
+  static void finish(Map& map);
+};
+
+}  // namespace orbslam

@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "map/stored_map.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <string>
+
+#include "base/errors.hpp"
+#include "map/contents_access.hpp"
+
+namespace orbslam {
+namespace {
+
+constexpr float kPatchSize = 31.0F;  // OrbExtractor: diameter on level 0 [px]
+
+Pose pose_of(const Quaternion& q, const Vector3& t) {
+  return Pose::from_unit(Eigen::Quaterniond(q[3], q[0], q[1], q[2]),
+                         Eigen::Vector3d(t[0], t[1], t[2]));
+}
+
+Eigen::Vector3d vector_of(const Vector3& v) { return {v[0], v[1], v[2]}; }
+
+void restore_keyframes(Map& map, const StoredMap& stored,
+                       const std::vector<std::shared_ptr<const Frame>>& frames) {
+  const auto& rows = stored.keyframes;
+  for (std::size_t i = 0; i < rows.ids.size; ++i) {
+    auto keyframe = std::make_unique<KeyFrame>();
+    keyframe->id = KeyFrameId(rows.ids[i]);
+    keyframe->frame = frames[i];
+    keyframe->T_cw = pose_of(rows.rotations[i], rows.translations[i]);
+    keyframe->scale = rows.scale[i];
+    keyframe->map_points.resize(frames[i]->size());
+    keyframe->parent = KeyFrameId(rows.parent[i]);
+    keyframe->provisional_parent = rows.provisional_parent[i] != 0;
+    keyframe->processed = rows.processed[i] != 0;
+    keyframe->published = true;
+    MapContentsAccess::add(map, std::move(keyframe));
+  }
+}
+
+void restore_points(Map& map, const StoredMap& stored) {
+  const auto& rows = stored.points;
+  const auto& seen = stored.observations;
+  std::size_t o = 0;
+  for (std::size_t i = 0; i < rows.ids.size; ++i) {
+    auto point = std::make_unique<MapPoint>();
+    point->id = MapPointId(rows.ids[i]);
+    point->position = vector_of(rows.positions[i]);
+    point->mean_direction = vector_of(rows.mean_directions[i]);
+    point->min_distance = rows.min_distance[i];
+    point->max_distance = rows.max_distance[i];
+    std::memcpy(&point->descriptor, rows.descriptors + 32 * i, 32);
+    point->n_visible = rows.n_visible[i];
+    point->n_found = rows.n_found[i];
+    point->reference_keyframe = KeyFrameId(rows.reference_keyframe[i]);
+    point->first_keyframe = KeyFrameId(rows.first_keyframe[i]);
+    point->first_frame = rows.first_frame[i];
+    std::size_t end = o;
+    while (end < seen.point.size && seen.point[end] == rows.ids[i]) ++end;
+    point->observations.reserve(end - o);
+    for (; o < end; ++o) {
+      point->observations.push_back(
+          {KeyFrameId(seen.keyframe[o]), static_cast<std::uint32_t>(seen.keypoint[o]), false});
+    }
+    MapContentsAccess::add(map, std::move(point));
+  }
+}
+
+}  // namespace
+
+KeyFrame& MapContentsAccess::add(Map& map, std::unique_ptr<KeyFrame> keyframe) {
+  ++map.n_published_;
+  const KeyFrameId id = keyframe->id;
+  return map.keyframes_.insert(id, std::move(keyframe));
+}
+
+MapPoint& MapContentsAccess::add(Map& map, std::unique_ptr<MapPoint> point) {
+  for (Observation& observation : point->observations) {
+    KeyFrame& observer = map.keyframe(observation.keyframe);
+    observation.has_depth = observer.frame->has_depth(observation.index);
+    point->observation_count += observation.has_depth ? 2 : 1;
+    observer.map_points[observation.index] = point->id;
+  }
+  const MapPointId id = point->id;
+  return map.points_.insert(id, std::move(point));
+}
+
+void MapContentsAccess::add(Map& map, const ArchivedPose& removed) {
+  map.archive_.emplace(removed.id, Map::ArchivedKeyFrame{removed.parent, removed.T_kp,
+                                                         removed.scale, removed.parent_scale});
+}
+
+void MapContentsAccess::set_next_ids(Map& map, KeyFrameId keyframe, MapPointId point) {
+  map.next_keyframe_ = keyframe;
+  map.next_point_ = point;
+}
+
+void MapContentsAccess::set_weight(Map& map, KeyFrameId a, KeyFrameId b, int weight) {
+  map.keyframe(a).weights.emplace(b, weight);
+  map.keyframe(b).weights.emplace(a, weight);
+}
+
+void MapContentsAccess::finish(Map& map) {
+  for (const KeyFrameId id : map.keyframe_ids()) {
+    KeyFrame& keyframe = map.keyframe(id);
+    if (keyframe.parent.valid()) map.keyframe(keyframe.parent).children.insert(id);
+    Map::sort_neighbours(keyframe);
+  }
+  ++map.structure_version_;
+  ++map.geometry_version_;
+}
+
+std::vector<std::shared_ptr<const Camera>> restore_cameras(const StoredMap& stored) {
+  std::vector<std::shared_ptr<const Camera>> cameras;
+  for (const CameraContents& contents : stored.cameras) {
+    try {
+      cameras.push_back(std::make_shared<Camera>(contents.camera));
+    } catch (const SettingsError& error) {
+      throw MapFileError("camera " + std::to_string(cameras.size()) +
+                         " is impossible: " + error.what());
+    }
+  }
+  return cameras;
+}
+
+std::vector<std::shared_ptr<const ScalePyramid>> restore_scales(const StoredMap& stored) {
+  std::vector<std::shared_ptr<const ScalePyramid>> scales;
+  for (const CameraContents& contents : stored.cameras) {
+    try {
+      scales.push_back(std::make_shared<ScalePyramid>(contents.scale_factor, contents.n_levels));
+    } catch (const SettingsError& error) {
+      throw MapFileError("the image pyramid of camera " + std::to_string(scales.size()) +
+                         " is impossible: " + error.what());
+    }
+  }
+  return scales;
+}
+
+std::shared_ptr<Frame> restore_frame(
+    const StoredMap& stored, std::size_t row,
+    const std::vector<std::shared_ptr<const Camera>>& cameras,
+    const std::vector<std::shared_ptr<const ScalePyramid>>& scales) {
+  const auto& columns = stored.keypoints;
+  const auto camera = static_cast<std::size_t>(stored.keyframes.camera[row]);
+  const auto first = static_cast<std::size_t>(stored.keyframes.offsets[row]);
+  const std::size_t n = static_cast<std::size_t>(stored.keyframes.offsets[row + 1]) - first;
+  auto frame = std::make_shared<Frame>();
+  frame->id = stored.keyframes.frame_ids[row];
+  frame->timestamp = stored.keyframes.timestamps[row];
+  frame->camera = cameras[camera];
+  frame->scales = scales[camera];
+  frame->keypoints.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    Keypoint& keypoint = frame->keypoints[i];
+    keypoint.x = columns.keypoints[2 * (first + i)];
+    keypoint.y = columns.keypoints[2 * (first + i) + 1];
+    keypoint.level = columns.octave[first + i];
+    keypoint.size = std::trunc(kPatchSize * frame->scales->scale(keypoint.level));
+    keypoint.angle = columns.angle[first + i];
+    keypoint.response = columns.response[first + i];
+  }
+  if (!frame->camera->lens().is_identity()) {
+    frame->raw_keypoints = frame->keypoints;
+    for (std::size_t i = 0; i < n; ++i) {
+      frame->raw_keypoints[i].x = columns.raw_keypoints[2 * (first + i)];
+      frame->raw_keypoints[i].y = columns.raw_keypoints[2 * (first + i) + 1];
+    }
+  }
+  frame->descriptors.resize(n);
+  if (n > 0) std::memcpy(frame->descriptors.data(), columns.descriptors + 32 * first, 32 * n);
+  frame->depth.assign(columns.depth + first, columns.depth + first + n);
+  frame->right_u.assign(columns.right_u + first, columns.right_u + first + n);
+  frame->grid = KeypointGrid(frame->keypoints, frame->camera->bounds());
+  return frame;
+}
+
+void restore_map(Map& map, const StoredMap& stored,
+                 const std::vector<std::shared_ptr<const Frame>>& frames) {
+  const auto lock = map.write_lock();
+  if (MapContentsAccess::next_keyframe(map).value != 0) {
+    throw StateError("a map can be loaded into an empty one only; make a new system");
+  }
+  restore_keyframes(map, stored, frames);
+  restore_points(map, stored);
+  const auto& edges = stored.covisibility;
+  for (std::size_t i = 0; i < edges.a.size; ++i) {
+    MapContentsAccess::set_weight(map, KeyFrameId(edges.a[i]), KeyFrameId(edges.b[i]),
+                                  edges.weight[i]);
+  }
+  for (std::size_t i = 0; i < stored.loop_edges.size; ++i) {
+    map.add_loop_edge(KeyFrameId(stored.loop_edges[i][0]), KeyFrameId(stored.loop_edges[i][1]));
+  }
+  const auto& removed = stored.removed_keyframes;
+  for (std::size_t i = 0; i < removed.ids.size; ++i) {
+    MapContentsAccess::add(
+        map, {KeyFrameId(removed.ids[i]), KeyFrameId(removed.parent[i]),
+              pose_of(removed.rotations[i], removed.translations[i]), removed.scale[i],
+              removed.parent_scale[i]});
+  }
+  MapContentsAccess::set_next_ids(map, KeyFrameId(stored.next_keyframe),
+                                  MapPointId(stored.next_point));
+  MapContentsAccess::finish(map);
+}
+
+}  // namespace orbslam

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "map/contents.hpp"
+
+namespace orbslam {
+
+/// A borrowed array of `size` rows.
+template <class Row>
+struct Column {
+  const Row* data = nullptr;
+  std::size_t size = 0;
+
+  const Row& operator[](std::size_t i) const { return data[i]; }
+};
+
+/// The arrays of a map that was written down (MapContents as columns), of which nothing is known
+/// but their lengths: columns of one group are equally long, `offsets` has one entry more.
+struct StoredMap {
+  std::int64_t next_keyframe = 0, next_point = 0;
+  std::vector<CameraContents> cameras;
+  struct {
+    Column<std::int64_t> ids, frame_ids, camera, parent, offsets;
+    Column<double> timestamps, scale;
+    Column<Quaternion> rotations;
+    Column<Vector3> translations;
+    Column<std::uint8_t> provisional_parent, processed, has_colours;
+  } keyframes;
+  std::size_t n_keypoints = 0;
+  KeypointColumns<const float, const std::uint8_t> keypoints;
+  struct {
+    Column<std::int64_t> ids, parent;
+    Column<Quaternion> rotations;
+    Column<Vector3> translations;
+    Column<double> scale, parent_scale;
+  } removed_keyframes;
+  struct {
+    Column<std::int64_t> ids, reference_keyframe, first_keyframe, first_frame;
+    Column<Vector3> positions, mean_directions;
+    Column<double> min_distance, max_distance;
+    const std::uint8_t* descriptors = nullptr;  ///< (p, 32)
+    Column<std::int32_t> n_visible, n_found;
+  } points;
+  struct {
+    Column<std::int64_t> point, keyframe;
+    Column<std::int32_t> keypoint;
+  } observations;
+  struct {
+    Column<std::int64_t> a, b;
+    Column<std::int32_t> weight;
+  } covisibility;
+  Column<std::array<std::int64_t, 2>> loop_edges;
+};
+
+/// Checks everything that restore_map() relies on before anything is allocated for it: ids ascend
+/// and refer to what is there, counts and sizes agree, poses are rigid, numbers are finite and in
+/// range, the spanning tree is a tree. Throws MapFileError with one clause that names the thing.
+void check_stored_map(const StoredMap& stored);
+
+/// The frame of keyframe `row`, not described yet.
+std::shared_ptr<Frame> restore_frame(const StoredMap& stored, std::size_t row,
+                                     const std::vector<std::shared_ptr<const Camera>>& cameras,
+                                     const std::vector<std::shared_ptr<const ScalePyramid>>& scales);
+
+/// The cameras and pyramids of restore_frame(). Throws MapFileError for impossible ones.
+std::vector<std::shared_ptr<const Camera>> restore_cameras(const StoredMap& stored);
+std::vector<std::shared_ptr<const ScalePyramid>> restore_scales(const StoredMap& stored);
+
+/// Fills an empty map; `frames` has one frame a keyframe. Takes the write lock. Throws StateError
+/// when the map is not empty. See docs/reference/map_file.md.
+void restore_map(Map& map, const StoredMap& stored,
+                 const std::vector<std::shared_ptr<const Frame>>& frames);
+
+}  // namespace orbslam

@@ -1,0 +1,295 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Writing map files: whole ones that appear at once, then what changes, one commit at a time."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+import sqlite3
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from orbslam2py._files import reason_of
+from orbslam2py.errors import MapFileError
+from orbslam2py.maps.map_rows import Row, checksum
+from orbslam2py.maps.schema import CREATE, TABLES, Table
+
+#: Tables whose rows never change and are written once.
+WRITTEN_ONCE = frozenset({"keypoints", "images", "frames", "runs", "settings", "vocabulary"})
+
+#: Seconds that a writer or reader waits for another program that has the file locked.
+LOCK_PATIENCE = 2.0
+
+_OLDEST_SQLITE = (3, 37, 0)
+_SIDE_FILES = ("-wal", "-shm", "-journal")
+
+
+def _upsert(table: Table) -> str:
+    """Write a row, or change it in place: replacing it would delete what refers to it."""
+    marks = ", ".join("?" * len(table.columns))
+    changes = ", ".join(
+        f"{column} = excluded.{column}" for column in table.columns if column not in table.keys
+    )
+    return (
+        f"INSERT INTO {table.name} VALUES ({marks}) "
+        f"ON CONFLICT ({', '.join(table.keys)}) DO UPDATE SET {changes}"
+    )
+
+
+_UPSERT = {name: _upsert(table) for name, table in TABLES.items()}
+
+
+class MapWriter:
+    """Keeps a map file up to date with a map, commit by commit.
+
+    The first `commit` writes a file of its own, which takes the place of `path` when it is
+    complete; later ones change only the rows that differ. After a crash the file is that of the
+    last commit. To be used by one thread at a time; `close` at the end.
+
+    Parameters
+    ----------
+    path
+        The map file; replaced by the first commit.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = Path(os.path.realpath(path))
+        self._named = str(path)
+        self._connection: sqlite3.Connection | None = None
+        #: Checksum of every row in the file, by table and key.
+        self._written: dict[str, dict[Row, int]] = {name: {} for name in TABLES}
+
+    def has(self, table: str, *key: int) -> bool:
+        """Whether the file holds a row."""
+        return key in self._written[table]
+
+    def keys(self, table: str) -> list[Row]:
+        """Keys of the rows that the file holds, ascending."""
+        return sorted(self._written[table])
+
+    def commit(self, rows: Iterable[tuple[str, Row]]) -> int:
+        """Make the file hold these rows, in one transaction; returns how many were written.
+
+        Rows of tables that may change and are not given are deleted. Those that are written once
+        stay, but for keypoints and images of keyframes that are no longer there.
+
+        Parameters
+        ----------
+        rows
+            (table, row) pairs.
+
+        Raises
+        ------
+        MapFileError
+            If the file cannot be written; what was there before stays.
+        """
+        with _naming(self._named):
+            if self._connection is None:
+                return self._commit_first(rows)
+            return self._change(self._connection, rows)
+
+    def close(self) -> None:
+        """End with a single file, without a log beside it; idempotent."""
+        connection, self._connection = self._connection, None
+        if connection is None:
+            return
+        with _naming(self._named), contextlib.closing(connection):
+            connection.execute("PRAGMA journal_mode = DELETE")
+
+    def _commit_first(self, rows: Iterable[tuple[str, Row]]) -> int:
+        _check_target(self.path, self._named)
+        temporary = self.path.with_name(f".{self.path.name}.{secrets.token_hex(4)}.tmp")
+        try:
+            with contextlib.closing(connect(temporary, "rwc")) as connection:
+                # Nobody sees the temporary file, so it needs no journal.
+                connection.execute("PRAGMA journal_mode = OFF")
+                connection.execute("PRAGMA synchronous = OFF")
+                connection.executescript(CREATE)
+                n = self._change(connection, rows)
+            _sync(temporary)
+            _end_old_log(self.path)
+            temporary.replace(self.path)
+            _sync(self.path.parent)
+        except BaseException:
+            self._written = {name: {} for name in TABLES}
+            with contextlib.suppress(OSError):
+                temporary.unlink()
+            raise
+        self._connection = connect(self.path, "rw")
+        # Readers see the last commit while the next is written, and so does whoever comes after
+        # a crash.
+        self._connection.execute("PRAGMA journal_mode = WAL")
+        self._connection.execute("PRAGMA synchronous = NORMAL")
+        return n
+
+    def _change(self, connection: sqlite3.Connection, rows: Iterable[tuple[str, Row]]) -> int:
+        written = {name: dict(known) for name, known in self._written.items()}
+        seen: dict[str, set[Row]] = {name: set() for name in TABLES}
+        n = 0
+        connection.execute("BEGIN IMMEDIATE")
+        try:
+            for name, row in rows:
+                table = TABLES[name]
+                key, total = row[: len(table.keys)], checksum(row)
+                seen[name].add(key)
+                if written[name].get(key) == total:
+                    continue
+                written[name][key] = total
+                connection.execute(_UPSERT[name], (*row, total))
+                n += 1
+            n += _delete_others(connection, written, seen)
+            if n:
+                _write_totals(connection, written)
+            connection.execute("COMMIT")
+        except BaseException:
+            with contextlib.suppress(sqlite3.Error):
+                connection.execute("ROLLBACK")
+            raise
+        self._written = written
+        return n
+
+
+def connect(path: Path, mode: str) -> sqlite3.Connection:
+    """Open a database file; transactions are begun and ended by hand.
+
+    Parameters
+    ----------
+    path
+        The file.
+    mode
+        ``ro``, ``rw`` or ``rwc``, as in SQLite's file names.
+    """
+    if sqlite3.sqlite_version_info < _OLDEST_SQLITE:
+        raise MapFileError(
+            f"map files need SQLite 3.37, this Python has {sqlite3.sqlite_version}; use a newer one"
+        )
+    connection = sqlite3.connect(
+        f"{path.absolute().as_uri()}?mode={mode}",
+        uri=True,
+        timeout=LOCK_PATIENCE,
+        isolation_level=None,
+        check_same_thread=False,
+    )
+    connection.execute("PRAGMA foreign_keys = ON")
+    return connection
+
+
+def _delete_others(
+    connection: sqlite3.Connection,
+    written: dict[str, dict[Row, int]],
+    seen: dict[str, set[Row]],
+) -> int:
+    """Delete what the map no longer has."""
+    n = 0
+    for name in ("keypoints", "images"):
+        for key in [key for key in written[name] if key not in seen["keyframes"]]:
+            n += _delete(connection, written, name, key)
+    for name, known in written.items():
+        if name not in WRITTEN_ONCE:
+            for key in [key for key in known if key not in seen[name]]:
+                n += _delete(connection, written, name, key)
+    return n
+
+
+def _delete(
+    connection: sqlite3.Connection, written: dict[str, dict[Row, int]], name: str, key: Row
+) -> int:
+    where = " AND ".join(f"{column} = ?" for column in TABLES[name].keys)
+    connection.execute(f"DELETE FROM {name} WHERE {where}", key)
+    del written[name][key]
+    return 1
+
+
+def _write_totals(connection: sqlite3.Connection, written: dict[str, dict[Row, int]]) -> None:
+    totals = [(name, len(rows), sum(rows.values())) for name, rows in written.items()]
+    connection.executemany("INSERT OR REPLACE INTO totals VALUES (?, ?, ?)", totals)
+
+
+# ---- the file ---------------------------------------------------------------------------------
+@contextlib.contextmanager
+def _naming(path: str) -> Iterator[None]:
+    """Say which file could not be written, and why, in words for people."""
+    try:
+        yield
+    except sqlite3.IntegrityError as error:
+        raise MapFileError(f"cannot write {path}: the map is inconsistent ({error})") from error
+    except sqlite3.Error as error:
+        raise MapFileError(f"cannot write {path}: {_remedy_for(str(error))}") from error
+    except OSError as error:
+        raise MapFileError(f"cannot write {path}: {_advice(error)}") from error
+
+
+def _advice(error: OSError) -> str:
+    reason = reason_of(error)
+    if isinstance(error, PermissionError):
+        return f"{reason}; choose a place where you may write"
+    if isinstance(error, FileNotFoundError):
+        return f"{reason}; make the folder first"
+    return f"{reason}; a file that was there is kept"
+
+
+def _remedy_for(message: str) -> str:
+    if "locked" in message:
+        return "another program is writing it; wait for it or choose another name"
+    if "full" in message:
+        return "the disk is full; make room, a file that was there is kept"
+    if "readonly" in message or "unable to open" in message:
+        return "the folder or the file is not writable; choose another place"
+    return f"{message}; a file that was there is kept"
+
+
+def check_map_target(path: str | os.PathLike[str]) -> None:
+    """Raise `MapFileError` if a map file cannot be written there, before there is a map."""
+    named, target = str(path), Path(os.path.realpath(path))
+    with _naming(named):
+        _check_target(target, named)
+        probe = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
+        probe.touch()
+        probe.unlink()
+
+
+def _check_target(path: Path, named: str) -> None:
+    if path.is_dir():
+        raise MapFileError(f"cannot write {named}: it is a folder; give the name of a file")
+    if path.exists() and not path.is_file():
+        raise MapFileError(f"cannot write {named}: it is a device; give the name of a file")
+    if not path.exists():
+        return
+    if not os.access(path, os.W_OK):
+        raise MapFileError(f"cannot write {named}: it is read-only; choose another name")
+    with path.open("rb") as stream:
+        if stream.read(16) != b"SQLite format 3\x00":
+            return
+    with contextlib.closing(connect(path, "rw")) as connection:
+        try:
+            connection.execute("BEGIN IMMEDIATE")
+            connection.execute("ROLLBACK")
+        except sqlite3.DatabaseError as error:
+            if "locked" in str(error):
+                raise
+
+
+def _end_old_log(path: Path) -> None:
+    """Put the log of a crashed writer into the file that is about to be replaced.
+
+    Else it would be taken for the new file's.
+    """
+    log = path.with_name(f"{path.name}-wal")
+    if path.exists() and log.exists():
+        with (
+            contextlib.suppress(sqlite3.Error, OSError),
+            contextlib.closing(connect(path, "rw")) as connection,
+        ):
+            connection.execute("PRAGMA journal_mode = DELETE")
+    for suffix in _SIDE_FILES:
+        with contextlib.suppress(FileNotFoundError):
+            path.with_name(f"{path.name}{suffix}").unlink()
+
+
+def _sync(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a map file holds: the map, and what must be known to use it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from orbslam2py import _core as core
+from orbslam2py._arrays import ByteArray, FloatArray, IntArray
+from orbslam2py.maps.contents import MapContents
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings.settings import Settings
+from orbslam2py.trajectory.rotations import (
+    inverse_poses,
+    poses_from,
+    rotations_from_quaternions,
+)
+from orbslam2py.trajectory.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class VocabularyIdentity:
+    """Which visual words a map was made with."""
+
+    name: str
+    """Of the file; empty when it was made in memory."""
+    hash: str
+    """Of the content, 16 hexadecimal digits, as ``orbslam2py vocabulary info`` shows it."""
+    comment: str = ""
+    """Where it comes from, its licence."""
+
+    @classmethod
+    def of(cls, vocabulary: core.Vocabulary, name: str = "") -> VocabularyIdentity:
+        """Identify a vocabulary by its content."""
+        return cls(name, f"{vocabulary.hash:016x}", vocabulary.comment)
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedFrames:
+    """Where the images of a run were, relative to keyframes: (n,) entries each."""
+
+    timestamps: FloatArray
+    """Seconds."""
+    ids: IntArray
+    """Numbers of the images in their run."""
+    keyframes: IntArray
+    """Ids of living or removed keyframes; -1 before the first pose."""
+    T_cr: FloatArray
+    """(n, 7) keyframe's camera to the image's at the keyframe's first scale: unit quaternion x, y,
+    z, w, then the translation."""
+    lost: ByteArray
+    """1 where tracking was lost; the pose then is the last known one."""
+
+    def __len__(self) -> int:
+        return len(self.timestamps)
+
+    @classmethod
+    def none(cls) -> RecordedFrames:
+        """No frames."""
+        return cls(
+            np.zeros(0),
+            np.zeros(0, np.int64),
+            np.zeros(0, np.int64),
+            np.zeros((0, 7)),
+            np.zeros(0, np.uint8),
+        )
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run that made or extended the map."""
+
+    program: str
+    """Name and version, such as ``orbslam2py 0.1.0``."""
+    started: str
+    """When, as ISO 8601 in UTC."""
+    seed: int = 0
+    options: Mapping[str, Any] = field(default_factory=dict)
+    """Those of the system, by their names."""
+    frames: RecordedFrames = field(default_factory=RecordedFrames.none)
+
+
+@dataclass(frozen=True, eq=False)
+class SavedMap:
+    """A map with its camera, its visual words and the runs that made it: one map file.
+
+    Examples
+    --------
+    >>> saved = load_map("office.orbmap")  # doctest: +SKIP
+    >>> len(saved.contents.points), saved.sensor
+    """
+
+    contents: MapContents
+    settings: Settings
+    vocabulary: VocabularyIdentity
+    runs: tuple[Run, ...] = ()
+    images: Mapping[int, bytes] = field(default_factory=dict)
+    """JPEG of some keyframes, by their ids."""
+    source: str = ""
+    """The file that it was read from."""
+
+    @property
+    def sensor(self) -> Sensor:
+        """What the map was made from."""
+        return self.settings.sensor
+
+    def trajectory(self, run: int = -1) -> Trajectory:
+        """Where the images of a run were, in the map as it is now.
+
+        Parameters
+        ----------
+        run
+            Which of `runs`; the last one by default.
+
+        Returns
+        -------
+        Trajectory
+            Relative to keyframe 0; empty when the map has no runs.
+        """
+        if not self.runs:
+            return Trajectory(np.zeros(0), np.zeros((0, 4, 4)))
+        frames = self.runs[run].frames
+        T_rw, scale = self._keyframe_poses(frames.keyframes)
+        T_cr = poses_from(
+            rotations_from_quaternions(frames.T_cr[:, :4]), scale[:, None] * frames.T_cr[:, 4:]
+        )
+        T_wc = inverse_poses(T_cr @ T_rw)
+        if len(frames):
+            T_wc = self.contents.keyframes.T_cw[0] @ T_wc
+        T_wc[frames.keyframes < 0] = np.eye(4)
+        return Trajectory(frames.timestamps, T_wc, frames.lost != 0, frames.ids)
+
+    def _keyframe_poses(self, wanted: IntArray) -> tuple[FloatArray, FloatArray]:
+        """`T_cw` (n, 4, 4) and scale (n,) of keyframes, removed ones by those they hang on."""
+        keyframes, removed = self.contents.keyframes, self.contents.removed_keyframes
+        row = {int(i): k for k, i in enumerate(keyframes.ids)}
+        hangs = {int(i): k for k, i in enumerate(removed.ids)}
+        T_kp = poses_from(rotations_from_quaternions(removed.rotations), removed.translations)
+        known: dict[int, tuple[FloatArray, float]] = {-1: (np.eye(4), 1.0)}
+
+        def pose_of(keyframe: int) -> tuple[FloatArray, float]:
+            chain = []
+            while keyframe not in known and keyframe not in row:
+                chain.append(keyframe)
+                keyframe = int(removed.parent[hangs[keyframe]])
+            if keyframe not in known:
+                k = row[keyframe]
+                known[keyframe] = (keyframes.T_cw[k], float(keyframes.scale[k]))
+            for dead in reversed(chain):
+                k = hangs[dead]
+                T_pw, scale = known[keyframe]
+                stretched = scale / float(removed.parent_scale[k])
+                T = T_kp[k].copy()
+                T[:3, 3] *= stretched
+                known[dead] = (T @ T_pw, float(removed.scale[k]) * stretched)
+                keyframe = dead
+            return known[keyframe]
+
+        distinct, places = np.unique(wanted, return_inverse=True)
+        poses = [pose_of(int(keyframe)) for keyframe in distinct]
+        T = np.array([pose for pose, _ in poses]).reshape(-1, 4, 4)
+        scales = np.array([scale for _, scale in poses])
+        return T[places], scales[places]

@@ -1,0 +1,273 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The tables of a map file; ``docs/reference/map_file.md`` describes them to other programs."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+#: Tells map files from other SQLite files: "ORBm" in ASCII.
+APPLICATION_ID = 0x4F52426D
+#: Version of the format; files of later versions are refused.
+FORMAT_VERSION = 1
+#: A row of `map_points` and of `observations` holds the points of so many ids.
+IDS_PER_PAGE = 256
+#: Frames in a row of `frames`.
+FRAMES_PER_ROW = 256
+
+
+class Blob(NamedTuple):
+    """A column of items in little-endian order, row by row."""
+
+    column: str
+    field: str
+    """Name of the array in the group of `MapContents` that the table holds."""
+    dtype: str
+    width: int = 0
+    """Items a row, for arrays (n, width); 0 for arrays (n,)."""
+    optional: bool = False
+    """NULL when the array is empty."""
+
+
+KEYPOINTS = (
+    Blob("positions", "keypoints", "<f4", 2),
+    Blob("raw_positions", "raw_keypoints", "<f4", 2, optional=True),
+    Blob("octaves", "octave", "|u1"),
+    Blob("angles", "angle", "<f4"),
+    Blob("responses", "response", "<f4"),
+    Blob("descriptors", "descriptors", "|u1", 32),
+    Blob("depths", "depth", "<f4"),
+    Blob("right_columns", "right_u", "<f4"),
+    Blob("colours", "colours", "|u1", 3, optional=True),
+)
+MAP_POINTS = (
+    Blob("ids", "ids", "<i8"),
+    Blob("positions", "positions", "<f8", 3),
+    Blob("mean_directions", "mean_directions", "<f8", 3),
+    Blob("min_distances", "min_distance", "<f8"),
+    Blob("max_distances", "max_distance", "<f8"),
+    Blob("descriptors", "descriptors", "|u1", 32),
+    Blob("times_visible", "n_visible", "<i4"),
+    Blob("times_found", "n_found", "<i4"),
+    Blob("reference_keyframes", "reference_keyframe", "<i8"),
+    Blob("first_keyframes", "first_keyframe", "<i8"),
+    Blob("first_frames", "first_frame", "<i8"),
+)
+OBSERVATIONS = (
+    Blob("points", "point", "<i8"),
+    Blob("keyframes", "keyframe", "<i8"),
+    Blob("keypoints", "keypoint", "<i4"),
+)
+COVISIBILITY = (
+    Blob("others", "b", "<i8"),
+    Blob("weights", "weight", "<i4"),
+)
+FRAMES = (
+    Blob("timestamps", "timestamps", "<f8"),
+    Blob("ids", "ids", "<i8"),
+    Blob("keyframes", "keyframes", "<i8"),
+    Blob("poses", "T_cr", "<f8", 7),
+    Blob("lost", "lost", "|u1"),
+)
+
+
+class Table(NamedTuple):
+    """A table: the columns of its key, its numbers and texts, its blobs."""
+
+    name: str
+    keys: tuple[str, ...]
+    values: tuple[str, ...] = ()
+    blobs: tuple[Blob, ...] = ()
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of all columns, in the order of the rows; blobs follow their count."""
+        count = ("count",) if self.blobs else ()
+        return (
+            *self.keys,
+            *self.values,
+            *count,
+            *(blob.column for blob in self.blobs),
+            "checksum",
+        )
+
+
+#: A pose as 7 float64: unit quaternion x, y, z, w, then the translation. A blob, because SQLite
+#: does not keep the sign of a zero in a REAL column.
+POSE = "pose"
+TABLES = {
+    table.name: table
+    for table in (
+        Table("map", ("id",), ("next_keyframe", "next_point")),
+        Table("settings", ("id",), ("sensor", "yaml")),
+        Table("vocabulary", ("id",), ("name", "hash", "comment")),
+        Table("runs", ("id",), ("program", "started", "seed", "options")),
+        Table(
+            "cameras",
+            ("id",),
+            (
+                *("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "bf", "depth_ratio"),
+                *("width", "height", "scale_factor", "n_levels"),
+            ),
+        ),
+        Table(
+            "keyframes",
+            ("id",),
+            (
+                *("frame", "timestamp", "camera", POSE, "scale", "parent"),
+                *("provisional_parent", "processed"),
+            ),
+        ),
+        Table("keypoints", ("keyframe",), (), KEYPOINTS),
+        Table("images", ("keyframe",), ("jpeg",)),
+        Table("removed_keyframes", ("id",), ("parent", POSE, "scale", "parent_scale")),
+        Table("map_points", ("page",), (), MAP_POINTS),
+        Table("observations", ("page",), (), OBSERVATIONS),
+        Table("covisibility", ("keyframe",), (), COVISIBILITY),
+        Table("loop_edges", ("a", "b")),
+        Table("frames", ("run", "part"), (), FRAMES),
+    )
+}
+
+
+def _blob_columns(blobs: tuple[Blob, ...]) -> str:
+    columns = ["count INTEGER NOT NULL CHECK (count >= 0),"]
+    columns += [f"{blob.column} BLOB{'' if blob.optional else ' NOT NULL'}," for blob in blobs]
+    return "\n  ".join(columns)
+
+
+#: Makes the tables. Rows carry their checksums; `totals` counts the rows and adds them up.
+CREATE = f"""
+PRAGMA application_id = {APPLICATION_ID};
+PRAGMA user_version = {FORMAT_VERSION};
+
+CREATE TABLE map (
+  id INTEGER PRIMARY KEY CHECK (id = 1),
+  next_keyframe INTEGER NOT NULL,
+  next_point INTEGER NOT NULL,
+  checksum INTEGER NOT NULL
+) STRICT;
+
+CREATE TABLE settings (
+  id INTEGER PRIMARY KEY CHECK (id = 1),
+  sensor TEXT NOT NULL,
+  yaml TEXT NOT NULL,
+  checksum INTEGER NOT NULL
+) STRICT;
+
+CREATE TABLE vocabulary (
+  id INTEGER PRIMARY KEY CHECK (id = 1),
+  name TEXT NOT NULL,
+  hash TEXT NOT NULL,
+  comment TEXT NOT NULL,
+  checksum INTEGER NOT NULL
+) STRICT;
+
+CREATE TABLE runs (
+  id INTEGER PRIMARY KEY,
+  program TEXT NOT NULL,
+  started TEXT NOT NULL,
+  seed INTEGER NOT NULL,
+  options TEXT NOT NULL,
+  checksum INTEGER NOT NULL
+) STRICT;
+
+CREATE TABLE cameras (
+  id INTEGER PRIMARY KEY,
+  fx REAL NOT NULL,
+  fy REAL NOT NULL,
+  cx REAL NOT NULL,
+  cy REAL NOT NULL,
+  k1 REAL NOT NULL,
+  k2 REAL NOT NULL,
+  p1 REAL NOT NULL,
+  p2 REAL NOT NULL,
+  k3 REAL NOT NULL,
+  bf REAL NOT NULL,
+  depth_ratio REAL NOT NULL,
+  width INTEGER NOT NULL,
+  height INTEGER NOT NULL,
+  scale_factor REAL NOT NULL,
+  n_levels INTEGER NOT NULL,
+  checksum INTEGER NOT NULL
+) STRICT;
+
+CREATE TABLE keyframes (
+  id INTEGER PRIMARY KEY,
+  frame INTEGER NOT NULL,
+  timestamp REAL NOT NULL,
+  camera INTEGER NOT NULL REFERENCES cameras DEFERRABLE INITIALLY DEFERRED,
+  pose BLOB NOT NULL,
+  scale REAL NOT NULL,
+  parent INTEGER REFERENCES keyframes DEFERRABLE INITIALLY DEFERRED,
+  provisional_parent INTEGER NOT NULL,
+  processed INTEGER NOT NULL,
+  checksum INTEGER NOT NULL
+) STRICT;
+
+CREATE VIEW spanning_tree AS
+  SELECT id AS child, parent FROM keyframes WHERE parent IS NOT NULL;
+
+CREATE TABLE keypoints (
+  keyframe INTEGER PRIMARY KEY
+    REFERENCES keyframes ON DELETE CASCADE DEFERRABLE INITIALLY DEFERRED,
+  {_blob_columns(KEYPOINTS)}
+  checksum INTEGER NOT NULL
+) STRICT;
+
+CREATE TABLE images (
+  keyframe INTEGER PRIMARY KEY
+    REFERENCES keyframes ON DELETE CASCADE DEFERRABLE INITIALLY DEFERRED,
+  jpeg BLOB NOT NULL,
+  checksum INTEGER NOT NULL
+) STRICT;
+
+CREATE TABLE removed_keyframes (
+  id INTEGER PRIMARY KEY,
+  parent INTEGER NOT NULL,
+  pose BLOB NOT NULL,
+  scale REAL NOT NULL,
+  parent_scale REAL NOT NULL,
+  checksum INTEGER NOT NULL
+) STRICT;
+
+CREATE TABLE map_points (
+  page INTEGER PRIMARY KEY,
+  {_blob_columns(MAP_POINTS)}
+  checksum INTEGER NOT NULL
+) STRICT;
+
+CREATE TABLE observations (
+  page INTEGER PRIMARY KEY
+    REFERENCES map_points ON DELETE CASCADE DEFERRABLE INITIALLY DEFERRED,
+  {_blob_columns(OBSERVATIONS)}
+  checksum INTEGER NOT NULL
+) STRICT;
+
+CREATE TABLE covisibility (
+  keyframe INTEGER PRIMARY KEY
+    REFERENCES keyframes ON DELETE CASCADE DEFERRABLE INITIALLY DEFERRED,
+  {_blob_columns(COVISIBILITY)}
+  checksum INTEGER NOT NULL
+) STRICT;
+
+CREATE TABLE loop_edges (
+  a INTEGER NOT NULL REFERENCES keyframes DEFERRABLE INITIALLY DEFERRED,
+  b INTEGER NOT NULL REFERENCES keyframes DEFERRABLE INITIALLY DEFERRED,
+  checksum INTEGER NOT NULL,
+  PRIMARY KEY (a, b)
+) STRICT, WITHOUT ROWID;
+
+CREATE TABLE frames (
+  run INTEGER NOT NULL REFERENCES runs DEFERRABLE INITIALLY DEFERRED,
+  part INTEGER NOT NULL,
+  {_blob_columns(FRAMES)}
+  checksum INTEGER NOT NULL,
+  PRIMARY KEY (run, part)
+) STRICT, WITHOUT ROWID;
+
+CREATE TABLE totals (
+  name TEXT PRIMARY KEY,
+  rows INTEGER NOT NULL,
+  checksum INTEGER NOT NULL
+) STRICT, WITHOUT ROWID;
+"""

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Small maps made once per test run, and map files to spoil."""
+
+from __future__ import annotations
+
+import sqlite3
+from contextlib import closing
+from functools import lru_cache
+from pathlib import Path
+
+from orbslam2py import Sensor
+from orbslam2py.maps import SavedMap, load_map, save_map
+from orbslam2py.maps.map_rows import checksum
+from orbslam2py.maps.schema import TABLES
+from support import small_sequences
+
+#: Frames of the mapping run: enough for several keyframes and a culled one.
+FRAMES = 40
+
+
+@lru_cache
+def small_map(sensor: Sensor = Sensor.RGBD, frames: int = FRAMES) -> SavedMap:
+    """The map of a short deterministic run, as it comes back from a file."""
+    with small_sequences.new_system(sensor, deterministic=True, keyframe_images=True) as slam:
+        small_sequences.play(slam, frames)
+        return slam.saved_map()
+
+
+def written(folder: Path, sensor: Sensor = Sensor.RGBD) -> Path:
+    """A file of the small map."""
+    path = folder / "small.orbmap"
+    save_map(small_map(sensor), path)
+    return path
+
+
+def edit(path: Path, *statements: str) -> Path:
+    """Change a map file by SQL, as another program might; checksums are made to fit again."""
+    with closing(sqlite3.connect(path)) as connection, connection:
+        for statement in statements:
+            connection.execute(statement)
+        for table in TABLES.values():
+            columns = ", ".join(table.columns[:-1])
+            where = " AND ".join(f"{key} = ?" for key in table.keys)
+            total = 0
+            rows = connection.execute(f"SELECT {columns} FROM {table.name}").fetchall()
+            for row in rows:
+                crc = checksum(row)
+                total += crc
+                connection.execute(
+                    f"UPDATE {table.name} SET checksum = ? WHERE {where}",
+                    (crc, *row[: len(table.keys)]),
+                )
+            connection.execute(
+                "UPDATE totals SET rows = ?, checksum = ? WHERE name = ?",
+                (len(rows), total, table.name),
+            )
+    return path
+
+
+def same_file_content(a: Path, b: Path) -> bool:
+    """Whether two map files hold equal maps."""
+    return load_map(a).contents.first_difference(load_map(b).contents) is None
