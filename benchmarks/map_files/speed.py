@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import dataclasses
 import gc
 import statistics
 import subprocess
@@ -30,7 +29,8 @@ from benchmarks.harness.process_memory import peak_mb, resident_mb
 from benchmarks.map_files.mapping import corridor, made_up, mapped
 from orbslam2py import System, load_vocabulary
 from orbslam2py import _core as core
-from orbslam2py.maps import load_map, restore_contents, save_map, take_contents
+from orbslam2py.maps import SavedMap, load_map, restore_contents, save_map, take_contents
+from orbslam2py.maps.contents import take_changes
 from orbslam2py.maps.map_rows import all_rows, keypoint_rows, map_rows
 from orbslam2py.maps.map_writer import MapWriter
 
@@ -64,26 +64,28 @@ def longest_wait(slam_map: core.Map) -> tuple[float, float]:
     return copy, max(waits)
 
 
-def increment(path: Path, slam_map: core.Map, like: object) -> float:
-    """Seconds of the commit of one new keyframe's rows, all else unchanged."""
-    saved = like
+def increment(path: Path, slam_map: core.Map, saved: SavedMap) -> float:
+    """Seconds of the commit of one new keyframe, and of 500 points that moved with it."""
+    ids = saved.contents.keyframes.ids
+    newest, points = int(ids[-1]), saved.contents.points.ids[-500:].tolist()
+    times = []
     with contextlib.closing(MapWriter(path)) as writer:
-        contents = saved.contents  # type: ignore[attr-defined]
-        writer.commit(all_rows(saved))  # type: ignore[arg-type]
-        known = contents.keyframes.ids[:-1]
-        times = []
-        for i in range(5):
-            moved = contents.points.positions.copy()
-            moved[-500:] += 0.001 * (i + 1)
+        before = take_changes(slam_map, ids[:0], None)
+        rows = list(all_rows(saved))
+        for _ in range(5):
+            without = [row for row in rows if row[0] != "keypoints" or row[1][0] != newest]
+            writer.commit(without, lambda table, key: False)
+            writer._written["keypoints"].pop((newest,), None)
+            for point in points:
+                slam_map.set_position(point, slam_map.point_position(point) + 0.001)
             begin = time.perf_counter()
-            part = take_contents(slam_map, known)
-            part = dataclasses.replace(
-                part, points=dataclasses.replace(part.points, positions=moved)
-            )
-            rows = [*map_rows(part), *list(keypoint_rows(part))[-1:]]
-            keep = [row for row in rows if row[0] not in ("settings",)]
-            writer.commit(keep)
+            changes = take_changes(slam_map, ids[:-1], before)
+            pages = set(changes.pages.tolist())
+            new = [*map_rows(changes.contents, changes.changed_keyframes)]
+            new.append(list(keypoint_rows(changes.contents))[-1])
+            writer.commit(new, lambda table, key, pages=pages: key[0] not in pages)
             times.append(time.perf_counter() - begin)
+            before = changes
     return statistics.median(times)
 
 

@@ -11,6 +11,7 @@
 #include "frame/build_frame.hpp"
 #include "frame/extract_pair.hpp"
 #include "frame/image_input.hpp"
+#include "frame/keypoint_colours.hpp"
 #include "frame/stereo_matching.hpp"
 
 namespace orbslam::bindings {
@@ -179,6 +180,13 @@ void bind_frame_class(py::module_& module) {
       .def_property_readonly(
           "depth", [](const Frame& f) { return to_array(f.depth); },
           "(n,) float32, metres; -1 when unknown.")
+      .def_property_readonly(
+          "colours",
+          [](const Frame& f) {
+            return copy_to_array<std::uint8_t>(f.colours.data(),
+                                               {static_cast<py::ssize_t>(f.colours.size()), 3});
+          },
+          "(n, 3) uint8, red, green, blue of the image at the keypoints; (0, 3) of a grey image.")
       .def(
           "features_in_area",
           [](const Frame& f, float x, float y, float r, int min_level, int max_level) {
@@ -358,6 +366,18 @@ void bind_frame(py::module_& module) {
   module.def("to_grey", &grey_of, py::arg("image"), py::arg("is_rgb"),
              "Grey image (h, w) uint8 of a grey, colour (h, w, 3) or colour + alpha (h, w, 4) "
              "image; a contiguous grey image comes back itself.");
+  module.def(
+      "sample_colours",
+      [](Frame& frame, const py::array& image, bool is_rgb) {
+        if (!holds<std::uint8_t>(image)) throw ImageError("image must be uint8");
+        const py::array pixels = normal_form(image);
+        const cv::Mat source = view_image(pixels, CV_8U);
+        const py::gil_scoped_release release;
+        sample_colours(source, is_rgb, frame);
+      },
+      py::arg("frame"), py::arg("image"), py::arg("is_rgb"),
+      "Gives a new frame the colours of its image (h, w, 3) or (h, w, 4) uint8 at the keypoints; "
+      "a grey image gives none. Raises ImageError for an image of another size.");
   module.def("to_depth_metres", &depth_metres_of, py::arg("raw"), py::arg("factor"),
              "Depth (h, w) float32 in metres: raw / factor. Values <= 0 and NaN mean none.");
 }

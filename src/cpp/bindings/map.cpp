@@ -18,6 +18,7 @@
 namespace orbslam::bindings {
 
 void bind_map_snapshots(py::module_& module);  // map_snapshots.cpp
+void bind_map_changes(py::module_& module);    // map_changes.cpp
 
 namespace {
 
@@ -118,6 +119,14 @@ void bind_queries(MapClass& map) {
             return living(self, id).frame->timestamp;
           },
           "id"_a, Release(), "Seconds, of a living keyframe.")
+      .def(
+          "keyframe_frame",
+          [](const Map& self, KeyFrameId id) {
+            const auto lock = self.read_lock();
+            return std::const_pointer_cast<Frame>(living(self, id).frame);
+          },
+          "id"_a, Release(),
+          "What a living keyframe saw: keypoints, descriptors, depths, colours, words.")
       .def("living", reader(&Map::living), "id"_a, Release(),
            "The keyframe itself, or the nearest of its ancestors that lives; -1 if unknown.")
       .def(
@@ -372,6 +381,7 @@ void bind_map(py::module_& module) {
   bind_local_map(module);
   bind_keyframe_verbs(module);
   bind_map_snapshots(module);
+  bind_map_changes(module);
 }
 
 }  // namespace orbslam::bindings

@@ -70,24 +70,27 @@ void put_keyframes(py::dict& arrays, KeyFrameRows&& rows) {
 void put_keypoints(py::dict& arrays, const std::vector<std::shared_ptr<const Frame>>& frames,
                    const std::vector<bool>& is_known) {
   std::vector<std::int64_t> offsets{0};
-  bool distorts = false;
+  std::vector<std::uint8_t> has_colours;
+  bool distorts = false, has_any_colours = false;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const std::size_t n = is_known[i] ? 0 : frames[i]->size();
     offsets.push_back(offsets.back() + static_cast<std::int64_t>(n));
     distorts |= !frames[i]->camera->lens().is_identity();
+    has_colours.push_back(frames[i]->colours.empty() ? 0 : 1);
+    has_any_colours |= !frames[i]->colours.empty();
   }
   const auto n = static_cast<py::ssize_t>(offsets.back());
   using Shape = std::vector<py::ssize_t>;
   py::array_t<float> keypoints(Shape{n, 2}), raw(Shape{distorts ? n : 0, 2}), angle(n), response(n),
       depth(n), right_u(n);
-  py::array_t<std::uint8_t> octave(n), descriptors(Shape{n, 32}), colours(Shape{0, 3});
+  py::array_t<std::uint8_t> octave(n), descriptors(Shape{n, 32}),
+      colours(Shape{has_any_colours ? n : 0, 3});
   const KeypointColumns<float, std::uint8_t> columns{
       keypoints.mutable_data(),   distorts ? raw.mutable_data() : nullptr,
       octave.mutable_data(),      angle.mutable_data(),
       response.mutable_data(),    descriptors.mutable_data(),
       depth.mutable_data(),       right_u.mutable_data(),
-      nullptr};
-  std::vector<std::uint8_t> has_colours(frames.size(), 0);
+      has_any_colours ? colours.mutable_data() : nullptr};
   {
     const py::gil_scoped_release release;
     for (std::size_t i = 0; i < frames.size(); ++i) {
@@ -138,13 +141,19 @@ void put_the_rest(py::dict& arrays, MapContents&& contents) {
   arrays["loop_edges"] = owned<std::int64_t>(std::move(contents.loop_edges), {2});
 }
 
-py::dict map_contents(const Map& map, const py::array_t<std::int64_t, py::array::c_style>& known) {
+using IdArray = py::array_t<std::int64_t, py::array::c_style>;
+
+py::dict map_contents(const Map& map, const IdArray& known, std::uint64_t keyframe_stamp,
+                      std::uint64_t point_stamp, const IdArray& incomplete_pages) {
   MapContents contents;
+  const ContentsKnown before{
+      keyframe_stamp, point_stamp,
+      {incomplete_pages.data(), incomplete_pages.data() + incomplete_pages.size()}};
   std::vector<bool> is_known;
   {
     const std::vector<std::int64_t> ids(known.data(), known.data() + known.size());
     const py::gil_scoped_release release;
-    contents = take_contents(map);
+    contents = take_contents(map, before);
     for (const KeyFrameId id : contents.keyframes.ids) {
       is_known.push_back(std::binary_search(ids.begin(), ids.end(), id.value));
     }
@@ -153,6 +162,11 @@ py::dict map_contents(const Map& map, const py::array_t<std::int64_t, py::array:
   arrays["map_index"] = contents.epoch;
   arrays["next_keyframe"] = contents.next_keyframe.value;
   arrays["next_point"] = contents.next_point.value;
+  arrays["known.keyframe_stamp"] = contents.keyframe_stamp;
+  arrays["known.point_stamp"] = contents.point_stamp;
+  arrays["known.changed_keyframes"] = flags(std::move(contents.keyframe_changed));
+  arrays["known.pages"] = owned<std::int64_t>(std::move(contents.pages));
+  arrays["known.incomplete_pages"] = owned<std::int64_t>(std::move(contents.incomplete_pages));
   put_cameras(arrays, contents.cameras);
   put_keyframes(arrays, std::move(contents.keyframes));
   put_keypoints(arrays, contents.frames, is_known);
@@ -321,10 +335,13 @@ void restore(Map& map, const py::dict& contents, const Vocabulary* vocabulary,
 
 void bind_map_contents(py::module_& module) {
   module.def("map_contents", &map_contents, "map"_a,
-             "known"_a = py::array_t<std::int64_t>(py::ssize_t{0}),
+             "known"_a = py::array_t<std::int64_t>(py::ssize_t{0}), "keyframe_stamp"_a = 0,
+             "point_stamp"_a = 0,
+             "incomplete_pages"_a = py::array_t<std::int64_t>(py::ssize_t{0}),
              "Everything that a map is at one moment, as arrays by name: see\n"
              "orbslam2py.maps.MapContents. The keypoints of the keyframes `known` ((m,) int64\n"
-             "ascending), which never change, are left out.");
+             "ascending), which never change, are left out. With the stamps and incomplete pages\n"
+             "of an earlier call, points come only of pages that may have changed since.");
   module.def(
       "check_map_contents",
       [](const py::dict& contents) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -28,6 +29,8 @@ struct Frame {
   std::vector<Descriptor> descriptors;
   std::vector<float> right_u;  ///< column in the right image; meaningful where depth > 0, else -1
   std::vector<float> depth;    ///< metres, -1 when unknown
+  /// Red, green, blue of the image at each keypoint; empty when the image was grey.
+  std::vector<std::array<std::uint8_t, 3>> colours;
   KeypointGrid grid;
 
   WordVector words;          ///< filled by describe() (places/), before the frame is shared

@@ -104,34 +104,71 @@ void reserve(PointRows& rows, ObservationRows& observations, std::size_t n) {
   observations.keypoint.reserve(4 * n);
 }
 
-void copy_points(const Map& map, MapContents& contents) {
+/// Notes the point, and tells whether all its observations are part of the contents.
+bool copy_point(const Map& map, const MapPoint& point, MapContents& contents) {
   PointRows& rows = contents.points;
   ObservationRows& observations = contents.observations;
-  reserve(rows, observations, map.n_points());
-  map.for_each_point([&](const MapPoint& point) {
-    KeyFrameId reference;
-    for (const Observation& observation : point.observations) {
-      if (!is_published(map, observation.keyframe)) continue;
-      observations.point.push_back(point.id);
-      observations.keyframe.push_back(observation.keyframe);
-      observations.keypoint.push_back(static_cast<std::int32_t>(observation.index));
-      if (!reference.valid() || observation.keyframe == point.reference_keyframe) {
-        reference = observation.keyframe;
-      }
+  KeyFrameId reference;
+  bool complete = true;
+  for (const Observation& observation : point.observations) {
+    if (!is_published(map, observation.keyframe)) {
+      complete = false;
+      continue;
     }
-    if (!reference.valid()) return;
-    rows.ids.push_back(point.id);
-    rows.positions.push_back(row_of(point.position));
-    rows.mean_directions.push_back(row_of(point.mean_direction));
-    rows.min_distance.push_back(point.min_distance);
-    rows.max_distance.push_back(point.max_distance);
-    rows.descriptors.push_back(point.descriptor);
-    rows.n_visible.push_back(point.n_visible);
-    rows.n_found.push_back(point.n_found);
-    rows.reference_keyframe.push_back(reference);
-    rows.first_keyframe.push_back(point.first_keyframe);
-    rows.first_frame.push_back(point.first_frame);
-  });
+    observations.point.push_back(point.id);
+    observations.keyframe.push_back(observation.keyframe);
+    observations.keypoint.push_back(static_cast<std::int32_t>(observation.index));
+    if (!reference.valid() || observation.keyframe == point.reference_keyframe) {
+      reference = observation.keyframe;
+    }
+  }
+  if (!reference.valid()) return complete;
+  rows.ids.push_back(point.id);
+  rows.positions.push_back(row_of(point.position));
+  rows.mean_directions.push_back(row_of(point.mean_direction));
+  rows.min_distance.push_back(point.min_distance);
+  rows.max_distance.push_back(point.max_distance);
+  rows.descriptors.push_back(point.descriptor);
+  rows.n_visible.push_back(point.n_visible);
+  rows.n_found.push_back(point.n_found);
+  rows.reference_keyframe.push_back(reference);
+  rows.first_keyframe.push_back(point.first_keyframe);
+  rows.first_frame.push_back(point.first_frame);
+  return complete;
+}
+
+void copy_points(const Map& map, const ContentsKnown& known, MapContents& contents) {
+  const auto& table = map.point_table();
+  if (known.point_stamp == 0) reserve(contents.points, contents.observations, map.n_points());
+  contents.point_stamp = table.stamp();
+  for (std::size_t page = 0; page < table.n_pages(); ++page) {
+    const auto number = static_cast<std::int64_t>(page);
+    if (table.page_stamp(page) <= known.point_stamp &&
+        !std::binary_search(known.incomplete_pages.begin(), known.incomplete_pages.end(), number)) {
+      continue;
+    }
+    bool complete = true;
+    table.for_each_change(page, 0, [&](MapPointId, const MapPoint* point) {
+      if (point) complete &= copy_point(map, *point, contents);
+    });
+    contents.pages.push_back(number);
+    if (!complete) contents.incomplete_pages.push_back(number);
+  }
+}
+
+void note_changed_keyframes(const Map& map, std::uint64_t since, MapContents& contents) {
+  const auto& table = map.keyframe_table();
+  contents.keyframe_stamp = table.stamp();
+  std::vector<KeyFrameId> changed;
+  for (std::size_t page = 0; page < table.n_pages(); ++page) {
+    table.for_each_change(page, since, [&](KeyFrameId id, const KeyFrame* keyframe) {
+      if (keyframe) changed.push_back(id);
+    });
+  }
+  for (const KeyFrameId id : contents.keyframes.ids) {
+    contents.keyframe_changed.push_back(
+        std::binary_search(changed.begin(), changed.end(), id) ? 1 : 0);
+  }
 }
 
 void copy_removed(const Map& map, MapContents& contents) {
@@ -170,7 +207,7 @@ ArchivedPose MapContentsAccess::relative_to_root(const Map& map, KeyFrameId id) 
   return {id, KeyFrameId(0), pose.T_cw * root.T_cw.inverse(), pose.scale, root.scale};
 }
 
-MapContents take_contents(const Map& map) {
+MapContents take_contents(const Map& map, const ContentsKnown& known) {
   MapContents contents;
   {
     const auto lock = map.read_lock();
@@ -178,7 +215,8 @@ MapContents take_contents(const Map& map) {
     contents.next_keyframe = MapContentsAccess::next_keyframe(map);
     contents.next_point = MapContentsAccess::next_point(map);
     copy_keyframes(map, contents);
-    copy_points(map, contents);
+    note_changed_keyframes(map, known.keyframe_stamp, contents);
+    copy_points(map, known, contents);
     copy_removed(map, contents);
   }
   list_cameras(contents);
@@ -200,6 +238,14 @@ void copy_keypoints(const Frame& frame, const KeypointColumns<float, std::uint8_
     into.octave[first + i] = static_cast<std::uint8_t>(keypoint.level);
     into.angle[first + i] = keypoint.angle;
     into.response[first + i] = keypoint.response;
+  }
+  if (into.colours) {
+    std::uint8_t* const colours = into.colours + 3 * first;
+    if (frame.colours.empty()) {
+      std::fill_n(colours, 3 * n, std::uint8_t{0});
+    } else if (n > 0) {
+      std::memcpy(colours, frame.colours.data(), 3 * n);
+    }
   }
   if (n == 0) return;
   static_assert(sizeof(Descriptor) == 32);

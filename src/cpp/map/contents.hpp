@@ -64,6 +64,12 @@ struct EdgeRows {
 /// taken in yet are not part of it, nor what only they see. See docs/reference/map_file.md.
 struct MapContents {
   std::uint64_t epoch = 0;
+  std::uint64_t keyframe_stamp = 0, point_stamp = 0;  ///< of the last changes (IdTable::stamp)
+  std::vector<std::uint8_t> keyframe_changed;  ///< one a keyframe: later than the stamp given
+  std::vector<std::int64_t> pages;             ///< of points (IdTable) that were looked at
+  /// Of these, the ones with observations left out, which may become part of it without a change
+  /// of the point.
+  std::vector<std::int64_t> incomplete_pages;
   KeyFrameId next_keyframe;
   MapPointId next_point;
   std::vector<CameraContents> cameras;
@@ -76,8 +82,15 @@ struct MapContents {
   std::vector<std::array<KeyFrameId, 2>> loop_edges;
 };
 
-/// Copies the map. Takes the read lock; the frames' keypoints are not copied under it.
-MapContents take_contents(const Map& map);
+/// What somebody has already: as of the stamps of an earlier copy of the same map.
+struct ContentsKnown {
+  std::uint64_t keyframe_stamp = 0, point_stamp = 0;
+  std::vector<std::int64_t> incomplete_pages;
+};
+
+/// Copies the map. Of the points only those on pages with a change since `known`, or incomplete
+/// then. Takes the read lock; the frames' keypoints are not copied under it.
+MapContents take_contents(const Map& map, const ContentsKnown& known = {});
 
 /// The keypoints of many frames, one after the other, borrowed for reading or writing. Colours
 /// and raw positions may be null.

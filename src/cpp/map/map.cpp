@@ -33,6 +33,18 @@ MapPoint& Map::point(MapPointId id) {
   return *found;
 }
 
+KeyFrame& Map::changing(KeyFrameId id) {
+  KeyFrame& changed = keyframe(id);
+  keyframes_.touch(id);
+  return changed;
+}
+
+MapPoint& Map::changing(MapPointId id) {
+  MapPoint& changed = point(id);
+  points_.touch(id);
+  return changed;
+}
+
 std::vector<KeyFrameId> Map::keyframe_ids() const {
   std::vector<KeyFrameId> ids;
   ids.reserve(keyframes_.size());
@@ -65,6 +77,7 @@ void Map::publish(KeyFrameId id) {
   KeyFrame& published = keyframe(id);
   if (published.published) return;
   published.published = true;
+  keyframes_.touch(id);
   ++n_published_;
   ++structure_version_;
   if (published.parent.valid() || id.value == 0) return;
@@ -97,11 +110,11 @@ void Map::set_slot(KeyFrameId id, std::size_t index, MapPointId point_id) {
 }
 
 void Map::set_pose(KeyFrameId id, const Pose& T_cw) {
-  keyframe(id).T_cw = T_cw;
+  changing(id).T_cw = T_cw;
   ++geometry_version_;
 }
 
-void Map::rescale(KeyFrameId id, double factor) { keyframe(id).scale *= factor; }
+void Map::rescale(KeyFrameId id, double factor) { changing(id).scale *= factor; }
 
 void Map::begin_lease(KeyFrameId id) { ++keyframe(id).leases; }
 

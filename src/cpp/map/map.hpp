@@ -73,6 +73,13 @@ class Map {
     points_.for_each(visit);
   }
 
+  /// What the last change of each object was, for those who follow the map (map/changes.hpp).
+  /// Changes of keyframes: birth, death, pose, scale, publication, processing, parent, loop edges
+  /// and weights. Of points: birth, death, position and what follows from it, descriptor and
+  /// observations; not the tracker's counters.
+  const IdTable<KeyFrameId, KeyFrame>& keyframe_table() const { return keyframes_; }
+  const IdTable<MapPointId, MapPoint>& point_table() const { return points_; }
+
   // ---- keyframes -------------------------------------------------------------------------------
   /// A new keyframe with empty slots, not yet published. The frame must be described (words) if a
   /// vocabulary is in use; nobody changes it afterwards.
@@ -81,7 +88,7 @@ class Map {
   /// hangs provisionally under the published keyframe before it, so that the tree spans all.
   void publish(KeyFrameId id);
   /// Notes that process_new_keyframe() is through with the keyframe.
-  void mark_processed(KeyFrameId id) { keyframe(id).processed = true; }
+  void mark_processed(KeyFrameId id) { changing(id).processed = true; }
   /// Only for a keyframe not yet published: notes a match (or its absence, with an invalid id)
   /// whose observation process_new_keyframe() adds later. The slot must not hold an observation.
   void set_slot(KeyFrameId id, std::size_t index, MapPointId point);
@@ -185,6 +192,9 @@ class Map {
 
   KeyFrame& keyframe(KeyFrameId id);
   MapPoint& point(MapPointId id);
+  // The same, to be changed in a way that followers are told of.
+  KeyFrame& changing(KeyFrameId id);
+  MapPoint& changing(MapPointId id);
   const KeyFrame& keyframe(KeyFrameId id) const;
 
   void insert_observation(MapPoint& point, KeyFrame& keyframe, std::size_t index);

@@ -70,12 +70,14 @@ void Map::update_connections(KeyFrameId id) {
     if (set_weight(updated, other, count)) {
       set_weight(neighbour, id, count);
       sort_neighbours(neighbour);
+      keyframes_.touch(other);
       changed = true;
     }
     count = 0;
   }
   if (changed) {
     sort_neighbours(updated);
+    keyframes_.touch(id);
     ++structure_version_;
   }
   if (id.value != 0 && (!updated.parent.valid() || updated.provisional_parent)) {
@@ -85,7 +87,7 @@ void Map::update_connections(KeyFrameId id) {
 
 void Map::forget_covisibility(KeyFrame& dying) {
   for (const auto& [other, weight] : dying.weights) {
-    KeyFrame& neighbour = keyframe(other);
+    KeyFrame& neighbour = changing(other);
     neighbour.weights.erase(dying.id);
     sort_neighbours(neighbour);
   }

@@ -105,11 +105,13 @@ void Map::refresh_geometry(MapPoint& refreshed) {
 }
 
 void Map::update_descriptor(MapPointId id) {
-  if (MapPoint* refreshed = points_.find(id)) refresh_descriptor(*refreshed);
+  if (!find(id)) return;
+  refresh_descriptor(changing(id));
 }
 
 void Map::update_geometry(MapPointId id) {
-  if (MapPoint* refreshed = points_.find(id)) refresh_geometry(*refreshed);
+  if (!find(id)) return;
+  refresh_geometry(changing(id));
 }
 
 }  // namespace orbslam

@@ -51,12 +51,12 @@ MapPointId Map::add_point(const Eigen::Vector3d& position, KeyFrameId reference,
 }
 
 void Map::set_position(MapPointId id, const Eigen::Vector3d& position) {
-  point(id).position = position;
+  changing(id).position = position;
   ++geometry_version_;
 }
 
 void Map::set_geometry(MapPointId id, const PointGeometry& geometry) {
-  MapPoint& moved = point(id);
+  MapPoint& moved = changing(id);
   moved.position = geometry.position;
   moved.mean_direction = geometry.mean_direction;
   moved.min_distance = geometry.min_distance;
@@ -71,6 +71,7 @@ void Map::insert_observation(MapPoint& observed, KeyFrame& observer, std::size_t
   all.insert(std::lower_bound(all.begin(), all.end(), observer.id, precedes), observation);
   observed.observation_count += weight_of(observation);
   observer.map_points[index] = observed.id;
+  points_.touch(observed.id);
 }
 
 void Map::add_observation(MapPointId point_id, KeyFrameId keyframe_id, std::size_t index) {
@@ -98,6 +99,7 @@ void Map::erase_observation(MapPointId point_id, KeyFrameId keyframe_id) {
   keyframe(keyframe_id).map_points[it->index] = MapPointId();
   observed->observation_count -= weight_of(*it);
   all.erase(it);
+  points_.touch(point_id);
   ++structure_version_;
   if (observed->observation_count <= kDyingCount) {
     erase_point(point_id);
@@ -133,6 +135,7 @@ void Map::replace_point(MapPointId id, MapPointId by) {
   survivor.n_found += dying->n_found;
   survivor.n_visible += dying->n_visible;
   points_.erase(id);
+  points_.touch(survivor_id);
   remember_replacement(id, survivor_id);
   refresh_descriptor(survivor);
   refresh_geometry(survivor);

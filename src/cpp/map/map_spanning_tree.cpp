@@ -20,6 +20,7 @@ void Map::link(KeyFrame& child, KeyFrameId parent) {
   keyframe(parent).children.insert(child.id);
   child.parent = parent;
   child.provisional_parent = false;
+  keyframes_.touch(child.id);
   ++structure_version_;
 }
 
@@ -51,6 +52,8 @@ void Map::add_loop_edge(KeyFrameId a, KeyFrameId b) {
   KeyFrame& second = keyframe(b);
   first.loop_edges.insert(b);
   second.loop_edges.insert(a);
+  keyframes_.touch(a);
+  keyframes_.touch(b);
   ++structure_version_;
 }
 

@@ -171,6 +171,10 @@ std::shared_ptr<Frame> restore_frame(
   if (n > 0) std::memcpy(frame->descriptors.data(), columns.descriptors + 32 * first, 32 * n);
   frame->depth.assign(columns.depth + first, columns.depth + first + n);
   frame->right_u.assign(columns.right_u + first, columns.right_u + first + n);
+  if (columns.colours && stored.keyframes.has_colours[row] != 0) {
+    frame->colours.resize(n);
+    if (n > 0) std::memcpy(frame->colours.data(), columns.colours + 3 * first, 3 * n);
+  }
   frame->grid = KeypointGrid(frame->keypoints, frame->camera->bounds());
   return frame;
 }

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The map outside of a running system: plain copies of it, and files of them."""
 
+from orbslam2py.maps.changes import KeyframesSet, MapChanges, MapFollower, PointsSet
 from orbslam2py.maps.contents import (
     Cameras,
     Covisibility,
@@ -40,11 +41,15 @@ __all__ = [
     "ImageOfKeyframe",
     "ImageSequence",
     "Keyframes",
+    "KeyframesSet",
+    "MapChanges",
     "MapContents",
+    "MapFollower",
     "MapSnapshot",
     "Observations",
     "Placement",
     "Points",
+    "PointsSet",
     "RecordedFrames",
     "RemovedKeyframes",
     "Run",

@@ -368,7 +368,25 @@ class MapContents:
         return digest.hexdigest()
 
 
-def take_contents(slam_map: core.Map, known: IntArray | None = None) -> MapContents:
+@dataclass(frozen=True, eq=False)
+class ChangedContents:
+    """What may have changed in a map since an earlier copy of it, for who keeps a file of it."""
+
+    contents: MapContents
+    """All but the keypoints that were known, and the points on pages without a change."""
+    keyframe_stamp: int
+    """Of the last change of a keyframe ..."""
+    point_stamp: int
+    """... and of a point."""
+    changed_keyframes: BoolArray
+    """(k,) pose, parent, weights or something else has changed."""
+    pages: IntArray
+    """(m,) of `IDS_PER_PAGE` ids each: points on other pages have not changed."""
+    incomplete_pages: IntArray
+    """(i,) of these, those with points whose keyframes mapping has not taken in yet."""
+
+
+def take_contents(slam_map: core.Map) -> MapContents:
     """Copy everything of a map, as of one moment, while the system may be running.
 
     Keyframes that local mapping has not taken in yet, and what only they see, are not part of it.
@@ -377,16 +395,38 @@ def take_contents(slam_map: core.Map, known: IntArray | None = None) -> MapConte
     ----------
     slam_map
         The map.
-    known
-        Ids (m,), ascending, of keyframes whose keypoints, which never change, are left out.
     """
-    arrays = core.map_contents(slam_map, np.zeros(0, np.int64) if known is None else known)
-    groups: dict[str, dict[str, NDArray[Any]]] = {}
+    return take_changes(slam_map, np.zeros(0, np.int64), None).contents
+
+
+def take_changes(
+    slam_map: core.Map, known_keyframes: IntArray, before: ChangedContents | None
+) -> ChangedContents:
+    """Copy what may have changed in a map since an earlier copy, but for the tracker's counters.
+
+    Parameters
+    ----------
+    slam_map
+        The map.
+    known_keyframes
+        Ids (m,), ascending, of keyframes whose keypoints, which never change, are left out.
+    before
+        The earlier copy, of the same map (`MapContents.map_index`); None: there is none.
+    """
+    since: dict[str, Any] = {}
+    if before is not None:
+        since = {
+            "keyframe_stamp": before.keyframe_stamp,
+            "point_stamp": before.point_stamp,
+            "incomplete_pages": before.incomplete_pages,
+        }
+    arrays = core.map_contents(slam_map, known_keyframes, **since)
+    groups: dict[str, dict[str, Any]] = {}
     for name, array in arrays.items():
         group, _, field = name.rpartition(".")
         groups.setdefault(group, {})[field] = array
-    return MapContents(
-        **groups[""],  # type: ignore[arg-type]  # the numbers, and the loop edges
+    contents = MapContents(
+        **groups[""],
         cameras=Cameras(**groups["cameras"]),
         keyframes=Keyframes(**groups["keyframes"]),
         removed_keyframes=RemovedKeyframes(**groups["removed_keyframes"]),
@@ -394,6 +434,7 @@ def take_contents(slam_map: core.Map, known: IntArray | None = None) -> MapConte
         observations=Observations(**groups["observations"]),
         covisibility=Covisibility(**groups["covisibility"]),
     )
+    return ChangedContents(contents, **groups["known"])
 
 
 def restore_contents(

@@ -58,17 +58,32 @@ def run_rows(number: int, run: Run, *, first_part: int = 0) -> Iterator[tuple[st
 
 
 # ---- the map ----------------------------------------------------------------------------------
-def map_rows(contents: MapContents) -> Iterator[tuple[str, Row]]:
-    """Everything of the map but the keyframes' keypoints, as (table, row)."""
+def map_rows(
+    contents: MapContents, changed_keyframes: NDArray[np.bool_] | None = None
+) -> Iterator[tuple[str, Row]]:
+    """Everything of the map but the keyframes' keypoints, as (table, row).
+
+    Parameters
+    ----------
+    contents
+        The map.
+    changed_keyframes
+        (k,) which keyframes' rows are wanted; all by default.
+    """
+    if changed_keyframes is None:
+        changed_keyframes = np.ones(len(contents.keyframes), bool)
     yield "map", (1, contents.next_keyframe, contents.next_point)
     yield from _camera_rows(contents)
-    yield from _keyframe_rows(contents)
+    yield from _keyframe_rows(contents, np.flatnonzero(changed_keyframes))
     yield from _removed_rows(contents)
     points, seen = contents.points, contents.observations
     yield from _page_rows("map_points", points, points.ids)
     yield from _page_rows("observations", seen, seen.point)
     edges = contents.covisibility
+    wanted = set(contents.keyframes.ids[changed_keyframes].tolist())
     for keyframe, which in _groups(edges.a):
+        if keyframe not in wanted:
+            continue
         yield "covisibility", (keyframe, *_blobs(TABLES["covisibility"], edges, which))
     for a, b in contents.loop_edges.tolist():
         yield "loop_edges", (a, b)
@@ -121,10 +136,11 @@ def _camera_rows(contents: MapContents) -> Iterator[tuple[str, Row]]:
         )
 
 
-def _keyframe_rows(contents: MapContents) -> Iterator[tuple[str, Row]]:
+def _keyframe_rows(contents: MapContents, rows: IntArray) -> Iterator[tuple[str, Row]]:
     keyframes = contents.keyframes
     poses = np.hstack([keyframes.rotations, keyframes.translations]).astype("<f8")
-    for row, keyframe in enumerate(keyframes.ids.tolist()):
+    for row in rows.tolist():
+        keyframe = int(keyframes.ids[row])
         parent = int(keyframes.parent[row])
         yield (
             "keyframes",

@@ -7,7 +7,7 @@ import contextlib
 import os
 import secrets
 import sqlite3
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from orbslam2py._files import reason_of
@@ -68,7 +68,11 @@ class MapWriter:
         """Keys of the rows that the file holds, ascending."""
         return sorted(self._written[table])
 
-    def commit(self, rows: Iterable[tuple[str, Row]]) -> int:
+    def commit(
+        self,
+        rows: Iterable[tuple[str, Row]],
+        unchanged: Callable[[str, Row], bool] = lambda table, key: False,
+    ) -> int:
         """Make the file hold these rows, in one transaction; returns how many were written.
 
         Rows of tables that may change and are not given are deleted. Those that are written once
@@ -78,6 +82,8 @@ class MapWriter:
         ----------
         rows
             (table, row) pairs.
+        unchanged
+            ``unchanged(table, key)`` tells of a row of the file that is not given whether it stays.
 
         Raises
         ------
@@ -87,7 +93,7 @@ class MapWriter:
         with _naming(self._named):
             if self._connection is None:
                 return self._commit_first(rows)
-            return self._change(self._connection, rows)
+            return self._change(self._connection, rows, unchanged)
 
     def close(self) -> None:
         """End with a single file, without a log beside it; idempotent."""
@@ -106,7 +112,7 @@ class MapWriter:
                 connection.execute("PRAGMA journal_mode = OFF")
                 connection.execute("PRAGMA synchronous = OFF")
                 connection.executescript(CREATE)
-                n = self._change(connection, rows)
+                n = self._change(connection, rows, lambda table, key: False)
             _sync(temporary)
             _end_old_log(self.path)
             temporary.replace(self.path)
@@ -123,7 +129,12 @@ class MapWriter:
         self._connection.execute("PRAGMA synchronous = NORMAL")
         return n
 
-    def _change(self, connection: sqlite3.Connection, rows: Iterable[tuple[str, Row]]) -> int:
+    def _change(
+        self,
+        connection: sqlite3.Connection,
+        rows: Iterable[tuple[str, Row]],
+        unchanged: Callable[[str, Row], bool],
+    ) -> int:
         written = {name: dict(known) for name, known in self._written.items()}
         seen: dict[str, set[Row]] = {name: set() for name in TABLES}
         n = 0
@@ -138,7 +149,10 @@ class MapWriter:
                 written[name][key] = total
                 connection.execute(_UPSERT[name], (*row, total))
                 n += 1
-            n += _delete_others(connection, written, seen)
+            for name, key in _others(written, seen, unchanged):
+                _delete(connection, name, key)
+                del written[name][key]
+                n += 1
             if n:
                 _write_totals(connection, written)
             connection.execute("COMMIT")
@@ -175,30 +189,27 @@ def connect(path: Path, mode: str) -> sqlite3.Connection:
     return connection
 
 
-def _delete_others(
-    connection: sqlite3.Connection,
+def _others(
     written: dict[str, dict[Row, int]],
     seen: dict[str, set[Row]],
-) -> int:
-    """Delete what the map no longer has."""
-    n = 0
-    for name in ("keypoints", "images"):
-        for key in [key for key in written[name] if key not in seen["keyframes"]]:
-            n += _delete(connection, written, name, key)
-    for name, known in written.items():
-        if name not in WRITTEN_ONCE:
-            for key in [key for key in known if key not in seen[name]]:
-                n += _delete(connection, written, name, key)
-    return n
+    unchanged: Callable[[str, Row], bool],
+) -> list[tuple[str, Row]]:
+    """What the file holds and the map no longer has; keypoints before their keyframes."""
+    gone = [
+        (name, key)
+        for name, known in written.items()
+        if name not in WRITTEN_ONCE
+        for key in known
+        if key not in seen[name] and not unchanged(name, key)
+    ]
+    dead = {key for name, key in gone if name == "keyframes"}
+    hanging = [(name, key) for name in ("keypoints", "images") for key in dead & set(written[name])]
+    return [*hanging, *gone]
 
 
-def _delete(
-    connection: sqlite3.Connection, written: dict[str, dict[Row, int]], name: str, key: Row
-) -> int:
+def _delete(connection: sqlite3.Connection, name: str, key: Row) -> None:
     where = " AND ".join(f"{column} = ?" for column in TABLES[name].keys)
     connection.execute(f"DELETE FROM {name} WHERE {where}", key)
-    del written[name][key]
-    return 1
 
 
 def _write_totals(connection: sqlite3.Connection, written: dict[str, dict[Row, int]]) -> None:

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from orbslam2py import _core as core
 from orbslam2py._version import __version__
 from orbslam2py.errors import MapFileError, StateError
-from orbslam2py.maps.contents import MapContents, take_contents
+from orbslam2py.maps.contents import ChangedContents, MapContents, take_changes, take_contents
 from orbslam2py.maps.map_file import save_map
 from orbslam2py.maps.map_rows import Row, keypoint_rows, map_rows, run_rows, settings_rows
 from orbslam2py.maps.map_writer import MapWriter
@@ -128,20 +128,42 @@ class MapKeeper:
         if autosave is not None:
             autosave.finish()
 
-    def rows_since(self, writer: MapWriter) -> Iterator[tuple[str, Row]] | None:
-        """Rows that bring a file up to date, without what it holds already; None without a map."""
-        known = np.array([key[0] for key in writer.keys("keypoints")], np.int64)
-        contents = take_contents(self._map, known)
-        return self._rows(contents, writer) if len(contents.keyframes) else None
+    def update(self, writer: MapWriter, before: ChangedContents | None) -> ChangedContents | None:
+        """Bring a file up to date; returns what it holds then, or None as long as there is no map.
 
-    def _rows(self, contents: MapContents, writer: MapWriter) -> Iterator[tuple[str, Row]]:
+        Parameters
+        ----------
+        writer : MapWriter
+            Of the file.
+        before : ChangedContents, optional
+            What the file holds: only what has changed since is looked at. None: everything.
+        """
+        known = np.array([key[0] for key in writer.keys("keypoints")], np.int64)
+        changes = take_changes(self._map, known, before)
+        contents = changes.contents
+        if not len(contents.keyframes):
+            return None
+        looked_at = set(changes.pages.tolist())
+        kept = set(contents.keyframes.ids[~changes.changed_keyframes].tolist())
+
+        def unchanged(table: str, key: Row) -> bool:
+            if table in ("map_points", "observations"):
+                return key[0] not in looked_at
+            return table in ("keyframes", "covisibility") and key[0] in kept
+
+        n = writer.commit(self._rows(changes, writer), unchanged)
+        _log.debug("%d rows written to %s", n, writer.path)
+        return changes
+
+    def _rows(self, changes: ChangedContents, writer: MapWriter) -> Iterator[tuple[str, Row]]:
+        contents = changes.contents
         yield from settings_rows(self._settings, self._vocabulary)
         runs = (*self._runs_before(contents), self._present_run(contents))
         for number, run in enumerate(runs):
             # Parts that are full do not change; the last one is looked at again.
             parts = sum(key[0] == number for key in writer.keys("frames"))
             yield from run_rows(number, run, first_part=max(0, parts - 1))
-        yield from map_rows(contents)
+        yield from map_rows(contents, changes.changed_keyframes)
         for name, row in keypoint_rows(contents):
             if not writer.has(name, row[0]):
                 yield name, row
@@ -171,17 +193,16 @@ class _Autosave:
         self._first_map = keeper._map.epoch
         self._map_index = self._first_map
         self._writer = MapWriter(self.path)
+        self._held: ChangedContents | None = None
         self._thread = threading.Thread(target=self._work, name="autosave", daemon=True)
         self._thread.start()
 
-    def save_now(self) -> None:
-        """Commit the present state."""
+    def save_now(self, *, everything: bool = True) -> None:
+        """Commit the present state; `everything`: also the tracker's counters of points."""
         with self._lock:
             self._follow_reset()
-            rows = self._keeper.rows_since(self._writer)
-            if rows is not None:
-                n = self._writer.commit(rows)
-                _log.debug("autosave: %d rows written to %s", n, self._writer.path)
+            before = None if everything else self._held
+            self._held = self._keeper.update(self._writer, before)
 
     def finish(self) -> None:
         """Commit a last time and end the thread."""
@@ -196,7 +217,7 @@ class _Autosave:
     def _work(self) -> None:
         while not self._stop.wait(self._every):
             try:
-                self.save_now()
+                self.save_now(everything=False)
             except MapFileError as error:
                 _log.warning("autosave failed and will be tried again: %s", error)
 
@@ -204,7 +225,7 @@ class _Autosave:
         epoch = self._keeper._map.epoch
         if epoch == self._map_index:
             return
-        self._map_index = epoch
+        self._map_index, self._held = epoch, None
         if not self._writer.keys("map"):
             return  # nothing of the old map was written
         self._writer.close()

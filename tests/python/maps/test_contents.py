@@ -11,6 +11,8 @@ import pytest
 from orbslam2py import MapFileError, Sensor
 from orbslam2py import _core as core
 from orbslam2py.maps import MapContents, restore_contents, take_contents
+from orbslam2py.maps.contents import take_changes
+from orbslam2py.maps.schema import IDS_PER_PAGE
 from support import small_sequences
 from support.saved_maps import small_map
 
@@ -73,11 +75,26 @@ def test_known_keyframes_come_without_their_keypoints() -> None:
     slam_map = restore_contents(small_map().contents)
     whole = take_contents(slam_map)
     ids = whole.keyframes.ids
-    part = take_contents(slam_map, ids[:-1])
+    part = take_changes(slam_map, ids[:-1], None).contents
     assert np.array_equal(part.keyframes.ids, ids)
     assert np.all(np.diff(part.keyframes.offsets)[:-1] == 0)
     last = whole.keyframes.keypoints_of(len(ids) - 1)
     assert np.array_equal(part.keyframes.descriptors, whole.keyframes.descriptors[last])
+
+
+def test_only_points_on_pages_with_a_change_are_copied_again() -> None:
+    slam_map = restore_contents(small_map().contents)
+    nothing = np.zeros(0, np.int64)
+    first = take_changes(slam_map, nothing, None)
+    again = take_changes(slam_map, nothing, first)
+    assert len(again.contents.points) == len(again.pages) == 0
+    assert not again.changed_keyframes.any()
+    moved = int(first.contents.points.ids[-1])
+    slam_map.set_position(moved, np.ones(3))
+    later = take_changes(slam_map, nothing, again)
+    assert later.pages.tolist() == [moved // IDS_PER_PAGE]
+    assert moved in later.contents.points.ids
+    assert set(later.contents.points.ids // IDS_PER_PAGE) == {moved // IDS_PER_PAGE}
 
 
 def test_a_map_is_restored_into_an_empty_one_only(contents: MapContents) -> None:

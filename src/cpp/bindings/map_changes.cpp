@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What has changed in the map, for viewers and writers; called by bind_map().
+#include <pybind11/stl.h>
+
+#include "bindings/arrays.hpp"
+#include "bindings/bindings.hpp"
+#include "map/changed_ids.hpp"
+#include "map/changes.hpp"
+
+namespace orbslam::bindings {
+
+void bind_map_changes(py::module_& module);
+
+namespace {
+
+using namespace py::literals;
+using Release = py::call_guard<py::gil_scoped_release>;
+
+using PairArray = py::array_t<std::int64_t>;
+
+std::optional<PairArray> pairs(const std::optional<KeyFramePairs>& values) {
+  if (!values) return std::nullopt;
+  return copy_to_array<std::int64_t>(values->data(), {static_cast<py::ssize_t>(values->size()), 2});
+}
+
+void bind_follower(py::module_& module) {
+  py::class_<MapChanges>(module, "MapChanges", "What turns an earlier map into a later one.")
+      .def_readonly("epoch", &MapChanges::epoch, "Which map it is, as Map.epoch.")
+      .def_readonly("restarted", &MapChanges::restarted, "Everything told before is void.")
+      .def_readonly("keyframes_set", &MapChanges::keyframes_set, "New and changed keyframes.")
+      .def_property_readonly(
+          "keyframes_removed",
+          [](const MapChanges& self) { return to_array(self.keyframes_removed); },
+          "(n,) int64, of those told before.")
+      .def_readonly("points_set", &MapChanges::points_set, "New and changed points.")
+      .def_property_readonly(
+          "points_removed", [](const MapChanges& self) { return to_array(self.points_removed); },
+          "(n,) int64, of those told before.")
+      .def_property_readonly(
+          "covisibility", [](const MapChanges& self) { return pairs(self.covisibility); },
+          "(n, 2) int64, all pairs, the lower id first; None if they are as before.")
+      .def_property_readonly(
+          "loop_edges", [](const MapChanges& self) { return pairs(self.loop_edges); },
+          "(n, 2) int64, all pairs, the lower id first; None if they are as before.")
+      .def_property_readonly(
+          "spanning_tree", [](const MapChanges& self) { return pairs(self.spanning_tree); },
+          "(n, 2) int64, all pairs of keyframe and parent; None if they are as before.");
+  py::class_<MapFollower>(module, "MapFollower", "Tells what has changed in a map since last time.")
+      .def(py::init([](const std::shared_ptr<Map>& map, int least_weight) {
+             return std::make_unique<MapFollower>(map, least_weight);
+           }),
+           "map"_a.none(false), "least_weight"_a = static_cast<int>(Map::kEssentialWeight),
+           "`least_weight`: shared points of two keyframes whose covisibility is told.")
+      .def("update", &MapFollower::update, Release(),
+           "All changes since the last call, in one consistent view.");
+}
+
+void bind_stamps(py::module_& module) {
+  py::class_<MapStamp>(module, "MapStamp", "A moment in the life of a map, by its changes.")
+      .def(py::init<>(), "Before everything.")
+      .def(
+          "__eq__", [](const MapStamp& a, const MapStamp& b) { return a == b; }, py::is_operator());
+  py::class_<ChangedIds>(module, "ChangedIds", "Ids, ascending, of what has changed.")
+      .def_readonly("stamp", &ChangedIds::stamp, "The moment of the answer.")
+      .def_readonly("restarted", &ChangedIds::restarted,
+                    "The map was cleared since; all that lives is listed.")
+      .def_property_readonly(
+          "keyframes", [](const ChangedIds& self) { return to_array(self.keyframes); },
+          "(n,) int64, those that live, unpublished ones included.")
+      .def_property_readonly(
+          "keyframes_removed",
+          [](const ChangedIds& self) { return to_array(self.keyframes_removed); },
+          "(n,) int64; may name some that came and went meanwhile, and ids not given yet.")
+      .def_property_readonly(
+          "points", [](const ChangedIds& self) { return to_array(self.points); },
+          "(n,) int64, those that live.")
+      .def_property_readonly(
+          "points_removed", [](const ChangedIds& self) { return to_array(self.points_removed); },
+          "(n,) int64; may name some that came and went meanwhile, and ids not given yet.");
+  module.def("stamp_of", &stamp_of, "map"_a, Release(), "The present moment.");
+  module.def("changed_since", &changed_since, "map"_a, "since"_a, Release(),
+             "Keyframes and points that have changed since a moment, but for the counters of the\n"
+             "tracker; everything since MapStamp().");
+}
+
+}  // namespace
+
+void bind_map_changes(py::module_& module) {
+  bind_follower(module);
+  bind_stamps(module);
+}
+
+}  // namespace orbslam::bindings
