@@ -12,7 +12,16 @@ from rich.console import Console
 
 from orbslam2py._files import describe_error
 from orbslam2py._version import __version__
-from orbslam2py.cli import calibrate, demo, evaluate, run, settings, synthesize, vocabulary
+from orbslam2py.cli import (
+    calibrate,
+    demo,
+    evaluate,
+    map_files,
+    run,
+    settings,
+    synthesize,
+    vocabulary,
+)
 from orbslam2py.cli.display import print_error, tell_repeated
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.errors import OrbSlamError
@@ -65,6 +74,7 @@ app.command("calibrate")(calibrate.calibrate)
 app.command("import-camera")(calibrate.import_camera)
 app.add_typer(settings.app, name="settings")
 app.add_typer(vocabulary.app, name="vocabulary")
+app.add_typer(map_files.app, name="map")
 
 
 def run_app() -> None:

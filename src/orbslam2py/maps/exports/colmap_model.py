@@ -19,6 +19,7 @@ import numpy as np
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
 from orbslam2py.maps.contents import Cameras, MapContents
 from orbslam2py.maps.exports.images import View, pixel_scale
+from orbslam2py.maps.reprojection import project_points
 
 #: Numbers of the camera models and of the parameters each has.
 MODEL_IDS = {"PINHOLE": 1, "OPENCV": 4, "FULL_OPENCV": 6}
@@ -138,30 +139,10 @@ def _sightings(contents: MapContents, views: list[View]) -> tuple[IntArray, Floa
     seen = np.flatnonzero(shown[seer])
     seer = seer[seen]
     point = np.searchsorted(contents.points.ids, observations.point[seen])
-    expected = _projected(contents, seer, point, bent[seer])
+    expected = project_points(contents, seer, point, bent[seer])
     expected = (expected + 0.5) * scales[seer]
     error = np.linalg.norm(expected - xy[contents.observed_keypoints[seen]], axis=1)
     return seen, xy, error
-
-
-def _projected(
-    contents: MapContents, rows: IntArray, points: IntArray, bent: IntArray
-) -> FloatArray:
-    """Where keyframes (s,) see points (s,), pixels (s, 2); through the lens where it is bent."""
-    keyframes, cameras = contents.keyframes, contents.cameras
-    T = keyframes.T_cw[rows]
-    X = np.einsum("sij,sj->si", T[:, :3, :3], contents.points.positions[points]) + T[:, :3, 3]
-    x, y = X[:, 0] / X[:, 2], X[:, 1] / X[:, 2]
-    camera = keyframes.camera[rows]
-    k1, k2, p1, p2, k3 = np.where(bent, cameras.distortion[camera].T, 0.0)
-    r2 = x * x + y * y
-    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    u = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
-    v = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
-    return np.stack(
-        [cameras.fx[camera] * u + cameras.cx[camera], cameras.fy[camera] * v + cameras.cy[camera]],
-        axis=1,
-    )
 
 
 def _camera(
