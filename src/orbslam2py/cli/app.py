@@ -24,6 +24,7 @@ from orbslam2py.cli import (
 )
 from orbslam2py.cli.display import print_error, tell_repeated
 from orbslam2py.cli.exit_codes import ExitCode
+from orbslam2py.cli.run_arguments import RunCommand
 from orbslam2py.errors import OrbSlamError
 
 
@@ -66,7 +67,7 @@ def _options(
     """Visual SLAM for one camera, a stereo pair or RGB-D: images in, path and map out."""
 
 
-app.command("run", cls=run.RunCommand)(run.run)
+app.command("run", cls=RunCommand)(run.run)
 app.command("demo")(demo.demo)
 app.command("synthesize")(synthesize.synthesize)
 app.command("evaluate")(evaluate.evaluate)

@@ -4,15 +4,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-import numpy as np
 import typer
 import typer.core
 from rich.console import Console
 from rich.markup import escape
 
-from orbslam2py._arrays import FloatArray
 from orbslam2py._files import describe_error
 from orbslam2py.cli.display import (
     Display,
@@ -24,9 +22,9 @@ from orbslam2py.cli.display import (
 )
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.interrupts import StopOnInterrupt
+from orbslam2py.cli.run_arguments import read_initial_pose
 from orbslam2py.datasets import open_input
 from orbslam2py.datasets.base import LiveSource, Sequence
-from orbslam2py.errors import DatasetError
 from orbslam2py.maps import load_map
 from orbslam2py.maps.setup_check import check_sensor
 from orbslam2py.runs.options import RunOptions
@@ -36,11 +34,7 @@ from orbslam2py.runs.run import FinishedRun, run_sequence
 from orbslam2py.settings import Settings
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.options import SystemOptions
-from orbslam2py.trajectory.rotations import poses_from, rotations_from_quaternions
 from orbslam2py.vocabulary.vocabulary import load_vocabulary
-
-#: Numbers of a position, and of a position with a quaternion.
-_POSITION, _POSE = 3, 7
 
 EXAMPLE = """
 **Example**
@@ -229,47 +223,6 @@ def run(
 
 
 run.__doc__ = f"{run.__doc__}\n{EXAMPLE}"
-
-
-class RunCommand(typer.core.TyperCommand):
-    """Takes ``--localize`` with and without a number."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Give ``--localize`` its number 0 where none follows."""
-        complete: list[str] = []
-        for argument, following in zip(args, [*args[1:], ""], strict=True):
-            complete.append(argument)
-            if argument == "--localize" and not following.lstrip("-").isdecimal():
-                complete.append("0")
-        return super().parse_args(ctx, complete)
-
-
-def read_initial_pose(text: str) -> FloatArray:
-    """Read the pose of a camera in the world: a position, and a unit quaternion if it is turned.
-
-    Returns
-    -------
-    array (4, 4)
-        Camera to world.
-
-    Raises
-    ------
-    DatasetError
-        If it is neither three nor seven numbers.
-    """
-    try:
-        numbers = np.array([float(number) for number in text.split(",")])
-    except ValueError:
-        numbers = np.zeros(0)
-    if len(numbers) == _POSITION:
-        numbers = np.append(numbers, [0, 0, 0, 1])
-    if len(numbers) != _POSE or not np.isfinite(numbers).all() or not numbers[3:].any():
-        raise DatasetError(
-            f"--initial-pose {text} is not a pose; give three numbers x,y,z or seven "
-            "x,y,z,qx,qy,qz,qw"
-        )
-    T_wc = poses_from(rotations_from_quaternions(numbers[None, 3:]), numbers[None, :3])
-    return np.asarray(T_wc[0])
 
 
 def run_and_show(

@@ -4,13 +4,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
-from orbslam2py.errors import StateError
+from orbslam2py.errors import ImageError, StateError
 from orbslam2py.settings.sensor import Sensor
+
+_Array = TypeVar("_Array", npt.NDArray[np.uint8], npt.NDArray[np.generic])
 
 
 class SomeImages(Protocol):
@@ -74,3 +76,10 @@ def timed_images(source: FrameSource, sensor: Sensor) -> Iterator[tuple[float, S
     else:
         for index, timestamp in enumerate(source.timestamps.tolist()):
             yield timestamp, source.load(index)
+
+
+def present(array: _Array | None, what: str, timestamp: float) -> _Array:
+    """Return an image that must be there; raises `ImageError` if it is None."""
+    if array is None:
+        raise ImageError(f"the frame of {timestamp:.6f} s has no {what}, which this sensor needs")
+    return array

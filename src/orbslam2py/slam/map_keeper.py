@@ -23,10 +23,9 @@ from orbslam2py.maps.contents import ChangedContents, MapContents, take_changes,
 from orbslam2py.maps.map_file import save_map
 from orbslam2py.maps.map_rows import Row, keypoint_rows, map_rows, run_rows, settings_rows
 from orbslam2py.maps.map_writer import MapWriter
-from orbslam2py.maps.saved_map import Run, SavedMap, VocabularyIdentity
-from orbslam2py.settings.settings import Settings
+from orbslam2py.maps.saved_map import Run, SavedMap
 from orbslam2py.slam.frame_recorder import FrameRecorder
-from orbslam2py.slam.options import SystemOptions
+from orbslam2py.slam.options import Setup, SystemOptions
 
 _log = logging.getLogger(__name__)
 
@@ -42,14 +41,10 @@ class MapKeeper:
         The map.
     recorder : FrameRecorder
         Where the frames were.
-    settings : Settings
-        Of the camera.
-    vocabulary : VocabularyIdentity
-        Visual words of the keyframes.
+    setup : Setup
+        Camera and visual words, and what the map was loaded from.
     options : SystemOptions
         Of the present run.
-    earlier : SavedMap, optional
-        What the map was loaded from.
 
     Attributes
     ----------
@@ -61,15 +56,14 @@ class MapKeeper:
         self,
         slam_map: core.Map,
         recorder: FrameRecorder,
-        settings: Settings,
-        vocabulary: VocabularyIdentity,
+        setup: Setup,
         options: SystemOptions,
-        earlier: SavedMap | None,
     ) -> None:
         self._map = slam_map
         self._recorder = recorder
-        self._settings = settings
-        self._vocabulary = vocabulary
+        self._settings = setup.settings
+        self._vocabulary = setup.identity
+        earlier = setup.loaded
         self._earlier_runs = earlier.runs if earlier is not None else ()
         self._images: dict[int, bytes] = dict(earlier.images) if earlier is not None else {}
         self._first_map = slam_map.epoch

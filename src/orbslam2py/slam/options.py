@@ -62,6 +62,8 @@ class Setup:
     vocabulary: core.Vocabulary
     identity: VocabularyIdentity
     loaded: SavedMap | None
+    initial_pose: core.Pose | None
+    """``T_cw`` where the camera may be in the loaded map."""
 
     @classmethod
     def of(
@@ -70,6 +72,7 @@ class Setup:
         sensor: Sensor | str | None,
         vocabulary: core.Vocabulary | str | Path | None,
         map_to_load: SavedMap | str | Path | None,
+        initial_T_wc: npt.ArrayLike | None,
         allow_other: bool,
     ) -> Setup:
         """Put together what was given and what the map brings; `System` describes the arguments."""
@@ -97,10 +100,12 @@ class Setup:
         if loaded is not None and not allow_other:
             check_camera(loaded, settings)
             check_vocabulary(loaded, identity)
-        return cls(sensor, settings, words, identity, loaded)
+        if loaded is None and initial_T_wc is not None:
+            raise SettingsError("initial_pose says where in a loaded map the camera is; load one")
+        return cls(sensor, settings, words, identity, loaded, _pose_given(initial_T_wc))
 
 
-def pose_given(T_wc: npt.ArrayLike | None) -> core.Pose | None:
+def _pose_given(T_wc: npt.ArrayLike | None) -> core.Pose | None:
     """``T_cw`` of the pose that a user gave."""
     if T_wc is None:
         return None

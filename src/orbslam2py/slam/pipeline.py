@@ -6,14 +6,15 @@ Mur-Artal and Tardos, "ORB-SLAM2", 2017, figure 2; ``docs/method/index.md``.
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import math
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from orbslam2py import _core as core
 from orbslam2py._timing import StageStatistics, StageTimer
-from orbslam2py.errors import ImageError
+from orbslam2py.errors import ImageError, MapFileError, StateError
 from orbslam2py.maps.contents import restore_contents
 from orbslam2py.maps.saved_map import SavedMap
 from orbslam2py.settings.sensor import Sensor
@@ -25,6 +26,7 @@ from orbslam2py.slam.front_end import FrontEnd
 from orbslam2py.slam.initialization import DepthInitializer, Initializer, MonocularInitializer
 from orbslam2py.slam.keyframe_decision import KeyframeDecision
 from orbslam2py.slam.localization_mode import LocalizationSwitch
+from orbslam2py.slam.map_keeper import MapKeeper
 from orbslam2py.slam.options import SystemOptions
 from orbslam2py.slam.pose_search import PoseSearch
 from orbslam2py.slam.records import Reason, TrackingOutcome, TrackingRecord, TrackingState
@@ -39,6 +41,24 @@ RESET_PATIENCE = 60.0
 
 #: Makes a frame of images: takes its id and a timer.
 BuildFrame = Callable[[int, StageTimer], core.Frame]
+
+
+class CallGuard:
+    """Allows one call at a time; a second one raises instead of waiting."""
+
+    def __init__(self, what: str) -> None:
+        self._what = what
+        self._lock = threading.Lock()
+
+    @contextlib.contextmanager
+    def __call__(self) -> Iterator[None]:
+        """Enter the guarded call."""
+        if not self._lock.acquire(blocking=False):
+            raise StateError(f"{self._what} is already running in another thread")
+        try:
+            yield
+        finally:
+            self._lock.release()
 
 
 class Pipeline:
@@ -244,6 +264,16 @@ class Pipeline:
         # A map that never began was not given up.
         self.n_resets += not self._start_failed
         self._start_failed = False
+
+
+def abandon(back_end: BackEnd, keeper: MapKeeper) -> None:
+    """End the threads of a system that was dropped without shutdown."""
+    try:
+        keeper.stop_autosave()
+    except MapFileError as unsaved:
+        _log.error("while a system was dropped: %s", unsaved)
+    for error in back_end.finish(drain=False, wait_for_adjustment=False, timeout=RESET_PATIENCE):
+        _log.error("while a system was dropped", exc_info=error)
 
 
 def _make_tracking(

@@ -3,39 +3,32 @@
 
 from __future__ import annotations
 
-import contextlib
 import logging
-import threading
 import weakref
-from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
-from orbslam2py.errors import ImageError, MapFileError, SettingsError, StateError, WorkerError
+from orbslam2py.errors import MapFileError, StateError, WorkerError
 from orbslam2py.maps.contents import MapContents, take_contents
 from orbslam2py.maps.saved_map import SavedMap
 from orbslam2py.maps.snapshot import MapSnapshot, keyframe_trajectory, take_snapshot
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
-from orbslam2py.slam.back_end import BackEnd
 from orbslam2py.slam.events import Callbacks, LoopClosed
-from orbslam2py.slam.frame_source import FrameSource, SomeImages, timed_images
+from orbslam2py.slam.frame_source import FrameSource, SomeImages, present, timed_images
 from orbslam2py.slam.front_end import Mask, PairMask
 from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
 from orbslam2py.slam.map_keeper import MapKeeper, encode_image
-from orbslam2py.slam.options import Setup, SystemOptions, pose_given
-from orbslam2py.slam.pipeline import RESET_PATIENCE, BuildFrame, Pipeline
+from orbslam2py.slam.options import Setup, SystemOptions
+from orbslam2py.slam.pipeline import BuildFrame, CallGuard, Pipeline, abandon
 from orbslam2py.slam.records import TrackingRecord, TrackingState
 from orbslam2py.trajectory.trajectory import Trajectory
 
 _log = logging.getLogger(__name__)
-
-_Array = TypeVar("_Array", npt.NDArray[np.uint8], npt.NDArray[np.generic])
 
 
 class System:
@@ -128,27 +121,20 @@ class System:
             keyframe_images=keyframe_images,
             seed=seed,
         )
-        setup = Setup.of(settings, sensor, vocabulary, load_map, allow_other_setup)
+        setup = Setup.of(settings, sensor, vocabulary, load_map, initial_pose, allow_other_setup)
         self.sensor, self.settings, self.vocabulary = setup.sensor, setup.settings, setup.vocabulary
         self.pipeline = Pipeline(
             self.settings, self.sensor, self.vocabulary, self.options, callbacks or Callbacks()
         )
         if setup.loaded is not None:
-            self.pipeline.begin_in(setup.loaded, self.vocabulary, pose_given(initial_pose))
-        elif initial_pose is not None:
-            raise SettingsError("initial_pose says where in a loaded map the camera is; load one")
+            self.pipeline.begin_in(setup.loaded, self.vocabulary, setup.initial_pose)
         self._keeper = MapKeeper(
-            self.pipeline.back_end.map,
-            self.pipeline.recorder,
-            self.settings,
-            setup.identity,
-            self.options,
-            setup.loaded,
+            self.pipeline.back_end.map, self.pipeline.recorder, setup, self.options
         )
         self._guard = CallGuard("tracking")
         self._shut_down = False
         self.pipeline.start()
-        self._finalizer = weakref.finalize(self, _abandon, self.pipeline.back_end, self._keeper)
+        self._finalizer = weakref.finalize(self, abandon, self.pipeline.back_end, self._keeper)
 
     # ---- tracking --------------------------------------------------------------------------------
     def track_stereo(
@@ -320,9 +306,9 @@ class System:
         if self.sensor is Sensor.MONOCULAR:
             return self.track_monocular(images.image, timestamp, mask=mask, details=details)
         if self.sensor is Sensor.RGBD:
-            depth = _present(images.depth, "depth image", timestamp)
+            depth = present(images.depth, "depth image", timestamp)
             return self.track_rgbd(images.image, depth, timestamp, mask=mask, details=details)
-        right = _present(images.right, "right image", timestamp)
+        right = present(images.right, "right image", timestamp)
         # The mask is the left image's; what it hides there needs no partner.
         pair = None if mask is None else (mask, None)
         return self.track_stereo(images.image, right, timestamp, mask=pair, details=details)
@@ -594,37 +580,3 @@ class System:
                 raise
             if not isinstance(error, WorkerError):  # else it is the same one
                 _log.exception("shutdown after an error failed as well")
-
-
-def _present(array: _Array | None, what: str, timestamp: float) -> _Array:
-    if array is None:
-        raise ImageError(f"the frame of {timestamp:.6f} s has no {what}, which this sensor needs")
-    return array
-
-
-class CallGuard:
-    """Allows one call at a time; a second one raises instead of waiting."""
-
-    def __init__(self, what: str) -> None:
-        self._what = what
-        self._lock = threading.Lock()
-
-    @contextlib.contextmanager
-    def __call__(self) -> Iterator[None]:
-        """Enter the guarded call."""
-        if not self._lock.acquire(blocking=False):
-            raise StateError(f"{self._what} is already running in another thread")
-        try:
-            yield
-        finally:
-            self._lock.release()
-
-
-def _abandon(back_end: BackEnd, keeper: MapKeeper) -> None:
-    """End the threads of a system that was dropped without shutdown."""
-    try:
-        keeper.stop_autosave()
-    except MapFileError as unsaved:
-        _log.error("while a system was dropped: %s", unsaved)
-    for error in back_end.finish(drain=False, wait_for_adjustment=False, timeout=RESET_PATIENCE):
-        _log.error("while a system was dropped", exc_info=error)

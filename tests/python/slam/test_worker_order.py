@@ -9,7 +9,7 @@ import pytest
 
 from orbslam2py import OrbSlamError, StateError, WorkerError
 from orbslam2py._worker import Worker, WorkerState
-from orbslam2py.slam.system import CallGuard
+from orbslam2py.slam.pipeline import CallGuard
 from support.worker_steps import NAME, Gate, eventually
 
 pytestmark = pytest.mark.watchdog(10)
