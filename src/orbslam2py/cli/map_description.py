@@ -62,5 +62,6 @@ def _times(timestamps: FloatArray) -> str:
 
 def _box(positions: FloatArray, unit: str) -> str:
     low, high = positions.min(axis=0), positions.max(axis=0)
-    corners = [",".join(f"{value:.3g}" for value in corner) for corner in (low, high)]
-    return f"{corners[0]} to {corners[1]} {unit}"
+    # Adding 0.0 turns a negative zero, which says nothing, into a plain one.
+    least, most = (",".join(f"{round(x, 3) + 0.0:g}" for x in corner) for corner in (low, high))
+    return f"{least} to {most} {unit}"

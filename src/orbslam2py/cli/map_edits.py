@@ -155,8 +155,10 @@ def align(
     elif points is not None:
         placement = place_by_points(contents, *read_known_points(points, contents))
     else:
-        ends = [_place(contents, text) for text in between or ()]
-        placement = place_by_length(contents, ends[0], ends[1], length or math.nan)
+        assert length is not None
+        assert between is not None
+        first, second = (_place(contents, text) for text in between)
+        placement = place_by_length(contents, first, second, length)
     moved = transform_map(contents, placement.similarity)
     save_edited(replace(saved, contents=moved), output, force=force)
     for line in _described(placement, metric=unit_of(contents) == "m"):
