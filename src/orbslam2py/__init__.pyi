@@ -7,6 +7,7 @@ from .errors import DatasetError as DatasetError
 from .errors import ImageError as ImageError
 from .errors import MapFileError as MapFileError
 from .errors import OrbSlamError as OrbSlamError
+from .errors import OutputFileError as OutputFileError
 from .errors import SettingsError as SettingsError
 from .errors import StateError as StateError
 from .errors import VocabularyError as VocabularyError
@@ -17,7 +18,11 @@ from .maps import export_g2o as export_g2o
 from .maps import export_nerfstudio as export_nerfstudio
 from .maps import export_points as export_points
 from .maps import export_trajectory as export_trajectory
+from .runs import check_calibration as check_calibration
 from .runs import run_sequence as run_sequence
+from .settings import CameraSettings as CameraSettings
+from .settings import DepthSettings as DepthSettings
+from .settings import OrbSettings as OrbSettings
 from .settings import Sensor as Sensor
 from .settings import Settings as Settings
 from .slam.events import Callbacks as Callbacks
@@ -34,4 +39,8 @@ from .slam.records import TrackingRecord as TrackingRecord
 from .slam.records import TrackingState as TrackingState
 from .slam.system import System as System
 from .trajectory import Trajectory as Trajectory
+from .viewer import Publisher as Publisher
+from .viewer import RerunRecorder as RerunRecorder
+from .viewer import VideoWriter as VideoWriter
+from .viewer import Viewer as Viewer
 from .vocabulary import load_vocabulary as load_vocabulary

@@ -13,7 +13,7 @@ from orbslam2py.errors import SettingsError
 from orbslam2py.errors import StateError
 from orbslam2py.errors import VocabularyError
 import typing
-__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FullBundleCommit', 'FullBundleOptions', 'FullBundleResult', 'GatheredBundle', 'ImageBounds', 'ImageError', 'KeyFrameIndex', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapFileError', 'MapSnapshot', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'anchor_frame', 'apply_loop_correction', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'check_invariants', 'choose_loop', 'commit_full_bundle', 'corridor_way', 'count_map_points', 'count_sightings', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'describe', 'direct_index_of', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'full_bundle_adjustment', 'fundamental_matrix', 'fuse_points', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'match_for_initialization', 'match_for_triangulation', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'plan_loop_correction', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'refresh_associations', 'render', 'room_T_wc', 'seed_of', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'snapshot_points', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'verify_loop_candidate', 'words_of']
+__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'ChangedIds', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FullBundleCommit', 'FullBundleOptions', 'FullBundleResult', 'GatheredBundle', 'ImageBounds', 'ImageError', 'KeyFrameIndex', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapChanges', 'MapFileError', 'MapFollower', 'MapSnapshot', 'MapStamp', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'anchor_frame', 'apply_loop_correction', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'changed_since', 'check_invariants', 'choose_loop', 'commit_full_bundle', 'corridor_way', 'count_map_points', 'count_sightings', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'describe', 'direct_index_of', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'full_bundle_adjustment', 'fundamental_matrix', 'fuse_points', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'match_for_initialization', 'match_for_triangulation', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'plan_loop_correction', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'refresh_associations', 'render', 'room_T_wc', 'sample_colours', 'seed_of', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'snapshot_points', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'stamp_of', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'verify_loop_candidate', 'words_of']
 class Pose:
     """
     Rigid transform. `T_ab` maps coordinates of frame b into frame a.
@@ -453,6 +453,11 @@ class Frame:
     def camera(self) -> Camera:
         ...
     @property
+    def colours(self) -> numpy.typing.NDArray[numpy.uint8]:
+        """
+        (n, 3) uint8, red, green, blue of the image at the keypoints; (0, 3) of a grey image.
+        """
+    @property
     def depth(self) -> numpy.typing.NDArray[numpy.float32]:
         """
         (n,) float32, metres; -1 when unknown.
@@ -680,6 +685,10 @@ class Map:
     def has_point(self, id: int) -> bool:
         """
         Whether the point is alive.
+        """
+    def keyframe_frame(self, id: int) -> Frame:
+        """
+        What a living keyframe saw: keypoints, descriptors, depths, colours, words.
         """
     def keyframe_ids(self) -> numpy.typing.NDArray[numpy.int64]:
         """
@@ -1024,6 +1033,112 @@ class TrajectoryRecorder:
     def n_bytes(self) -> int:
         """
         Allocated memory.
+        """
+class MapChanges:
+    """
+    What turns an earlier map into a later one.
+    """
+    @property
+    def covisibility(self) -> numpy.typing.NDArray[numpy.int64] | None:
+        """
+        (n, 2) int64, all pairs, the lower id first; None if they are as before.
+        """
+    @property
+    def epoch(self) -> int:
+        """
+        Which map it is, as Map.epoch.
+        """
+    @property
+    def keyframes_removed(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (n,) int64, of those told before.
+        """
+    @property
+    def keyframes_set(self) -> KeyFrameSnapshot:
+        """
+        New and changed keyframes.
+        """
+    @property
+    def loop_edges(self) -> numpy.typing.NDArray[numpy.int64] | None:
+        """
+        (n, 2) int64, all pairs, the lower id first; None if they are as before.
+        """
+    @property
+    def points_removed(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (n,) int64, of those told before.
+        """
+    @property
+    def points_set(self) -> PointSnapshot:
+        """
+        New and changed points.
+        """
+    @property
+    def restarted(self) -> bool:
+        """
+        Everything told before is void.
+        """
+    @property
+    def spanning_tree(self) -> numpy.typing.NDArray[numpy.int64] | None:
+        """
+        (n, 2) int64, all pairs of keyframe and parent; None if they are as before.
+        """
+class MapFollower:
+    """
+    Tells what has changed in a map since last time.
+    """
+    def __init__(self, map: Map, least_weight: typing.SupportsInt | typing.SupportsIndex = 100) -> None:
+        """
+        `least_weight`: shared points of two keyframes whose covisibility is told.
+        """
+    def update(self) -> MapChanges:
+        """
+        All changes since the last call, in one consistent view.
+        """
+class MapStamp:
+    """
+    A moment in the life of a map, by its changes.
+    """
+    __hash__: typing.ClassVar[None] = None
+    def __eq__(self, arg0: MapStamp) -> bool:
+        ...
+    def __init__(self) -> None:
+        """
+        Before everything.
+        """
+class ChangedIds:
+    """
+    Ids, ascending, of what has changed.
+    """
+    @property
+    def keyframes(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (n,) int64, those that live, unpublished ones included.
+        """
+    @property
+    def keyframes_removed(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (n,) int64; may name some that came and went meanwhile, and ids not given yet.
+        """
+    @property
+    def points(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (n,) int64, those that live.
+        """
+    @property
+    def points_removed(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (n,) int64; may name some that came and went meanwhile, and ids not given yet.
+        """
+    @property
+    def restarted(self) -> bool:
+        """
+        The map was cleared since; all that lives is listed.
+        """
+    @property
+    def stamp(self) -> MapStamp:
+        """
+        The moment of the answer.
         """
 class WordVector:
     """
@@ -2517,6 +2632,11 @@ def build_stereo_frame(context: FrameContext, id: typing.SupportsInt | typing.Su
     """
     Frame of a rectified pair with depth by stereo matching.
     """
+def changed_since(map: Map, since: MapStamp) -> ChangedIds:
+    """
+    Keyframes and points that have changed since a moment, but for the counters of the
+    tracker; everything since MapStamp().
+    """
 def check_invariants(map: Map, require_words: bool) -> list[str]:
     """
     One sentence per violated invariant; empty for a consistent map.
@@ -2825,6 +2945,10 @@ def room_T_wc(size: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3,
     """
     Camera to world (4, 4) of somebody looking around in a room, once in `period` seconds.
     """
+def sample_colours(frame: Frame, image: numpy.ndarray, is_rgb: bool) -> None:
+    """
+    Gives a new frame the colours of its image (h, w, 3) or (h, w, 4) uint8 at the keypoints; a grey image gives none. Raises ImageError for an image of another size.
+    """
 def seed_of(seed: typing.SupportsInt | typing.SupportsIndex, first: typing.SupportsInt | typing.SupportsIndex, second: typing.SupportsInt | typing.SupportsIndex) -> int:
     """
     One seed (uint64) out of the system's and two ids: another one for other ids or another
@@ -2881,6 +3005,10 @@ def solve_full_bundle(bundle: GatheredBundle, options: FullBundleOptions = ..., 
 
     `abort`: a StopFlag polled once per iteration, or None; what an aborted run has reached
     is not committed. Results that are worse or not finite are not either.
+    """
+def stamp_of(map: Map) -> MapStamp:
+    """
+    The present moment.
     """
 def street_lap_way(length: typing.SupportsFloat | typing.SupportsIndex, breadth: typing.SupportsFloat | typing.SupportsIndex, width: typing.SupportsFloat | typing.SupportsIndex) -> Way:
     """

@@ -86,10 +86,14 @@ void put_keypoints(py::dict& arrays, const std::vector<std::shared_ptr<const Fra
   py::array_t<std::uint8_t> octave(n), descriptors(Shape{n, 32}),
       colours(Shape{has_any_colours ? n : 0, 3});
   const KeypointColumns<float, std::uint8_t> columns{
-      keypoints.mutable_data(),   distorts ? raw.mutable_data() : nullptr,
-      octave.mutable_data(),      angle.mutable_data(),
-      response.mutable_data(),    descriptors.mutable_data(),
-      depth.mutable_data(),       right_u.mutable_data(),
+      keypoints.mutable_data(),
+      distorts ? raw.mutable_data() : nullptr,
+      octave.mutable_data(),
+      angle.mutable_data(),
+      response.mutable_data(),
+      descriptors.mutable_data(),
+      depth.mutable_data(),
+      right_u.mutable_data(),
       has_any_colours ? colours.mutable_data() : nullptr};
   {
     const py::gil_scoped_release release;
@@ -128,8 +132,7 @@ void put_the_rest(py::dict& arrays, MapContents&& contents) {
   arrays["points.descriptors"] = owned<std::uint8_t>(std::move(points.descriptors), {32});
   arrays["points.n_visible"] = owned<std::int32_t>(std::move(points.n_visible));
   arrays["points.n_found"] = owned<std::int32_t>(std::move(points.n_found));
-  arrays["points.reference_keyframe"] =
-      owned<std::int64_t>(std::move(points.reference_keyframe));
+  arrays["points.reference_keyframe"] = owned<std::int64_t>(std::move(points.reference_keyframe));
   arrays["points.first_keyframe"] = owned<std::int64_t>(std::move(points.first_keyframe));
   arrays["points.first_frame"] = owned<std::int64_t>(std::move(points.first_frame));
   arrays["observations.point"] = owned<std::int64_t>(std::move(contents.observations.point));
@@ -147,7 +150,8 @@ py::dict map_contents(const Map& map, const IdArray& known, std::uint64_t keyfra
                       std::uint64_t point_stamp, const IdArray& incomplete_pages) {
   MapContents contents;
   const ContentsKnown before{
-      keyframe_stamp, point_stamp,
+      keyframe_stamp,
+      point_stamp,
       {incomplete_pages.data(), incomplete_pages.data() + incomplete_pages.size()}};
   std::vector<bool> is_known;
   {
@@ -184,9 +188,9 @@ class Arrays {
   const Item* items(const char* name, py::ssize_t& count) {
     if (!arrays_.contains(name)) throw MapFileError(std::string(name) + " is missing");
     const auto array = py::array::ensure(arrays_[name]);
-    const bool fits =
-        array && py::isinstance<py::array_t<Item>>(array) && array.ndim() == (Width ? 2 : 1) &&
-        (!Width || array.shape(1) == Width) && (count < 0 || array.shape(0) == count);
+    const bool fits = array && py::isinstance<py::array_t<Item>>(array) &&
+                      array.ndim() == (Width ? 2 : 1) && (!Width || array.shape(1) == Width) &&
+                      (count < 0 || array.shape(0) == count);
     if (!fits) throw MapFileError(std::string(name) + " has the wrong type or length");
     kept_.push_back(py::array_t<Item, py::array::c_style>::ensure(array));
     count = array.shape(0);
@@ -209,12 +213,13 @@ class Arrays {
 
 void read_cameras(Arrays& arrays, StoredMap& stored) {
   py::ssize_t n = -1;
-  const auto fx = arrays.column<double>("cameras.fx", n), fy = arrays.column<double>("cameras.fy", n),
-             cx = arrays.column<double>("cameras.cx", n), cy = arrays.column<double>("cameras.cy", n),
+  const auto fx = arrays.column<double>("cameras.fx", n),
+             fy = arrays.column<double>("cameras.fy", n),
+             cx = arrays.column<double>("cameras.cx", n),
+             cy = arrays.column<double>("cameras.cy", n),
              bf = arrays.column<double>("cameras.bf", n),
              ratio = arrays.column<double>("cameras.depth_ratio", n);
-  const auto distortion =
-      arrays.column<std::array<double, 5>, double, 5>("cameras.distortion", n);
+  const auto distortion = arrays.column<std::array<double, 5>, double, 5>("cameras.distortion", n);
   const auto width = arrays.column<std::int64_t>("cameras.width", n),
              height = arrays.column<std::int64_t>("cameras.height", n),
              levels = arrays.column<std::int64_t>("cameras.n_levels", n);
@@ -296,8 +301,7 @@ void read_the_rest(Arrays& arrays, StoredMap& stored) {
   stored.covisibility.a = arrays.column<std::int64_t>("covisibility.a", e);
   stored.covisibility.b = arrays.column<std::int64_t>("covisibility.b", e);
   stored.covisibility.weight = arrays.column<std::int32_t>("covisibility.weight", e);
-  stored.loop_edges =
-      arrays.column<std::array<std::int64_t, 2>, std::int64_t, 2>("loop_edges", l);
+  stored.loop_edges = arrays.column<std::array<std::int64_t, 2>, std::int64_t, 2>("loop_edges", l);
 }
 
 StoredMap read_stored(Arrays& arrays) {
@@ -336,8 +340,7 @@ void restore(Map& map, const py::dict& contents, const Vocabulary* vocabulary,
 void bind_map_contents(py::module_& module) {
   module.def("map_contents", &map_contents, "map"_a,
              "known"_a = py::array_t<std::int64_t>(py::ssize_t{0}), "keyframe_stamp"_a = 0,
-             "point_stamp"_a = 0,
-             "incomplete_pages"_a = py::array_t<std::int64_t>(py::ssize_t{0}),
+             "point_stamp"_a = 0, "incomplete_pages"_a = py::array_t<std::int64_t>(py::ssize_t{0}),
              "Everything that a map is at one moment, as arrays by name: see\n"
              "orbslam2py.maps.MapContents. The keypoints of the keyframes `known` ((m,) int64\n"
              "ascending), which never change, are left out. With the stamps and incomplete pages\n"
@@ -351,11 +354,11 @@ void bind_map_contents(py::module_& module) {
         check_stored_map(stored);
       },
       "contents"_a, "Raises MapFileError, naming the thing, unless a map can be made of them.");
-  module.def("restore_map", &restore, "map"_a, "contents"_a, "vocabulary"_a = nullptr,
-             "index"_a = nullptr,
-             "Fill an empty map with contents as of map_contents(). With a vocabulary keyframes\n"
-             "are described by words, and added to the index if there is one. Raises MapFileError,\n"
-             "naming the thing, before anything was changed.");
+  module.def(
+      "restore_map", &restore, "map"_a, "contents"_a, "vocabulary"_a = nullptr, "index"_a = nullptr,
+      "Fill an empty map with contents as of map_contents(). With a vocabulary keyframes\n"
+      "are described by words, and added to the index if there is one. Raises MapFileError,\n"
+      "naming the thing, before anything was changed.");
 }
 
 }  // namespace orbslam::bindings

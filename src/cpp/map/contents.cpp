@@ -37,8 +37,7 @@ void list_cameras(MapContents& contents) {
   const Frame* before = nullptr;
   std::int64_t row = 0;
   for (const auto& frame : contents.frames) {
-    const bool known =
-        before && before->camera == frame->camera && before->scales == frame->scales;
+    const bool known = before && before->camera == frame->camera && before->scales == frame->scales;
     if (!known) {
       const auto found = std::find_if(cameras.begin(), cameras.end(),
                                       [&](const CameraContents& c) { return same(c, *frame); });
@@ -82,7 +81,8 @@ void copy_keyframes(const Map& map, MapContents& contents) {
       edges.weight.push_back(it->second);
     }
     for (const KeyFrameId other : keyframe.loop_edges) {
-      if (other > keyframe.id) contents.loop_edges.push_back({keyframe.id, other});
+      if (other > keyframe.id && is_published(map, other))
+        contents.loop_edges.push_back({keyframe.id, other});
     }
   });
 }
@@ -166,8 +166,8 @@ void note_changed_keyframes(const Map& map, std::uint64_t since, MapContents& co
     });
   }
   for (const KeyFrameId id : contents.keyframes.ids) {
-    contents.keyframe_changed.push_back(
-        std::binary_search(changed.begin(), changed.end(), id) ? 1 : 0);
+    contents.keyframe_changed.push_back(std::binary_search(changed.begin(), changed.end(), id) ? 1
+                                                                                               : 0);
   }
 }
 

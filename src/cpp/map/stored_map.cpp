@@ -197,10 +197,9 @@ void restore_map(Map& map, const StoredMap& stored,
   }
   const auto& removed = stored.removed_keyframes;
   for (std::size_t i = 0; i < removed.ids.size; ++i) {
-    MapContentsAccess::add(
-        map, {KeyFrameId(removed.ids[i]), KeyFrameId(removed.parent[i]),
-              pose_of(removed.rotations[i], removed.translations[i]), removed.scale[i],
-              removed.parent_scale[i]});
+    MapContentsAccess::add(map, {KeyFrameId(removed.ids[i]), KeyFrameId(removed.parent[i]),
+                                 pose_of(removed.rotations[i], removed.translations[i]),
+                                 removed.scale[i], removed.parent_scale[i]});
   }
   MapContentsAccess::set_next_ids(map, KeyFrameId(stored.next_keyframe),
                                   MapPointId(stored.next_point));

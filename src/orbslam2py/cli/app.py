@@ -17,9 +17,11 @@ from orbslam2py.cli import (
     demo,
     evaluate,
     map_files,
+    report,
     run,
     settings,
     synthesize,
+    view,
     vocabulary,
 )
 from orbslam2py.cli.display import print_error, tell_repeated
@@ -70,7 +72,10 @@ def _options(
 app.command("run", cls=RunCommand)(run.run)
 app.command("demo")(demo.demo)
 app.command("synthesize")(synthesize.synthesize)
+app.command("view")(view.view)
 app.command("evaluate")(evaluate.evaluate)
+app.command("report")(report.report)
+app.command("compare")(report.compare)
 app.command("calibrate")(calibrate.calibrate)
 app.command("import-camera")(calibrate.import_camera)
 app.add_typer(settings.app, name="settings")
@@ -83,6 +88,7 @@ def run_app() -> None:
     try:
         app()
     except (OrbSlamError, OSError) as error:
+        tell_repeated()  # warnings before what they led to
         print_error(Console(stderr=True), "Error", describe_error(error))
         sys.exit(ExitCode.BAD_INPUT)
     finally:

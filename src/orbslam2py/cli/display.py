@@ -129,7 +129,8 @@ def _describe_loop(loop: dict[str, Any], unit: str) -> str:
 
 #: Keys of report.json that the table leaves out: they are its title, or told by another row.
 _UNTOLD = {
-    *("sequence", "sensor", "milliseconds", "settings", "losses"),
+    *("sequence", "sensor", "milliseconds", "settings", "losses", "warnings"),
+    *("options", "command", "command_folder", "machine"),
     *("lost_frames", "lost_seconds", "longest_loss_seconds"),
 }
 

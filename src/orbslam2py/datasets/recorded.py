@@ -50,6 +50,8 @@ class RecordedSequence(FramesInOrder, ABC):
     """
 
     layout: Layout
+    #: Direction of up in the world of the ground truth, (3,); None if the layout does not tell it.
+    up_in_truth: FloatArray | None = None
     #: Why there are no settings if none were found, and which of the built-in ones to give.
     _missing_calibration: str
 

@@ -7,6 +7,7 @@ from enum import Enum
 
 import numpy as np
 
+from orbslam2py._arguments import shown
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import DatasetError
 from orbslam2py.trajectory import align
@@ -41,7 +42,7 @@ class Alignment(str, Enum):
             return cls(value)
         except ValueError:
             names = ", ".join(alignment.value for alignment in cls)
-            raise DatasetError(f"'{value}' is no alignment; give one of {names}") from None
+            raise DatasetError(f"{shown(value)} is no alignment; give one of {names}") from None
 
     @property
     def fewest_poses(self) -> int:

@@ -30,6 +30,7 @@ from orbslam2py.maps.exports.images import ImageOfKeyframe, ImageSequence, image
 from orbslam2py.maps.exports.nerfstudio import export_nerfstudio
 from orbslam2py.maps.exports.points import export_points
 from orbslam2py.maps.exports.trajectories import export_trajectory, keyframe_path
+from orbslam2py.maps.map_arrays import MapArrays
 from orbslam2py.maps.map_file import save_map
 from orbslam2py.maps.map_reader import load_map
 from orbslam2py.maps.pcd import write_pcd
@@ -46,6 +47,7 @@ __all__ = [
     "ImageSequence",
     "Keyframes",
     "KeyframesSet",
+    "MapArrays",
     "MapChanges",
     "MapContents",
     "MapFollower",

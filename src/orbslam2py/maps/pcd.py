@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from orbslam2py._arguments import array_of
 from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py._files import atomic_write
+from orbslam2py.errors import DatasetError
 
 _FRAME = "camera frame of keyframe 0: x right, y down, z forward"
 
@@ -59,14 +61,16 @@ def write_pcd(
     ------
     OSError
         If the file cannot be written; an existing file is kept then.
-    ValueError
-        If there is not one colour per point.
+    DatasetError
+        If the points are no such array, or there is not one colour per point.
     """
     names = ["x", "y", "z"]
-    table = np.asarray(points, "<f4").reshape(-1, 3)
+    table = array_of(points, "points", (-1, 3), finite=False).astype("<f4")
     if colours is not None:
         if len(colours) != len(points):
-            raise ValueError(f"{len(points)} points, but {len(colours)} colours")
+            raise DatasetError(
+                f"{len(points)} points, but {len(colours)} colours; give one per point"
+            )
         names.append("rgb")
         red, green, blue = colours.astype("<u4").reshape(-1, 3).T
         packed = (red << 16 | green << 8 | blue).astype("<u4").view("<f4")

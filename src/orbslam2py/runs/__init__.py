@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A sequence in, a folder of results out."""
 
+from orbslam2py.runs.calibration_watch import check_calibration
+from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.result import FrameRow, RunResult
 from orbslam2py.runs.run import FinishedRun, run_sequence
@@ -10,9 +12,11 @@ from orbslam2py.slam.options import SystemOptions
 __all__ = [
     "FinishedRun",
     "FrameRow",
+    "RunControl",
     "RunOptions",
     "RunResult",
     "SequenceRunner",
     "SystemOptions",
+    "check_calibration",
     "run_sequence",
 ]

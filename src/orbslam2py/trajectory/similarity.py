@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from orbslam2py._arguments import array_of
 from orbslam2py._arrays import FloatArray
+from orbslam2py.errors import DatasetError
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +67,19 @@ def align(points: FloatArray, targets: FloatArray, *, with_scale: bool = False) 
     -------
     Similarity
         Always finite.
+
+    Raises
+    ------
+    DatasetError
+        If they are no such arrays.
     """
+    points = array_of(points, "points", (-1, 3), finite=False)
+    targets = array_of(targets, "targets", (-1, 3), finite=False)
+    if len(points) != len(targets) or not len(points):
+        raise DatasetError(
+            f"{len(points)} points cannot be aligned to {len(targets)} targets; give one target "
+            "per point, at least one"
+        )
     centre, target_centre = points.mean(axis=0), targets.mean(axis=0)
     x, y = points - centre, targets - target_centre
     U, stretch, Vt = np.linalg.svd(y.T @ x / len(x))

@@ -11,6 +11,7 @@ import plyfile
 import pytest
 import trimesh
 
+from orbslam2py import DatasetError
 from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py.maps import write_pcd, write_ply
 
@@ -95,6 +96,6 @@ def test_no_points(tmp_path: Path, write: Callable[..., None]) -> None:
 def test_a_colour_for_every_point(
     tmp_path: Path, points: FloatArray, colours: ByteArray, write: Callable[..., None]
 ) -> None:
-    with pytest.raises(ValueError, match="37 points, but 36 colours"):
+    with pytest.raises(DatasetError, match="37 points, but 36 colours"):
         write(tmp_path / "points", points, colours=colours[1:])
     assert not list(tmp_path.iterdir())

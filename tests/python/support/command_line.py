@@ -28,6 +28,9 @@ RUN_FILES = frozenset(
         "points.ply",
         "trajectory.png",
         "report.json",
+        "report.html",
+        "frame_images.zip",
+        "groundtruth_aligned.txt",
         "settings.yaml",
     ]
 )

@@ -126,11 +126,11 @@ def keep_keyframes(
 
     Raises
     ------
-    ValueError
+    MapFileError
         If no keyframe is kept.
     """
     if not kept.any():
-        raise ValueError("at least one keyframe must be kept")
+        raise MapFileError("nothing of the map is left; keep at least one keyframe")
     stay = np.ones(len(contents.points), bool) if kept_points is None else kept_points
     sightings = _surviving_observations(contents, kept, stay)
     observations = Observations(

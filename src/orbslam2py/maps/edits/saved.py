@@ -34,7 +34,7 @@ def crop_saved_map(
 
     Raises
     ------
-    ValueError
+    MapFileError
         If no keyframe is kept.
     """
     contents = keep_keyframes(saved.contents, kept, kept_points)

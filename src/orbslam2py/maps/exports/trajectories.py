@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from orbslam2py.errors import DatasetError
 from orbslam2py.maps.contents import MapContents
 from orbslam2py.trajectory import (
     Trajectory,
@@ -37,14 +38,14 @@ def export_trajectory(
 
     Raises
     ------
-    ValueError
+    DatasetError
         For ``auto``, or what is no format.
     OSError
         If it cannot be written; an existing file is kept then.
     """
     kept = trajectory.select(~trajectory.lost)
     kept = Trajectory(kept.timestamps, kept.T_wc)
-    file_format = TrajectoryFormat(file_format)
+    file_format = TrajectoryFormat.of(file_format)
     if file_format is TrajectoryFormat.TUM:
         write_tum(path, kept)
     elif file_format is TrajectoryFormat.KITTI:
@@ -52,4 +53,4 @@ def export_trajectory(
     elif file_format is TrajectoryFormat.EUROC:
         write_euroc(path, kept)
     else:
-        raise ValueError("a file to be written needs a format: tum, kitti or euroc")
+        raise DatasetError("a file to be written needs a format: tum, kitti or euroc")

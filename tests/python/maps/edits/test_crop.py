@@ -204,5 +204,5 @@ def test_nothing_left() -> None:
         crop_to_times(contents, 1.0, 2.0)
     with pytest.raises(MapFileError, match=r"box from \(9, 9, 9\) to \(9, 9, 9\); they stood in"):
         crop_to_box(contents, FAR, FAR)
-    with pytest.raises(ValueError, match="at least one"):
+    with pytest.raises(MapFileError, match="at least one"):
         keep_keyframes(contents, np.zeros(8, bool))

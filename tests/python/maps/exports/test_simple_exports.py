@@ -41,7 +41,7 @@ def test_evo_reads_the_keyframes(tmp_path: Path, name: str) -> None:
 
 
 def test_a_format_must_be_chosen(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="tum, kitti or euroc"):
+    with pytest.raises(DatasetError, match="tum, kitti or euroc"):
         export_trajectory(keyframe_path(made_up_map()), tmp_path / "path", "auto")
 
 
