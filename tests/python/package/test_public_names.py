@@ -59,6 +59,7 @@ NAMES = {
     "export_trajectory",
     "load_vocabulary",
     "open_sequence",
+    "optimize_map",
     "run_sequence",
 }
 
