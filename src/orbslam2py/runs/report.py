@@ -159,6 +159,7 @@ def options_entry(options: RunOptions) -> dict[str, Any]:
         "stride": options.stride,
         "max_frames": options.max_frames,
         "localize_after": options.localize_after,
+        "final_adjustment": options.final_adjustment,
         "loop_closing": options.system.loop_closing,
         "full_adjustment": options.system.full_adjustment,
         "full_adjustment_time_limit": options.system.full_adjustment_time_limit,

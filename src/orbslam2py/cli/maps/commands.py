@@ -11,11 +11,11 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from orbslam2py.cli import map_edits, map_export
 from orbslam2py.cli.calibrate import Force, Quiet, check_target
 from orbslam2py.cli.exit_codes import ExitCode
-from orbslam2py.cli.map_description import describe_map
-from orbslam2py.cli.map_edits import MapFile, save_edited
+from orbslam2py.cli.maps.description import describe_map
+from orbslam2py.cli.maps.edits import MapFile, align, crop, optimize, save_edited
+from orbslam2py.cli.maps.export import export
 from orbslam2py.maps import load_map, map_differences, verify_map_file
 from orbslam2py.runs.map_picture import draw_map
 
@@ -105,10 +105,10 @@ for command, example in (
     (verify, "verify office.orbmap"),
     (compare, "compare office.orbmap copy.orbmap"),
     (compact, "compact office.orbmap --output small.orbmap"),
-    (map_export.export, "export colmap office.orbmap office-colmap --images monday.mp4"),
-    (map_edits.crop, "crop office.orbmap --output start.orbmap --from 0 --to 30"),
-    (map_edits.align, "align office.orbmap --output metric.orbmap --length 2.5 --between 0 12.4"),
-    (map_edits.optimize, "optimize office.orbmap --output refined.orbmap"),
+    (export, "export colmap office.orbmap office-colmap --images monday.mp4"),
+    (crop, "crop office.orbmap --output start.orbmap --from 0 --to 30"),
+    (align, "align office.orbmap --output metric.orbmap --length 2.5 --between 0 12.4"),
+    (optimize, "optimize office.orbmap --output refined.orbmap"),
 ):
     command.__doc__ = EXAMPLE.format(command.__doc__, example)
     app.command(command.__name__)(command)
