@@ -13,6 +13,11 @@ from .errors import StateError as StateError
 from .errors import VocabularyError as VocabularyError
 from .errors import WorkerError as WorkerError
 from .maps import MapSnapshot as MapSnapshot
+from .maps import export_colmap as export_colmap
+from .maps import export_g2o as export_g2o
+from .maps import export_nerfstudio as export_nerfstudio
+from .maps import export_points as export_points
+from .maps import export_trajectory as export_trajectory
 from .recordings import RerunRecorder as RerunRecorder
 from .recordings import VideoWriter as VideoWriter
 from .runs import check_calibration as check_calibration
@@ -30,6 +35,7 @@ from .slam.events import MapChanged as MapChanged
 from .slam.events import Relocalized as Relocalized
 from .slam.events import TrackingLost as TrackingLost
 from .slam.full_bundle_adjustment import FullAdjustmentRecord as FullAdjustmentRecord
+from .slam.map_optimization import optimize_map as optimize_map
 from .slam.records import FrameFeatures as FrameFeatures
 from .slam.records import Reason as Reason
 from .slam.records import TrackingRecord as TrackingRecord

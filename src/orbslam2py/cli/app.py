@@ -16,6 +16,7 @@ from orbslam2py.cli import (
     calibrate,
     demo,
     evaluate,
+    maps,
     report,
     run,
     settings,
@@ -79,6 +80,7 @@ app.command("calibrate")(calibrate.calibrate)
 app.command("import-camera")(calibrate.import_camera)
 app.add_typer(settings.app, name="settings")
 app.add_typer(vocabulary.app, name="vocabulary")
+app.add_typer(maps.app, name="map")
 
 
 def run_app() -> None:

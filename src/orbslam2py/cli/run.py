@@ -187,6 +187,12 @@ def run(
             help="Seconds after which that ends with what it has reached.", metavar="SECONDS"
         ),
     ] = None,
+    final_adjustment: Annotated[
+        bool,
+        typer.Option(
+            "--final-adjustment", help="At the end, refine the finished map before it is written."
+        ),
+    ] = False,
     seed: Annotated[int, typer.Option(help="Seed of all random draws.", min=0)] = 0,
     video: VideoOption = None,
     record: RecordOption = None,
@@ -227,6 +233,7 @@ def run(
         stride=stride,
         max_frames=max_frames,
         localize_after=localize,
+        final_adjustment=final_adjustment,
         load_map=loaded,
         initial_pose=None if initial_pose is None else read_initial_pose(initial_pose),
         allow_other_setup=allow_other_setup,

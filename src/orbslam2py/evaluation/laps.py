@@ -13,10 +13,15 @@ import numpy as np
 from orbslam2py._arguments import shown
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import DatasetError
-from orbslam2py.evaluation.alignment import Similarity, align
 from orbslam2py.evaluation.matching import match_poses
 from orbslam2py.evaluation.metrics import relative_errors
-from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory, lengths_along
+from orbslam2py.trajectory import (
+    MAX_DIFFERENCE,
+    Similarity,
+    Trajectory,
+    align,
+    lengths_along,
+)
 
 
 @dataclass(frozen=True)

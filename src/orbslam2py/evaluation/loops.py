@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import DatasetError
-from orbslam2py.evaluation.alignment import align
 from orbslam2py.evaluation.matching import match_poses
-from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory, lengths_along
+from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory, align, lengths_along
 from orbslam2py.trajectory.rotations import inverse_poses, rotation_angles
 
 # How far the truth may be from what a true loop says.

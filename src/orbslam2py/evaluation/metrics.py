@@ -16,9 +16,15 @@ import numpy as np
 from orbslam2py._arguments import finite_number, shown
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.errors import DatasetError
-from orbslam2py.evaluation.alignment import Alignment, Similarity, align, differ_in_unit
+from orbslam2py.evaluation.alignment import Alignment, differ_in_unit
 from orbslam2py.evaluation.matching import Matched, describe_match, match_poses
-from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory, lengths_along
+from orbslam2py.trajectory import (
+    MAX_DIFFERENCE,
+    Similarity,
+    Trajectory,
+    align,
+    lengths_along,
+)
 from orbslam2py.trajectory.rotations import inverse_poses, rotation_angles
 
 #: Lengths of KITTI's path segments [m].

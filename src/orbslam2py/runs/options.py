@@ -39,6 +39,8 @@ class RunOptions:
     """Take at most so many frames."""
     localize_after: int | None = None
     """Switch to localization mode after so many frames; 0, in a loaded map: from the first on."""
+    final_adjustment: bool = False
+    """Refine the finished map as a whole (`System.optimize`) before the results are written."""
     load_map: SavedMap | None = None
     """Begin in this map."""
     initial_pose: FloatArray | None = None
@@ -56,6 +58,11 @@ class RunOptions:
             raise DatasetError(
                 "--localize needs a map from the beginning: load one with --load, or say after how "
                 "many frames the map is to stay as it is"
+            )
+        if self.final_adjustment and self.localize_after is not None:
+            raise DatasetError(
+                "--final-adjustment changes the map, which --localize leaves as it is; leave out "
+                "one of them"
             )
         if self.initial_pose is not None and self.load_map is None:
             raise DatasetError("--initial-pose says where in a map the camera is; load one: --load")

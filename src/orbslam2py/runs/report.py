@@ -130,6 +130,9 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "losses": each_loss,
         "loops": [loop_entry(loop) for loop in result.loops],
         "full_adjustments": [adjustment_entry(a) for a in result.full_adjustments],
+        "final_adjustment": None
+        if result.final_adjustment is None
+        else adjustment_entry(result.final_adjustment),
     }
     if evaluation is not None:
         report |= evaluation.figures.as_dict()
@@ -156,6 +159,7 @@ def options_entry(options: RunOptions) -> dict[str, Any]:
         "stride": options.stride,
         "max_frames": options.max_frames,
         "localize_after": options.localize_after,
+        "final_adjustment": options.final_adjustment,
         "loop_closing": options.system.loop_closing,
         "full_adjustment": options.system.full_adjustment,
         "full_adjustment_time_limit": options.system.full_adjustment_time_limit,

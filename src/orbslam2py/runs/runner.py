@@ -143,6 +143,7 @@ class SequenceRunner:
                     watching.enter_context(watch(system))
                 self._process(system, progress, control)
                 self._wait_for_mapping(system, stop)
+                self._adjust_finished_map(system, stop)
             except KeyboardInterrupt:
                 stop.set()
             except Exception as error:
@@ -238,6 +239,13 @@ class SequenceRunner:
         while not (idle or stop.is_set() or system.localization_mode):
             idle = system.wait_until_idle(_WAIT_SLICE)
         self.result.slam_seconds += time.perf_counter() - begin
+
+    def _adjust_finished_map(self, system: System, stop: threading.Event) -> None:
+        # Ctrl-C is how a camera's run ends; the results of others are wanted at once then.
+        ended = stop.is_set() and not self.result.is_live
+        if self._options.final_adjustment and system.n_keyframes > 0 and not ended:
+            give_up = threading.Event() if self.result.is_live else stop
+            self.result.final_adjustment = system.optimize(stop=give_up)
 
     def _shut_down(self, system: System) -> None:
         try:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import logging
+import threading
 import weakref
 from pathlib import Path
 from types import TracebackType
@@ -362,12 +363,18 @@ class System:
         """
         self.pipeline.reset_requested.set()
 
-    def optimize(self) -> FullAdjustmentRecord:
+    def optimize(self, *, stop: threading.Event | None = None) -> FullAdjustmentRecord:
         """Refine all keyframes and points together, now (full bundle adjustment).
 
         Tracking may go on meanwhile. A Ctrl-C gives up and leaves the map as it was; so do a loop
         that is closed meanwhile, another call, a reset, the shutdown and a switch to localization
         mode.
+
+        Parameters
+        ----------
+        stop : threading.Event, optional
+            Gives up when it is set, as a Ctrl-C does. In the deterministic mode nothing does once
+            it has begun.
 
         Returns
         -------
@@ -387,7 +394,7 @@ class System:
         adjustment = self.pipeline.back_end.adjustment
         if adjustment.worker.ended:
             return adjustment.run()
-        return adjustment.start_and_wait()
+        return adjustment.start_and_wait(stop)
 
     def wait_until_idle(self, timeout: float | None = None) -> bool:
         """Wait until every keyframe has been processed, and full adjustments have ended.

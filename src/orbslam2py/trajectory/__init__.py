@@ -9,14 +9,17 @@ from orbslam2py.trajectory.files import (
     read_tum,
 )
 from orbslam2py.trajectory.frame_times import FrameTable, read_frame_table, read_times
+from orbslam2py.trajectory.similarity import Similarity, align
 from orbslam2py.trajectory.trajectory import Trajectory, lengths_along
-from orbslam2py.trajectory.writers import TrajectoryFormat, write_kitti, write_tum
+from orbslam2py.trajectory.writers import TrajectoryFormat, write_euroc, write_kitti, write_tum
 
 __all__ = [
     "MAX_DIFFERENCE",
     "FrameTable",
+    "Similarity",
     "Trajectory",
     "TrajectoryFormat",
+    "align",
     "associate",
     "lengths_along",
     "read_euroc",
@@ -25,6 +28,7 @@ __all__ = [
     "read_times",
     "read_trajectory",
     "read_tum",
+    "write_euroc",
     "write_kitti",
     "write_tum",
 ]

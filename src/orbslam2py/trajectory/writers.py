@@ -7,6 +7,7 @@ Apart from reading, so that a `Trajectory` can save itself.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from decimal import Decimal
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +21,12 @@ from orbslam2py.trajectory.rotations import quaternions_from_rotations
 
 if TYPE_CHECKING:
     from orbslam2py.trajectory.trajectory import Trajectory
+
+
+_EUROC_HEADER = (
+    "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],"
+    "q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []\n"
+)
 
 
 class TrajectoryFormat(str, Enum):
@@ -125,6 +132,44 @@ def write_kitti(path: str | Path, trajectory: Trajectory, n_frames: int | None =
         for i in source:
             T = trajectory.T_wc[i] if i >= 0 else np.eye(4)
             stream.write(_decimals(T[:3].ravel()) + "\n")
+
+
+def write_euroc(
+    path: str | Path, trajectory: Trajectory, timestamp_texts: Sequence[str] | None = None
+) -> None:
+    """Write ``ns, px, py, pz, qw, qx, qy, qz`` for every pose that is not lost, below a header.
+
+    The layout of EuRoC's ``data.csv`` (Burri et al., IJRR 2016); its tools take the poses for those
+    of the body, so multiply `T_wc` by the inverse of ``T_BS`` first if that is what they compare.
+
+    Parameters
+    ----------
+    path
+        The file; replaced only when everything was written.
+    trajectory
+        Poses; positions and quaternions get 9 decimals.
+    timestamp_texts
+        The source's text of every time stamp in decimal seconds, so that no nanosecond is lost;
+        rounded to microseconds without.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    DatasetError
+        If there is not one text per pose.
+    """
+    _check(trajectory)
+    if timestamp_texts is not None:
+        _check_texts(timestamp_texts, len(trajectory))
+    texts = timestamp_texts or [f"{t:.6f}" for t in trajectory.timestamps]
+    xyzw = quaternions_from_rotations(trajectory.T_wc[:, :3, :3])
+    with atomic_write(path) as stream:
+        stream.write(_EUROC_HEADER)
+        for i in np.flatnonzero(~trajectory.lost).tolist():
+            nanoseconds = int(Decimal(texts[i]).scaleb(9).to_integral_value())
+            values = (*trajectory.positions[i], xyzw[i, 3], *xyzw[i, :3])
+            stream.write(f"{nanoseconds},{_decimals(values).replace(' ', ',')}\n")
 
 
 def _decimals(values: Any) -> str:

@@ -52,8 +52,14 @@ NAMES = {
     "WorkerError",
     "__version__",
     "check_calibration",
+    "export_colmap",
+    "export_g2o",
+    "export_nerfstudio",
+    "export_points",
+    "export_trajectory",
     "load_vocabulary",
     "open_sequence",
+    "optimize_map",
     "run_sequence",
 }
 
@@ -62,7 +68,10 @@ ROOMS = {
     "calibration": ["Board", "Calibration", "calibrate", "find_views", "read_camera_file"],
     "datasets": ["ImageFolder", "Images", "LiveCamera", "Sequence", "VideoSequence", "open_input"],
     "evaluation": ["Alignment", "align", "evaluate_trajectory", "lap_error"],
-    "maps": ["MapChanges", "MapFollower", "MapSnapshot"],
+    "maps": [
+        *("MapChanges", "MapFollower", "MapSnapshot"),
+        *("export_colmap", "images_of", "with_colours"),
+    ],
     "runs": ["RunOptions", "RunResult", "SequenceRunner", "SystemOptions", "run_sequence"],
     "settings": ["CameraSettings", "DepthSettings", "OrbSettings", "Settings", "builtin_settings"],
     "synthetic": ["SyntheticOptions", "SyntheticSequence"],
