@@ -34,10 +34,11 @@ PYTHON_SOURCES := $(shell find src/orbslam2py -name '*.py' -o -name '*.pyx' -o -
 CPP_SOURCES := $(shell find src/cpp cmake -name '*.cpp' -o -name '*.hpp' -o -name '*.cmake' \
   -o -name CMakeLists.txt) CMakeLists.txt
 
-# The package, installed for development: Python files are used from src, extensions from build.
+# The package, installed for development: Python files are used from src, extensions from build. The
+# compiler goes by the name that CMake gives it elsewhere: the compiler cache tells names apart.
 $(VENV)/.installed: $(VENV)/.requirements $(CPP_SOURCES) $(PYTHON_SOURCES)
 	@echo "Building the package"
-	@$(BIN)/pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps \
+	@CXX=$${CXX:-c++} $(BIN)/pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps \
 	  -C build-dir=build/python -C editable.mode=redirect -e .
 	@touch $@
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Install what pyproject.toml names: to build, to run, to test, to make the documentation."""
+"""Install what pyproject.toml names: to build, to run with all extras, to test, to document."""
 
 import subprocess
 import sys
@@ -14,8 +14,11 @@ project = tomllib.loads((Path(__file__).parent.parent / "pyproject.toml").read_t
 wanted = [
     *project["build-system"]["requires"],
     *project["project"]["dependencies"],
-    *project["project"]["optional-dependencies"]["test"],
-    *project["project"]["optional-dependencies"]["docs"],
+    *(
+        package
+        for extra in project["project"]["optional-dependencies"].values()
+        for package in extra
+    ),
 ]
 command = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
 sys.exit(subprocess.run([*command, *wanted], check=False).returncode)

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import cv2
 import numpy as np
 
@@ -15,22 +17,24 @@ SECONDS_PER_FRAME = 0.05
 
 
 class MappedWorld:
-    """The first frames of a sequence, mapped.
+    """Frames of a sequence, mapped.
 
-    Errors are taken through the nearest keyframe of this map; with a single camera, in lengths of
-    the mapped path aligned by Sim(3).
+    Errors are taken through the nearest keyframe of this map, so that its own drift does not count;
+    with a single camera, in lengths of the mapped path aligned by Sim(3).
     """
 
-    def __init__(self, sequence: SyntheticSequence, n_frames: int, seed: int) -> None:
-        self.sequence, self.n_frames = sequence, n_frames
+    def __init__(self, sequence: SyntheticSequence, frames: Iterable[int], seed: int = 0) -> None:
+        self.sequence = sequence
         self.system = System(sequence.settings, sequence.sensor, deterministic=True, seed=seed)
         self._n_shown = 0
-        records = [self.show(sequence.load(index)) for index in range(n_frames)]
+        shown = list(frames)
+        self.n_frames = len(shown)
+        records = [self.show(sequence.load(index)) for index in shown]
         self.n_tracked = sum(record.state is TrackingState.OK for record in records)
         keyframes = self.system.keyframe_trajectory()
         self._T_wk = keyframes.T_wc
-        shown = np.rint(keyframes.timestamps / SECONDS_PER_FRAME).astype(int)
-        self.true_T_wk = np.array([sequence.T_wc(int(index)) for index in shown])
+        places = np.rint(keyframes.timestamps / SECONDS_PER_FRAME).astype(int)
+        self.true_T_wk = np.array([sequence.T_wc(shown[place]) for place in places])
         self.metres_per_unit = 1.0
         if sequence.sensor is Sensor.MONOCULAR:
             fit = align(keyframes.positions, self.true_T_wk[:, :3, 3], with_scale=True)
@@ -46,14 +50,19 @@ class MappedWorld:
             return self.system.track_rgbd(images.image, images.depth, seconds)
         return self.system.track_monocular(images.image, seconds)
 
-    def lose(self, n_frames: int = 1) -> None:
-        """Show black images, after which tracking must be lost."""
+    def black(self) -> Images:
+        """Images in which nothing can be seen."""
         seen = self.sequence.load(0)
         parts = (seen.image, seen.right, seen.depth)
-        black = Images(*(None if part is None else 0 * part for part in parts))
+        return Images(*(None if part is None else 0 * part for part in parts))
+
+    def lose(self, n_frames: int = 1) -> TrackingRecord:
+        """Show black images, after which tracking must be lost."""
+        black = self.black()
         for _ in range(n_frames):
             record = self.show(black)
         assert record.state is TrackingState.LOST
+        return record
 
     def error(self, record: TrackingRecord, true_T_wc: np.ndarray) -> PoseError:
         """Of a tracked frame."""

@@ -52,7 +52,7 @@ def sequence_of(arguments: argparse.Namespace, sensor: str, **options: object) -
 def mapped(arguments: argparse.Namespace, sensor: str) -> MappedWorld:
     sequence = sequence_of(arguments, sensor)
     n_frames = min(arguments.frames or len(sequence), len(sequence) - 1)
-    world = MappedWorld(sequence, n_frames, arguments.seed)
+    world = MappedWorld(sequence, range(n_frames), arguments.seed)
     print(
         f"{sensor}, {arguments.world}: {world.n_tracked} of {n_frames} frames tracked, "
         f"{world.system.n_keyframes} keyframes, {world.metres_per_unit:.3f} m a unit",

@@ -8,6 +8,7 @@
 #include "frame/build_frame.hpp"
 #include "frame/extract_pair.hpp"
 #include "frame/image_input.hpp"
+#include "frame/keypoint_colours.hpp"
 #include "frame/stereo_kernels.hpp"
 #include "frame/stereo_matching.hpp"
 #include "measure.hpp"
@@ -158,6 +159,14 @@ void grey_of_rgb_1241x376(benchmark::State& state) {
   measure(state, [&] { to_grey(image, true, grey); });
 }
 BENCHMARK(grey_of_rgb_1241x376)->Unit(benchmark::kMillisecond);
+
+void colours_of_keypoints_1241x376(benchmark::State& state) {
+  const Pair& pair = kitti_like();
+  const auto frame = build_monocular_frame(pair.context(), 0, 0, pair.left.features);
+  const cv::Mat image(376, 1241, CV_8UC3, cv::Scalar(10, 20, 30));
+  measure(state, [&] { sample_colours(image, true, *frame); });
+}
+BENCHMARK(colours_of_keypoints_1241x376)->Unit(benchmark::kMillisecond);
 
 void metres_of_uint16_640x480(benchmark::State& state) {
   const cv::Mat raw(480, 640, CV_16UC1, cv::Scalar(5000));

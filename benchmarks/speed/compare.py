@@ -25,9 +25,10 @@ from benchmarks.speed import single_steps, vocabularies
 from benchmarks.speed.locks import lock_tables
 from benchmarks.speed.python_share import python_tables
 from benchmarks.speed.sequences import sequence_tables
+from benchmarks.speed.viewer_cost import viewer_tables
 from orbslam2py import _core as core
 
-PARTS = ("steps", "vocabularies", "sequences", "python", "locks", "loops")
+PARTS = ("steps", "vocabularies", "sequences", "python", "viewer", "locks", "loops")
 
 
 def single_step_tables(
@@ -75,6 +76,7 @@ def main() -> None:
         "vocabularies": lambda: vocabulary_tables(yardstick, large),
         "sequences": lambda: sequence_tables(yardstick, arguments.runs),
         "python": python_tables,
+        "viewer": lambda: viewer_tables(arguments.runs),
         "locks": lambda: lock_tables(build),
         "loops": lambda: loop_tables(yardstick, build, arguments.pictures),
     }

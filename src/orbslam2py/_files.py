@@ -4,12 +4,15 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import secrets
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO, Any, NoReturn
+
+from orbslam2py._arguments import path_of
 
 #: Endings of names, in lower case, that OpenCV reads as single images.
 IMAGE_SUFFIXES = (
@@ -24,6 +27,13 @@ IMAGE_SUFFIXES = (
     ".ppm",
     ".jp2",
 )
+
+
+_REMEDIES = {
+    errno.ENOENT: "make the folder first",
+    errno.ENOTDIR: "a part of the path is a file; give another one",
+    errno.EISDIR: "give the name of a file",
+}
 
 
 def reason_of(error: OSError) -> str:
@@ -61,7 +71,10 @@ def atomic_write(path: str | os.PathLike[str], *, binary: bool = False) -> Itera
     OSError
         If the file cannot be written (no permission, no such folder, disk full); the message
         names the file. Subclasses (`PermissionError`, `FileNotFoundError`) as usual.
+    DatasetError
+        If `path` is no path.
     """
+    path = path_of(path, "the file to write")
     target = Path(os.path.realpath(path))
     if target.exists() and not target.is_file():
         with _open(path, target, os.O_WRONLY, binary) as stream:
@@ -107,10 +120,17 @@ def atomic_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
     OSError
         If it cannot be written or replaced.
     """
-    target = Path(os.path.realpath(path))
+    target = Path(os.path.realpath(path_of(path, "the folder to write")))
     token = secrets.token_hex(4)
     temporary = target.with_name(f".{target.name}.{token}.tmp")
-    temporary.mkdir(parents=True)
+    try:
+        temporary.mkdir(parents=True)
+    except OSError as error:
+        raise OSError(
+            error.errno,
+            f"cannot write to {path}: {reason_of(error)}; give another folder",
+            str(path),
+        ) from error
     try:
         yield temporary
         if target.exists() and any(target.iterdir()):
@@ -156,6 +176,7 @@ def _report_as(path: str | os.PathLike[str], step: Callable[[], object]) -> None
 
 
 def _raise_named(path: str | os.PathLike[str], error: OSError) -> NoReturn:
-    message = f"cannot write {path}: {reason_of(error)}; a file that was there is kept"
+    remedy = _REMEDIES.get(error.errno or 0, "a file that was there is kept")
+    message = f"cannot write {path}: {reason_of(error)}; {remedy}"
     # OSError(errno, ...) makes the matching subclass by itself.
     raise OSError(error.errno, message, str(path)) from error

@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
+from orbslam2py._arguments import cannot_open, path_of
 from orbslam2py.errors import DatasetError
 
 
@@ -33,10 +34,11 @@ def content_lines(path: str | Path, separator: str | None = None) -> list[TextLi
     DatasetError
         If the file cannot be read.
     """
+    path = path_of(path, "the file to read")
     try:
-        text = Path(path).read_text(encoding="utf-8-sig", errors="replace")
+        text = path.read_text(encoding="utf-8-sig", errors="replace")
     except OSError as error:
-        raise DatasetError(f"cannot open {path}: {error.strerror or error}") from error
+        raise DatasetError(cannot_open(path, error)) from error
     lines = []
     for number, raw in enumerate(text.splitlines(), start=1):
         line = raw.strip()
@@ -80,7 +82,9 @@ def number_of(path: str | Path, line: TextLine, text: str) -> float:
     try:
         value = float(text)
     except ValueError:
-        raise DatasetError(f"{path}:{line.number}: '{text}' is not a number") from None
+        raise DatasetError(f"{path}:{line.number}: '{text}' is not a number; correct it") from None
     if not math.isfinite(value):
-        raise DatasetError(f"{path}:{line.number}: {text} is not finite")
+        raise DatasetError(
+            f"{path}:{line.number}: {text} is not finite; correct it, or leave out the line"
+        )
     return value

@@ -27,6 +27,10 @@ class MapFileError(OrbSlamError):
     """A map file cannot be read or is inconsistent."""
 
 
+class OutputFileError(OrbSlamError):
+    """A video or a recording that was asked for cannot be written."""
+
+
 class ImageError(OrbSlamError):
     """An image is unreadable, empty, of the wrong type or of an unexpected size."""
 

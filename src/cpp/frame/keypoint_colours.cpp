@@ -2,7 +2,6 @@
 #include "frame/keypoint_colours.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "base/errors.hpp"
 
@@ -23,8 +22,8 @@ void sample_colours(const cv::Mat& image, bool is_rgb, Frame& frame) {
   const int red = is_rgb ? 0 : 2, blue = 2 - red;
   frame.colours.resize(raw.size());
   for (std::size_t i = 0; i < raw.size(); ++i) {
-    const int column = std::clamp(static_cast<int>(std::lround(raw[i].x)), 0, image.cols - 1);
-    const int row = std::clamp(static_cast<int>(std::lround(raw[i].y)), 0, image.rows - 1);
+    const int column = std::clamp(static_cast<int>(raw[i].x + 0.5F), 0, image.cols - 1);
+    const int row = std::clamp(static_cast<int>(raw[i].y + 0.5F), 0, image.rows - 1);
     const std::uint8_t* pixel = image.ptr<std::uint8_t>(row) + column * channels;
     frame.colours[i] = {pixel[red], pixel[1], pixel[blue]};
   }

@@ -14,6 +14,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from orbslam2py._arguments import cannot_open, path_of
 from orbslam2py.calibration.camera_model import (
     CameraModel,
     checked_camera_matrix,
@@ -93,7 +94,7 @@ def read_camera_file(
     SettingsError
         If the file cannot be read or understood, or has a camera model that is not supported.
     """
-    path = Path(path)
+    path = path_of(path, "the calibration file", SettingsError)
     text = _read_text(path)
     if file_format is CameraFileFormat.AUTO:
         file_format = _recognise(path, text)
@@ -116,9 +117,11 @@ def _read(
     """Make settings of what the file holds: of one camera, or of a pair if none else is wanted."""
     alone = sensor is not None and sensor is not Sensor.STEREO
     if right is not None and file_format is not CameraFileFormat.ROS:
-        raise SettingsError(f"a file of the right camera goes with ros files, {path} is not one")
+        raise SettingsError(
+            f"a file of the right camera goes with ros files, {path} is not one; leave out --right"
+        )
     if camera is not None and file_format in (CameraFileFormat.OPENCV, CameraFileFormat.ROS):
-        raise SettingsError(f"{path} holds one camera; choosing camera {camera} makes no sense")
+        raise SettingsError(f"{path} holds one camera, and no camera {camera}; leave out --camera")
     if file_format is CameraFileFormat.KITTI:
         return kitti_settings(path, text, camera, sensor, fps)
     fps = 30.0 if fps is None else fps
@@ -160,7 +163,7 @@ def _read_text(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8-sig", errors="replace")
     except OSError as error:
-        raise SettingsError(f"cannot open {path}: {error.strerror or error}") from error
+        raise SettingsError(cannot_open(path, error)) from error
 
 
 def _recognise(path: Path, text: str) -> CameraFileFormat:
@@ -209,7 +212,9 @@ def _opencv(path: Path, text: str) -> CameraModel:
         raise SettingsError(f"{path} is no file that OpenCV reads: {error}") from error
     if K is None:
         names = ", ".join(_OPENCV_NAMES["camera_matrix"])
-        raise SettingsError(f"{path} has no camera matrix (looked for {names})")
+        raise SettingsError(
+            f"{path} has no camera matrix (looked for {names}); is it a file of OpenCV?"
+        )
     return CameraModel(
         checked_camera_matrix(path, np.asarray(K)),
         five_coefficients(path, np.zeros(0) if D is None else np.asarray(D)),
@@ -244,16 +249,21 @@ def _colmap(path: Path, text: str, number: int | None) -> CameraModel:
             continue
         if len(fields) < 5 or not fields[0].isdecimal():
             raise SettingsError(
-                f"{path}:{line_number}: expected 'CAMERA_ID MODEL WIDTH HEIGHT PARAMS...'"
+                f"{path}:{line_number}: expected 'CAMERA_ID MODEL WIDTH HEIGHT PARAMS...'; is it "
+                "cameras.txt of COLMAP?"
             )
         cameras[int(fields[0])] = (line_number, fields[1:])
     ids = ", ".join(map(str, cameras))
     if not cameras:
         raise SettingsError(f"{path} lists no camera")
     if number is None and len(cameras) > 1:
-        raise SettingsError(f"{path} lists {len(cameras)} cameras ({ids}); choose one by number")
+        raise SettingsError(
+            f"{path} lists {len(cameras)} cameras ({ids}); choose one with --camera"
+        )
     if number is not None and number not in cameras:
-        raise SettingsError(f"{path} has no camera {number}; there are: {ids}")
+        raise SettingsError(
+            f"{path} has no camera {number}; give --camera with one there is: {ids}"
+        )
     line_number, (model, *values) = cameras[next(iter(cameras)) if number is None else number]
     where = Path(f"{path}:{line_number}")
     require_supported(where, "camera model", model, tuple(_COLMAP))

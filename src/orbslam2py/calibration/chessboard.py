@@ -11,6 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from orbslam2py._arguments import finite_number, is_whole, shown
 from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py.datasets import VideoReader
 from orbslam2py.datasets.image_folder import image_files
@@ -43,6 +44,12 @@ class Board:
     square: float = 1.0
 
     def __post_init__(self) -> None:
+        if not (is_whole(self.columns) and is_whole(self.rows)):
+            raise SettingsError(
+                f"the board has {shown(self.columns)} x {shown(self.rows)} inner corners; give "
+                "whole numbers, such as 9 x 6"
+            )
+        finite_number(self.square, "the side of the squares", "metres, such as 0.025")
         if min(self.columns, self.rows) < 3 or max(self.columns, self.rows) > 100:
             raise SettingsError(
                 f"a board of {self.columns} x {self.rows} inner corners cannot be used: give 3 to "
@@ -201,7 +208,9 @@ def find_views(
         if progress is not None:
             progress(result.n_searched, len(result.views))
     if result.n_unreadable == result.n_searched:
-        raise ImageError(f"none of the {result.n_searched} images of {source} can be read")
+        raise ImageError(
+            f"none of the {result.n_searched} images of {source} can be read; give others"
+        )
     if not result.views:
         raise DatasetError(
             f"no board of {board} inner corners in any of the {result.n_searched} images of "
@@ -265,7 +274,7 @@ def _images(
     if source.is_dir():
         paths = image_files(source)[:: every or 1]
         if not paths:
-            raise DatasetError(f"no images in {source}")
+            raise DatasetError(f"no images in {source}; give a folder of images, or a video")
         for path in paths:
             try:
                 yield path.name, read_image(path, rgb=False)

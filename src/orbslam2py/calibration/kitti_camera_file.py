@@ -50,7 +50,7 @@ def kitti_settings(
     first = min(projections) if number is None else number
     if first not in projections:
         there = ", ".join(f"P{one}" for one in sorted(projections))
-        raise SettingsError(f"{path} has no P{first}; there are: {there}")
+        raise SettingsError(f"{path} has no P{first}; give --camera with one there is: {there}")
     if sensor is Sensor.STEREO and first + 1 not in projections:
         raise SettingsError(f"{path} has no P{first + 1}, the right camera that stereo needs")
     camera = _camera(path, text, first, projections[first], _RATE if fps is None else fps)

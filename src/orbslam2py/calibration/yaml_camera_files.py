@@ -55,7 +55,7 @@ def parse_yaml(path: Path, text: str) -> Mapping[str, Any]:
 
 def _value(path: Path, where: str, values: Mapping[str, Any], key: str) -> Any:
     if key not in values:
-        raise SettingsError(f"{path}: {where}{key} is missing")
+        raise SettingsError(f"{path}: {where}{key} is missing; add it, or name another --format")
     return values[key]
 
 
@@ -92,7 +92,9 @@ def kalibr_settings(
     if not names:
         raise SettingsError(f"{path} has no cam0; is it a camchain of Kalibr?")
     if number is not None and f"cam{number}" not in names:
-        raise SettingsError(f"{path} has no cam{number}; there are: {', '.join(names)}")
+        raise SettingsError(
+            f"{path} has no cam{number}; give --camera with one there is: {', '.join(names)}"
+        )
     if number is not None or alone or len(names) == 1:
         name = names[0] if number is None else f"cam{number}"
         return _kalibr_camera(path, name, document[name]).settings(fps)
@@ -164,7 +166,7 @@ def _ros_matrix(
 ) -> FloatArray:
     name = next((name for name in names if name in values), None)
     if name is None:
-        raise SettingsError(f"{path}: {names[0]} is missing")
+        raise SettingsError(f"{path}: {names[0]} is missing; add it, or name another --format")
     value = values[name]
     if isinstance(value, Mapping):
         value = _value(path, f"{name}.", value, "data")

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 
 from orbslam2py.cli.exit_codes import ExitCode
@@ -11,6 +12,8 @@ from orbslam2py.cli.exit_codes import ExitCode
 def main() -> None:
     """Run the command line; errors a person can act on become one message and an exit code."""
     try:
+        # FFmpeg writes of broken videos by itself, beside the message.
+        os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
         # Loading the libraries takes long enough for a Ctrl-C.
         from orbslam2py.cli.app import run_app  # noqa: PLC0415
 

@@ -12,7 +12,18 @@ from rich.console import Console
 
 from orbslam2py._files import describe_error
 from orbslam2py._version import __version__
-from orbslam2py.cli import calibrate, demo, evaluate, run, settings, synthesize, vocabulary
+from orbslam2py.cli import (
+    calibrate,
+    demo,
+    evaluate,
+    maps,
+    report,
+    run,
+    settings,
+    synthesize,
+    view,
+    vocabulary,
+)
 from orbslam2py.cli.display import print_error, tell_repeated
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.run_arguments import RunCommand
@@ -61,11 +72,15 @@ def _options(
 app.command("run", cls=RunCommand)(run.run)
 app.command("demo")(demo.demo)
 app.command("synthesize")(synthesize.synthesize)
+app.command("view")(view.view)
 app.command("evaluate")(evaluate.evaluate)
+app.command("report")(report.report)
+app.command("compare")(report.compare)
 app.command("calibrate")(calibrate.calibrate)
 app.command("import-camera")(calibrate.import_camera)
 app.add_typer(settings.app, name="settings")
 app.add_typer(vocabulary.app, name="vocabulary")
+app.add_typer(maps.app, name="map")
 
 
 def run_app() -> None:
@@ -73,6 +88,7 @@ def run_app() -> None:
     try:
         app()
     except (OrbSlamError, OSError) as error:
+        tell_repeated()  # warnings before what they led to
         print_error(Console(stderr=True), "Error", describe_error(error))
         sys.exit(ExitCode.BAD_INPUT)
     finally:

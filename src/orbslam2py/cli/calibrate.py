@@ -23,7 +23,7 @@ from orbslam2py.calibration import (
 from orbslam2py.calibration import calibrate as calibrate_views
 from orbslam2py.calibration.plot import draw_residuals
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings import CameraSettings, Sensor, settings_for_camera
+from orbslam2py.settings import CameraSettings, OrbSettings, Sensor, settings_for_camera
 
 Output = Annotated[Path, typer.Option("--output", "-o", help="Settings file to write.")]
 Fps = Annotated[
@@ -88,8 +88,9 @@ def calibrate(
             "and give its file to orbslam2py import-camera"
         )
     # What does not go together is refused before the long search.
-    a_camera = CameraSettings(1.0, 1.0, 0.0, 0.0)
-    settings_for_camera(a_camera, sensor, baseline=baseline, depth_factor=depth_factor)
+    a_camera = CameraSettings(1.0, 1.0, 0.0, 0.0, fps=30.0 if fps is None else fps)
+    orb = None if features is None else OrbSettings(n_features=features)
+    settings_for_camera(a_camera, sensor, baseline=baseline, depth_factor=depth_factor, orb=orb)
     model = Board.parse(board, square)
     for path in (output, plot):
         check_target(path, force=force)
@@ -186,7 +187,7 @@ def check_target(path: Path | None, *, force: bool) -> None:
     if path.exists() and not force:
         raise SettingsError(f"{path} exists; use --force to replace it")
     if not path.absolute().parent.is_dir():
-        raise SettingsError(f"{path.absolute().parent}: no such folder")
+        raise SettingsError(f"{path.parent}: no such folder; make it first, or give another name")
 
 
 def _table(result: Calibration, source: Path) -> Table:

@@ -9,6 +9,14 @@ from typing import Annotated
 import typer
 
 from orbslam2py.cli.run import run_and_show
+from orbslam2py.cli.viewing import (
+    ViewerExit,
+    ViewerFlag,
+    ViewerHost,
+    ViewerOptions,
+    ViewerPort,
+)
+from orbslam2py.cli.watching import RecordOption, VideoOption
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.settings import Sensor
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
@@ -17,11 +25,20 @@ DEFAULT_OUTPUT = Path("runs/demo")
 
 
 def demo(
-    sensor: Annotated[Sensor, typer.Option(help="stereo or rgbd.")] = Sensor.STEREO,
+    sensor: Annotated[Sensor, typer.Option(help="What delivers the images.")] = Sensor.STEREO,
     frames: Annotated[
         int | None, typer.Option(help="Number of images [one lap and a bit].", min=10)
     ] = None,
     output: Annotated[Path, typer.Option(help="Folder for the results.")] = DEFAULT_OUTPUT,
+    no_report: Annotated[
+        bool, typer.Option("--no-report", help="Do not write the page report.html.")
+    ] = False,
+    viewer: ViewerFlag = False,
+    viewer_port: ViewerPort = None,
+    viewer_host: ViewerHost = None,
+    viewer_exit: ViewerExit = False,
+    video: VideoOption = None,
+    record: RecordOption = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
 ) -> None:
     """Track a camera once around a synthetic corridor: needs no data.
@@ -29,12 +46,27 @@ def demo(
     **Example**
 
         orbslam2py demo --sensor rgbd
+
+        orbslam2py demo --viewer
     """
+    look = ViewerOptions(viewer, viewer_port, viewer_host, viewer_exit)
     options = SyntheticOptions(world="corridor", sensor=sensor, frames=frames, speed=1.4, noise=2)
     sequence = SyntheticSequence(options)
     # Results of an earlier demo are replaced, other files are not.
     force = output == DEFAULT_OUTPUT or (output / "report.json").is_file()
-    code = run_and_show(sequence, RunOptions(sensor), output=output, force=force, quiet=quiet)
+    code = run_and_show(
+        sequence,
+        RunOptions(sensor),
+        output=output,
+        force=force,
+        report_page=not no_report,
+        viewer=look,
+        video=video,
+        record=record,
+        quiet=quiet,
+    )
     if not quiet:
         typer.echo(f"Look at {output / 'trajectory.png'}.")
+        if not viewer:
+            typer.echo("To see it while it runs: orbslam2py demo --viewer")
     raise typer.Exit(code)

@@ -129,7 +129,8 @@ def _describe_loop(loop: dict[str, Any], unit: str) -> str:
 
 #: Keys of report.json that the table leaves out: they are its title, or told by another row.
 _UNTOLD = {
-    *("sequence", "sensor", "milliseconds", "settings", "losses"),
+    *("sequence", "sensor", "milliseconds", "settings", "losses", "warnings"),
+    *("options", "command", "command_folder", "machine"),
     *("lost_frames", "lost_seconds", "longest_loss_seconds"),
 }
 
@@ -147,13 +148,21 @@ def _rows_of(key: str, value: Any, report: dict[str, Any]) -> list[tuple[str, st
         unit = "units" if report["sensor"] == "mono" else "m"
         return [("loop", _describe_loop(loop, unit)) for loop in value]
     text = f"{value:.4f}" if isinstance(value, float) else str(value)
-    if key == "lost":
+    if key == "final_adjustment":
+        text = _describe_adjustment(value)
+    elif key == "lost":
         text = _describe_losses(report)
     elif key == "lost_at_end":
         text = "yes" if value else ""
     elif key == "full_adjustments":
         text = f"{sum(entry['used'] for entry in value)} of {len(value)} used" if value else ""
     return [(key.replace("_", " "), text)] if text else []
+
+
+def _describe_adjustment(entry: dict[str, Any]) -> str:
+    before, after = entry["initial_cost"], entry["final_cost"]
+    text = f"cost {before:.0f} to {after:.0f}, {sum(entry['milliseconds'].values()) / 1000:.1f} s"
+    return text if entry["used"] else f"{text}, given up"
 
 
 def _describe_losses(report: dict[str, Any]) -> str:

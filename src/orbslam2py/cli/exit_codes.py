@@ -9,7 +9,7 @@ class ExitCode(IntEnum):
 
     OK = 0
     FAILED = 1
-    """Something broke in the middle; what was done until then is saved."""
+    """Something broke in the middle; what was done until then is saved. Two files differ."""
     BAD_INPUT = 2
     """Bad input or usage; nothing was run."""
     NOTHING_TRACKED = 3

@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import shlex
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -23,6 +26,15 @@ from orbslam2py.cli.display import (
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.interrupts import StopOnInterrupt
 from orbslam2py.cli.run_arguments import read_initial_pose
+from orbslam2py.cli.viewing import (
+    ViewerExit,
+    ViewerFlag,
+    ViewerHost,
+    ViewerOptions,
+    ViewerPort,
+    Viewing,
+)
+from orbslam2py.cli.watching import RecordOption, VideoOption, file_watchers, watch_all
 from orbslam2py.datasets import open_input
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.maps import load_map
@@ -30,10 +42,12 @@ from orbslam2py.maps.setup_check import check_sensor
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.outputs import new_output_folder
 from orbslam2py.runs.remedies import why_nothing_was_tracked
+from orbslam2py.runs.result import FrameRow
 from orbslam2py.runs.run import FinishedRun, run_sequence
 from orbslam2py.settings import Settings
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.options import SystemOptions
+from orbslam2py.slam.system import System
 from orbslam2py.vocabulary.vocabulary import load_vocabulary
 
 EXAMPLE = """
@@ -173,13 +187,29 @@ def run(
             help="Seconds after which that ends with what it has reached.", metavar="SECONDS"
         ),
     ] = None,
+    final_adjustment: Annotated[
+        bool,
+        typer.Option(
+            "--final-adjustment", help="At the end, refine the finished map before it is written."
+        ),
+    ] = False,
     seed: Annotated[int, typer.Option(help="Seed of all random draws.", min=0)] = 0,
+    video: VideoOption = None,
+    record: RecordOption = None,
     force: Annotated[
         bool, typer.Option("--force", help="Write into an output folder that is not empty.")
     ] = False,
+    no_report: Annotated[
+        bool, typer.Option("--no-report", help="Do not write the page report.html.")
+    ] = False,
+    viewer: ViewerFlag = False,
+    viewer_port: ViewerPort = None,
+    viewer_host: ViewerHost = None,
+    viewer_exit: ViewerExit = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
 ) -> None:
     """Track a recorded sequence, a video or a camera; write trajectory, map and report."""
+    look = ViewerOptions(viewer, viewer_port, viewer_host, viewer_exit)
     log_to(Console(stderr=True), quiet=quiet)  # opening warns already
     loaded = None if load is None else load_map(load, images=True)
     chosen: Settings | str | None = settings
@@ -203,6 +233,7 @@ def run(
         stride=stride,
         max_frames=max_frames,
         localize_after=localize,
+        final_adjustment=final_adjustment,
         load_map=loaded,
         initial_pose=None if initial_pose is None else read_initial_pose(initial_pose),
         allow_other_setup=allow_other_setup,
@@ -210,7 +241,16 @@ def run(
         autosave=autosave,
     )
     code = run_and_show(
-        images, options, vocabulary=vocabulary, output=output, force=force, quiet=quiet
+        images,
+        options,
+        vocabulary=vocabulary,
+        output=output,
+        force=force,
+        report_page=not no_report,
+        viewer=look,
+        video=video,
+        record=record,
+        quiet=quiet,
     )
     raise typer.Exit(code)
 
@@ -225,7 +265,11 @@ def run_and_show(
     vocabulary: Path | None = None,
     output: Path | None = None,
     force: bool = False,
+    report_page: bool = True,
+    viewer: ViewerOptions | None = None,
     quiet: bool = False,
+    video: Path | None = None,
+    record: Path | None = None,
 ) -> ExitCode:
     """Run, with a progress bar and a table at the end; returns the exit code."""
     console = Console(quiet=quiet)
@@ -233,21 +277,42 @@ def run_and_show(
     log_to(errors, quiet=quiet)
     n_frames = options.n_frames(sequence)
     words = load_vocabulary(vocabulary)  # until here a Ctrl-C leaves nothing behind
-    with StopOnInterrupt() as interrupt, progress_bar(console) as bar:
-        done = run_sequence(
-            sequence,
-            options,
-            vocabulary=words,
-            output=output or new_output_folder(sequence.name),
-            force=force,
-            progress=Display(bar, n_frames).show,
-            stop=interrupt.event,
-        )
-    tell_repeated()
-    console.print(report_table(done.report))
-    folder = escape(str(done.folder))
-    console.print(f"Results are in [bold]{folder}[/]", highlight=False, soft_wrap=True)
-    code = _conclude(done, errors)
+    with contextlib.ExitStack() as page:
+        with StopOnInterrupt() as interrupt:
+            files = page.enter_context(file_watchers(sequence, options, video, record))
+            viewing = Viewing(viewer or ViewerOptions(), sequence, interrupt.event)
+            page.enter_context(viewing)
+            with progress_bar(console) as bar:
+                display = Display(bar, n_frames)
+
+                def progress(row: FrameRow, system: System) -> None:
+                    display.show(row, system)
+                    viewing.count(row)
+                    files.count(row)
+
+                done = run_sequence(
+                    sequence,
+                    options,
+                    vocabulary=words,
+                    output=output or new_output_folder(sequence.name),
+                    force=force,
+                    report_page=report_page,
+                    command=shlex.join(["orbslam2py", *sys.argv[1:]]),
+                    progress=progress,
+                    control=viewing.control,
+                    watch=watch_all(viewing.watch, files.watch),
+                )
+        tell_repeated()
+        console.print(report_table(done.report))
+        folder = escape(str(done.folder))
+        console.print(f"Results are in [bold]{folder}[/]", highlight=False, soft_wrap=True)
+        html = done.folder / "report.html" if done.folder is not None else None
+        if report_page and html is not None and html.is_file():
+            text = f"To look at them: [bold]{escape(str(html))}[/]"
+            console.print(text, highlight=False, soft_wrap=True)
+        files.tell(console)
+        code = _conclude(done, errors)
+        viewing.stay(console, done.folder)
     interrupted = interrupt.event.is_set() and not done.result.is_live  # also while writing
     if code is not ExitCode.FAILED and interrupted:
         return ExitCode.INTERRUPTED

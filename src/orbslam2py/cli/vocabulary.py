@@ -15,6 +15,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
 from orbslam2py import _core as core
+from orbslam2py._arguments import seed_of
 from orbslam2py._version import __version__
 from orbslam2py.errors import VocabularyError
 from orbslam2py.vocabulary import (
@@ -52,12 +53,14 @@ def train(
     output: Annotated[
         Path, typer.Option("--output", "-o", help="File to write: .bvoc, .txt or .txt.gz.")
     ],
-    branching: Annotated[int, typer.Option(help="Children per node, 2 to 20.")] = 10,
-    depth: Annotated[int, typer.Option(help="Levels, 1 to 10; at most branching^depth words.")] = 5,
-    features: Annotated[int, typer.Option(help="Features per image.")] = 2000,
+    branching: Annotated[int, typer.Option(help="Children per node.", min=2, max=20)] = 10,
+    depth: Annotated[
+        int, typer.Option(help="Levels; at most branching^depth words.", min=1, max=10)
+    ] = 5,
+    features: Annotated[int, typer.Option(help="Features per image.", min=1, max=1_000_000)] = 2000,
     seed: Annotated[int, typer.Option(min=0, help="Of the random generator.")] = 0,
     threads: Annotated[
-        int, typer.Option(help="0: one per core. The result does not depend on it.")
+        int, typer.Option(help="0: one per core. The result does not depend on it.", min=0, max=256)
     ] = 0,
     note: Annotated[
         str, typer.Option(help="Kept in a .bvoc file: licence, where the images come from.")
@@ -70,7 +73,7 @@ def train(
     options = core.TrainingOptions()
     options.branching = branching
     options.depth = depth
-    options.seed = seed
+    options.seed = seed_of(seed)
     options.n_threads = threads
     paths = read_training_images(images)
     comment = (
@@ -144,7 +147,7 @@ def _check_target(path: Path, *, force: bool) -> None:
     if path.exists() and not force:
         raise VocabularyError(f"{path} exists; use --force to replace it")
     if not path.absolute().parent.is_dir():
-        raise VocabularyError(f"{path.absolute().parent}: no such folder")
+        raise VocabularyError(f"{path.parent}: no such folder; make it first, or give another name")
 
 
 EXAMPLE = "{}\n\n**Example**\n\n    orbslam2py vocabulary {}\n"

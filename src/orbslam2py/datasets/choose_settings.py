@@ -62,5 +62,7 @@ def choose_settings(
     shown = folders[0] if folders[0].name else folders[0].resolve()
     raise DatasetError(
         f"no settings for {shown}: {advice}; for another camera give a file of its own, or put it "
-        f"into the folder as {_SETTINGS_FILE}"
+        f"into the folder as {_SETTINGS_FILE}; 'orbslam2py settings new' makes one of the "
+        "numbers of "
+        "the camera"
     )

@@ -71,6 +71,7 @@ class EurocSequence(RecordedSequence):
     """
 
     layout = Layout.EUROC
+    up_in_truth = np.array([0.0, 0.0, 1.0])  # as the laser tracker and the IMU see gravity
     _missing_calibration = (
         "sensor.yaml is missing in cam0, or for stereo in cam1; copy it there from the data set, "
         "or for EuRoC's own cameras give --settings euroc"

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from orbslam2py._arguments import cannot_open
 from orbslam2py._arrays import FloatArray
 from orbslam2py.datasets.rectification import rectification_of_pair
 from orbslam2py.errors import DatasetError
@@ -94,7 +95,7 @@ def read_sensor_yaml(path: Path) -> SensorCalibration:
     try:
         document = scan(path.read_text(encoding="utf-8", errors="replace"))
     except OSError as error:
-        raise DatasetError(f"cannot open {path}: {error.strerror or error}") from error
+        raise DatasetError(cannot_open(path, error)) from error
     if document.problems:
         raise DatasetError("\n".join(problem.located(path) for problem in document.problems))
     entries = document.entries

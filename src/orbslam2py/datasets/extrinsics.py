@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from orbslam2py._arguments import cannot_open
 from orbslam2py._arrays import FloatArray
 from orbslam2py._text_lines import content_lines
 from orbslam2py.errors import DatasetError, SettingsError
@@ -51,7 +52,7 @@ def _from_yaml(path: Path) -> FloatArray:
     try:
         document = scan(path.read_text(encoding="utf-8", errors="replace"))
     except OSError as error:
-        raise DatasetError(f"cannot open {path}: {error.strerror or error}") from error
+        raise DatasetError(cannot_open(path, error)) from error
     if "T_BS" not in document.entries:
         raise DatasetError(f"{path} has no T_BS; {_WANTED}")
     entry = document.entries["T_BS"]

@@ -40,7 +40,9 @@ def image_files(folder: Path) -> list[Path]:
             if path.suffix.lower() in IMAGE_SUFFIXES and not path.name.startswith(".")
         ]
     except OSError as error:
-        raise DatasetError(f"cannot list {folder}: {error.strerror or error}") from error
+        raise DatasetError(
+            f"cannot list {folder}: {error.strerror or error}; give a folder of images"
+        ) from error
     return sorted(found, key=lambda path: (natural_key(path.name), path.name))
 
 

@@ -100,5 +100,7 @@ def _decode(path: Path) -> NDArray[np.generic]:
         except cv2.error as error:
             raise ImageError(f"cannot decode image {path}: {error}") from error
     if image is None or image.size == 0:
-        raise ImageError(f"{path} is no readable image ({len(content)} bytes)")
+        raise ImageError(
+            f"{path} is no readable image ({len(content)} bytes); replace it, or leave it out"
+        )
     return np.asarray(image)

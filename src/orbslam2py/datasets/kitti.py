@@ -59,6 +59,7 @@ class KittiSequence(RecordedSequence):
     """
 
     layout = Layout.KITTI
+    up_in_truth = np.array([0.0, -1.0, 0.0])  # the world is the first camera, mounted level
     _missing_calibration = (
         "calib.txt is missing; copy it there from the data set, or give --settings kitti00-02, "
         "kitti03 or kitti04-12, by the number of the sequence"

@@ -83,7 +83,9 @@ class MaskFolder:
     def __init__(self, folder: Path, sequence: Sequence) -> None:
         files = image_files(folder)
         if not files:
-            raise DatasetError(f"no masks in {folder}")
+            raise DatasetError(
+                f"no masks in {folder}; give an image, or a folder with one per image"
+            )
         n = len(sequence)
         by_stem = {path.stem: path for path in files}
         path_of = getattr(sequence, "image_path", None)
@@ -136,7 +138,9 @@ def read_mask(path: Path) -> ByteArray:
         If it is no image of 8 bits, or its channels differ.
     """
     if not path.exists():
-        raise DatasetError(f"mask {path} does not exist")
+        raise DatasetError(
+            f"mask {path} does not exist; give an image, or a folder with one per image"
+        )
     image = read_image(path, rgb=False)
     if image.ndim == 2:
         return image
@@ -150,7 +154,7 @@ def _fitting(path: Path, mask: ByteArray, image: ByteArray) -> ByteArray:
     if mask.shape != image.shape[:2]:
         raise ImageError(
             f"mask {path} is {mask.shape[1]} x {mask.shape[0]}, "
-            f"but its image {image.shape[1]} x {image.shape[0]}"
+            f"but its image {image.shape[1]} x {image.shape[0]}; give one of the image's size"
         )
     return mask
 
@@ -181,6 +185,11 @@ class _Masked:
     def settings(self) -> Settings:
         """Settings of the source."""
         return self._inner.settings
+
+    @property
+    def up_in_truth(self) -> FloatArray | None:
+        """Direction of up in the world of the ground truth, (3,); None if it is not known."""
+        return getattr(self._inner, "up_in_truth", None)
 
     def ground_truth(self) -> Trajectory | None:
         """Return the true poses; see `datasets.base.Source.ground_truth`."""

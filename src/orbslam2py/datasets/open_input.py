@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from orbslam2py._arguments import is_whole, path_of
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.image_folder import ImageFolder, image_files
@@ -58,11 +59,15 @@ def open_input(
     ImageError
         If the mask is no readable image.
     """
-    named = Path(str(source))
-    if isinstance(source, int) or (str(source).isdecimal() and not named.exists()):
+    if is_whole(source) and int(str(source)) < 0:
+        raise DatasetError(f"there is no camera {source}; cameras are numbered from 0")
+    named = Path(str(source)) if is_whole(source) else path_of(source, "what to open")
+    if is_whole(source) or (str(source).isdecimal() and not named.exists()):
         number = int(str(source))
         if times is not None:
-            raise DatasetError("--times does not go with a camera: its images get their own times")
+            raise DatasetError(
+                "--times does not go with a camera: its images get their own times; leave it out"
+            )
         camera = LiveCamera(number, sensor, settings=settings, fps=fps)
         live: LiveSource = camera if mask is None else MaskedCamera(camera, mask)
         live.open()

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from orbslam2py._arguments import path_of
 from orbslam2py.datasets.base import Layout
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.euroc import EurocSequence, find_root
@@ -33,9 +34,13 @@ def recognise(folder: str | Path) -> Layout:
     DatasetError
         If the folder is missing, fits no layout, or several.
     """
-    folder = Path(folder)
+    folder = path_of(folder, "the folder of the sequence")
     if not folder.exists():
-        raise DatasetError(f"{folder} does not exist")
+        raise DatasetError(
+            f"{folder} does not exist; give the folder of a sequence, a folder of images, a "
+            "video or "
+            "the number of a camera"
+        )
     if not folder.is_dir():
         raise DatasetError(f"{folder} is no folder; give the folder of a sequence")
     found = _layouts(folder)
@@ -48,6 +53,8 @@ def recognise(folder: str | Path) -> Layout:
     inner = sorted(child for child in folder.iterdir() if child.is_dir() and _layouts(child))
     if inner:
         message += f"; did you mean {inner[0]}?"
+    else:
+        message += "; give the folder in which these lie"
     raise DatasetError(message)
 
 
@@ -91,6 +98,9 @@ def open_sequence(
     SettingsError
         If the settings given are wrong.
     """
+    folder = path_of(folder, "the folder of the sequence")
+    if association is not None:
+        association = path_of(association, "association")
     layout = recognise(folder) if layout is None else Layout(layout)
     if layout is Layout.TUM:
         return TumSequence(folder, sensor, settings=settings, association=association)

@@ -50,6 +50,8 @@ class RecordedSequence(FramesInOrder, ABC):
     """
 
     layout: Layout
+    #: Direction of up in the world of the ground truth, (3,); None if the layout does not tell it.
+    up_in_truth: FloatArray | None = None
     #: Why there are no settings if none were found, and which of the built-in ones to give.
     _missing_calibration: str
 
@@ -76,6 +78,11 @@ class RecordedSequence(FramesInOrder, ABC):
 
     def default_settings(self) -> Settings:
         """Choose by what is in the folder; see `choose_settings`."""
+        return self._default_settings
+
+    @cached_property
+    def _default_settings(self) -> Settings:
+        # Read once: a file tells its doubts whenever it is read.
         return choose_settings(
             self.sensor, self._settings_folders(), self._from_calibration, self._missing_calibration
         )

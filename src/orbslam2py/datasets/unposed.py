@@ -60,8 +60,11 @@ class UnposedSource:
             raise SettingsError(
                 f"no settings for {what}: nothing tells what camera it is from. Give --settings "
                 f"with a file or a built-in name ({', '.join(BUILTIN_NAMES)}). Make a file with "
-                "'orbslam2py calibrate' from images of a chessboard, or with 'orbslam2py "
-                "import-camera' from a calibration you have"
+                "'orbslam2py settings new' from the numbers of the camera, with 'orbslam2py "
+                "calibrate' "
+                "from images of a chessboard, or with 'orbslam2py import-camera' from a "
+                "calibration "
+                "you have"
             )
         self.settings: Settings = resolve_settings(settings, self.sensor)
         if fps is not None:
@@ -130,7 +133,9 @@ def chosen_stamps(
         If both are given, or the file does not fit.
     """
     if fps is not None and times is not None:
-        raise DatasetError("--fps and --times exclude each other: both tell the time stamps")
+        raise DatasetError(
+            "--fps and --times exclude each other: both tell the time stamps; give one of them"
+        )
     if times is not None:
         return read_time_file(Path(times), n, names)
     if fps is not None:

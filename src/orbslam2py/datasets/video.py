@@ -45,7 +45,7 @@ class VideoReader:
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         if not self.path.is_file():
-            raise DatasetError(f"video {self.path} does not exist")
+            raise DatasetError(f"video {self.path} does not exist; check the path")
         self._capture = self._open()
         self._next = 0
         #: Frames per second as the file tells; 0 if it does not.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How far an estimate is from the truth: paths, laps, poses found in a map, closed loops."""
 
-from orbslam2py.evaluation.alignment import Alignment, Similarity, align, differ_in_unit
+from orbslam2py.evaluation.alignment import Alignment, differ_in_unit
 from orbslam2py.evaluation.keyframes import (
     PoseError,
     errors_through_keyframes,
@@ -28,6 +28,7 @@ from orbslam2py.evaluation.metrics import (
     segment_errors,
 )
 from orbslam2py.evaluation.pairing import Paired, Poses, ends_early, pair, read_estimate, read_truth
+from orbslam2py.trajectory import Similarity, align
 
 __all__ = [
     "SEGMENT_LENGTHS",

@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 
+from orbslam2py._arguments import shown
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import DatasetError
+from orbslam2py.trajectory import align
 
 #: Lengths that differ by more than this factor are those of one camera, not of a wrong baseline.
 _OTHER_UNIT = 1.5
@@ -41,7 +42,7 @@ class Alignment(str, Enum):
             return cls(value)
         except ValueError:
             names = ", ".join(alignment.value for alignment in cls)
-            raise DatasetError(f"'{value}' is no alignment; give one of {names}") from None
+            raise DatasetError(f"{shown(value)} is no alignment; give one of {names}") from None
 
     @property
     def fewest_poses(self) -> int:
@@ -50,75 +51,6 @@ class Alignment(str, Enum):
 
     def __str__(self) -> str:
         return self.value
-
-
-@dataclass(frozen=True, eq=False)
-class Similarity:
-    """A similarity transform ``y = scale * R @ x + t``.
-
-    Attributes
-    ----------
-    scale
-        Ratio of lengths, above 0.
-    R
-        Rotation, float64 (3, 3).
-    t
-        Translation, float64 (3,).
-    """
-
-    scale: float
-    R: FloatArray
-    t: FloatArray
-
-    @classmethod
-    def identity(cls) -> Similarity:
-        """Make the transform that changes nothing."""
-        return cls(1.0, np.eye(3), np.zeros(3))
-
-    def inverse(self) -> Similarity:
-        """Make the transform that undoes this one."""
-        return Similarity(1 / self.scale, self.R.T, -(self.R.T @ self.t) / self.scale)
-
-    def apply(self, points: FloatArray) -> FloatArray:
-        """Transform points (n, 3); returns float64 (n, 3)."""
-        moved: FloatArray = self.scale * points @ self.R.T + self.t
-        return moved
-
-    def apply_to_poses(self, T_wc: FloatArray) -> FloatArray:
-        """Transform poses (n, 4, 4), camera to world: positions as points, orientations turned."""
-        moved: FloatArray = T_wc.copy()
-        moved[:, :3, :3] = self.R @ T_wc[:, :3, :3]
-        moved[:, :3, 3] = self.apply(T_wc[:, :3, 3])
-        return moved
-
-
-def align(points: FloatArray, targets: FloatArray, *, with_scale: bool = False) -> Similarity:
-    """Find the transform that moves points nearest to their targets (Umeyama, PAMI 1991).
-
-    Parameters
-    ----------
-    points, targets
-        float64 (n, 3), at least one.
-    with_scale
-        Whether lengths may change. They do not if one of the sets is a single place, where no
-        scale can be seen; a rotation that cannot be seen is chosen so that nothing is turned.
-
-    Returns
-    -------
-    Similarity
-        Always finite.
-    """
-    centre, target_centre = points.mean(axis=0), targets.mean(axis=0)
-    x, y = points - centre, targets - target_centre
-    U, stretch, Vt = np.linalg.svd(y.T @ x / len(x))
-    signs = np.array([1.0, 1.0, np.sign(np.linalg.det(U) * np.linalg.det(Vt))])
-    R = U @ (signs[:, None] * Vt) if stretch[0] > 0 else np.eye(3)
-    scale = 1.0
-    spread, target_spread = np.mean(np.sum(x**2, axis=1)), np.mean(np.sum(y**2, axis=1))
-    if with_scale and spread > 1e-18 and target_spread > 1e-18:
-        fitted = float(np.sum(stretch * signs) / spread)
-        scale = fitted if fitted > 1e-12 else 1.0
-    return Similarity(scale, R, target_centre - scale * R @ centre)
 
 
 def differ_in_unit(points: FloatArray, targets: FloatArray) -> float | None:

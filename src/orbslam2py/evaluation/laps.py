@@ -10,12 +10,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from orbslam2py._arguments import shown
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import DatasetError
-from orbslam2py.evaluation.alignment import Similarity, align
 from orbslam2py.evaluation.matching import match_poses
 from orbslam2py.evaluation.metrics import relative_errors
-from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory
+from orbslam2py.trajectory import (
+    MAX_DIFFERENCE,
+    Similarity,
+    Trajectory,
+    align,
+    lengths_along,
+)
 
 
 @dataclass(frozen=True)
@@ -125,12 +131,14 @@ def _lap(
     estimate: Trajectory, truth: Trajectory, length: float | None, max_difference: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Poses (n, 4, 4) of the lap, estimated and true, and metres from its start (n,)."""
+    for name, trajectory in (("estimate", estimate), ("truth", truth)):
+        if not isinstance(trajectory, Trajectory):
+            raise DatasetError(f"the {name} is {shown(trajectory)}; give an orbslam2py.Trajectory")
     estimate = estimate.select(~estimate.lost)
     truth = truth.select(~truth.lost)
     i, j = match_poses(estimate, truth, max_difference)
     # Along all true poses: the way also goes on where the estimate has gaps.
-    steps = np.linalg.norm(np.diff(truth.positions, axis=0), axis=1)
-    along = np.concatenate([[0.0], np.cumsum(steps)])[j]
+    along = lengths_along(truth.positions)[j]
     along -= along[0]
     n = len(along)
     if length is not None:

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import DatasetError
-from orbslam2py.evaluation.alignment import align
 from orbslam2py.evaluation.matching import match_poses
-from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory
+from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory, align, lengths_along
 from orbslam2py.trajectory.rotations import inverse_poses, rotation_angles
 
 # How far the truth may be from what a true loop says.
@@ -126,7 +125,7 @@ def metres_per_unit_at(
     estimate = estimate.select(~estimate.lost)
     truth = truth.select(~truth.lost)
     i, j = match_poses(estimate, truth, max_difference)
-    along = _path_lengths(truth)
+    along = lengths_along(truth.positions)
     near = np.abs(along[j] - along[_nearest(truth, timestamp)]) <= reach
     if near.sum() < 3:
         raise DatasetError(
@@ -152,7 +151,7 @@ def find_revisits(
     degrees
         Angle between the two views that still is the same direction [deg].
     """
-    along = _path_lengths(truth)
+    along = lengths_along(truth.positions)
     ahead = truth.T_wc[:, :3, 2]
     found = np.zeros(len(truth), bool)
     for k in range(len(truth)):
@@ -197,9 +196,3 @@ def closed_revisits(revisits: Sequence[Revisit], timestamps: FloatArray) -> NDAr
 
 def _nearest(trajectory: Trajectory, timestamp: float) -> int:
     return int(np.argmin(np.abs(trajectory.timestamps - timestamp)))
-
-
-def _path_lengths(trajectory: Trajectory) -> FloatArray:
-    """Metres from the start, (n,)."""
-    steps = np.linalg.norm(np.diff(trajectory.positions, axis=0), axis=1)
-    return np.concatenate([[0.0], np.cumsum(steps)])

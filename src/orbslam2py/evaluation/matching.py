@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orbslam2py._arrays import FloatArray, IntArray
+from orbslam2py._arrays import IntArray
 from orbslam2py.errors import DatasetError
-from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory, associate
+from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory, associate, lengths_along
 
 _LONGEST_STEP = 1.0  # seconds between matched poses; what is longer, and unusual, is a gap
 _UNUSUAL_STEP = 5.0  # times the median step
@@ -114,7 +114,7 @@ def describe_match(
     differences = np.abs(estimate.timestamps[i] - truth.timestamps[j])
     by_time = np.argsort(truth.timestamps, kind="stable")
     with np.errstate(all="ignore"):
-        along = _lengths_along(truth.positions[by_time])
+        along = lengths_along(truth.positions[by_time])
         place = np.empty(len(truth), np.int64)
         place[by_time] = np.arange(len(truth))
         matched = np.sort(place[j])
@@ -135,11 +135,6 @@ def describe_match(
         max_difference=float(differences.max()),
         is_timed=timed,
     )
-
-
-def _lengths_along(positions: FloatArray) -> FloatArray:
-    steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
-    return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def _span(trajectory: Trajectory) -> str:

@@ -13,10 +13,18 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from orbslam2py._arguments import finite_number, shown
 from orbslam2py._arrays import FloatArray, IntArray
-from orbslam2py.evaluation.alignment import Alignment, Similarity, align, differ_in_unit
+from orbslam2py.errors import DatasetError
+from orbslam2py.evaluation.alignment import Alignment, differ_in_unit
 from orbslam2py.evaluation.matching import Matched, describe_match, match_poses
-from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory
+from orbslam2py.trajectory import (
+    MAX_DIFFERENCE,
+    Similarity,
+    Trajectory,
+    align,
+    lengths_along,
+)
 from orbslam2py.trajectory.rotations import inverse_poses, rotation_angles
 
 #: Lengths of KITTI's path segments [m].
@@ -189,6 +197,10 @@ def evaluate_trajectory(
         If no time stamps match.
     """
     alignment = Alignment.of(alignment)
+    for name, trajectory in (("estimate", estimate), ("truth", truth)):
+        if not isinstance(trajectory, Trajectory):
+            raise DatasetError(f"the {name} is {shown(trajectory)}; give an orbslam2py.Trajectory")
+    offset = finite_number(offset, "the offset", "a number of seconds", DatasetError)
     estimate = estimate.select(~estimate.lost).shifted(offset)
     truth = truth.select(~truth.lost)
     i, j = match_poses(estimate, truth, max_difference)
@@ -316,8 +328,7 @@ def segment_errors(estimate: FloatArray, truth: FloatArray) -> FloatArray:
     FloatArray
         (k, 2): translation error per metre of length, and rotation error [rad] per metre.
     """
-    steps = np.linalg.norm(np.diff(truth[:, :3, 3], axis=0), axis=1)
-    along = np.concatenate([[0.0], np.cumsum(steps)])
+    along = lengths_along(truth[:, :3, 3])
     starts = np.arange(0, len(truth), _SEGMENT_STEP)
     errors = []
     for length in SEGMENT_LENGTHS:

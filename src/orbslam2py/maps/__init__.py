@@ -2,6 +2,7 @@
 """The map outside of a running system: plain copies of it, and files of them."""
 
 from orbslam2py.maps.changes import KeyframesSet, MapChanges, MapFollower, PointsSet
+from orbslam2py.maps.compare import map_differences
 from orbslam2py.maps.contents import (
     Cameras,
     Covisibility,
@@ -13,22 +14,46 @@ from orbslam2py.maps.contents import (
     restore_contents,
     take_contents,
 )
+from orbslam2py.maps.edits.crop import crop_to_box, crop_to_times, keep_keyframes
+from orbslam2py.maps.edits.placement import (
+    Placement,
+    place_by_length,
+    place_by_points,
+    place_by_trajectory,
+)
+from orbslam2py.maps.edits.saved import crop_saved_map
+from orbslam2py.maps.edits.transform import transform_map
+from orbslam2py.maps.exports.colmap import export_colmap
+from orbslam2py.maps.exports.colours import with_colours
+from orbslam2py.maps.exports.g2o import export_g2o
+from orbslam2py.maps.exports.images import ImageOfKeyframe, ImageSequence, images_of
+from orbslam2py.maps.exports.nerfstudio import export_nerfstudio
+from orbslam2py.maps.exports.points import export_points
+from orbslam2py.maps.exports.trajectories import export_trajectory, keyframe_path
+from orbslam2py.maps.map_arrays import MapArrays
 from orbslam2py.maps.map_file import save_map
 from orbslam2py.maps.map_reader import load_map
+from orbslam2py.maps.pcd import write_pcd
 from orbslam2py.maps.ply import write_ply
+from orbslam2py.maps.reprojection import reprojection_errors
 from orbslam2py.maps.saved_map import RecordedFrames, Run, SavedMap, VocabularyIdentity
 from orbslam2py.maps.snapshot import MapSnapshot, keyframe_trajectory, take_snapshot
+from orbslam2py.maps.verify import verify_map_file
 
 __all__ = [
     "Cameras",
     "Covisibility",
+    "ImageOfKeyframe",
+    "ImageSequence",
     "Keyframes",
     "KeyframesSet",
+    "MapArrays",
     "MapChanges",
     "MapContents",
     "MapFollower",
     "MapSnapshot",
     "Observations",
+    "Placement",
     "Points",
     "PointsSet",
     "RecordedFrames",
@@ -36,11 +61,31 @@ __all__ = [
     "Run",
     "SavedMap",
     "VocabularyIdentity",
+    "crop_saved_map",
+    "crop_to_box",
+    "crop_to_times",
+    "export_colmap",
+    "export_g2o",
+    "export_nerfstudio",
+    "export_points",
+    "export_trajectory",
+    "images_of",
+    "keep_keyframes",
+    "keyframe_path",
     "keyframe_trajectory",
     "load_map",
+    "map_differences",
+    "place_by_length",
+    "place_by_points",
+    "place_by_trajectory",
+    "reprojection_errors",
     "restore_contents",
     "save_map",
     "take_contents",
     "take_snapshot",
+    "transform_map",
+    "verify_map_file",
+    "with_colours",
+    "write_pcd",
     "write_ply",
 ]

@@ -46,7 +46,7 @@ class PointsSet:
         return len(self.ids)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class MapChanges:
     """What turns the map as it was at the last look into the map of one later moment.
 
@@ -89,34 +89,36 @@ class MapChanges:
         return self.restarted or n_objects > 0 or any(pairs is not None for pairs in edges)
 
     def __repr__(self) -> str:
-        new_edges = [
-            name
+        edges = [
+            name.replace("_", " ")
             for name in ("covisibility", "loop_edges", "spanning_tree")
             if getattr(self, name) is not None
         ]
         return (
-            f"MapChanges(map_index={self.map_index}, restarted={self.restarted}, "
-            f"keyframes=+{len(self.keyframes_set)} -{len(self.keyframes_removed)}, "
-            f"points=+{len(self.points_set)} -{len(self.points_removed)}, "
-            f"edges={', '.join(new_edges) or 'as before'})"
+            f"<MapChanges: map {self.map_index}{' from the beginning' if self.restarted else ''}, "
+            f"keyframes +{len(self.keyframes_set)} -{len(self.keyframes_removed)}, "
+            f"points +{len(self.points_set)} -{len(self.points_removed)}"
+            f"{', new ' + ', '.join(edges) if edges else ''}>"
         )
 
 
 class MapFollower:
     """Tells at every look what has changed in a map since the look before.
 
+    A look costs what has changed, not what there is: a map of thousands of keyframes can be
+    followed several times a second. It is of one moment, does not keep tracking waiting, and may
+    be taken from any thread.
+
     Parameters
     ----------
     slam_map
-        The map; another thread may change it.
+        The map, as in ``slam.pipeline.back_end.map``; other threads may change it.
     least_weight
         Shared points of two keyframes whose covisibility is told.
     """
 
     def __init__(self, slam_map: core.Map, *, least_weight: int = STRONG_EDGE) -> None:
-        self._map = slam_map
-        self._least_weight = least_weight
-        self._seen: _Look | None = None
+        self._follower = core.MapFollower(slam_map, least_weight)
 
     def update(self) -> MapChanges:
         """Look at the map.
@@ -126,56 +128,20 @@ class MapFollower:
         MapChanges
             What has changed since the last call; in the first, everything.
         """
-        look = _Look(self._map, self._least_weight)
-        restarted = self._seen is None or self._seen.map_index != look.map_index
-        before = _Look(core.Map(), 1) if self._seen is None or restarted else self._seen
-        self._seen = look
-        k = _changed(before.keyframe_rows, look.keyframe_rows)
-        p = _changed(before.point_rows, look.point_rows)
-        keyframes, points = look.keyframes, look.points
-        covisibility, loop_edges, spanning_tree = (
-            now if restarted or not np.array_equal(now, then) else None
-            for now, then in zip(look.edges, before.edges, strict=True)
-        )
+        changes = self._follower.update()
+        keyframes, points = changes.keyframes_set, changes.points_set
         return MapChanges(
-            map_index=look.map_index,
-            restarted=restarted,
+            map_index=int(changes.epoch),
+            restarted=changes.restarted,
             keyframes_set=KeyframesSet(
-                keyframes.ids[k], keyframes.T_wc[k], keyframes.timestamps[k], keyframes.parents[k]
+                keyframes.ids, keyframes.T_wc, keyframes.timestamps, keyframes.parents
             ),
-            keyframes_removed=np.setdiff1d(before.keyframes.ids, keyframes.ids),
+            keyframes_removed=changes.keyframes_removed,
             points_set=PointsSet(
-                points.ids[p],
-                points.positions[p],
-                points.observation_counts[p].astype(np.int64),
+                points.ids, points.positions, points.observation_counts.astype(np.int64)
             ),
-            points_removed=np.setdiff1d(before.points.ids, points.ids),
-            covisibility=covisibility,
-            loop_edges=loop_edges,
-            spanning_tree=spanning_tree,
+            points_removed=changes.points_removed,
+            covisibility=changes.covisibility,
+            loop_edges=changes.loop_edges,
+            spanning_tree=changes.spanning_tree,
         )
-
-
-class _Look:
-    """The whole map at one moment."""
-
-    def __init__(self, slam_map: core.Map, least_weight: int) -> None:
-        self.map_index = int(slam_map.epoch)
-        snapshot = core.snapshot_map(slam_map)
-        strong = core.snapshot_edges(slam_map, least_weight)
-        self.keyframes, self.points = snapshot.keyframes, snapshot.points
-        ids, parents = self.keyframes.ids, self.keyframes.parents
-        tree = np.column_stack([ids, parents])[parents >= 0]
-        self.edges = (np.column_stack([strong.a, strong.b]), snapshot.loop_edges, tree)
-        self.keyframe_rows = np.column_stack([ids, self.keyframes.T_wc.reshape(-1, 16), parents])
-        self.point_rows = np.column_stack(
-            [self.points.ids, self.points.positions, self.points.observation_counts]
-        )
-
-
-def _changed(before: FloatArray, now: FloatArray) -> IntArray:
-    """Which rows of `now`, whose first column is an ascending id, are not in `before`."""
-    _, then, here = np.intersect1d(before[:, 0], now[:, 0], assume_unique=True, return_indices=True)
-    same = np.zeros(len(now), dtype=bool)
-    same[here] = (before[then] == now[here]).all(axis=1)
-    return np.flatnonzero(~same)

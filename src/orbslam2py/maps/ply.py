@@ -7,11 +7,29 @@ from pathlib import Path
 
 import numpy as np
 
-from orbslam2py._arrays import FloatArray
+from orbslam2py._arguments import array_of
+from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py._files import atomic_write
+from orbslam2py.errors import DatasetError
+
+#: Names of types in a header, and NumPy's.
+_TYPES = {
+    **{"char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "<i2", "int16": "<i2"},
+    **{"ushort": "<u2", "uint16": "<u2", "int": "<i4", "int32": "<i4", "uint": "<u4"},
+    **{"uint32": "<u4", "float": "<f4", "float32": "<f4", "double": "<f8", "float64": "<f8"},
+}
+
+_FRAME = "camera frame of keyframe 0: x right, y down, z forward"
 
 
-def write_ply(path: str | Path, points: FloatArray, *, unit: str = "m") -> None:
+def write_ply(
+    path: str | Path,
+    points: FloatArray,
+    *,
+    colours: ByteArray | None = None,
+    unit: str = "m",
+    frame: str = _FRAME,
+) -> None:
     """Write points as a binary PLY file that common viewers open.
 
     Parameters
@@ -20,20 +38,74 @@ def write_ply(path: str | Path, points: FloatArray, *, unit: str = "m") -> None:
         The file; replaced only when everything was written.
     points
         Positions (p, 3) in the frame of keyframe 0's camera; written as float32.
+    colours
+        Red, green and blue of every point, uint8 (p, 3); none are written if None.
     unit
         Of the positions, for the comment in the file: metres, or ``units`` for one camera, whose
         unit of length is its own.
+    frame
+        What the axes are, for the comment in the file.
 
     Raises
     ------
     OSError
         If the file cannot be written; an existing file is kept then.
+    DatasetError
+        If the points are no such array, or there is not one colour per point.
     """
+    positions = array_of(points, "points", (-1, 3), finite=False)
+    fields = [(name, "<f4") for name in "xyz"]
+    if colours is not None:
+        fields += [(name, "u1") for name in ("red", "green", "blue")]
+        if len(colours) != len(positions):
+            raise DatasetError(
+                f"{len(positions)} points, but {len(colours)} colours; give one per point"
+            )
+    vertices = np.zeros(len(positions), fields)
+    for column, name in enumerate("xyz"):
+        vertices[name] = positions[:, column]
+    if colours is not None:
+        for column, name in enumerate(("red", "green", "blue")):
+            vertices[name] = colours[:, column]
+    words = {"<f4": "float", "u1": "uchar"}
+    properties = "".join(f"property {words[kind]} {name}\n" for name, kind in fields)
     header = (
-        "ply\nformat binary_little_endian 1.0\ncomment camera frame of keyframe 0: "
-        f"x right, y down, z forward [{unit}]\nelement vertex {len(points)}\n"
-        "property float x\nproperty float y\nproperty float z\nend_header\n"
+        f"ply\nformat binary_little_endian 1.0\ncomment {frame} [{unit}]\n"
+        f"element vertex {len(positions)}\n{properties}end_header\n"
     )
     with atomic_write(path, binary=True) as stream:
         stream.write(header.encode())
-        stream.write(np.ascontiguousarray(points, dtype="<f4").tobytes())
+        stream.write(vertices.tobytes())
+
+
+def read_points(path: str | Path) -> FloatArray:
+    """Read the positions of a binary PLY file: one of `write_ply`, or one with more columns.
+
+    Returns
+    -------
+    FloatArray
+        Positions (p, 3).
+
+    Raises
+    ------
+    DatasetError
+        Naming the file, if it is no such file or not whole.
+    OSError
+        If it cannot be read.
+    """
+    header, _, body = Path(path).read_bytes().partition(b"end_header\n")
+    lines = header.decode("ascii", "replace").splitlines()
+    if not lines or lines[0] != "ply" or "format binary_little_endian 1.0" not in lines:
+        raise DatasetError(f"{path} is no binary PLY file (little-endian)")
+    first = [k for k, line in enumerate(lines) if line.startswith("element ")]
+    if not first or not lines[first[0]].startswith("element vertex "):
+        raise DatasetError(f"{path} has no points first")
+    words = [line.split() for line in lines[first[0] + 1 : [*first, len(lines)][1]]]
+    words = [word for word in words if word and word[0] == "property"]
+    try:
+        count = int(lines[first[0]].split()[2])
+        kind = np.dtype([(word[2], _TYPES[word[1]]) for word in words])
+        points = np.frombuffer(body, kind, count)
+        return np.stack([points[axis].astype(np.float64) for axis in "xyz"], axis=1)
+    except (KeyError, IndexError, ValueError) as error:
+        raise DatasetError(f"{path} is not whole, or has no positions x, y, z") from error

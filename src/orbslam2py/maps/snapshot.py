@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -12,9 +12,12 @@ from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.trajectory import Trajectory
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class MapSnapshot:
-    """A consistent copy of the map, in the frame of keyframe 0's first pose (the world)."""
+    """A consistent copy of the map, in the frame of keyframe 0's first pose (the world).
+
+    Two snapshots are equal if all their arrays are, bit by bit.
+    """
 
     keyframe_ids: IntArray
     """(k,) ascending."""
@@ -28,6 +31,22 @@ class MapSnapshot:
     """(p, 3) world [m] (one camera: the map's own units)."""
     loop_edges: IntArray
     """(l, 2) ids of the keyframes that a closed loop connects."""
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, MapSnapshot):
+            return NotImplemented
+        return all(
+            np.array_equal(getattr(self, field.name), getattr(other, field.name))
+            for field in fields(self)
+        )
+
+    __hash__ = None  # type: ignore[assignment]  # arrays may be changed
+
+    def __repr__(self) -> str:
+        return (
+            f"<MapSnapshot: keyframes {len(self.keyframe_ids)}, points {len(self.point_ids)}, "
+            f"loop edges {len(self.loop_edges)}>"
+        )
 
 
 def take_snapshot(slam_map: core.Map) -> MapSnapshot:

@@ -61,6 +61,7 @@ class RecordedFeed:
         self._sequence = sequence
         self._indices = indices
         self._realtime = realtime
+        self._clock: _Clock | None = None
         self.n_frames: int | None = len(indices)
 
     def frames(self, stop: threading.Event) -> Generator[FedFrame, None, None]:
@@ -70,6 +71,7 @@ class RecordedFeed:
         """
         sequence = self._sequence
         clock = _Clock(sequence.timestamps, self._indices, stop) if self._realtime else None
+        self._clock = clock
         with contextlib.closing(prefetch(sequence.load, self._indices, stop)) as images:
             for position, (index, item) in enumerate(images):
                 dropped = clock is not None and clock.must_drop(position)
@@ -78,6 +80,11 @@ class RecordedFeed:
                 timestamp = float(sequence.timestamps[index])
                 text = sequence.timestamp_text(index)
                 yield FedFrame(index, timestamp, text, None if dropped else item)
+
+    def delay(self, seconds: float) -> None:
+        """Nobody has asked for frames for so long: those that come next are due so much later."""
+        if self._clock is not None:
+            self._clock.delay(seconds)
 
 
 class LiveFeed:
@@ -119,6 +126,9 @@ class LiveFeed:
                     yield FedFrame(index, frame.timestamp, frame.text, frame.images)
                     index += 1
 
+    def delay(self, seconds: float) -> None:
+        """Nothing: a camera goes on."""
+
 
 def is_sequence(source: Sequence | LiveSource) -> TypeGuard[Sequence]:
     """Whether the source is a sequence, which has a known length, and no camera."""
@@ -132,6 +142,11 @@ class _Clock:
         self._due = np.asarray(timestamps)[indices]
         self._stop = stop
         self._offset: float | None = None
+
+    def delay(self, seconds: float) -> None:
+        """Stand still for so long."""
+        if self._offset is not None:
+            self._offset += seconds
 
     def must_drop(self, position: int) -> bool:
         """Wait until the frame at a position of the run is due; True if its successor is too."""

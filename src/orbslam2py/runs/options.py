@@ -7,13 +7,16 @@ import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from orbslam2py._arguments import choice_of, is_whole, shown
 from orbslam2py._arrays import FloatArray
 from orbslam2py.datasets.base import LiveSource, Sequence
-from orbslam2py.errors import DatasetError
+from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.maps.saved_map import SavedMap
 from orbslam2py.runs.feeds import is_sequence
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.options import SystemOptions
+
+_MAY_BE_NONE = ("max_frames", "localize_after")
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,8 @@ class RunOptions:
     """Take at most so many frames."""
     localize_after: int | None = None
     """Switch to localization mode after so many frames; 0, in a loaded map: from the first on."""
+    final_adjustment: bool = False
+    """Refine the finished map as a whole (`System.optimize`) before the results are written."""
     load_map: SavedMap | None = None
     """Begin in this map."""
     initial_pose: FloatArray | None = None
@@ -54,12 +59,24 @@ class RunOptions:
                 "--localize needs a map from the beginning: load one with --load, or say after how "
                 "many frames the map is to stay as it is"
             )
+        if self.final_adjustment and self.localize_after is not None:
+            raise DatasetError(
+                "--final-adjustment changes the map, which --localize leaves as it is; leave out "
+                "one of them"
+            )
         if self.initial_pose is not None and self.load_map is None:
             raise DatasetError("--initial-pose says where in a map the camera is; load one: --load")
         if self.autosave is not None and self.save_map is None:
             raise DatasetError("--autosave needs the file to save to: --save FILE")
         if self.autosave is not None and not (math.isfinite(self.autosave) and self.autosave > 0):
             raise DatasetError(f"--autosave must be more than 0 seconds, got {self.autosave:g}")
+        object.__setattr__(self, "realtime", choice_of(self.realtime, "realtime"))
+        if not isinstance(self.system, SystemOptions):
+            raise SettingsError(f"system is {shown(self.system)}; give SystemOptions(...)")
+        for name in ("start", "stride", "max_frames", "localize_after"):
+            value = getattr(self, name)
+            if not is_whole(value) and not (value is None and name in _MAY_BE_NONE):
+                raise SettingsError(f"{name} is {shown(value)}; give a whole number of frames")
 
     def n_frames(self, source: Sequence | LiveSource) -> int | None:
         """How many frames a run over the source will take; None for a camera without an end.
@@ -84,7 +101,9 @@ class RunOptions:
         """
         if self.system.deterministic and self.realtime:
             raise DatasetError(
-                "--deterministic and --realtime exclude each other: dropping frames depends on time"
+                "--deterministic and --realtime exclude each other: dropping frames depends on "
+                "time; "
+                "leave one of them out"
             )
         if (
             self.start < 0
@@ -94,7 +113,10 @@ class RunOptions:
             raise DatasetError("--start must be 0 or more, --stride and --max-frames 1 or more")
         indices = list(range(self.start, n_frames, self.stride))
         if not indices:
-            raise DatasetError(f"--start {self.start} is past the end: {n_frames} frames")
+            raise DatasetError(
+                f"--start {self.start} is past the end; give less than the number of frames, "
+                f"{n_frames}"
+            )
         return indices[: self.max_frames]
 
     def check_for_camera(self) -> None:

@@ -13,30 +13,26 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
 from orbslam2py._files import atomic_write, reason_of
 from orbslam2py.errors import DatasetError
-from orbslam2py.evaluation import Alignment
 from orbslam2py.maps.ply import write_ply
+from orbslam2py.runs.frame_errors import truth_of_frames, worst_frames
 from orbslam2py.runs.frame_table import write_frames
-from orbslam2py.runs.plots import draw_trajectory
 from orbslam2py.runs.report import RunEvaluation
+from orbslam2py.runs.report_page import write_report_page
+from orbslam2py.runs.report_page.frame_images import choose_frames, has_images, write_frame_images
 from orbslam2py.runs.result import RunResult
-from orbslam2py.runs.timeline import Timeline
+from orbslam2py.runs.run_picture import anchored_points, draw_run
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.trajectory import Trajectory, write_kitti, write_tum
 
 _log = logging.getLogger(__name__)
 
-#: So many poses must have a true one at their time before they tell how long a unit is.
-_POSES_FOR_SCALE = 3
-
 #: Files that a run may have no content for.
 _NOT_ALWAYS = (
     *("trajectory.txt", "trajectory_online.txt", "trajectory_kitti.txt", "keyframes.txt"),
-    *("trajectory.png", "trajectory_map*.txt"),
+    *("trajectory.png", "trajectory_map*.txt", "groundtruth_aligned.txt"),
+    *("report.html", "frame_images.zip"),
 )
 
 
@@ -114,21 +110,39 @@ class OutputWriter:
         self._written: set[str] = set()
 
     def write_all(
-        self, result: RunResult, report: dict[str, Any], evaluation: RunEvaluation | None
+        self,
+        result: RunResult,
+        report: dict[str, Any],
+        evaluation: RunEvaluation | None,
+        *,
+        page: bool = True,
     ) -> None:
-        """Write all files of the run."""
+        """Write all files of the run; the page and its images only if they are wanted."""
         self._write("settings.yaml", result.settings.save)
-        self._write_trajectories(result)
+        self._write_trajectories(result, evaluation)
         self._write("frames.csv", lambda path: write_frames(path, result.rows))
         points = anchored_points(result)
         unit = "units" if result.options.sensor is Sensor.MONOCULAR else "m"
         self._write("points.ply", lambda path: write_ply(path, points, unit=unit))
+        if result.drawing is not None:
+            self._write("map.npz", result.drawing.save)
         if len(result.tracked_trajectory()):
-            self._write("trajectory.png", lambda path: _draw(path, result, evaluation, report))
+            self._write("trajectory.png", lambda path: draw_run(path, result, evaluation, report))
         self._write(
             "report.json", lambda path: _write_text(path, json.dumps(report, indent=2) + "\n")
         )
+        if page:
+            self._write_page(result, evaluation)
         self._remove_stale()
+
+    def _write_page(self, result: RunResult, evaluation: RunEvaluation | None) -> None:
+        worst = None if evaluation is None else worst_frames(result, evaluation)
+        frames = choose_frames(result, worst)
+        if frames and has_images(result.sequence):
+            self._write("frame_images.zip", lambda path: write_frame_images(path, result, frames))
+        # It is made from the other files, wherever they could be written.
+        folders = [self.folder, *([] if self._rescue is None else [self._rescue])]
+        self._write("report.html", lambda path: write_report_page(path, folders))
 
     def _remove_stale(self) -> None:
         """Remove what an earlier run left in the folder and this one has no counterpart of."""
@@ -137,13 +151,16 @@ class OutputWriter:
                 with contextlib.suppress(OSError):
                     path.unlink()
 
-    def _write_trajectories(self, result: RunResult) -> None:
+    def _write_trajectories(self, result: RunResult, evaluation: RunEvaluation | None) -> None:
         *earlier, last = result.trajectories
         for number, trajectory in enumerate(earlier):
             self._write_tum(f"trajectory_map{number}.txt", result, trajectory)
         self._write_tum("trajectory.txt", result, last)
         self._write_tum("trajectory_online.txt", result, result.online_trajectory())
         self._write_tum("keyframes.txt", result, result.keyframes)
+        if evaluation is not None:
+            truth = truth_of_frames(result, evaluation)
+            self._write("groundtruth_aligned.txt", lambda path: write_tum(path, *truth))
         paths = [f"trajectory_map{n}.txt" for n, t in enumerate(earlier) if not t.lost.all()]
         if last.lost.all() and paths:
             _log.warning(
@@ -182,70 +199,6 @@ class OutputWriter:
         self.problems.append(message)
 
 
-def anchored_points(result: RunResult) -> npt.NDArray[np.float64]:
-    """Map points (p, 3) in the frame of keyframe 0, like the trajectories."""
-    snapshot = result.snapshot
-    if not len(snapshot.keyframe_T_wc):
-        return snapshot.point_positions
-    T_0w = np.linalg.inv(snapshot.keyframe_T_wc[0])
-    points: npt.NDArray[np.float64] = snapshot.point_positions @ T_0w[:3, :3].T + T_0w[:3, 3]
-    return points
-
-
 def _write_text(path: Path, text: str) -> None:
     with atomic_write(path) as stream:
         stream.write(text)
-
-
-def _loop_positions(result: RunResult) -> npt.NDArray[np.float64]:
-    """Both ends of every loop of the last map, (l, 2, 3), in the frame of keyframe 0."""
-    snapshot = result.snapshot
-    rows = np.searchsorted(snapshot.keyframe_ids, snapshot.loop_edges)
-    return np.asarray(result.keyframes.positions[rows])
-
-
-def _draw(
-    path: Path, result: RunResult, evaluation: RunEvaluation | None, report: dict[str, Any]
-) -> None:
-    last = result.tracked_trajectory()
-    timeline = Timeline.of(result.rows, len(result.trajectories) - 1)
-    begin = float(result.rows[0].timestamp)
-    truth = None
-    subtitle = (
-        f"{report['tracked']} of {report['frames']} frames tracked, "
-        f"{report['keyframes']} keyframes, {report['map_points']} points"
-    )
-    scale, unit = metres_per_unit(result, evaluation), "m"
-    if scale is None:
-        scale, unit = 1.0, "units"
-    if evaluation is not None:
-        truth = (evaluation.truth.timestamps - begin, scale * evaluation.truth.positions)
-        if report["ate_rmse_m"] is not None:
-            subtitle += f", ATE {report['ate_rmse_m']:.4f} m"
-    draw_trajectory(
-        path,
-        title=f"{report['sequence']} ({report['sensor']})",
-        subtitle=subtitle,
-        positions=scale * last.positions,
-        seconds=last.timestamps - begin,
-        keyframes=scale * result.keyframes.positions,
-        points=scale * anchored_points(result),
-        truth=truth,
-        loops=scale * _loop_positions(result),
-        gaps=timeline.gaps_before(last.indices),
-        timeline=timeline,
-        unit=unit,
-    )
-
-
-def metres_per_unit(result: RunResult, evaluation: RunEvaluation | None) -> float | None:
-    """Tell what lengths of the map are multiplied by for metres; None where nobody knows.
-
-    A single camera's unit of length is its own: only ground truth tells how long it is.
-    """
-    if result.options.sensor is not Sensor.MONOCULAR:
-        return 1.0
-    if evaluation is None or evaluation.figures.alignment is not Alignment.SIM3:
-        return None
-    enough = evaluation.figures.matched_poses >= _POSES_FOR_SCALE
-    return evaluation.figures.transform.scale if enough else None

@@ -11,6 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py._files import atomic_write
+from orbslam2py.runs.gravity import Height
+from orbslam2py.runs.report_page.plane_view import FROM_ABOVE, View, choose_view
+from orbslam2py.runs.report_page.round_numbers import round_down, short
 from orbslam2py.runs.timeline import Timeline, gaps_in_time
 
 if TYPE_CHECKING:
@@ -24,6 +27,8 @@ _UNTRACKED = "#f6cfc6"
 _EARLIER = "#e2e2e2"
 _POINTS = "#c9b99a"
 _LOOP = "#c8442c"
+#: From no error to the largest: a part of matplotlib's plasma, seen well on white.
+_ERRORS = ["#2a0593", "#7d03a8", "#c33d80", "#ee7f4e", "#f99a3e"]
 #: Width by height of the view from above.
 _SHAPE = 1.85
 
@@ -39,11 +44,15 @@ def draw_trajectory(
     truth: tuple[FloatArray, FloatArray] | None = None,
     loops: FloatArray | None = None,
     gaps: npt.NDArray[np.bool_] | None = None,
+    errors: FloatArray | None = None,
     timeline: Timeline | None = None,
     subtitle: str = "",
     unit: str = "m",
+    height: Height | None = None,
 ) -> None:
     """Draw the path from above, and how high it goes over time, into a PNG file.
+
+    If the camera went up or down more than forward, the path is drawn as seen from behind.
 
     Parameters
     ----------
@@ -67,10 +76,15 @@ def draw_trajectory(
     gaps : array of bool, (n,), optional
         Whether the path is interrupted before each position; by default only where much time
         passes.
+    errors : array of float64, (n,), optional
+        Distance of each position to the ground truth in `unit`, nan where it is not known: the
+        path gets its colours.
     timeline : Timeline, optional
         Of the whole recording; by default that of the positions.
     unit : str
         Unit of length of all positions, for the axes.
+    height : Height, optional
+        Which way is up; by default as the first camera was held.
     """
     # The object interface keeps the process-wide state of pyplot untouched.
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
@@ -78,21 +92,26 @@ def draw_trajectory(
 
     figure = Figure(figsize=(10, 8), dpi=110, layout="constrained")
     FigureCanvasAgg(figure)
-    above, height = figure.subplots(2, 1, height_ratios=[3.2, 1])
+    above, below = figure.subplots(2, 1, height_ratios=[3.2, 1])
     figure.suptitle(f"{title}\n{subtitle}" if subtitle else title, fontsize=11)
 
     estimate = _Path(seconds, positions, gaps_in_time(seconds) if gaps is None else gaps)
     true = None if truth is None else _Path(*truth, gaps_in_time(truth[0]))
-    _draw_above(above, estimate, keyframes, points, true)
+    view = choose_view(positions)
+    coloured = errors is not None and bool(np.isfinite(errors).any())
+    label = None if coloured else "estimate"  # else the bar of colours names it
+    _draw_flat(above, view, estimate, keyframes, points, true, label)
+    if errors is not None and coloured:
+        _draw_errors(above, view, estimate, errors, unit)
     if loops is not None and len(loops):
-        _draw_loops(above, loops)
+        _draw_loops(above, view, loops)
     above.legend(loc="best", fontsize=9, framealpha=0.9, markerscale=1.2)
-    above.set_xlabel(f"x (right) [{unit}]")
-    above.set_ylabel(f"z (forward) [{unit}]")
-    _draw_height(height, estimate, true, timeline)
-    height.set_xlabel("time since the first image [s]")
-    height.set_ylabel(f"up in the\nfirst keyframe [{unit}]")
-    for axes in (above, height):
+    _say_where_up_is(above, view, unit)
+    height = height or Height.of_first_keyframe()
+    _draw_height(below, estimate, true, height, timeline)
+    below.set_xlabel("time since the first image [s]")
+    below.set_ylabel(f"{height.label} [{unit}]")
+    for axes in (above, below):
         axes.grid(color="#eeeeee", linewidth=0.8)
         axes.set_axisbelow(True)
         for side in ("top", "right"):
@@ -120,11 +139,17 @@ class _Path:
 
 
 def _draw_height(
-    axes: Axes, estimate: _Path, truth: _Path | None, timeline: Timeline | None
+    axes: Axes,
+    estimate: _Path,
+    truth: _Path | None,
+    height: Height,
+    timeline: Timeline | None,
 ) -> None:
     if truth is not None:
-        truth.draw(axes, truth.seconds, -truth.positions[:, 1], color=_TRUTH, linewidth=5.0)
-    estimate.draw(axes, estimate.seconds, -estimate.positions[:, 1], color=_ESTIMATE, linewidth=1.2)
+        up = height.of(truth.positions)
+        truth.draw(axes, truth.seconds, up, color=_TRUTH, linewidth=5.0)
+    up = height.of(estimate.positions)
+    estimate.draw(axes, estimate.seconds, up, color=_ESTIMATE, linewidth=1.2)
     low, high = axes.get_ylim()
     if high - low < 0.1:  # a level path should look level
         middle = 0.5 * (low + high)
@@ -142,78 +167,91 @@ def _draw_height(
         axes.set_xlim(-0.01 * end, 1.01 * end)
 
 
-def _draw_above(
+def _draw_flat(
     axes: Axes,
+    view: View,
     estimate: _Path,
     keyframes: FloatArray,
     points: FloatArray,
     truth: _Path | None,
+    label: str | None,
 ) -> None:
-    positions = estimate.positions
-    path = positions if truth is None else np.vstack([positions, truth.positions])
-    low, high = path[:, [0, 2]].min(axis=0), path[:, [0, 2]].max(axis=0)
-    # The window follows the path and shows the points around it, but not those so far away that
-    # they would shrink the path to a dot. It has the shape of the axes: lengths are equal on both.
-    extent = float((high - low).max())
+    flat, dots = view.flatten(estimate.positions), view.flatten(points)
+    true = None if truth is None else view.flatten(truth.positions)
+    low, high = _window(flat if true is None else np.vstack([flat, true]), dots)
     if len(points):
-        near, far = np.quantile(points[:, [0, 2]], [0.03, 0.97], axis=0)
-        low = np.clip(near, low - 2.0 - 0.5 * extent, low)
-        high = np.clip(far, high, high + 2.0 + 0.5 * extent)
-    center, half = 0.5 * (low + high), 0.5 * (high - low) + 0.1 + 0.05 * extent
-    half = np.array([max(half[0], half[1] * _SHAPE), max(half[1], half[0] / _SHAPE)])
-    low, high = center - half, center + half
-    if len(points):
-        inside = np.all((points[:, [0, 2]] > low) & (points[:, [0, 2]] < high), axis=1)
-        axes.scatter(
-            points[inside, 0],
-            points[inside, 2],
-            s=2.0,
-            color=_POINTS,
-            linewidths=0,
-            label="map points",
-            rasterized=True,
-        )
-    if truth is not None:
+        seen = dots[np.all((dots > low) & (dots < high), axis=1)]
+        small: dict[str, Any] = {"s": 2.0, "color": _POINTS, "linewidths": 0, "rasterized": True}
+        axes.scatter(*seen.T, label="map points", **small)
+    if truth is not None and true is not None:
         # Wide enough to be seen on both sides of an estimate that lies on it.
-        x, z = truth.positions[:, 0], truth.positions[:, 2]
-        truth.draw(axes, x, z, color=_TRUTH, linewidth=6.0, label="ground truth")
-    x, z = positions[:, 0], positions[:, 2]
-    estimate.draw(axes, x, z, color=_ESTIMATE, linewidth=1.4, label="estimate")
+        truth.draw(axes, *true.T, color=_TRUTH, linewidth=6.0, label="ground truth")
+    estimate.draw(axes, *flat.T, color=_ESTIMATE, linewidth=1.4, label=label)
+    rings: dict[str, Any] = {"facecolors": "white", "edgecolors": _ESTIMATE, "linewidths": 0.7}
+    x, y = view.flatten(keyframes).T
+    axes.scatter(x, y, s=9, zorder=3, label="keyframes", **rings)
     axes.scatter(
-        keyframes[:, 0],
-        keyframes[:, 2],
-        s=9,
-        facecolors="white",
-        edgecolors=_ESTIMATE,
-        linewidths=0.7,
-        zorder=3,
-        label="keyframes",
-    )
-    axes.scatter(
-        positions[:1, 0],
-        positions[:1, 2],
-        s=50,
-        marker="s",
-        color=_ESTIMATE,
-        zorder=4,
-        label="start",
+        flat[:1, 0], flat[:1, 1], s=50, marker="s", color=_ESTIMATE, zorder=4, label="start"
     )
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     axes.set_aspect("equal", adjustable="box")
 
 
-def _draw_loops(axes: Axes, loops: FloatArray) -> None:
+def _window(path: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Lower and upper corner of what is shown."""
+    low, high = path.min(axis=0), path.max(axis=0)
+    # The window follows the path and shows the points around it, but not those so far away that
+    # they would shrink the path to a dot. It has the shape of the axes: lengths are equal on both.
+    extent = float((high - low).max())
+    if len(points):
+        near, far = np.quantile(points, [0.03, 0.97], axis=0)
+        low = np.clip(near, low - 2.0 - 0.5 * extent, low)
+        high = np.clip(far, high, high + 2.0 + 0.5 * extent)
+    center, half = 0.5 * (low + high), 0.5 * (high - low) + 0.1 + 0.05 * extent
+    half = np.array([max(half[0], half[1] * _SHAPE), max(half[1], half[0] / _SHAPE)])
+    return center - half, center + half
+
+
+def _draw_errors(axes: Axes, view: View, estimate: _Path, errors: FloatArray, unit: str) -> None:
+    """Colour the path by its distance to the truth; the bar beside it tells the lengths."""
+    from matplotlib.collections import LineCollection  # noqa: PLC0415
+    from matplotlib.colors import LinearSegmentedColormap  # noqa: PLC0415
+
+    flat = view.flatten(estimate.positions)
+    joined = np.flatnonzero(~estimate.gaps[1:] & np.isfinite(errors[:-1]))
+    colours = LinearSegmentedColormap.from_list("error", _ERRORS)
+    lines = LineCollection(
+        [flat[[k, k + 1]] for k in joined.tolist()], cmap=colours, linewidths=2.2, zorder=2.5
+    )
+    lines.set_array(errors[joined])
+    lines.set_clim(0.0, float(np.nanmax(errors)) or 1.0)
+    lines.set_capstyle("round")
+    axes.add_collection(lines, autolim=False)
+    bar = axes.figure.colorbar(lines, ax=axes, shrink=0.85, pad=0.01)
+    bar.set_label(f"estimate: distance to the ground truth [{unit}]")
+
+
+def _say_where_up_is(axes: Axes, view: View, unit: str) -> None:
+    """Name the axes, say what is up in the picture, and draw a bar that tells a length."""
+    axes.set_xlabel(f"{view.right_name} [{unit}]")
+    axes.set_ylabel(f"{view.up_name} [{unit}]")
+    whence = "From above" if view is FROM_ABOVE else "From behind"
+    text = f"{whence}: up in the picture is {view.up_name}, as the first keyframe looked"
+    axes.set_title(text, fontsize=9, loc="left", color="#555555")
+    left, right = axes.get_xlim()
+    bottom, top = axes.get_ylim()
+    length = round_down(0.2 * (right - left))
+    x, y = left + 0.03 * (right - left), bottom + 0.05 * (top - bottom)
+    axes.plot([x, x + length], [y, y], color="#222222", linewidth=2.0, zorder=6)
+    axes.annotate(f"{short(length, 1)} {unit}", (x + length / 2, y), xytext=(0, 3),
+                  textcoords="offset points", ha="center", fontsize=9)  # fmt: skip
+
+
+def _draw_loops(axes: Axes, view: View, loops: FloatArray) -> None:
     # Ends of a closed loop are close together: rings around them show where they are.
+    look: dict[str, Any] = {"marker": "o", "markersize": 9, "markerfacecolor": "none"}
     for number, ends in enumerate(loops):
-        axes.plot(
-            ends[:, 0],
-            ends[:, 2],
-            color=_LOOP,
-            linewidth=2.0,
-            marker="o",
-            markersize=9,
-            markerfacecolor="none",
-            zorder=5,
-            label="loops closed" if number == 0 else None,
-        )
+        label = "loops closed" if number == 0 else None
+        x, y = view.flatten(ends).T
+        axes.plot(x, y, color=_LOOP, linewidth=2.0, zorder=5, label=label, **look)

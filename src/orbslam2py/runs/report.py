@@ -16,7 +16,10 @@ from orbslam2py._version import __version__
 from orbslam2py.errors import OrbSlamError
 from orbslam2py.evaluation import Alignment, Evaluation, evaluate_trajectory
 from orbslam2py.maps.saved_map import SavedMap
+from orbslam2py.runs.gravity import Height, height_of
 from orbslam2py.runs.losses import losses_report
+from orbslam2py.runs.machine import describe_machine
+from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.result import RunResult
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.events import LoopClosed
@@ -37,6 +40,8 @@ class RunEvaluation:
     """Of the keyframes alone [m]; None if too few of them have a true pose."""
     truth: Trajectory
     """Ground truth over the time of the whole run, in the estimate's frame and unit."""
+    height: Height
+    """Which way is up in the estimate's frame."""
 
 
 def evaluate_run(result: RunResult) -> RunEvaluation | None:
@@ -63,7 +68,8 @@ def evaluate_run(result: RunResult) -> RunEvaluation | None:
     begin, end = float(result.rows[0].timestamp) - 0.02, float(result.rows[-1].timestamp) + 0.02
     during = truth.select((truth.timestamps >= begin) & (truth.timestamps <= end))
     T_wc = figures.transform.inverse().apply_to_poses(during.T_wc)
-    return RunEvaluation(figures, keyframes_ate, Trajectory(during.timestamps, T_wc))
+    height = height_of(result.sequence, estimate, truth)
+    return RunEvaluation(figures, keyframes_ate, Trajectory(during.timestamps, T_wc), height)
 
 
 def _ate_of_keyframes(
@@ -94,6 +100,11 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "deterministic": options.system.deterministic,
         "realtime": options.realtime,
         "seed": options.system.seed,
+        "options": options_entry(options),
+        "command": result.command,
+        "command_folder": None if result.command is None else str(Path.cwd()),
+        "started": result.started,
+        "machine": describe_machine(),
         "frames": n_frames,
         "seen_frames": n_done,
         "tracked": n_tracked,
@@ -109,6 +120,7 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "resets": result.n_resets,
         **losses,
         "initialisation_reasons": initialization_reasons(result),
+        "warnings": result.warnings,
         "interrupted": result.interrupted,
         "seconds": result.seconds,
         "frames_per_second": _rate(n_done, result.seconds),
@@ -118,6 +130,9 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "losses": each_loss,
         "loops": [loop_entry(loop) for loop in result.loops],
         "full_adjustments": [adjustment_entry(a) for a in result.full_adjustments],
+        "final_adjustment": None
+        if result.final_adjustment is None
+        else adjustment_entry(result.final_adjustment),
     }
     if evaluation is not None:
         report |= evaluation.figures.as_dict()
@@ -134,6 +149,20 @@ def loaded_map_entry(loaded: SavedMap | None) -> dict[str, Any] | None:
         "keyframes": len(loaded.contents.keyframes),
         "map_points": len(loaded.contents.points),
         "runs": len(loaded.runs),
+    }
+
+
+def options_entry(options: RunOptions) -> dict[str, Any]:
+    """What report.json says about which frames were taken, and what the system was to do."""
+    return {
+        "start": options.start,
+        "stride": options.stride,
+        "max_frames": options.max_frames,
+        "localize_after": options.localize_after,
+        "final_adjustment": options.final_adjustment,
+        "loop_closing": options.system.loop_closing,
+        "full_adjustment": options.system.full_adjustment,
+        "full_adjustment_time_limit": options.system.full_adjustment_time_limit,
     }
 
 

@@ -8,7 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from orbslam2py._arrays import IntArray
 from orbslam2py.datasets.base import Source
+from orbslam2py.maps.map_arrays import MapArrays
 from orbslam2py.maps.snapshot import MapSnapshot
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.settings.settings import Settings
@@ -72,6 +74,10 @@ class RunResult:
     """Keyframes of the last map."""
     snapshot: MapSnapshot = field(default_factory=empty_snapshot)
     """The last map."""
+    sightings: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
+    """(o, 2) ids of a point of the last map and of a keyframe that observes it."""
+    drawing: MapArrays | None = None
+    """What is drawn of the last map."""
     stages: dict[str, dict[str, float]] = field(default_factory=dict)
     seconds: float = 0.0
     slam_seconds: float = 0.0
@@ -82,6 +88,10 @@ class RunResult:
     """Loops closed, over all maps."""
     full_adjustments: list[FullAdjustmentRecord] = field(default_factory=list)
     """Full bundle adjustments, also those that were given up."""
+    final_adjustment: FullAdjustmentRecord | None = None
+    """The one of the finished map, if it was asked for; the last of these."""
+    warnings: list[str] = field(default_factory=list)
+    """What the result suffers from: a calibration that does not fit, a loss until the end."""
     n_lost_by_camera: int = 0
     """Images of a camera that came while an earlier one was being tracked."""
     is_live: bool = False
@@ -92,6 +102,10 @@ class RunResult:
     """The run was stopped before its end; never for a camera, which has none."""
     error: Exception | None = None
     """What ended it."""
+    started: str = ""
+    """Date and time of its beginning, ISO 8601 with the time zone."""
+    command: str | None = None
+    """The line that repeats it, if it was started by one."""
 
     @property
     def n_tracked(self) -> int:

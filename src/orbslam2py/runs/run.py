@@ -10,15 +10,18 @@ from pathlib import Path
 from typing import Any
 
 from orbslam2py import _core as core
+from orbslam2py._arguments import path_of, shown
 from orbslam2py.datasets import RecordedSequence
 from orbslam2py.datasets.base import LiveSource, Sequence
+from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.maps.map_writer import check_map_target
+from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.losses import find_losses, last_loss_warning
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.outputs import OutputWriter, link_latest, prepare_output_folder
 from orbslam2py.runs.report import RunEvaluation, evaluate_run, make_report
 from orbslam2py.runs.result import RunResult
-from orbslam2py.runs.runner import Progress, SequenceRunner
+from orbslam2py.runs.runner import Progress, SequenceRunner, Watch
 from orbslam2py.slam.options import Setup
 from orbslam2py.trajectory.trajectory import Trajectory
 from orbslam2py.vocabulary.vocabulary import load_vocabulary
@@ -56,6 +59,10 @@ def run_sequence(
     force: bool = False,
     progress: Progress | None = None,
     stop: threading.Event | None = None,
+    report_page: bool = True,
+    command: str | None = None,
+    control: RunControl | None = None,
+    watch: Watch | None = None,
 ) -> FinishedRun:
     """Run the system over a sequence, judge the result and write its files.
 
@@ -75,6 +82,15 @@ def run_sequence(
         ``progress(row, system)``, called after every frame.
     stop : threading.Event, optional
         Ends the run after the present frame when it is set; what was done is written.
+    report_page : bool
+        Write ``report.html`` and the images for it as well.
+    command : str, optional
+        The line that started the run, for its report.
+    control : RunControl, optional
+        In place of `stop`: also holds the run and lets single frames through.
+    watch : callable, optional
+        Called with the system; what it returns is entered before the first frame, and left when the
+        system has been shut down. For viewers, recordings, videos.
 
     Returns
     -------
@@ -98,7 +114,15 @@ def run_sequence(
     """
     if isinstance(sequence, RecordedSequence):
         sequence.require_images()
-    options = options or RunOptions(sequence.settings.sensor)
+    if not hasattr(sequence, "settings"):
+        raise DatasetError(
+            f"the sequence is {shown(sequence)}; give what orbslam2py.open_sequence returns"
+        )
+    if options is None:
+        options = RunOptions(sequence.settings.sensor)
+    elif not isinstance(options, RunOptions):
+        raise SettingsError(f"options are {shown(options)}; give orbslam2py.runs.RunOptions(...)")
+    folder = None if output is None else path_of(output, "output")
     if not isinstance(vocabulary, core.Vocabulary):
         vocabulary = load_vocabulary(vocabulary)
     if options.load_map is not None:  # before anything is made
@@ -113,19 +137,20 @@ def run_sequence(
     if options.save_map is not None:
         check_map_target(options.save_map)
     runner = SequenceRunner(sequence, sequence.settings, vocabulary, options)
-    folder = None
-    if output is not None:
-        folder = prepare_output_folder(Path(output), force=force)
+    runner.result.command = command
+    if folder is not None:
+        folder = prepare_output_folder(folder, force=force)
         link_latest(folder)
-    result = runner.run(progress, stop)
+    result = runner.run(progress, stop, control=control, watch=watch)
     warning = last_loss_warning(find_losses(result.rows))
     if warning is not None:
         _log.warning("%s", warning)
+        result.warnings.append(warning)
     evaluation = evaluate_run(result)
     report = make_report(result, evaluation)
     problems: tuple[str, ...] = ()
     if folder is not None:
         writer = OutputWriter(folder)
-        writer.write_all(result, report, evaluation)
+        writer.write_all(result, report, evaluation, page=report_page)
         problems = tuple(writer.problems)
     return FinishedRun(result, evaluation, report, folder, problems)

@@ -8,7 +8,9 @@ import logging
 import threading
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import asdict, replace
+from datetime import datetime
 from typing import Any, cast
 
 import numpy as np
@@ -18,6 +20,9 @@ from orbslam2py import _core as core
 from orbslam2py._files import describe_error
 from orbslam2py.datasets.base import Images, LiveSource, Sequence
 from orbslam2py.errors import DatasetError, ImageError, OrbSlamError
+from orbslam2py.maps.map_arrays import MapArrays
+from orbslam2py.runs.calibration_watch import CalibrationWatch, settings_beside
+from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.feeds import FedFrame, LiveFeed, RecordedFeed, is_sequence
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.result import DROPPED, FrameRow, RunResult
@@ -35,6 +40,10 @@ _WAIT_SLICE = 0.2
 
 #: Called after every frame with the row and the system.
 Progress = Callable[[FrameRow, System], None]
+
+#: Called with the system before the first frame; what it returns is entered then, and left when the
+#: system has been shut down.
+Watch = Callable[[System], AbstractContextManager[object]]
 
 
 class SequenceRunner:
@@ -63,6 +72,7 @@ class SequenceRunner:
     ) -> None:
         self._vocabulary = vocabulary
         self._options = options
+        self._watch: CalibrationWatch | None = None
         self._feed: RecordedFeed | LiveFeed
         if is_sequence(sequence):
             indices = options.indices(len(sequence))
@@ -79,7 +89,12 @@ class SequenceRunner:
         )
 
     def run(
-        self, progress: Progress | None = None, stop: threading.Event | None = None
+        self,
+        progress: Progress | None = None,
+        stop: threading.Event | None = None,
+        *,
+        control: RunControl | None = None,
+        watch: Watch | None = None,
     ) -> RunResult:
         """Process the frames.
 
@@ -90,6 +105,11 @@ class SequenceRunner:
         stop : threading.Event, optional
             Ends the run after the present frame when it is set: the only end of a camera's run
             unless `RunOptions.max_frames` tells one.
+        control : RunControl, optional
+            In place of `stop`: also holds the run and lets single frames through.
+        watch : callable, optional
+            Called with the system; what it returns is entered before the first frame, and left when
+            the system has been shut down. For viewers, recordings, videos.
 
         Returns
         -------
@@ -99,8 +119,11 @@ class SequenceRunner:
         """
         result, options = self.result, self._options
         begin = time.perf_counter()
+        result.started = datetime.now().astimezone().isoformat(timespec="seconds")
         in_time = options.realtime or self._feed.is_live
-        how = replace(options.system, wait_for_mapping=not in_time)
+        # Told by the watch, which knows more, or by nobody.
+        how = replace(options.system, wait_for_mapping=not in_time, check_calibration=False)
+        self._watch = self._calibration_watch(in_time)
         system = System(
             result.settings,
             options.sensor,
@@ -112,28 +135,47 @@ class SequenceRunner:
         )
         if options.save_map is not None and options.autosave is not None:
             system.autosave(options.save_map, options.autosave)
-        stop = stop or threading.Event()
-        try:
-            self._process(system, progress, stop)
-            self._wait_for_mapping(system, stop)
-        except KeyboardInterrupt:
-            stop.set()
-        except Exception as error:
-            self._take_note(error)
-        result.interrupted = stop.is_set() and not result.is_live
-        if result.interrupted:
-            seen = f"{len(result.rows)} of {result.n_frames} frames"
-            _log.warning("interrupted; saving what was done so far (%s)", seen)
-        self._shut_down(system)
+        control = control or RunControl(stop)
+        stop = control.stop
+        with contextlib.ExitStack() as watching:
+            try:
+                if watch is not None:
+                    watching.enter_context(watch(system))
+                self._process(system, progress, control)
+                self._wait_for_mapping(system, stop)
+                self._adjust_finished_map(system, stop)
+            except KeyboardInterrupt:
+                stop.set()
+            except Exception as error:
+                self._take_note(error)
+            result.interrupted = stop.is_set() and not result.is_live
+            if result.interrupted:
+                seen = f"{len(result.rows)} of {result.n_frames} frames"
+                _log.warning("interrupted; saving what was done so far (%s)", seen)
+            self._shut_down(system)
         self._save_map(system)
+        if self._watch is not None:
+            misfit = self._watch.finish()
+            result.warnings += [] if misfit is None else [str(misfit)]
         self._collect(system)
         result.seconds = time.perf_counter() - begin
         return result
 
+    def _calibration_watch(self, in_time: bool) -> CalibrationWatch | None:
+        if not self._options.system.check_calibration:
+            return None
+        return CalibrationWatch(
+            self.result.settings,
+            self._options.sensor,
+            known=settings_beside(self.result.sequence),
+            in_background=in_time,
+        )
+
     # ---- one pass over the frames ----------------------------------------------------------------
-    def _process(self, system: System, progress: Progress | None, stop: threading.Event) -> None:
-        result = self.result
+    def _process(self, system: System, progress: Progress | None, control: RunControl) -> None:
+        result, stop = self.result, control.stop
         try:
+            control.wait()
             with contextlib.closing(self._feed.frames(stop)) as frames:
                 for position, frame in enumerate(frames):
                     if position == self._options.localize_after:
@@ -144,6 +186,7 @@ class SequenceRunner:
                     result.rows.append(row)
                     if progress is not None:
                         progress(row, system)
+                    self._feed.delay(control.wait())
         finally:
             if result.is_live:
                 result.n_frames = len(result.rows)
@@ -163,6 +206,8 @@ class SequenceRunner:
             return self._skip(frame, error)
         finally:
             self.result.slam_seconds += time.perf_counter() - begin
+        if self._watch is not None:
+            self._watch.look(frame.item)
         return _row(frame, record, str(record.reason))
 
     def _call(self, system: System, images: Images, timestamp: float) -> TrackingRecord:
@@ -194,6 +239,13 @@ class SequenceRunner:
         while not (idle or stop.is_set() or system.localization_mode):
             idle = system.wait_until_idle(_WAIT_SLICE)
         self.result.slam_seconds += time.perf_counter() - begin
+
+    def _adjust_finished_map(self, system: System, stop: threading.Event) -> None:
+        # Ctrl-C is how a camera's run ends; the results of others are wanted at once then.
+        ended = stop.is_set() and not self.result.is_live
+        if self._options.final_adjustment and system.n_keyframes > 0 and not ended:
+            give_up = threading.Event() if self.result.is_live else stop
+            self.result.final_adjustment = system.optimize(stop=give_up)
 
     def _shut_down(self, system: System) -> None:
         try:
@@ -242,6 +294,10 @@ class SequenceRunner:
             keyframes, [by_time.get(float(t), -1) for t in keyframes.timestamps]
         )
         result.snapshot = system.map_snapshot()
+        seen = core.snapshot_observations(system.pipeline.back_end.map)
+        points = np.repeat(seen.ids, np.diff(seen.offsets))
+        result.sightings = np.stack([points, seen.keyframes], axis=1)
+        result.drawing = MapArrays.of(system.pipeline.back_end.map)
         result.stages = system.stage_statistics()
         result.n_resets = system.n_resets
         result.n_relocalizations = system.n_relocalizations

@@ -3,6 +3,7 @@
 
 from orbslam2py.settings.builtin import BUILTIN_NAMES
 from orbslam2py.settings.defaults import settings_for_camera
+from orbslam2py.settings.fit import FitThresholds, Misfit
 from orbslam2py.settings.groups import (
     CameraRectification,
     CameraSettings,
@@ -19,6 +20,8 @@ __all__ = [
     "CameraRectification",
     "CameraSettings",
     "DepthSettings",
+    "FitThresholds",
+    "Misfit",
     "OrbSettings",
     "Sensor",
     "Settings",

@@ -88,5 +88,8 @@ def builtin_file(name: str, sensor: Sensor) -> Path:
     files = _FILES[key]
     if sensor not in files:
         available = " and ".join(str(one) for one in files)
-        raise SettingsError(f"built-in settings '{key}' are for {available}, not for {sensor}")
+        raise SettingsError(
+            f"built-in settings '{key}' are for {available}, not for {sensor}; take others, or "
+            "another sensor"
+        )
     return _FOLDER / files[sensor]

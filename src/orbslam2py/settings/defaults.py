@@ -3,9 +3,9 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
+from orbslam2py._arguments import finite_number, shown
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings.groups import CameraSettings, DepthSettings, OrbSettings
 from orbslam2py.settings.sensor import Sensor
@@ -56,6 +56,10 @@ def settings_for_camera(
         missing, or a pair is not rectified.
     """
     sensor = Sensor(sensor)
+    if not isinstance(camera, CameraSettings):
+        raise SettingsError(f"camera is {shown(camera)}; give CameraSettings(fx, fy, cx, cy)")
+    if orb is not None and not isinstance(orb, OrbSettings):
+        raise SettingsError(f"orb is {shown(orb)}; give OrbSettings(...), or None for the usual")
     _check(camera, sensor, baseline, depth_factor)
     bf = 0.0
     if sensor.has_depth:
@@ -82,10 +86,10 @@ def _check(
         raise SettingsError(f"a baseline goes with stereo and rgbd; leave it out for {sensor}")
     if depth_factor is not None and sensor is not Sensor.RGBD:
         raise SettingsError(f"a depth factor goes with rgbd; leave it out for {sensor}")
-    if baseline is not None and not (math.isfinite(baseline) and baseline > 0):
-        raise SettingsError(
-            f"the baseline is {baseline:g}; give the distance of the two cameras in metres, above 0"
-        )
+    if baseline is not None:
+        metres = "the distance of the two cameras in metres, above 0"
+        if finite_number(baseline, "the baseline", metres) <= 0:
+            raise SettingsError(f"the baseline is {baseline:g}; give {metres}")
     if sensor is not Sensor.STEREO:
         return
     if baseline is None and not camera.bf:

@@ -12,9 +12,11 @@ from typing import TypedDict
 
 import numpy as np
 
+from orbslam2py._arguments import array_of, choice_of, is_whole, numbers_of, shown
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings.keys import check_group
+from orbslam2py.settings.projection import on_image_plane
 
 
 def raise_if_any(problems: list[str]) -> None:
@@ -76,6 +78,41 @@ class CameraSettings:
     def is_distorted(self) -> bool:
         """Whether any distortion coefficient is not 0."""
         return bool(np.any(self.distortion))
+
+    def project(
+        self, points: FloatArray, T_cw: FloatArray | None = None, *, distort: bool = True
+    ) -> FloatArray:
+        """Find where points are seen.
+
+        Parameters
+        ----------
+        points
+            Positions in the world (n, 3), as in `orbslam2py.MapSnapshot.point_positions`.
+        T_cw
+            World to camera (4, 4), as in `orbslam2py.TrackingRecord.T_cw`; None if the points are
+            in camera coordinates (x right, y down, z forward) already.
+        distort
+            Give pixels of the images as they come. False: undistorted pixels, as the keypoints of
+            `orbslam2py.FrameFeatures` are; there is no difference for rectified images.
+
+        Returns
+        -------
+        FloatArray
+            Pixels u, v, float64 (n, 2), also beside the image. NaN for points that are not in front
+            of the camera, or so far aside that the distortion says nothing of them.
+
+        Raises
+        ------
+        SettingsError
+            If the arrays have other shapes, or `T_cw` is no pose.
+        """
+        positions = array_of(points, "points", (-1, 3), SettingsError, finite=False)
+        if T_cw is not None:
+            T = array_of(T_cw, "T_cw", (4, 4), SettingsError)
+            positions = positions @ T[:3, :3].T + T[:3, 3]
+        coefficients = (self.k1, self.k2, self.p1, self.p2, self.k3)
+        plane = on_image_plane(positions, coefficients if choice_of(distort, "distort") else None)
+        return plane * (self.fx, self.fy) + (self.cx, self.cy)
 
 
 @dataclass(frozen=True)
@@ -192,7 +229,7 @@ class CameraRectification:
     def __post_init__(self) -> None:
         problems = []
         for name, shape in (("K", (3, 3)), ("D", None), ("R", (3, 3)), ("P", (3, 4))):
-            value = np.array(getattr(self, name), dtype=np.float64)
+            value = numbers_of(getattr(self, name), name, SettingsError).copy()
             value = value.reshape(-1) if name == "D" else value
             value.setflags(write=False)
             object.__setattr__(self, name, value)
@@ -204,8 +241,10 @@ class CameraRectification:
                 problems.append(f"{name} holds a number that is not finite")
         if not problems and np.abs(self.R @ self.R.T - np.eye(3)).max() > 1e-3:
             problems.append("R is not a rotation (rows not orthonormal to 1e-3)")
-        if min(self.width, self.height) < 1:
-            problems.append(f"width and height must be at least 1, not {self.width}, {self.height}")
+        for name in ("width", "height"):
+            side = getattr(self, name)
+            if not is_whole(side) or side < 1:
+                problems.append(f"{name} is {shown(side)}; give pixels, 1 or more")
         raise_if_any(problems)
 
     def __eq__(self, other: object) -> bool:
@@ -225,6 +264,12 @@ class StereoRectification:
 
     left: CameraRectification
     right: CameraRectification
+
+    def __post_init__(self) -> None:
+        for side in ("left", "right"):
+            camera = getattr(self, side)
+            if not isinstance(camera, CameraRectification):
+                raise SettingsError(f"{side} is {shown(camera)}; give CameraRectification(...)")
 
 
 class SettingsGroups(TypedDict):

@@ -10,8 +10,10 @@ import difflib
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from numbers import Real
 
+import numpy as np
+
+from orbslam2py._arguments import is_number, shown
 from orbslam2py.settings.sensor import Sensor
 
 _ALL = frozenset(Sensor)
@@ -241,6 +243,10 @@ def convert(key: Key, value: float) -> float | int | bool:
     return key.kind(value)
 
 
+#: Fields that may be None: image size and unit of depth are not known of every camera.
+_MAY_BE_UNKNOWN = ("width", "height", "raw_per_metre")
+
+
 def check_group(group: str, values: object) -> list[str]:
     """Say what is wrong with the values of one settings dataclass.
 
@@ -251,11 +257,14 @@ def check_group(group: str, values: object) -> list[str]:
         if key.group != group:
             continue
         value = getattr(values, key.field)
-        if value is None or (key.name == "Camera.bf" and value == 0):
-            continue  # image size unknown, a camera without depth
-        if not isinstance(value, Real):
-            problems.append(f"{key.name} ({key.field}) is {value!r}, not a number")
+        if value is None and key.field in _MAY_BE_UNKNOWN:
             continue
+        number = isinstance(value, bool | np.bool_) if key.kind is bool else is_number(value)
+        if not number and not (key.kind is bool and is_number(value)):
+            problems.append(f"{key.name} ({key.field}) is {shown(value)}; give {key.allowed}")
+            continue
+        if key.name == "Camera.bf" and value == 0:
+            continue  # a camera without depth
         try:
             object.__setattr__(values, key.field, convert(key, float(value)))
         except ValueError as error:

@@ -7,12 +7,14 @@
 from __future__ import annotations
 
 import logging
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from orbslam2py._arguments import cannot_open
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import keys as schema
 from orbslam2py.settings.foreign import (
@@ -45,6 +47,10 @@ _log = logging.getLogger(__name__)
 _MOST_PROBLEMS = 30
 
 
+#: What text files do not hold: control characters.
+_NO_TEXT = re.compile(r"[\x00-\x08\x0e-\x1a\x1c-\x1f]")
+
+
 def read_text(path: Path) -> str:
     """Read a settings file.
 
@@ -54,11 +60,18 @@ def read_text(path: Path) -> str:
         If it cannot be read.
     """
     try:
-        return path.read_text(encoding="utf-8", errors="replace")
+        text = path.read_text(encoding="utf-8", errors="replace")
     except OSError as error:
         raise SettingsError(
-            f"cannot open settings file {path}: {error.strerror or error}"
+            f"{cannot_open(path, error, 'settings file')}; there are built-in ones, too: "
+            "orbslam2py settings list"
         ) from error
+    if _NO_TEXT.search(text):
+        raise SettingsError(
+            f"{path} is no text file, so it holds no settings; make a file with orbslam2py "
+            "settings new"
+        )
+    return text
 
 
 def read_groups(
@@ -105,8 +118,11 @@ def groups_of_text(
     if not any(map(schema.is_known, document.entries)):
         _refuse_camera_file(path, text, sensor)
     problems = document.problems
-    if not document.entries and not problems:
-        problems.append(Problem(None, "the file holds no settings"))
+    if not document.entries:
+        raise SettingsError(
+            f"{path} holds no settings, not a line 'key: value'; make a file with "
+            f"{new_line(sensor)}"
+        )
     _check_names(document, path, warn if allow_unknown else None)
     _check_camera_type(document)
     values = _read_values(document, sensor)

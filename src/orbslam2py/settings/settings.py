@@ -13,9 +13,10 @@ from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 
+from orbslam2py._arguments import path_of, shown
 from orbslam2py._files import atomic_write
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings.builtin import builtin_file, is_builtin_name
+from orbslam2py.settings.builtin import BUILTIN_NAMES, builtin_file, is_builtin_name
 from orbslam2py.settings.groups import (
     CameraSettings,
     DepthSettings,
@@ -28,6 +29,15 @@ from orbslam2py.settings.groups import (
 from orbslam2py.settings.reader import groups_of_text, read_groups
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.writer import format_settings
+
+_GROUPS = {
+    "camera": CameraSettings,
+    "orb": OrbSettings,
+    "depth": DepthSettings,
+    "rectification": StereoRectification,
+    "viewer": ViewerSettings,
+}
+_MAY_BE_MISSING = ("depth", "rectification")
 
 
 @dataclass(frozen=True)
@@ -62,6 +72,7 @@ class Settings:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "sensor", Sensor(self.sensor))
+        self._check_types()
         problems = []
         if self.sensor.has_depth:
             if not self.camera.bf > 0:
@@ -74,6 +85,12 @@ class Settings:
                     "millimetres, 5000 for TUM, 1 for metres"
                 )
         raise_if_any(problems)
+
+    def _check_types(self) -> None:
+        for name, kind in _GROUPS.items():
+            group = getattr(self, name)
+            if not (isinstance(group, kind) or (group is None and name in _MAY_BE_MISSING)):
+                raise SettingsError(f"{name} is {shown(group)}; give {kind.__name__}(...)")
 
     @property
     def baseline(self) -> float:
@@ -217,6 +234,9 @@ def builtin_settings(name: str, sensor: Sensor | str) -> Settings:
         If there is no such name, or none for that sensor.
     """
     sensor = Sensor(sensor)
+    if not isinstance(name, str):
+        names = ", ".join(BUILTIN_NAMES)
+        raise SettingsError(f"the name of the settings is {shown(name)}; give one of {names}")
     return _settings_of_file(builtin_file(name, sensor), sensor)
 
 
@@ -246,6 +266,13 @@ def resolve_settings(
     if isinstance(choice, Settings):
         choice.check_for(sensor)
         return choice
+    if not isinstance(choice, str | PathLike) or not str(choice):
+        raise SettingsError(
+            f"settings are {shown(choice)}; give Settings, a file, or "
+            f"a built-in name ({', '.join(BUILTIN_NAMES)}); 'orbslam2py settings new' and "
+            "settings_for_camera make them of the numbers of a camera"
+        )
+    choice = path_of(choice, "the settings file", SettingsError)
     if looks_like_path(choice) and not is_builtin_name(str(choice)):
         return _settings_of_file(Path(choice), sensor, allow_unknown=allow_unknown)
     return builtin_settings(str(choice), sensor)

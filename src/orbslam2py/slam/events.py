@@ -12,11 +12,13 @@ from __future__ import annotations
 import enum
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
+from orbslam2py._arguments import shown
 from orbslam2py._arrays import FloatArray
 from orbslam2py._worker import Worker
+from orbslam2py.errors import SettingsError
 
 _log = logging.getLogger(__name__)
 
@@ -116,6 +118,11 @@ class Callbacks:
     They run one after the other in a thread of their own (in deterministic mode: in the thread of
     the track call), so that a slow one delays neither tracking nor mapping, and hold no lock of the
     system; they may call the system's methods. An exception is logged and goes no further.
+
+    Raises
+    ------
+    SettingsError
+        If one of them cannot be called.
     """
 
     on_loop: Callable[[LoopClosed], None] | None = None
@@ -123,6 +130,30 @@ class Callbacks:
     on_lost: Callable[[TrackingLost], None] | None = None
     on_relocalized: Callable[[Relocalized], None] | None = None
     on_map_change: Callable[[MapChanged], None] | None = None
+
+    def __post_init__(self) -> None:
+        for listener in fields(self):
+            function = getattr(self, listener.name)
+            if function is not None and not callable(function):
+                raise SettingsError(
+                    f"{listener.name} is {shown(function)}; give a function that takes the event, "
+                    "or None"
+                )
+
+    @classmethod
+    def of(cls, value: Callbacks | None) -> Callbacks:
+        """Take callbacks, or nobody who wants to know.
+
+        Raises
+        ------
+        SettingsError
+            For anything else.
+        """
+        if value is not None and not isinstance(value, Callbacks):
+            raise SettingsError(
+                f"callbacks is {shown(value)}; give orbslam2py.Callbacks(on_loop=...)"
+            )
+        return value or cls()
 
 
 Event = LoopClosed | KeyframeAdded | TrackingLost | Relocalized | MapChanged
@@ -151,20 +182,25 @@ class EventDispatcher:
             "callbacks", lambda deliver: deliver(), threaded=threaded
         )
 
+        #: Told of every event, like the callbacks; assign another tuple to add one.
+        self.watchers: tuple[Callable[[Event], None], ...] = ()
+
     def wanted(self, kind: type[Event]) -> bool:
         """Whether anybody listens to events of a type: others need not be made."""
-        return self._listeners[kind] is not None
+        return self._listeners[kind] is not None or bool(self.watchers)
 
     def post(self, event: Event) -> None:
-        """Queue an event for the function that listens to its type; nothing if there is none."""
+        """Queue an event for those who listen to its type; nothing if there are none."""
         listener = self._listeners[type(event)]
-        if listener is None:
+        listeners = (*(() if listener is None else (listener,)), *self.watchers)
+        if not listeners:
             return
 
         def deliver() -> None:
-            try:
-                listener(event)
-            except Exception:
-                _log.exception("a callback failed on %s", type(event).__name__)
+            for tell in listeners:
+                try:
+                    tell(event)
+                except Exception:
+                    _log.exception("a callback failed on %s", type(event).__name__)
 
         self.worker.offer(deliver)  # a shutdown ends the deliveries

@@ -86,6 +86,12 @@ def accepted_keypoints(frame: core.TrackedFrame) -> npt.NDArray[np.bool_]:
     return accepted
 
 
+def pixels_as_given(frame: core.Frame) -> npt.NDArray[np.float32]:
+    """Where the keypoints lie in the image as it came, not undistorted, (n, 2)."""
+    raw = frame.raw_keypoints
+    return raw if len(raw) else frame.keypoints
+
+
 def frame_features(
     frame: core.TrackedFrame, inliers: npt.NDArray[np.bool_] | None = None
 ) -> FrameFeatures:
@@ -105,4 +111,5 @@ def frame_features(
         depths=features.depth,
         map_point_ids=frame.map_points,
         inliers=accepted_keypoints(frame) if inliers is None else inliers,
+        colours=features.colours,
     )

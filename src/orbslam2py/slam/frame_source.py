@@ -9,6 +9,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from orbslam2py._arguments import shown
 from orbslam2py.errors import ImageError, StateError
 from orbslam2py.settings.sensor import Sensor
 
@@ -64,6 +65,12 @@ def timed_images(source: FrameSource, sensor: Sensor) -> Iterator[tuple[float, S
     StateError
         If the source was opened for another sensor.
     """
+    is_recording = hasattr(source, "timestamps") and hasattr(source, "load")
+    if not is_recording and (not isinstance(source, Iterable) or isinstance(source, str | bytes)):
+        raise StateError(
+            f"the images come from {shown(source)}; give a sequence, as open_sequence returns, or "
+            "anything that yields frames with a timestamp and images"
+        )
     opened_for: Any = getattr(source, "sensor", sensor)
     if opened_for != sensor:
         raise StateError(
@@ -72,6 +79,11 @@ def timed_images(source: FrameSource, sensor: Sensor) -> Iterator[tuple[float, S
         )
     if isinstance(source, Iterable):
         for frame in source:
+            if not (hasattr(frame, "timestamp") and hasattr(frame, "images")):
+                raise StateError(
+                    f"a frame is {shown(frame)}; it must have a timestamp and images, as those of "
+                    "orbslam2py.datasets.Frame"
+                )
             yield frame.timestamp, frame.images
     else:
         for index, timestamp in enumerate(source.timestamps.tolist()):

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import logging
+
 import numpy as np
 import numpy.typing as npt
 
@@ -10,17 +12,26 @@ from orbslam2py import _core as core
 from orbslam2py._timing import StageTimer
 from orbslam2py.errors import ImageError
 from orbslam2py.settings.depth_check import DepthCheck
+from orbslam2py.settings.fit import find_misfit
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
 from orbslam2py.slam.thresholds import InitializationThresholds
+
+#: Pixels per side from which on an image has room for a cell of corners (30 pixels) between its
+#: borders (16 on each side): `features/corner_grid.hpp`.
+SMALLEST_SIDE = 62
+_log = logging.getLogger(__name__)
 
 Mask = npt.NDArray[np.uint8]
 #: For a pair: one mask for both images, or (left, right), either of which may be None.
 PairMask = Mask | tuple[Mask | None, Mask | None]
 
 
+_LARGEST_NUMBER = 8  # bytes of the largest type of depth that is converted
+
+
 class FrontEnd:
-    """Builds frames from images; the first image fixes the size.
+    """Builds frames from images; the first image fixes the size until a reset.
 
     Parameters
     ----------
@@ -28,9 +39,13 @@ class FrontEnd:
         Calibration and extractor settings.
     sensor : Sensor
         Which images come.
+    check_calibration : bool
+        Warn if the calibration cannot belong to images of that size.
     """
 
-    def __init__(self, settings: Settings, sensor: Sensor) -> None:
+    def __init__(
+        self, settings: Settings, sensor: Sensor, *, check_calibration: bool = True
+    ) -> None:
         self._settings = settings
         self._sensor = sensor
         self._context: core.FrameContext | None = None
@@ -41,7 +56,13 @@ class FrontEnd:
             _orb_options(settings, factor=InitializationThresholds().feature_factor)
         )
         self._pair_extractor = core.PairExtractor(options) if sensor is Sensor.STEREO else None
+        self._check_calibration = check_calibration
         self._depth_check: DepthCheck | None = DepthCheck(settings.depth_factor)
+
+    def reset(self) -> None:
+        """Let the next image have any size: a new map begins."""
+        self._context = None
+        self._size = None
 
     def monocular(
         self,
@@ -60,9 +81,10 @@ class FrontEnd:
         with timer("extract"):
             grey = core.to_grey(image, self._settings.camera.rgb)
             extractor = self._initial_extractor if initializing else self._extractor
-            return core.build_monocular_frame(
+            frame = core.build_monocular_frame(
                 context, frame_id, timestamp, extractor.extract(grey, mask)
             )
+            return self._coloured(frame, image)
 
     def stereo(
         self,
@@ -92,9 +114,10 @@ class FrontEnd:
                 left_grey, right_grey, left_mask, right_mask
             )
         with timer("stereo"):
-            return core.build_stereo_frame(
+            frame = core.build_stereo_frame(
                 context, frame_id, timestamp, features_left, features_right
             )
+            return self._coloured(frame, left)
 
     def rgbd(
         self,
@@ -115,7 +138,7 @@ class FrontEnd:
                 f"depth has size {depth.shape}, the image {image.shape[:2]}; "
                 "depth must be registered to the image"
             )
-        if depth.dtype.kind not in "uif":
+        if depth.dtype.kind not in "uif" or depth.dtype.itemsize > _LARGEST_NUMBER:
             raise ImageError(f"depth must hold numbers (uint16, float32...), got {depth.dtype}")
         _check_mask(mask, image, "mask")
         if self._depth_check is not None:
@@ -128,7 +151,13 @@ class FrontEnd:
             extraction = self._extractor.extract(grey, mask)
         with timer("stereo"):
             metres = core.to_depth_metres(depth, self._settings.depth_factor)
-            return core.build_rgbd_frame(context, frame_id, timestamp, extraction, metres)
+            frame = core.build_rgbd_frame(context, frame_id, timestamp, extraction, metres)
+            return self._coloured(frame, image)
+
+    def _coloured(self, frame: core.Frame, image: npt.NDArray[np.uint8]) -> core.Frame:
+        if image.ndim == 3:
+            core.sample_colours(frame, image, self._settings.camera.rgb)
+        return frame
 
     def _check(self, image: npt.NDArray[np.uint8], what: str) -> None:
         if not isinstance(image, np.ndarray):
@@ -142,10 +171,16 @@ class FrontEnd:
                 f"{what} must have shape (height, width) or (height, width, 3 or 4), "
                 f"got {image.shape}"
             )
+        if min(image.shape[:2]) < SMALLEST_SIDE:
+            raise ImageError(
+                f"{what} is too small: {image.shape[1]}x{image.shape[0]} pixels, and keypoints are "
+                f"found from {SMALLEST_SIDE} per side on; give whole images of the camera"
+            )
         if self._size is not None and image.shape[:2] != self._size:
             raise ImageError(
                 f"{what} has size {image.shape[1]}x{image.shape[0]}, the first image had "
-                f"{self._size[1]}x{self._size[0]}; the size must not change"
+                f"{self._size[1]}x{self._size[0]}; give images of one size, or call reset() before "
+                "the first one of another size"
             )
 
     def _context_for(self, image: npt.NDArray[np.uint8]) -> core.FrameContext:
@@ -154,7 +189,16 @@ class FrontEnd:
             camera = core.Camera(_camera_options(self._settings, width, height))
             self._context = core.FrameContext(camera, self._extractor.scales)
             self._size = (height, width)
+            self._tell_misfit(width, height)
         return self._context
+
+    def _tell_misfit(self, width: int, height: int) -> None:
+        if not self._check_calibration:
+            return
+        self._check_calibration = False
+        misfit = find_misfit(self._settings, (width, height))
+        if misfit is not None:
+            _log.warning("%s", misfit)
 
 
 def _check_mask(mask: Mask | None, image: npt.NDArray[np.uint8], what: str) -> None:

@@ -11,6 +11,7 @@ import contextlib
 import itertools
 import logging
 import os
+import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
@@ -107,24 +108,28 @@ class FullBundleAdjustment:
         self.worker.submit(number)
         return number
 
-    def start_and_wait(self) -> FullAdjustmentRecord:
+    def start_and_wait(self, stop: threading.Event | None = None) -> FullAdjustmentRecord:
         """Begin one, and wait for its end.
 
         It is given up when the worker is to stand still for longer (localization mode), and when
         another one, a reset or the shutdown takes its place, maybe before it has begun: then
-        nothing is counted in its record.
+        nothing is counted in its record. Also when `stop` is set.
         """
         number = self.start()
         worker = self.worker
+        stop = stop or threading.Event()
+
+        def done() -> bool:
+            ended = worker.idle or worker.state is WorkerState.FAILED
+            return ended or worker.held or stop.is_set()
+
         try:
-            worker.wait_until(
-                lambda: worker.idle or worker.held or worker.state is WorkerState.FAILED
-            )
+            worker.wait_until(done)
         except KeyboardInterrupt:
             self.cancel()
             raise
         worker.raise_if_failed()
-        if worker.held:
+        if worker.held or stop.is_set():
             self.cancel()
         latest = self._latest
         if latest is not None and latest[0] == number:

@@ -14,6 +14,8 @@ from typing import Protocol
 import numpy as np
 
 from orbslam2py import _core as core
+from orbslam2py._arrays import FloatArray
+from orbslam2py.slam.frame_recorder import pixels_as_given
 from orbslam2py.slam.front_end import intrinsics
 from orbslam2py.slam.local_mapping import LocalMapping
 from orbslam2py.slam.records import Reason
@@ -27,6 +29,17 @@ class Initializer(Protocol):
 
     def reset(self) -> None:
         """Forget the frames before."""
+        ...
+
+    def lines(self) -> FloatArray | None:
+        """What the last frame was matched with, for those who watch.
+
+        Returns
+        -------
+        array (m, 4) or None
+            Pixels of the images as given: x and y in the first view, then in the last frame. None
+            where a map does not begin from two views.
+        """
         ...
 
     def try_initialize(self, frame: core.TrackedFrame) -> Reason:
@@ -65,6 +78,10 @@ class DepthInitializer:
 
     def reset(self) -> None:
         """Nothing is kept from frame to frame."""
+
+    def lines(self) -> FloatArray | None:
+        """None: one frame is enough."""
+        return None
 
     def try_initialize(self, frame: core.TrackedFrame) -> Reason:
         """Make the frame keyframe 0, with a map point for every depth; or say why not."""
@@ -130,6 +147,17 @@ class MonocularInitializer:
         """Drop the first view."""
         self._first: core.TrackedFrame | None = None
         self._positions = np.zeros((0, 2), np.float32)
+        self._last: core.TrackedFrame | None = None
+        self._matches = np.zeros(0, np.int32)
+
+    def lines(self) -> FloatArray | None:
+        """From each keypoint of the first view to its match in the last frame, (m, 4) pixels."""
+        if self._first is None or self._last is None:
+            return np.zeros((0, 4))
+        matched = np.flatnonzero(self._matches >= 0)
+        seen_first = pixels_as_given(self._first.features)[matched]
+        seen_last = pixels_as_given(self._last.features)[self._matches[matched]]
+        return np.hstack([seen_first, seen_last]).astype(np.float64)
 
     def try_initialize(self, frame: core.TrackedFrame) -> Reason:
         """Begin the map with this frame as second view; or say why not."""
@@ -145,6 +173,7 @@ class MonocularInitializer:
         matches, self._positions = core.match_for_initialization(
             first.features, frame.features, self._positions, self._limits.window, self._limits.ratio
         )
+        self._last, self._matches = frame, matches
         if np.count_nonzero(matches >= 0) < self._limits.matches:
             self.reset()
             return Reason.FEW_MATCHES_FIRST_VIEW

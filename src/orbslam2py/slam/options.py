@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
+from orbslam2py._arguments import choice_of, is_number, seed_of, shown
 from orbslam2py.errors import SettingsError
 from orbslam2py.maps.map_reader import load_map
 from orbslam2py.maps.saved_map import SavedMap, VocabularyIdentity
@@ -27,7 +28,8 @@ class SystemOptions:
     Raises
     ------
     SettingsError
-        If the time limit is not more than 0, or given for the deterministic mode.
+        If a switch is not True or False, the seed is no whole number from 0 to 2^64 - 1, or the
+        time limit is not more than 0 or given for the deterministic mode.
     """
 
     deterministic: bool = False
@@ -37,19 +39,24 @@ class SystemOptions:
     full_adjustment_time_limit: float | None = None
     keyframe_images: bool = False
     seed: int = 0
+    check_calibration: bool = True
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "seed", seed_of(self.seed))
+        for name in ("deterministic", "wait_for_mapping", "loop_closing", "full_adjustment"):
+            object.__setattr__(self, name, choice_of(getattr(self, name), name))
         seconds = self.full_adjustment_time_limit
         if seconds is None:
             return
-        if not (math.isfinite(seconds) and seconds > 0):
+        if not (is_number(seconds) and math.isfinite(seconds) and seconds > 0):
             raise SettingsError(
-                f"the time limit of the full adjustment must be more than 0 s, got {seconds}"
+                "the time limit of the full adjustment must be more than 0 s, got "
+                f"{shown(seconds)}; give seconds, or leave it out"
             )
         if self.deterministic:
             raise SettingsError(
                 "deterministic mode takes no time limit for the full adjustment: what is reached "
-                "in a given time differs from run to run"
+                "in a given time differs from run to run; leave the limit out"
             )
 
 

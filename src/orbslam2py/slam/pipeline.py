@@ -12,7 +12,12 @@ import math
 import threading
 from collections.abc import Callable, Iterator
 
+import numpy as np
+import numpy.typing as npt
+
 from orbslam2py import _core as core
+from orbslam2py._arguments import is_number, shown
+from orbslam2py._arrays import ByteArray, FloatArray, IntArray
 from orbslam2py._timing import StageStatistics, StageTimer
 from orbslam2py.errors import ImageError, MapFileError, StateError
 from orbslam2py.maps.contents import restore_contents
@@ -21,7 +26,7 @@ from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
 from orbslam2py.slam.back_end import BackEnd
 from orbslam2py.slam.events import Callbacks, Relocalized, TrackingLost
-from orbslam2py.slam.frame_recorder import FrameRecorder, frame_features
+from orbslam2py.slam.frame_recorder import FrameRecorder, frame_features, pixels_as_given
 from orbslam2py.slam.front_end import FrontEnd
 from orbslam2py.slam.initialization import DepthInitializer, Initializer, MonocularInitializer
 from orbslam2py.slam.keyframe_decision import KeyframeDecision
@@ -29,7 +34,13 @@ from orbslam2py.slam.localization_mode import LocalizationSwitch
 from orbslam2py.slam.map_keeper import MapKeeper
 from orbslam2py.slam.options import SystemOptions
 from orbslam2py.slam.pose_search import PoseSearch
-from orbslam2py.slam.records import Reason, TrackingOutcome, TrackingRecord, TrackingState
+from orbslam2py.slam.records import (
+    FrameFeatures,
+    Reason,
+    TrackingOutcome,
+    TrackingRecord,
+    TrackingState,
+)
 from orbslam2py.slam.relocalization import Relocalizer
 from orbslam2py.slam.thresholds import TrackingThresholds
 from orbslam2py.slam.tracking import Tracking
@@ -61,6 +72,60 @@ class CallGuard:
             self._lock.release()
 
 
+class WatchedFrame:
+    """What a watcher is given after every image; copies are made when they are asked for.
+
+    Valid only during the call: the frame goes on to be the one that the next is compared with.
+
+    Parameters
+    ----------
+    image : array of uint8, (h, w) or (h, w, 3) or (h, w, 4)
+        As the caller gave it, who may use the memory again.
+    record : TrackingRecord
+        What tracking says about it.
+    frame : orbslam2py._core.TrackedFrame
+        Keypoints and what they are matched with.
+    inliers : array of bool, (n,), optional
+        See `FrameFeatures.inliers`.
+    tracking : Tracking
+        The state machine, as the frame left it.
+    """
+
+    def __init__(
+        self,
+        image: ByteArray,
+        record: TrackingRecord,
+        frame: core.TrackedFrame,
+        inliers: npt.NDArray[np.bool_] | None,
+        tracking: Tracking,
+    ) -> None:
+        self.image = image
+        self.record = record
+        self._frame = frame
+        self._inliers = inliers
+        self._tracking = tracking
+
+    def features(self) -> FrameFeatures:
+        """Keypoints and matches."""
+        return self.record.features or frame_features(self._frame, self._inliers)
+
+    def pixels(self) -> npt.NDArray[np.float32]:
+        """Where the keypoints lie in the image as it came, (n, 2)."""
+        return pixels_as_given(self._frame.features)
+
+    def local_points(self) -> IntArray:
+        """Ids of the points of the local map, (p,)."""
+        return self._tracking.local_points
+
+    def start_lines(self) -> FloatArray | None:
+        """While a single camera's map begins: pixels in the first view and now, (m, 4)."""
+        return self._tracking.start_lines
+
+
+#: Called after every image, in the thread of the track call.
+FrameWatcher = Callable[[WatchedFrame], None]
+
+
 class Pipeline:
     """All parts of the method, and the way of an image through them.
 
@@ -89,6 +154,8 @@ class Pipeline:
         Where every frame was.
     reset_requested : threading.Event
         When set, the next image begins a new map.
+    frame_watchers : tuple of callables
+        Told of every image; assign another tuple to add one. They must be quick and not raise.
     """
 
     def __init__(
@@ -101,7 +168,7 @@ class Pipeline:
     ) -> None:
         self._sensor = sensor
         self._waits_for_mapping = options.wait_for_mapping and not options.deterministic
-        self.front_end = FrontEnd(settings, sensor)
+        self.front_end = FrontEnd(settings, sensor, check_calibration=options.check_calibration)
         self.back_end = back_end = BackEnd(sensor, options, callbacks)
         self.tracking = _make_tracking(settings, sensor, vocabulary, back_end, options.seed)
         self.localization = LocalizationSwitch(
@@ -110,6 +177,7 @@ class Pipeline:
         self.recorder = FrameRecorder(back_end.map)
         self.statistics = StageStatistics()
         self.reset_requested = threading.Event()
+        self.frame_watchers: tuple[FrameWatcher, ...] = ()
         self.n_resets = 0
         self._start_failed = False
         self._next_frame_id = 0
@@ -139,7 +207,9 @@ class Pipeline:
         self.tracking.begin_in_loaded_map(initial_pose)
 
     # ---- one image -------------------------------------------------------------------------------
-    def process(self, timestamp: float, build: BuildFrame, *, details: bool) -> TrackingRecord:
+    def process(
+        self, timestamp: float, build: BuildFrame, image: ByteArray, *, details: bool
+    ) -> TrackingRecord:
         """Take one image from its pixels to its record.
 
         Parameters
@@ -148,6 +218,8 @@ class Pipeline:
             Seconds.
         build : callable
             Makes the frame: ``build(frame_id, timer)``.
+        image : array of uint8, (h, w) or (h, w, 3) or (h, w, 4)
+            What is shown of it to those who watch.
         details : bool
             The record is to hold keypoints and matches.
         """
@@ -164,23 +236,30 @@ class Pipeline:
             with timer("wait"):
                 self._wait_for_mapping()
         state_before = tracking.state
+        watchers = self.frame_watchers
         with timer("track"):
             frame = core.TrackedFrame(build(self._next_frame_id, timer))
             # From here on the image counts: every id is one image.
             self._next_frame_id += 1
             self._last_timestamp = timestamp
-            outcome = tracking.track(frame, timer, localize=self.localization.on, details=details)
+            outcome = tracking.track(
+                frame, timer, localize=self.localization.on, details=details or bool(watchers)
+            )
         self.statistics.add(timer.milliseconds)
 
         self._keep(frame, outcome)
         record = self._record(frame, outcome, timer, details=details)
         self._announce(state_before, record)
         back_end.mapping.start()
+        for watch in watchers:
+            watch(WatchedFrame(image, record, frame, outcome.inliers, tracking))
         return record
 
     def _check_timestamp(self, timestamp: float) -> None:
-        if not math.isfinite(timestamp):
-            raise ImageError(f"the time stamp must be a finite number of seconds, got {timestamp}")
+        if not (is_number(timestamp) and math.isfinite(timestamp)):
+            raise ImageError(
+                f"the time stamp must be a finite number of seconds, got {shown(timestamp)}"
+            )
         if timestamp <= self._last_timestamp:
             raise ImageError(
                 f"time stamps must grow: {timestamp!r} came after {self._last_timestamp!r}"
@@ -258,6 +337,7 @@ class Pipeline:
         _log.info("resetting: map %d ends", self.back_end.map.epoch)
         self.back_end.reset(RESET_PATIENCE, keep=self.recorder.end_map)
         self.tracking.reset()
+        self.front_end.reset()
         self._next_frame_id = 0
         self._last_timestamp = -math.inf
         self.reset_requested.clear()

@@ -115,6 +115,8 @@ class PoseSearch:
         The last frame and the speed.
     reference_keyframe : int
         Shares most points with the last frame that had a pose, -1 before the first.
+    local_map : orbslam2py._core.LocalMap or None
+        Where the last frame was refined, None before the first.
     last_relocalization : int
         Id of the frame in which the camera was last found again. 0 at the beginning, as if the
         first frame had been: a young map has to prove itself.
@@ -144,6 +146,7 @@ class PoseSearch:
         """Forget the frames before."""
         self.motion = MotionModel()
         self.reference_keyframe = -1
+        self.local_map: core.LocalMap | None = None
         self.last_relocalization = 0
         self.initial_pose: core.Pose | None = None
 
@@ -232,7 +235,7 @@ class PoseSearch:
     # ---- local map -------------------------------------------------------------------------------
     def in_local_map(self, frame: core.TrackedFrame, first: PoseEstimate) -> PoseEstimate:
         """Refine a first estimate with all points around it; the final verdict on the pose."""
-        local_map = core.select_local_map(self._map, frame)
+        self.local_map = local_map = core.select_local_map(self._map, frame)
         if local_map.reference_keyframe >= 0:
             self.reference_keyframe = local_map.reference_keyframe
         matches = core.match_local_map(

@@ -15,7 +15,6 @@ from orbslam2py._arrays import FloatArray, IntArray
 class TrackingState(enum.IntEnum):
     """State of the tracker after an image."""
 
-    SYSTEM_NOT_READY = -1
     NO_IMAGES_YET = 0
     NOT_INITIALIZED = 1
     OK = 2
@@ -59,6 +58,8 @@ class FrameFeatures:
     """(n,) id of the matched map point, -1 for none; in a keyframe also of points made from it."""
     inliers: npt.NDArray[np.bool_]
     """(n,) matched and accepted by the pose optimisation: as many as `TrackingRecord.n_inliers`."""
+    colours: npt.NDArray[np.uint8]
+    """(n, 3) red, green, blue of the image at the keypoints; (0, 3) for a grey image."""
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import logging
+import threading
 import weakref
 from pathlib import Path
 from types import TracebackType
@@ -12,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
+from orbslam2py._arguments import patience_of
 from orbslam2py.errors import MapFileError, StateError, WorkerError
 from orbslam2py.maps.contents import MapContents, take_contents
 from orbslam2py.maps.saved_map import SavedMap
@@ -72,6 +74,9 @@ class System:
         Keep a small grey JPEG of every keyframe for map files.
     seed : int
         Seed of all random draws.
+    check_calibration : bool
+        Log one warning if the calibration cannot belong to images of the first one's size.
+        `orbslam2py.check_calibration` looks into the images, too.
 
     Attributes
     ----------
@@ -111,6 +116,7 @@ class System:
         callbacks: Callbacks | None = None,
         keyframe_images: bool = False,
         seed: int = 0,
+        check_calibration: bool = True,
     ) -> None:
         self.options = SystemOptions(
             deterministic=deterministic,
@@ -120,11 +126,12 @@ class System:
             full_adjustment_time_limit=full_adjustment_time_limit,
             keyframe_images=keyframe_images,
             seed=seed,
+            check_calibration=check_calibration,
         )
         setup = Setup.of(settings, sensor, vocabulary, load_map, initial_pose, allow_other_setup)
         self.sensor, self.settings, self.vocabulary = setup.sensor, setup.settings, setup.vocabulary
         self.pipeline = Pipeline(
-            self.settings, self.sensor, self.vocabulary, self.options, callbacks or Callbacks()
+            self.settings, self.sensor, self.vocabulary, self.options, Callbacks.of(callbacks)
         )
         if setup.loaded is not None:
             self.pipeline.begin_in(setup.loaded, self.vocabulary, setup.initial_pose)
@@ -326,7 +333,7 @@ class System:
         with self._guard():
             if self._shut_down:
                 raise StateError("the system has been shut down; make a new one")
-            record = self.pipeline.process(timestamp, build, details=details)
+            record = self.pipeline.process(timestamp, build, image, details=details)
             if self.options.keyframe_images and record.is_keyframe:
                 self._keeper.keep_image(record.reference_keyframe, encode_image(image))
             return record
@@ -351,17 +358,23 @@ class System:
     def reset(self) -> None:
         """Ask for a new map; carried out at the beginning of the next track call.
 
-        Settings, vocabulary and mode stay. The trajectory of the present map is kept, see
-        `trajectories`.
+        Settings, vocabulary and mode stay; the images may have another size from then on. The
+        trajectory of the present map is kept, see `trajectories`.
         """
         self.pipeline.reset_requested.set()
 
-    def optimize(self) -> FullAdjustmentRecord:
+    def optimize(self, *, stop: threading.Event | None = None) -> FullAdjustmentRecord:
         """Refine all keyframes and points together, now (full bundle adjustment).
 
         Tracking may go on meanwhile. A Ctrl-C gives up and leaves the map as it was; so do a loop
         that is closed meanwhile, another call, a reset, the shutdown and a switch to localization
         mode.
+
+        Parameters
+        ----------
+        stop : threading.Event, optional
+            Gives up when it is set, as a Ctrl-C does. In the deterministic mode nothing does once
+            it has begun.
 
         Returns
         -------
@@ -381,7 +394,7 @@ class System:
         adjustment = self.pipeline.back_end.adjustment
         if adjustment.worker.ended:
             return adjustment.run()
-        return adjustment.start_and_wait()
+        return adjustment.start_and_wait(stop)
 
     def wait_until_idle(self, timeout: float | None = None) -> bool:
         """Wait until every keyframe has been processed, and full adjustments have ended.
@@ -392,7 +405,7 @@ class System:
             False when `timeout` seconds passed first, or keyframes wait for the end of localization
             mode.
         """
-        return self.pipeline.back_end.wait_until_idle(timeout)
+        return self.pipeline.back_end.wait_until_idle(patience_of(timeout))
 
     def shutdown(
         self,
@@ -422,6 +435,7 @@ class System:
         MapFileError
             If the last autosave could not be written.
         """
+        timeout = patience_of(timeout)
         self._shut_down = True
         if not self._finalizer.alive:
             return

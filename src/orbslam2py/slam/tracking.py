@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from orbslam2py import _core as core
+from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._timing import StageTimer
 from orbslam2py.slam.frame_recorder import accepted_keypoints
 from orbslam2py.slam.initialization import Initializer
@@ -160,6 +161,17 @@ class Tracking:
     def reference_keyframe(self) -> int:
         """The keyframe that shares most points with the last tracked frame, -1 for none."""
         return self._search.reference_keyframe
+
+    @property
+    def local_points(self) -> IntArray:
+        """Ids (n,) of the points that the last refined frame was matched with."""
+        local_map = self._search.local_map
+        return np.zeros(0, np.int64) if local_map is None else local_map.points.ids
+
+    @property
+    def start_lines(self) -> FloatArray | None:
+        """While a single camera's map begins: see `Initializer.lines`; else None."""
+        return self._initializer.lines() if self.initializing else None
 
     # ---- one image -------------------------------------------------------------------------------
     def track(

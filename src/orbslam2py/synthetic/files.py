@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from orbslam2py._arrays import IntArray
+from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._files import atomic_folder
 from orbslam2py.datasets import Layout, Sequence
 from orbslam2py.errors import DatasetError, SettingsError
@@ -130,7 +130,7 @@ def _write_tum(sequence: WritableSequence, folder: Path, progress: Progress) -> 
     if sequence.sensor is Sensor.RGBD:
         _write_text(folder / "depth.txt", depth)
         _write_text(folder / "associations.txt", pairs)
-    T_wc = sequence.ground_truth().T_wc
+    T_wc = _upright(sequence.ground_truth().T_wc)
     quaternions = quaternions_from_rotations(T_wc[:, :3, :3])
     lines = ["# timestamp tx ty tz qx qy qz qw (camera to world)"]
     for i, (T, q) in enumerate(zip(T_wc, quaternions, strict=True)):
@@ -178,7 +178,7 @@ def _write_euroc(sequence: WritableSequence, folder: Path, progress: Progress) -
     for camera in cameras:
         rows = [f"{stamp},{stamp}.png" for stamp in stamps]
         _write_text(camera / "data.csv", ["#timestamp [ns],filename", *rows])
-    T_wc = sequence.ground_truth().T_wc
+    T_wc = _upright(sequence.ground_truth().T_wc)
     lines = [
         "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], "
         "q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z []"
@@ -188,6 +188,13 @@ def _write_euroc(sequence: WritableSequence, folder: Path, progress: Progress) -
     truth = top / "state_groundtruth_estimate0"
     truth.mkdir()
     _write_text(truth / "data.csv", lines)
+
+
+def _upright(T_wc: FloatArray) -> FloatArray:
+    """Poses in a world whose z points up, as in TUM's and EuRoC's ground truth; here y is down."""
+    T_up = np.eye(4)
+    T_up[:3, :3] = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
+    return np.asarray(T_up @ T_wc)
 
 
 def _sensor_yaml(sequence: WritableSequence, number: int) -> list[str]:

@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from enum import Enum
+from typing import Any
 
+from orbslam2py._arguments import is_number, is_whole, seed_of, shown
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import Sensor
 from orbslam2py.synthetic.scenes import LAPS, ROOM_BESIDE, SyntheticWorld
@@ -71,13 +72,13 @@ class SyntheticOptions:
     def __post_init__(self) -> None:
         object.__setattr__(self, "world", _member(SyntheticWorld, "world", self.world))
         object.__setattr__(self, "sensor", _member(Sensor, "sensor", self.sensor))
-        _check_range("frames", self.frames, 1, 1_000_000)
+        _check_range("frames", self.frames, 1, 1_000_000, whole=True)
         _check_range("laps", self.laps, 0.01, 1000)
         _check_range("fps", self.fps, 0.1, 1000)
         _check_range("speed", self.speed, 0.001, 100)
-        for pixels in self.size or ():
-            _check_range("size", pixels, 64, 8192)
-        _check_range("seed", self.seed, 0, 2**31 - 1)
+        if self.size is not None:
+            _check_size(self.size)
+        seed_of(self.seed, most=2**31 - 1)
         _check_range("noise", self.noise, 0, 100)
         _check_range("exposure", self.exposure, 0.01, 100)
         _check_range("depth_noise", self.depth_noise, 0, 1)
@@ -85,12 +86,19 @@ class SyntheticOptions:
         _check_range("lateral", self.lateral, -beside, beside)
         _check_range("yaw", self.yaw, -180, 180)
         if self.speed is not None and self.world is SyntheticWorld.ROOM:
-            raise SettingsError("speed does not apply to the room: one turn takes 30 s")
+            raise SettingsError(
+                "speed does not apply to the room: one turn takes 30 s; leave it out"
+            )
         if self.laps is not None and self.world not in LAPS:
             names = ", ".join(map(str, LAPS))
-            raise SettingsError(f"laps apply to ways that come back to their start: {names}")
+            raise SettingsError(
+                f"laps apply to ways that come back to their start: {names}; take one, or give "
+                "frames"
+            )
         if self.laps is not None and self.frames is not None:
-            raise SettingsError("frames and laps exclude each other: both say how long the way is")
+            raise SettingsError(
+                "frames and laps exclude each other: both say how long the way is; give one"
+            )
 
 
 def _member(kind: type[Enum], name: str, value: object) -> Enum:
@@ -101,6 +109,18 @@ def _member(kind: type[Enum], name: str, value: object) -> Enum:
         raise SettingsError(f"{name} is '{value}'; there are {names}") from None
 
 
-def _check_range(name: str, value: float | None, low: float, high: float) -> None:
-    if value is not None and not (math.isfinite(value) and low <= value <= high):
-        raise SettingsError(f"{name} is {value}; allowed: {low:g} to {high:g}")
+def _check_range(
+    name: str, value: float | None, low: float, high: float, *, whole: bool = False
+) -> None:
+    if value is None:
+        return
+    if not (is_whole(value) if whole else is_number(value)) or not low <= value <= high:
+        kind = "whole numbers " if whole else ""
+        raise SettingsError(f"{name} is {shown(value)}; allowed: {kind}{low:g} to {high:g}")
+
+
+def _check_size(size: Any) -> None:
+    if not isinstance(size, tuple | list) or len(size) != 2:
+        raise SettingsError(f"size is {shown(size)}; give width and height, such as (640, 480)")
+    for pixels in size:
+        _check_range("size", pixels, 64, 8192, whole=True)

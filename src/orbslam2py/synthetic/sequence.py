@@ -20,8 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbslam2py import _core as core
+from orbslam2py._arguments import shown
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
 from orbslam2py.datasets import FramesInOrder, Images, Layout
+from orbslam2py.errors import SettingsError
 from orbslam2py.settings import CameraSettings, DepthSettings, OrbSettings, Sensor, Settings
 from orbslam2py.synthetic.files import write_sequence
 from orbslam2py.synthetic.options import SyntheticOptions
@@ -44,7 +46,12 @@ class SyntheticSequence(FramesInOrder):
         Rendering threads; the images do not depend on it.
     """
 
+    #: Direction of up in the world of the ground truth: y points down.
+    up_in_truth: FloatArray = np.array([0.0, -1.0, 0.0])
+
     def __init__(self, options: SyntheticOptions, *, threads: int = 1) -> None:
+        if not isinstance(options, SyntheticOptions):
+            raise SettingsError(f"options are {shown(options)}; give SyntheticOptions(...)")
         self.options = options
         self._threads = threads
         self._world = SyntheticWorld(options.world)

@@ -3,29 +3,32 @@
 
 from orbslam2py.trajectory.association import MAX_DIFFERENCE, associate
 from orbslam2py.trajectory.files import (
-    TrajectoryFormat,
     read_euroc,
     read_kitti,
     read_trajectory,
     read_tum,
-    write_kitti,
-    write_tum,
 )
 from orbslam2py.trajectory.frame_times import FrameTable, read_frame_table, read_times
-from orbslam2py.trajectory.trajectory import Trajectory
+from orbslam2py.trajectory.similarity import Similarity, align
+from orbslam2py.trajectory.trajectory import Trajectory, lengths_along
+from orbslam2py.trajectory.writers import TrajectoryFormat, write_euroc, write_kitti, write_tum
 
 __all__ = [
     "MAX_DIFFERENCE",
     "FrameTable",
+    "Similarity",
     "Trajectory",
     "TrajectoryFormat",
+    "align",
     "associate",
+    "lengths_along",
     "read_euroc",
     "read_frame_table",
     "read_kitti",
     "read_times",
     "read_trajectory",
     "read_tum",
+    "write_euroc",
     "write_kitti",
     "write_tum",
 ]

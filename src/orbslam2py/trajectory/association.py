@@ -5,12 +5,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from orbslam2py._arguments import array_of, finite_number
 from orbslam2py._arrays import FloatArray, IntArray
+from orbslam2py.errors import DatasetError
 
 #: Largest difference of stamps that may belong together [s].
 MAX_DIFFERENCE = 0.02
 
 _ROUNDS = 16
+_REMEDY = "seconds, 0 or more"
 
 
 def associate(
@@ -31,12 +34,21 @@ def associate(
     max_difference
         Limit in seconds; pairs must stay below it.
 
+    Raises
+    ------
+    DatasetError
+        If they are no lists of numbers, or the limit is below 0.
+
     Returns
     -------
     first_indices, second_indices
         int64 (k,) each, in the order of the stamps of `first`.
     """
-    first, second = np.asarray(first, np.float64), np.asarray(second, np.float64)
+    first = array_of(first, "the first time stamps", (-1,), finite=False)
+    second = array_of(second, "the second time stamps", (-1,), finite=False)
+    max_difference = finite_number(max_difference, "max_difference", _REMEDY, DatasetError)
+    if max_difference < 0:
+        raise DatasetError(f"max_difference is {max_difference:g}; give {_REMEDY}")
     i, j = _candidates(first, second, max_difference)
     order = np.lexsort((second[j], first[i], np.abs(first[i] - second[j])))
     i, j = i[order], j[order]

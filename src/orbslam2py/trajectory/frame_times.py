@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from orbslam2py._arguments import cannot_open, path_of
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._text_lines import content_lines, number_of
 from orbslam2py.errors import DatasetError
@@ -49,14 +50,14 @@ def read_frame_table(path: str | Path) -> FrameTable:
     """
     rows = []
     try:
-        with Path(path).open(encoding="utf-8", newline="") as stream:
+        with path_of(path, "the table of frames").open(encoding="utf-8", newline="") as stream:
             reader = csv.DictReader(stream)
             for row in reader:
                 world = int(row["map"]) if row["map"] else -1
                 timestamp = float(row["timestamp"])
                 rows.append((int(row["index"]), timestamp, world, row["state"] == "OK"))
     except OSError as error:
-        raise DatasetError(f"cannot open {path}: {error.strerror or error}") from error
+        raise DatasetError(cannot_open(path, error)) from error
     except (KeyError, TypeError, ValueError, csv.Error):
         raise DatasetError(
             f"{path}:{len(rows) + 2}: no row of a run's frames (index, timestamp, map, state); "

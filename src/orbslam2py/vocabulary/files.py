@@ -21,6 +21,7 @@ from typing import IO, cast
 import numpy as np
 
 from orbslam2py import _core as core
+from orbslam2py._arguments import cannot_open
 from orbslam2py.errors import VocabularyError
 from orbslam2py.vocabulary import _textio
 
@@ -138,10 +139,11 @@ def _reading(path: Path) -> Iterator[None]:
         raise VocabularyError(named) from error
     except OSError as error:
         # gzip's own complaints are OSErrors without a code
-        reason = error.strerror or f"damaged archive ({error})"
-        raise VocabularyError(f"{path}: {reason}") from error
+        if error.errno is not None:
+            raise VocabularyError(cannot_open(path, error)) from error
+        raise VocabularyError(f"{path}: damaged archive ({error}); get it again") from error
     except (EOFError, zlib.error, tarfile.TarError) as error:
-        raise VocabularyError(f"{path}: damaged archive ({error})") from error
+        raise VocabularyError(f"{path}: damaged archive ({error}); get it again") from error
 
 
 @contextmanager

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 
 from orbslam2py import _core as core
+from orbslam2py._arguments import path_of, shown
 from orbslam2py._arrays import ByteArray
 from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.errors import ImageError, VocabularyError
@@ -31,10 +32,16 @@ def read_training_images(folder: str | os.PathLike[str]) -> list[Path]:
     VocabularyError
         If there are none.
     """
-    root = Path(folder).expanduser()
+    root = path_of(folder, "the folder of images", VocabularyError).expanduser()
     images = sorted(p for p in root.rglob("*") if p.suffix.lower() in IMAGE_SUFFIXES)
     if not images:
-        raise VocabularyError(f"{root}: no images ({', '.join(sorted(IMAGE_SUFFIXES))}) found")
+        if not root.is_dir():
+            what = "is a file" if root.exists() else "does not exist"
+            raise VocabularyError(f"{root} {what}; give a folder of photographs")
+        suffixes = ", ".join(sorted(IMAGE_SUFFIXES))
+        raise VocabularyError(
+            f"{root} holds no images ({suffixes}), nor do its folders; give a folder of photographs"
+        )
     return images
 
 
@@ -75,13 +82,21 @@ def train_vocabulary(
     features = features or core.OrbOptions(n_features=2000)
     report = progress or (lambda step, fraction: None)
 
-    descriptors = _describe_images([Path(image) for image in images], features, options, report)
+    descriptors = _describe_images(_paths_of(images), features, options, report)
     if descriptors is None:
         return None
     ends = np.cumsum([len(rows) for rows in descriptors]).tolist()
     rows = np.concatenate([np.empty((0, 32), np.uint8), *descriptors])
     descriptors.clear()
     return core.train_vocabulary(rows, ends, options, lambda done: report("Clustering", done))
+
+
+def _paths_of(images: Iterable[str | os.PathLike[str]]) -> list[Path]:
+    if isinstance(images, str | bytes | os.PathLike) or not isinstance(images, Iterable):
+        raise VocabularyError(
+            f"the images are {shown(images)}; give a list of paths, as from read_training_images"
+        )
+    return [path_of(image, "an image", VocabularyError) for image in images]
 
 
 def _describe_images(
@@ -98,7 +113,7 @@ def _describe_images(
             of_thread.extractor = core.OrbExtractor(features)
         image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
         if image is None:
-            raise ImageError(f"{path}: cannot be read as an image")
+            raise ImageError(f"{path}: cannot be read as an image; remove it, or replace it")
         descriptors: ByteArray = of_thread.extractor.extract(image).descriptors
         return descriptors
 

@@ -23,6 +23,7 @@ from typing import IO
 import numpy as np
 
 from orbslam2py import _core as core
+from orbslam2py._arguments import cannot_open, path_of, shown
 from orbslam2py._files import atomic_write
 from orbslam2py.errors import VocabularyError
 from orbslam2py.vocabulary import _textio
@@ -70,7 +71,7 @@ def load_vocabulary(
     """
     if path is None:
         path = os.environ.get(ENVIRONMENT_VARIABLE) or default_vocabulary_path()
-    chosen = Path(path).expanduser()
+    chosen = path_of(path, "the vocabulary", VocabularyError).expanduser()
     file_format = detect_format(chosen)
     if file_format is VocabularyFormat.BINARY:
         return core.Vocabulary.open(str(chosen))
@@ -108,7 +109,7 @@ def _stamp(path: Path) -> core.VocabularySource:
                 file.seek(start)
                 digest.update(file.read(sample))
     except OSError as error:
-        raise VocabularyError(f"{path}: {error.strerror}") from error
+        raise VocabularyError(cannot_open(path, error)) from error
     content = int.from_bytes(digest.digest(), "little")
     return core.VocabularySource(status.st_size, status.st_mtime_ns, content)
 
@@ -169,7 +170,11 @@ def save_vocabulary(
     VocabularyError
         If the name has another ending or the file cannot be written.
     """
-    target = Path(path).expanduser()
+    if not isinstance(vocabulary, core.Vocabulary):
+        raise VocabularyError(
+            f"the vocabulary is {shown(vocabulary)}; give one that load_vocabulary returned"
+        )
+    target = path_of(path, "the file of the vocabulary", VocabularyError).expanduser()
     if target.suffix == ".bvoc":
         vocabulary.save(str(target), comment, core.VocabularySource())
     elif target.suffix == ".txt":
@@ -232,6 +237,7 @@ def convert_vocabulary(
     VocabularyError
         If one cannot be read or the other not be written.
     """
+    source = path_of(source, "the vocabulary", VocabularyError)
     vocabulary = load_vocabulary(source, cache=False, progress=_half(progress, 0.0))
     comment = vocabulary.comment or f"Converted from {Path(source).name}."
     save_vocabulary(vocabulary, target, comment=comment, progress=_half(progress, 0.5))
@@ -277,7 +283,9 @@ def vocabulary_info(path: str | os.PathLike[str] | None = None) -> VocabularyInf
     VocabularyError
         If it is damaged or not a vocabulary.
     """
-    chosen = Path(path or os.environ.get(ENVIRONMENT_VARIABLE) or default_vocabulary_path())
+    if path is None:
+        path = os.environ.get(ENVIRONMENT_VARIABLE) or default_vocabulary_path()
+    chosen = path_of(path, "the vocabulary", VocabularyError)
     vocabulary = load_vocabulary(chosen, cache=False)
     vocabulary.check_content()
     _, is_word, _, weights = vocabulary.table()

@@ -50,7 +50,7 @@ def test_colmap(tmp_path: Path, line: str, expected: tuple[float, ...]) -> None:
     path = written(tmp_path, f"# Camera list\n3 {line}\n", "cameras.txt")
     assert read_camera_file(path).camera == CameraSettings(*expected, width=640, height=480)
     assert read_camera_file(path, camera=3).camera.fx == 500
-    with pytest.raises(SettingsError, match="no camera 1; there are: 3"):
+    with pytest.raises(SettingsError, match="no camera 1; give --camera with one there is: 3"):
         read_camera_file(path, camera=1)
 
 

@@ -44,7 +44,7 @@ def test_rectified_camera_becomes_a_pair_by_its_baseline(tmp_path: Path) -> None
         (KALIBR_PAIR, {"depth_factor": 1000}, "leave it out for stereo"),
         (KALIBR, {"depth_factor": 1000}, "leave it out for mono"),
         (ROS, {"sensor": "rgbd", "right": "right.yaml"}, "leave --right out for rgbd"),
-        (KITTI, {"camera": 4}, "has no P4; there are: P0, P1, P2, P3"),
+        (KITTI, {"camera": 4}, "has no P4; give --camera with one there is: P0, P1, P2, P3"),
         (KITTI, {"camera": 3, "sensor": "stereo"}, "has no P4, the right camera"),
         (KITTI, {"camera": 1, "sensor": "stereo"}, "P2 does not stand to the right of P1"),
         (KITTI.replace("P0: 700", "P0: x"), {}, "P0 must hold 12 finite numbers"),

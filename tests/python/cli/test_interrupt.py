@@ -95,7 +95,7 @@ MOMENTS = [
     ("orbslam2py", "System.wait_until_idle", 1, ()),
     ("orbslam2py", "System.shutdown", 1, ()),
     ("orbslam2py.runs.report", "evaluate_trajectory", 1, ()),
-    ("orbslam2py.runs.outputs", "draw_trajectory", 1, ()),
+    ("orbslam2py.runs.run_picture", "draw_trajectory", 1, ()),
     ("orbslam2py.runs.outputs", "OutputWriter._remove_stale", 1, ()),
 ]
 
@@ -167,7 +167,7 @@ def test_while_an_image_does_not_come(lap: Path) -> None:
 
 
 def test_twice_while_writing_gives_up(lap: Path) -> None:
-    code, _ = finish(start(lap.parent, "orbslam2py.runs.outputs", "draw_trajectory", 1, 2))
+    code, _ = finish(start(lap.parent, "orbslam2py.runs.run_picture", "draw_trajectory", 1, 2))
     assert code == 130
     names = {path.name for path in (lap.parent / "r").iterdir()}
     assert "trajectory.txt" in names

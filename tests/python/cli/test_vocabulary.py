@@ -64,7 +64,7 @@ def test_convert_there_and_back(run, tmp_path):
         (["convert", TEXT, "v.bin"], "must end with .bvoc"),
         (["convert", TEXT, TEXT], "use --force"),
         (["convert", TEXT, "no/folder/v.bvoc"], "no such folder"),
-        (["train", "nowhere", "-o", "v.bvoc"], "no images"),
+        (["train", "nowhere", "-o", "v.bvoc"], "give a folder of photographs"),
         (["train", ".", "-o", "v.bvoc", "--branching", 1], "branching"),
         (["train", "nowhere"], "Missing option"),
         (["train", ".", "-o", "v.bvoc", "--seed", -1], "seed"),

@@ -76,9 +76,12 @@ def literals_of(text: str, name: str) -> list[float]:
     return found
 
 
+MODULES = ("orbslam2py.slam.thresholds", "orbslam2py.settings.fit")
+
+
 @pytest.fixture(scope="module")
-def thresholds() -> ModuleType:
-    return importlib.import_module("orbslam2py.slam.thresholds")
+def thresholds() -> list[ModuleType]:
+    return [importlib.import_module(name) for name in MODULES]
 
 
 @pytest.mark.parametrize("path", CHAPTERS, ids=lambda p: p.stem)
@@ -102,13 +105,13 @@ def test_thresholds_of_the_core(path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", CHAPTERS, ids=lambda p: p.stem)
-def test_thresholds_of_python(path: Path, thresholds: ModuleType) -> None:
+def test_thresholds_of_python(path: Path, thresholds: list[ModuleType]) -> None:
     wrong = []
     for row in rows_of(path):
         named = _PYTHON.match(row.name)
         if named is None:
             continue
-        kind = getattr(thresholds, named["owner"], None)
+        kind = next(filter(None, (getattr(m, named["owner"], None) for m in thresholds)), None)
         defaults = {} if kind is None else {f.name: f.default for f in fields(kind)}
         if named["field"] not in defaults:
             wrong.append(f"{row.place}: no such field")

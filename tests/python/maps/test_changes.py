@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 import pytest
 
@@ -234,7 +236,46 @@ def test_changes_are_printed_in_one_line(frame: core.Frame) -> None:
     growing = Growing(frame, keyframes=2)
     growing.add_point(0, 0, 1)
     assert repr(growing.look()) == (
-        "MapChanges(map_index=0, restarted=True, keyframes=+2 -0, points=+1 -0, "
-        "edges=covisibility, loop_edges, spanning_tree)"
+        "<MapChanges: map 0 from the beginning, keyframes +2 -0, points +1 -0, "
+        "new covisibility, loop edges, spanning tree>"
     )
-    assert repr(growing.look()).endswith("points=+0 -0, edges=as before)")
+    assert repr(growing.look()) == "<MapChanges: map 0, keyframes +0 -0, points +0 -0>"
+
+
+def test_a_follower_changes_nothing() -> None:
+    hashes = []
+    for followed in (False, True):
+        with new_system(Sensor.RGBD, deterministic=True) as system:
+            follower = MapFollower(system.pipeline.back_end.map)
+            for index in range(24):
+                play(system, 1, index)
+                if followed:
+                    follower.update()
+            hashes.append(system.map_hash())
+    assert hashes[0] == hashes[1]
+
+
+def test_a_map_is_followed_by_another_thread_while_it_grows() -> None:
+    with new_system(Sensor.RGBD, wait_for_mapping=True) as system:
+        slam_map = system.pipeline.back_end.map
+        follower, mirror = MapFollower(slam_map), MapMirror()
+        done = threading.Event()
+        looks = []
+
+        def follow() -> None:
+            while not done.is_set():
+                changes = follower.update()
+                looks.append(changes)
+                mirror.apply(changes)
+
+        watcher = threading.Thread(target=follow)
+        watcher.start()
+        try:
+            play(system, 30)
+            assert system.wait_until_idle(20)
+        finally:
+            done.set()
+            watcher.join()
+        mirror.apply(follower.update())
+        mirror.assert_equals(slam_map, 100)
+    assert sum(map(bool, looks)) > 2

@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
-from orbslam2py import Sensor
+from orbslam2py import MapSnapshot, Sensor
 from support.small_sequences import new_system, play
 
 pytestmark = pytest.mark.watchdog(30)
@@ -33,3 +35,40 @@ def test_snapshot(sensor: Sensor) -> None:
     positions = {t: T[:3, 3] for t, T in zip(frames.timestamps, frames.T_wc, strict=True)}
     for t, T_wc in zip(keyframes.timestamps, keyframes.T_wc, strict=True):
         np.testing.assert_allclose(positions[t], T_wc[:3, 3], atol=0.02)
+
+
+def made_up() -> MapSnapshot:
+    return MapSnapshot(
+        keyframe_ids=np.array([0, 2]),
+        keyframe_timestamps=np.array([0.5, 1.5]),
+        keyframe_T_wc=np.stack([np.eye(4)] * 2),
+        point_ids=np.arange(3),
+        point_positions=np.ones((3, 3)),
+        loop_edges=np.array([[0, 2]]),
+    )
+
+
+def test_snapshots_are_compared_by_what_is_in_them() -> None:
+    snapshot = made_up()
+    assert snapshot == made_up()
+    assert snapshot != "a map"
+    for field in dataclasses.fields(MapSnapshot):
+        values = getattr(snapshot, field.name).copy()
+        values[(0,) * values.ndim] += 1
+        other = dataclasses.replace(snapshot, **{field.name: values})
+        assert snapshot != other, field.name
+        assert snapshot != dataclasses.replace(snapshot, **{field.name: values[:1]}), field.name
+
+
+def test_equal_runs_give_equal_snapshots() -> None:
+    snapshots = []
+    for n_frames in (12, 12, 14):
+        with new_system(Sensor.RGBD, deterministic=True) as system:
+            play(system, n_frames)
+            snapshots.append(system.map_snapshot())
+    assert snapshots[0] == snapshots[1]
+    assert snapshots[0] != snapshots[2]
+
+
+def test_a_snapshot_is_printed_in_one_line() -> None:
+    assert repr(made_up()) == "<MapSnapshot: keyframes 2, points 3, loop edges 1>"

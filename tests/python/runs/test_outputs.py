@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from orbslam2py import DatasetError, run_sequence
-from orbslam2py.runs import RunOptions, SystemOptions, outputs
+from orbslam2py.runs import RunOptions, SystemOptions, run_picture
 from orbslam2py.runs.outputs import link_latest, prepare_output_folder, write_ply
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.files import names_in
@@ -80,7 +80,7 @@ def test_lengths_of_one_camera_are_metres_only_where_the_truth_tells(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: type[SyntheticSequence]
 ) -> None:
     drawn: dict[str, Any] = {}
-    monkeypatch.setattr(outputs, "draw_trajectory", lambda _, **values: drawn.update(values))
+    monkeypatch.setattr(run_picture, "draw_trajectory", lambda _, **values: drawn.update(values))
     sequence = kind(SyntheticOptions(world="corridor", sensor="mono", frames=40, size=(320, 240)))
     options = RunOptions("mono", SystemOptions(deterministic=True))
     done = run_sequence(sequence, options, output=tmp_path / "r")

@@ -12,6 +12,7 @@ import pytest
 
 from orbslam2py.runs import plots
 from orbslam2py.runs.plots import draw_trajectory
+from orbslam2py.runs.report_page.plane_view import choose_view
 from orbslam2py.runs.timeline import Timeline
 from support.files import names_in
 from support.made_up_rows import FPS, rows_of
@@ -136,3 +137,28 @@ def test_time_axis_is_that_of_the_recording(tmp_path: Path) -> None:
     assert line.min() - marked.min() == pytest.approx(0.25 * width, abs=0.02 * width)
     assert line.max() - marked.min() == pytest.approx(0.5 * width, abs=0.02 * width)
     assert not ((marked > line.min() + 5) & (marked < line.max() - 5)).any()
+
+
+def test_errors_colour_the_path(tmp_path: Path) -> None:
+    positions, seconds = circle(), np.arange(200) / FPS
+    truth = (seconds, positions)
+    plain = drawn(tmp_path / "a", positions, truth=truth)
+    errors = np.linspace(0, 0.5, 200)
+    coloured = drawn(tmp_path / "b", positions, truth=truth, errors=errors)
+    unknown = drawn(tmp_path / "c", positions, truth=truth, errors=np.full(200, np.nan))
+    np.testing.assert_array_equal(unknown, plain, "no colours without a known error")
+    assert len(pixels_of(plain, plots._ERRORS[0])) == 0
+    for colour in (plots._ERRORS[0], plots._ERRORS[-1]):
+        assert len(pixels_of(coloured, colour)) > 10, "on the path and in the bar"
+    top = coloured[: int(0.7 * len(coloured))]
+    assert len(pixels_of(top, plots._ESTIMATE)) < len(pixels_of(plain, plots._ESTIMATE)) / 4
+
+
+def test_a_camera_that_climbs_is_seen_from_behind() -> None:
+    climb = np.stack([np.zeros(9), -np.arange(9.0), 0.1 * np.arange(9.0)], axis=1)
+    view = choose_view(climb)
+    assert (view.right_name, view.up_name) == ("right", "up")
+    np.testing.assert_allclose(view.flatten(climb), np.stack([np.zeros(9), np.arange(9.0)], axis=1))
+    walk = climb[:, [0, 2, 1]]
+    assert choose_view(walk).up_name == "forward"
+    assert choose_view(walk[:1]).up_name == "forward"

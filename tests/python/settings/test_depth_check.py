@@ -123,8 +123,8 @@ def test_front_end_looks_at_the_first_images_only(monkeypatch: pytest.MonkeyPatc
 
     monkeypatch.setattr(front_end, "DepthCheck", Counting)
     front = FrontEnd(builtin_settings("tum1", Sensor.RGBD), Sensor.RGBD)
-    depth = np.full((48, 64), 7000, np.uint16)
-    image = np.zeros((48, 64), np.uint8)
+    depth = np.full((64, 64), 7000, np.uint16)
+    image = np.zeros((64, 64), np.uint8)
     for i in range(N_CHECKED + 3):
         front.rgbd(image, depth, i, i / 30, StageTimer())
     assert len(looked) == N_CHECKED

@@ -26,7 +26,7 @@ def test_values_are_checked_without_a_file_too() -> None:
         CameraSettings(-1.0, math.nan, 0.0, 0.0)
     with pytest.raises(SettingsError, match="which is 5"):
         OrbSettings(ini_th_fast=5)
-    with pytest.raises(SettingsError, match="not a number"):
+    with pytest.raises(SettingsError, match="give 1 to 16"):
         OrbSettings(n_levels="eight")  # type: ignore[arg-type]
     with pytest.raises(SettingsError, match="ThDepth"):
         DepthSettings(0.0)

@@ -80,15 +80,43 @@ def test_stereo_images_of_different_size() -> None:
 def test_a_refused_first_image_does_not_fix_the_size(sensor: Sensor, size: tuple[int, int]) -> None:
     tiny = np.zeros(size, np.uint8)
     with new_system(sensor) as system:
-        try:
-            shown = Images(tiny, tiny, tiny.astype(np.uint16))
-            assert track(system, 0, shown=shown).state is TrackingState.NOT_INITIALIZED
-        except ImageError as error:
-            assert "too small" in str(error)
-            assert track(system, 0).state is TrackingState.OK
-        else:
-            with pytest.raises(ImageError, match="the first image had"):
-                track(system, 1)
+        shown = Images(tiny, tiny, tiny.astype(np.uint16))
+        with pytest.raises(ImageError, match=r"too small: .* 62 per side .* give whole images"):
+            track(system, 0, shown=shown)
+        record = track(system, 0)
+        assert record.frame_id == 0
+        assert record.reason is not Reason.TOO_FEW_KEYPOINTS
+
+
+def padded(shown: Images) -> Images:
+    """The same images on a larger black ground."""
+    grey = np.zeros((260, 352), np.uint8)
+    grey[:240, :320] = shown.image
+    right = depth = None
+    if shown.right is not None:
+        right = np.zeros_like(grey)
+        right[:240, :320] = shown.right
+    if shown.depth is not None:
+        depth = np.zeros(grey.shape, shown.depth.dtype)
+        depth[:240, :320] = shown.depth
+    return Images(grey, right, depth)
+
+
+def test_reset_frees_the_size(sensor: Sensor) -> None:
+    larger = padded(images(sensor, 3))
+    with new_system(sensor, deterministic=True) as system:
+        play(system, 3)
+        with pytest.raises(ImageError, match=r"size 352x260, the first image had 320x240.*reset"):
+            track(system, 3, shown=larger)
+        system.reset()
+        record = track(system, 3, shown=larger)
+        assert (record.frame_id, record.map_index) == (0, 1)
+        with pytest.raises(ImageError, match="size 320x240, the first image had 352x260"):
+            track(system, 4)
+        for index in range(4, 20):
+            last = track(system, index, shown=padded(images(sensor, index)))
+        assert last.state is TrackingState.OK
+        assert system.check_map() == []
 
 
 @pytest.mark.parametrize(

@@ -26,8 +26,12 @@ RUN_FILES = frozenset(
         "trajectory_kitti.txt",
         "frames.csv",
         "points.ply",
+        "map.npz",
         "trajectory.png",
         "report.json",
+        "report.html",
+        "frame_images.zip",
+        "groundtruth_aligned.txt",
         "settings.yaml",
     ]
 )

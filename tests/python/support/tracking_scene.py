@@ -201,6 +201,9 @@ class FakeInitializer:
     def reset(self) -> None:
         self.refusals = 0
 
+    def lines(self) -> None:
+        """None: one frame is enough."""
+
     def try_initialize(self, frame: FakeFrame) -> Reason:
         if self.refusals:
             self.refusals -= 1

@@ -43,5 +43,7 @@ def worker_threads() -> list[str]:
         "callbacks",
         "image loader",
         "worker under test",
+        "viewer publisher",
+        "viewer page",
     }
     return [thread.name for thread in threading.enumerate() if thread.name in names]

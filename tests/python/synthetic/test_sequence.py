@@ -191,7 +191,10 @@ def test_folders_are_read_back_by_the_loaders(tmp_path, layout, sensor):
     assert read.layout == layout
     np.testing.assert_array_equal(read.timestamps, sequence.timestamps)
     truth = read.ground_truth()
-    np.testing.assert_allclose(truth.T_wc, sequence.ground_truth().T_wc, rtol=0, atol=1e-9)
+    T_up = np.eye(4)
+    if layout is not Layout.KITTI:  # whose ground truth has z up
+        T_up[:3, :3] = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
+    np.testing.assert_allclose(truth.T_wc, T_up @ sequence.ground_truth().T_wc, rtol=0, atol=1e-9)
     np.testing.assert_array_equal(truth.timestamps, sequence.timestamps)
     rectified = layout is Layout.EUROC and sensor is Sensor.STEREO
     camera, exact = read.default_settings().camera, sequence.camera

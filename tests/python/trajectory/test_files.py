@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from evo.tools import file_interface
 from hypothesis import HealthCheck, given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
@@ -19,6 +20,7 @@ from orbslam2py.trajectory import (
     read_kitti,
     read_trajectory,
     read_tum,
+    write_euroc,
     write_kitti,
     write_tum,
 )
@@ -44,7 +46,7 @@ def test_tum_keeps_the_text_of_time_stamps_and_leaves_lost_poses_out(tmp_path: P
     write_tum(tmp_path / "a.txt", trajectory, texts)
     stamps = [line.split()[0] for line in (tmp_path / "a.txt").read_text().splitlines()]
     assert stamps == [texts[0], texts[2]]
-    with pytest.raises(ValueError, match="3 poses, but 2 time stamp texts"):
+    with pytest.raises(DatasetError, match="3 poses, but 2 time stamp texts"):
         write_tum(tmp_path / "a.txt", trajectory, texts[:2])
 
 
@@ -109,7 +111,7 @@ def test_kitti_of_nothing(tmp_path: Path) -> None:
 def test_kitti_frames_must_increase(tmp_path: Path, indices: list[int]) -> None:
     trajectory = made_up(2)
     trajectory = Trajectory(trajectory.timestamps, trajectory.T_wc, indices=np.array(indices))
-    with pytest.raises(ValueError, match="frame numbers must increase"):
+    with pytest.raises(DatasetError, match="frame numbers must increase"):
         write_kitti(tmp_path / "a.txt", trajectory, 2)
     assert not (tmp_path / "a.txt").exists()
 
@@ -156,3 +158,38 @@ def test_files_that_are_no_trajectory(tmp_path: Path, text: str, expected: str) 
     assert expected in str(caught.value)
     with pytest.raises(DatasetError, match="cannot open"):
         read_trajectory(tmp_path / "none.txt")
+
+
+# ---- EuRoC, written ------------------------------------------------------------------------------
+def test_euroc_text(tmp_path: Path) -> None:
+    T_wc = np.eye(4)[None].copy()
+    T_wc[0, :3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    T_wc[0, :3, 3] = [1, -2.5, -1e-12]
+    write_euroc(tmp_path / "a.csv", Trajectory(np.array([1.5]), T_wc), ["1403636579.763555527"])
+    header, row = (tmp_path / "a.csv").read_text().splitlines()
+    assert header.startswith("#timestamp [ns],p_RS_R_x [m]")
+    assert row == (
+        "1403636579763555527,1.000000000,-2.500000000,0.000000000,"
+        "0.707106781,0.000000000,0.000000000,0.707106781"
+    )
+
+
+def test_euroc_round_trip_without_lost_poses(tmp_path: Path) -> None:
+    trajectory = made_up(9)
+    lost = np.arange(9) == 4
+    trajectory = Trajectory(trajectory.timestamps, trajectory.T_wc, lost)
+    write_euroc(tmp_path / "a.csv", trajectory)
+    kept = trajectory.select(~lost)
+    for read in (read_euroc(tmp_path / "a.csv"), read_trajectory(tmp_path / "a.csv")[0]):
+        np.testing.assert_allclose(read.timestamps, kept.timestamps, atol=1e-6)
+        np.testing.assert_allclose(read.T_wc, kept.T_wc, atol=5e-9)
+    with pytest.raises(DatasetError, match="9 poses"):
+        write_euroc(tmp_path / "a.csv", trajectory, ["1", "2"])
+
+
+def test_evo_reads_what_is_written(tmp_path: Path) -> None:
+    trajectory = made_up(9)
+    write_euroc(tmp_path / "a.csv", trajectory)
+    read = file_interface.read_euroc_csv_trajectory(str(tmp_path / "a.csv"))
+    np.testing.assert_allclose(read.poses_se3, trajectory.T_wc, atol=5e-9)
+    np.testing.assert_allclose(read.timestamps, trajectory.timestamps, atol=1e-6)

@@ -3,10 +3,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from orbslam2py.trajectory import Trajectory
+from orbslam2py.errors import DatasetError
+from orbslam2py.trajectory import Trajectory, lengths_along, read_kitti, read_tum
 from support.made_up_paths import made_up
 
 
@@ -15,5 +19,72 @@ def test_fields_are_filled_in_and_checked() -> None:
     np.testing.assert_array_equal(trajectory.lost, [False] * 3)
     np.testing.assert_array_equal(trajectory.indices, [0, 1, 2])
     assert len(trajectory.select(np.array([True, False, True]))) == 2
-    with pytest.raises(ValueError, match="3 timestamps, but 2 T_wc"):
+    with pytest.raises(DatasetError, match="3 timestamps, but 2 T_wc"):
         Trajectory(np.arange(3), trajectory.T_wc[:2])
+
+
+def test_prints_in_a_line() -> None:
+    trajectory = made_up(3)
+    steps = np.linalg.norm(np.diff(trajectory.positions, axis=0), axis=1)
+    first, last = trajectory.timestamps[[0, -1]]
+    assert repr(trajectory) == (
+        f"<Trajectory: 3 poses, {first:.3f} s to {last:.3f} s, path length {steps.sum():.3f}>"
+    )
+    lost = Trajectory(trajectory.timestamps, trajectory.T_wc, np.array([False, False, True]))
+    assert "3 poses (1 lost)" in repr(lost)
+    assert f"path length {steps[0]:.3f}" in repr(lost), "lost poses are no part of the path"
+    assert repr(trajectory.select([])) == "<Trajectory: no poses>"
+
+
+def test_the_other_way_round() -> None:
+    trajectory = made_up(5)
+    np.testing.assert_allclose(
+        trajectory.T_cw @ trajectory.T_wc, np.tile(np.eye(4), (5, 1, 1)), atol=1e-12
+    )
+
+
+def test_quaternions_end_with_w() -> None:
+    quarter_turn = np.eye(4)
+    quarter_turn[:3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    trajectory = Trajectory(np.arange(2), np.stack([np.eye(4), quarter_turn]))
+    half = np.sqrt(0.5)
+    np.testing.assert_allclose(trajectory.quaternions, [[0, 0, 0, 1], [0, 0, half, half]])
+
+
+@pytest.mark.parametrize(("name", "read"), [("tum", read_tum), ("kitti", read_kitti)])
+def test_saved_and_read_again(
+    tmp_path: Path, name: str, read: Callable[[Path], Trajectory]
+) -> None:
+    trajectory = made_up(6)
+    trajectory.save(tmp_path / "path.txt", format=name)
+    again = read(tmp_path / "path.txt")
+    np.testing.assert_allclose(again.T_wc, trajectory.T_wc, atol=1e-8)
+    trajectory.save(str(tmp_path / "tum.txt"))
+    assert len(read_tum(tmp_path / "tum.txt")) == 6
+
+
+def test_not_saved_in_another_format(tmp_path: Path) -> None:
+    (tmp_path / "path.txt").write_text("mine")
+    with pytest.raises(DatasetError, match="'euroc'; give tum or kitti"):
+        made_up(3).save(tmp_path / "path.txt", "euroc")
+    with pytest.raises(DatasetError, match="'csv'; give one of auto, tum, kitti, euroc"):
+        made_up(3).save(tmp_path / "path.txt", "csv")
+    with pytest.raises(DatasetError, match="frame numbers must increase"):
+        made_up(3).select([2, 1]).save(tmp_path / "path.txt", "kitti")
+    assert (tmp_path / "path.txt").read_text() == "mine"
+
+
+def test_chosen_by_a_slice_a_mask_or_indices() -> None:
+    trajectory = made_up(4)
+    for which in (slice(1, 3), np.array([False, True, True, False]), [1, 2], np.array([1, 2])):
+        np.testing.assert_array_equal(trajectory.select(which).indices, [1, 2])
+    for wrong in (np.array([True, False]), [4], [-5], [0.5]):
+        with pytest.raises(DatasetError, match=r"a mask of bool \(4,\), indices from 0 to 3"):
+            trajectory.select(wrong)
+
+
+def test_lengths_along_a_path() -> None:
+    positions = np.array([[0, 0, 0], [3, 4, 0], [3, 4, 12.0]])
+    np.testing.assert_array_equal(lengths_along(positions), [0, 5, 17])
+    np.testing.assert_array_equal(lengths_along(positions[:1]), [0])
+    assert len(lengths_along(positions[:0])) == 0

@@ -64,7 +64,7 @@ def test_training_reports_and_cancels(photographs):
 
 
 def test_training_refuses_nonsense(photographs, tmp_path):
-    with pytest.raises(VocabularyError, match="no images"):
+    with pytest.raises(VocabularyError, match="does not exist; give a folder"):
         read_training_images(tmp_path / "nowhere")
     with pytest.raises(VocabularyError, match="no descriptors"):
         train_vocabulary([])

@@ -129,7 +129,7 @@ def test_a_picture_that_cannot_be_drawn(
     def draw(*_: object, **__: object) -> None:
         raise ValueError("no font")
 
-    monkeypatch.setattr("orbslam2py.runs.outputs.draw_trajectory", draw)
+    monkeypatch.setattr("orbslam2py.runs.run_picture.draw_trajectory", draw)
     done = run(command, rgbd)
     assert done.code == 1
     assert "cannot make trajectory.png: no font" in done.err

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Pictures of the viewer for README and documentation, taken in a browser without a screen.
+
+    .venv/bin/python scripts/draw_viewer_pictures.py SEQUENCE [--sensor S] [--output PNG]
+
+Needs the extra ``viewer`` and Chromium. Without a sequence the demo's corridor is run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(CHECKOUT / "tests" / "python"))  # the tests' browser
+
+import orbslam2py as orb  # noqa: E402
+from orbslam2py.datasets import Sequence  # noqa: E402
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence  # noqa: E402
+from support.browser import Browser, Page  # noqa: E402
+from support.viewer_pages import click_on, open_viewer, picture, wait_until  # noqa: E402
+
+_WIDTH, _HEIGHT = 1600, 900
+
+
+def open_source(arguments: argparse.Namespace) -> Sequence:
+    """The sequence that is run."""
+    if arguments.sequence is None:
+        return SyntheticSequence(SyntheticOptions(world="corridor", sensor="stereo", speed=1.4))
+    return orb.open_sequence(arguments.sequence, arguments.sensor)
+
+
+def dismiss_notes(page: Page) -> None:
+    """Close what the page says of a computer without graphics hardware."""
+    page.evaluate(
+        "document.querySelectorAll('.mantine-Notification-closeButton').forEach(b => b.click())"
+    )
+
+
+def wait_until_still(page: Page) -> None:
+    """Wait until two pictures in a row are the same."""
+    before = [np.zeros(0, np.uint8)]
+
+    def still() -> bool:
+        page.evaluate("new Promise(done => setTimeout(done, 700))")
+        seen = picture(page)
+        same = np.array_equal(seen, before[0])
+        before[0] = seen
+        return same
+
+    wait_until(still, "a picture that stays")
+
+
+def draw(arguments: argparse.Namespace) -> None:
+    """Run, and take the picture after the wanted number of images."""
+    sequence = open_source(arguments)
+    n_frames = min(arguments.frames or len(sequence), len(sequence))
+    with (
+        orb.System(sequence.settings, sequence.sensor, wait_for_mapping=True) as slam,
+        orb.Viewer(slam, port=0, truth=sequence.ground_truth(), open_browser=False) as viewer,
+        Browser() as browser,
+    ):
+        page = open_viewer(browser, viewer.address)
+        page.set_size(_WIDTH, _HEIGHT)
+        dismiss_notes(page)
+        for layer in arguments.without:
+            click_on(page, layer)
+        slam.run(itertools.islice(sequence, n_frames))
+        if arguments.look is not None:
+            look_from(viewer, arguments.look)
+        wait_until_still(page)
+        cv2.imwrite(
+            str(arguments.output), picture(page)[:, :, ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 9]
+        )
+        print(arguments.output)
+
+
+def look_from(viewer: orb.Viewer, look: list[float]) -> None:
+    """Let the view be free and put it somewhere: eye and target, world of the map."""
+    viewer.look_from(look[:3], look[3:])
+
+
+def main() -> None:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("sequence", nargs="?")
+    parser.add_argument("--sensor")
+    parser.add_argument("--frames", type=int)
+    parser.add_argument("--without", nargs="*", default=[], help="layers that are switched off")
+    parser.add_argument("--look", nargs=6, type=float, help="eye and target")
+    parser.add_argument("--output", type=Path, default=CHECKOUT / "docs/images/viewer.png")
+    draw(parser.parse_args())
+
+
+if __name__ == "__main__":
+    main()

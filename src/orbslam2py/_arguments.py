@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What callers give, checked where it comes in: a wrong type gets an error that says what to give.
+
+Without, it would surface deep inside, as a bare `TypeError` about a thing nobody has named.
+"""
+
+from __future__ import annotations
+
+import errno
+import math
+import numbers
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from orbslam2py.errors import DatasetError, OrbSlamError, SettingsError, StateError
+
+#: Seeds are unsigned 64-bit numbers in the core.
+LARGEST_SEED = 2**64 - 1
+_LONGEST = 60
+
+
+def shown(value: object) -> str:
+    """Say what a value is, in a few words for a message: ``None``, ``a dict``, ``'abc'``."""
+    if value is None or isinstance(value, bool | numbers.Number | str):
+        text = repr(value)
+        return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
+    name = type(value).__name__
+    if name == "bytes":
+        return name
+    return f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"
+
+
+def is_whole(value: object) -> bool:
+    """Whether a value is a whole number, Python's or NumPy's; True and False are none."""
+    return isinstance(value, numbers.Integral) and not isinstance(value, bool)
+
+
+def is_number(value: object) -> bool:
+    """Whether a value is a real number, Python's or NumPy's; True and False are none."""
+    return isinstance(value, numbers.Real) and not isinstance(value, bool)
+
+
+def choice_of(value: Any, what: str) -> bool:
+    """Take True or False.
+
+    Raises
+    ------
+    SettingsError
+        For anything else: the text ``"no"`` would count as true.
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise SettingsError(f"{what} is {shown(value)}; give True or False")
+    return bool(value)
+
+
+def finite_number(
+    value: Any, what: str, remedy: str, error: type[OrbSlamError] = SettingsError
+) -> float:
+    """Take a finite number.
+
+    Parameters
+    ----------
+    value
+        What was given.
+    what, remedy
+        What it is called, and what to give, for the message.
+    error
+        Raised for anything else.
+    """
+    if not is_number(value) or not math.isfinite(value):
+        raise error(f"{what} is {shown(value)}; give {remedy}")
+    return float(value)
+
+
+def seed_of(value: Any, what: str = "seed", most: int = LARGEST_SEED) -> int:
+    """Take a seed: a whole number from 0.
+
+    Raises
+    ------
+    SettingsError
+        For anything else, also for True and for 1.0.
+    """
+    if not is_whole(value) or not 0 <= value <= most:
+        raise SettingsError(f"{what} is {shown(value)}; give a whole number from 0 to {most}")
+    return int(value)
+
+
+def patience_of(timeout: Any) -> float | None:
+    """Take seconds to wait at most; None waits for ever.
+
+    Raises
+    ------
+    StateError
+        For anything else.
+    """
+    if timeout is None or (is_number(timeout) and timeout >= 0):
+        return None if timeout is None else float(timeout)
+    raise StateError(f"timeout is {shown(timeout)}; give seconds from 0, or None to wait for ever")
+
+
+_REMEDIES = {
+    errno.ENOENT: "check the path",
+    errno.EISDIR: "give a file, not a folder",
+    errno.ENOTDIR: "check the path: a part of it is a file",
+    errno.EACCES: "ask for the right to read it, or give another one",
+}
+
+
+def cannot_open(path: object, error: OSError, what: str = "") -> str:
+    """Say that a file cannot be read, why, and what to do about it."""
+    named = f"{what} {path}" if what else f"{path}"
+    remedy = _REMEDIES.get(error.errno or 0, "give another file")
+    return f"cannot open {named}: {error.strerror or error}; {remedy}"
+
+
+def path_of(value: Any, what: str, error: type[OrbSlamError] = DatasetError) -> Path:
+    """Take a path, as text or as a `Path`.
+
+    Raises
+    ------
+    error
+        For anything else, and for text that no file can be called.
+    """
+    path = value if isinstance(value, str) else _text_of(value)
+    if path is None:
+        raise error(f"{what} is {shown(value)}; give a path, as text or as a pathlib.Path")
+    if not path or "\0" in path:
+        raise error(f"{what} is {path!r}, which is the name of no file; give a path")
+    return Path(path)
+
+
+def _text_of(value: object) -> str | None:
+    if not isinstance(value, os.PathLike):
+        return None
+    text = os.fspath(value)
+    return text if isinstance(text, str) else None
+
+
+def numbers_of(
+    value: Any, what: str, error: type[OrbSlamError] = DatasetError, wanted: str = ""
+) -> npt.NDArray[np.float64]:
+    """Take an array of numbers of any shape, float64; lists of numbers will do.
+
+    Raises
+    ------
+    error
+        For anything else, with the shape that is wanted if it is told.
+    """
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind not in "iuf" and array.size:
+            raise TypeError
+        return array.astype(np.float64)
+    except (TypeError, ValueError):
+        shape = wanted and f" of shape {wanted}"
+        raise error(f"{what} is {shown(value)}; give an array of numbers{shape}") from None
+
+
+def array_of(
+    value: Any,
+    what: str,
+    shape: tuple[int, ...],
+    error: type[OrbSlamError] = DatasetError,
+    *,
+    finite: bool = True,
+) -> npt.NDArray[np.float64]:
+    """Take an array of numbers.
+
+    Parameters
+    ----------
+    value
+        What was given; lists of numbers will do.
+    what
+        What it is called.
+    shape
+        What it must have; -1 allows any length.
+    error
+        Raised for anything else.
+    finite
+        Whether all of them must be finite.
+
+    Returns
+    -------
+    array of float64
+        Of that shape.
+    """
+    wanted = "(" + ", ".join("n" if length < 0 else str(length) for length in shape) + ")"
+    array = numbers_of(value, what, error, wanted)
+    if array.size == 0 and -1 in shape and array.ndim <= len(shape):
+        array = array.reshape([0 if length < 0 else length for length in shape])
+    fits = array.ndim == len(shape) and all(
+        length in (-1, found) for length, found in zip(shape, array.shape, strict=True)
+    )
+    if not fits:
+        raise error(f"{what} has shape {array.shape}; give {wanted}")
+    if finite and not np.isfinite(array).all():
+        raise error(f"{what} holds a number that is not finite; leave such entries out")
+    return array

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Points followed from image to image, without any calibration."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from orbslam2py._arrays import ByteArray, FloatArray
+
+#: Size of the window in which a point is followed [pixels], and how often images are halved.
+_WINDOW, _HALVINGS = (15, 15), 3
+#: Points that do not come back to their beginning to so many pixels are dropped.
+_THERE_AND_BACK = 0.5
+#: Corners are looked for in so many parts of an image by row and column, so that a single thing
+#: with much texture does not take them all; least quality by the best of a part, and distance.
+_N_PARTS, _QUALITY, _APART = 4, 0.05, 7
+
+
+@dataclass(frozen=True)
+class TrackedPair:
+    """The same points in two images.
+
+    Attributes
+    ----------
+    first, second
+        Pixels in the images, float64 (n, 2), with the lens' distortion.
+    frames
+        Numbers of the two images.
+    """
+
+    first: FloatArray
+    second: FloatArray
+    frames: tuple[int, int]
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+
+def find_corners(grey: ByteArray, n_points: int, mask: ByteArray | None = None) -> FloatArray:
+    """Find corners that lie all over an image, as many in every one of 16 parts.
+
+    Parameters
+    ----------
+    grey : array of uint8, (h, w)
+        The image.
+    n_points : int
+        Points wanted; there are fewer where there is no texture.
+    mask : array of uint8, (h, w), optional
+        No corner lies where it is 0.
+
+    Returns
+    -------
+    array, (n, 2)
+        Pixels.
+    """
+    height, width = grey.shape
+    ys, xs = (np.linspace(0, size, _N_PARTS + 1).astype(int) for size in (height, width))
+    found: list[FloatArray] = [np.zeros((0, 2))]
+    for top, bottom in itertools.pairwise(ys.tolist()):
+        for left, right in itertools.pairwise(xs.tolist()):
+            part = slice(top, bottom), slice(left, right)
+            corners = cv2.goodFeaturesToTrack(
+                np.ascontiguousarray(grey[part]),
+                -(-n_points // _N_PARTS**2),
+                _QUALITY,
+                _APART,
+                mask=None if mask is None else np.ascontiguousarray(mask[part]),
+            )
+            if corners is not None:
+                corner = np.array([left, top], np.float64)
+                found.append(np.asarray(corners.reshape(-1, 2) + corner, np.float64))
+    return np.concatenate(found)
+
+
+def follow_points(
+    before: ByteArray, after: ByteArray, points: FloatArray, *, halvings: int
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Find points (n, 2) of one image in another one, and back again.
+
+    Parameters
+    ----------
+    before, after : array of uint8, (h, w)
+        Grey images.
+    points : array, (n, 2)
+        Pixels in the first image.
+    halvings : int
+        How often the images are halved: a point is found over some 8 pixels at the top level.
+
+    Returns
+    -------
+    points, found
+        Pixels (n, 2), and which of them lead back to where they came from, (n,).
+    """
+    if not len(points):
+        return np.zeros((0, 2)), np.zeros(0, np.bool_)
+    begin = points.astype(np.float32)
+    there, found = _flow(before, after, begin, halvings)
+    back, found_back = _flow(after, before, there, halvings)
+    same = np.abs(back - begin).max(axis=1) < _THERE_AND_BACK
+    return there.astype(np.float64), found & found_back & same
+
+
+def _flow(
+    before: ByteArray, after: ByteArray, points: NDArray[np.float32], halvings: int
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    guess = points.copy()
+    there, found, _ = cv2.calcOpticalFlowPyrLK(
+        before, after, points, guess, winSize=_WINDOW, maxLevel=halvings
+    )
+    return np.asarray(there, np.float32), np.asarray(found).ravel() == 1
+
+
+@dataclass
+class _Points:
+    frame: int
+    start: FloatArray
+    now: FloatArray
+
+
+class PointTracker:
+    """Follows corners through the first images (Lucas and Kanade's method, in a pyramid).
+
+    Bouguet, Pyramidal implementation of the Lucas Kanade feature tracker, 2001; Shi and Tomasi,
+    Good features to track, 1994.
+
+    Parameters
+    ----------
+    every : int
+        New points are looked for in every so many images, and pairs are made of images so far
+        apart.
+    spans : int
+        Points are followed over so many of these distances.
+    n_points : int
+        Points looked for.
+    least : int
+        A pair needs so many of them.
+    """
+
+    def __init__(
+        self, *, every: int = 8, spans: int = 3, n_points: int = 200, least: int = 60
+    ) -> None:
+        self._every, self._spans = every, spans
+        self._n_points, self._least = n_points, least
+        self._previous: ByteArray | None = None
+        self._sets: list[_Points] = []
+        self._frame = 0
+
+    def add(self, grey: ByteArray, mask: ByteArray | None = None) -> list[TrackedPair]:
+        """Take the next image.
+
+        Parameters
+        ----------
+        grey : array of uint8, (h, w)
+            The image.
+        mask : array of uint8, (h, w), optional
+            No point begins where it is 0.
+
+        Returns
+        -------
+        list of TrackedPair
+            Pairs that end with this image.
+        """
+        if self._previous is not None and self._sets:
+            self._follow(self._previous, grey)
+        pairs = list(self._pairs())
+        if self._frame % self._every == 0:
+            start = find_corners(grey, self._n_points, mask)
+            if len(start):
+                self._sets.append(_Points(self._frame, start, start.copy()))
+        self._previous = grey
+        self._frame += 1
+        return pairs
+
+    def _follow(self, before: ByteArray, grey: ByteArray) -> None:
+        now = np.concatenate([points.now for points in self._sets])
+        there, good = follow_points(before, grey, now, halvings=_HALVINGS)
+        begin = 0
+        kept = []
+        for points in self._sets:
+            part = slice(begin, begin + len(points.now))
+            begin = part.stop
+            points.start = points.start[good[part]]
+            points.now = there[part][good[part]]
+            if len(points.now) >= self._least:
+                kept.append(points)
+        self._sets = kept
+
+    def _pairs(self) -> Iterator[TrackedPair]:
+        for points in list(self._sets):
+            age = self._frame - points.frame
+            if age and age % self._every == 0:
+                yield TrackedPair(points.start, points.now, (points.frame, self._frame))
+            if age == self._every * self._spans:
+                self._sets.remove(points)

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a person is told about a map."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import datetime, timezone
+from pathlib import Path
+
+import numpy as np
+
+from orbslam2py._arrays import FloatArray
+from orbslam2py.maps import MapContents, SavedMap, reprojection_errors
+from orbslam2py.maps.units import unit_of
+
+#: Time stamps above are seconds since 1970, as a date is easier to read (1990).
+_CLOCK_TIME = 631152000.0
+
+
+def describe_map(saved: SavedMap, file: Path) -> Iterator[tuple[str, str]]:
+    """Names and values, line by line."""
+    contents, settings = saved.contents, saved.settings
+    keyframes, camera, unit = contents.keyframes, settings.camera, unit_of(contents)
+    words = saved.vocabulary
+    yield "file", f"{file} ({file.stat().st_size / 1e6:.2f} MB)"
+    size = f", {contents.cameras.width[0]} x {contents.cameras.height[0]}"
+    yield "camera", f"{saved.sensor}{size}, fx {camera.fx:g}"
+    yield "vocabulary", f"{words.hash}{f' ({words.name})' if words.name else ''}"
+    yield "keyframes", f"{len(keyframes)} ({len(contents.removed_keyframes)} were culled)"
+    yield "points", str(len(contents.points))
+    yield "observations", f"{len(contents.observations)}{_per_point(contents)}"
+    errors = reprojection_errors(contents)
+    if len(errors):
+        yield "reprojection error", f"median {np.median(errors):.2f} px"
+    yield "loops", str(len(contents.loop_edges))
+    yield "times", _times(keyframes.timestamps)
+    path = keyframes.T_wc[:, :3, 3]
+    length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+    yield "path", f"{length:.2f} {unit} from keyframe to keyframe"
+    yield "cameras stood in", _box(path, unit)
+    yield "colours", f"of {int(keyframes.has_colours.sum())} keyframes"
+    yield "images", f"of {len(saved.images)} keyframes"
+    for number, run in enumerate(saved.runs):
+        frames = f"{len(run.frames)} frames, {int((run.frames.lost != 0).sum())} of them lost"
+        yield f"run {number}", f"{run.started}, {run.program}, {frames}"
+
+
+def _per_point(contents: MapContents) -> str:
+    if not len(contents.points):
+        return ""
+    return f", {len(contents.observations) / len(contents.points):.1f} per point"
+
+
+def _times(timestamps: FloatArray) -> str:
+    first, last = float(timestamps.min()), float(timestamps.max())
+    text = f"{first:.3f} to {last:.3f} s ({last - first:.1f} s)"
+    if first < _CLOCK_TIME:
+        return text
+    day = datetime.fromtimestamp(first, timezone.utc)
+    return f"{text}, from {day:%Y-%m-%d %H:%M:%S} UTC"
+
+
+def _box(positions: FloatArray, unit: str) -> str:
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    # Adding 0.0 turns a negative zero, which says nothing, into a plain one.
+    least, most = (",".join(f"{round(x, 3) + 0.0:g}" for x in corner) for corner in (low, high))
+    return f"{least} to {most} {unit}"

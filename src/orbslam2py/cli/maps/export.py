@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``orbslam2py map export``: maps for other programs."""
+
+from __future__ import annotations
+
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import cv2
+import numpy as np
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+from orbslam2py._arrays import ByteArray
+from orbslam2py.cli.calibrate import Force, Quiet, check_target
+from orbslam2py.cli.display import log_to
+from orbslam2py.datasets import open_input
+from orbslam2py.errors import DatasetError
+from orbslam2py.maps import (
+    ImageOfKeyframe,
+    SavedMap,
+    export_colmap,
+    export_g2o,
+    export_nerfstudio,
+    export_points,
+    export_trajectory,
+    images_of,
+    keyframe_path,
+    load_map,
+    with_colours,
+)
+from orbslam2py.runs.feeds import is_sequence
+from orbslam2py.trajectory import Trajectory
+
+
+class ExportFormat(str, Enum):
+    """What a map can be exported as."""
+
+    COLMAP = "colmap"
+    COLMAP_TEXT = "colmap-text"
+    NERFSTUDIO = "nerfstudio"
+    PLY = "ply"
+    PCD = "pcd"
+    G2O = "g2o"
+    TUM = "tum"
+    KITTI = "kitti"
+    EUROC = "euroc"
+
+    def __str__(self) -> str:
+        return self.value
+
+
+_FOLDERS = (ExportFormat.COLMAP, ExportFormat.COLMAP_TEXT, ExportFormat.NERFSTUDIO)
+_POINTS = (ExportFormat.PLY, ExportFormat.PCD)
+_PATHS = (ExportFormat.TUM, ExportFormat.KITTI, ExportFormat.EUROC)
+
+
+def export(
+    file_format: Annotated[
+        ExportFormat,
+        typer.Argument(
+            metavar="FORMAT",
+            help="colmap, colmap-text or nerfstudio (a folder); ply or pcd (points); g2o (graph of "
+            "the keyframes); tum, kitti or euroc (path of the keyframes).",
+        ),
+    ],
+    file: Annotated[Path, typer.Argument(help="Map file.")],
+    output: Annotated[Path, typer.Argument(help="Folder or file to write.")],
+    images: Annotated[
+        str | None,
+        typer.Option(
+            help="The sequence that the map was made of: its images are written undistorted, or "
+            "give the points their colours [the images in the map file].",
+            metavar="SEQUENCE",
+        ),
+    ] = None,
+    fps: Annotated[float | None, typer.Option(help="Of --images, as the run was given it.")] = None,
+    times: Annotated[
+        Path | None, typer.Option(help="Of --images, as the run was given it.")
+    ] = None,
+    without_images: Annotated[
+        bool, typer.Option("--without-images", help="Use no images, also if the map file has some.")
+    ] = False,
+    frames: Annotated[
+        bool,
+        typer.Option(
+            "--frames", help="tum, kitti, euroc: all images of the last run, not only keyframes."
+        ),
+    ] = False,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write a map for another program: Gaussian splatting, NeRF, photogrammetry, viewers, tools."""
+    _refuse_what_does_nothing(file_format, images, fps, times, without_images, frames)
+    log_to(Console(stderr=True), quiet=quiet)
+    saved = load_map(file, images=images is None and not without_images)
+    if file_format not in _FOLDERS:
+        check_target(output, force=force)
+    console = Console(quiet=quiet, highlight=False, soft_wrap=True)
+    source = None if without_images else _image_source(saved, images, fps, times)
+    with _progress(console) as bar:
+        _write(saved, file_format, output, source, bar, frames=frames, force=force)
+    console.print(f"{_what(saved, file_format)} is in [bold]{escape(str(output))}[/]")
+    if source is None and file_format in _FOLDERS:
+        console.print("No images are beside it: give the sequence with --images to train on it.")
+
+
+def _refuse_what_does_nothing(
+    file_format: ExportFormat,
+    images: str | None,
+    fps: float | None,
+    times: Path | None,
+    without_images: bool,
+    frames: bool,
+) -> None:
+    if frames and file_format not in _PATHS:
+        raise DatasetError(f"--frames is for tum, kitti and euroc; {file_format} has keyframes")
+    if (images is not None or without_images) and file_format not in (*_FOLDERS, *_POINTS):
+        name = "--without-images" if images is None else "--images"
+        raise DatasetError(f"{name} has no meaning for {file_format}, which has none; leave it out")
+    if images is not None and without_images:
+        raise DatasetError("--images and --without-images exclude each other")
+    for name, value in (("--fps", fps), ("--times", times)):
+        if value is not None and images is None:
+            raise DatasetError(f"{name} says when --images were taken; give these as well")
+
+
+def _image_source(
+    saved: SavedMap, images: str | None, fps: float | None, times: Path | None
+) -> ImageOfKeyframe | None:
+    if images is not None:
+        sequence = open_input(images, saved.sensor, settings=saved.settings, fps=fps, times=times)
+        if not is_sequence(sequence):
+            raise DatasetError(f"--images {images} is a camera; give what it recorded")
+        return images_of(saved.contents, sequence)
+    return (lambda keyframe: _decoded(saved, keyframe)) if saved.images else None
+
+
+def _decoded(saved: SavedMap, keyframe: int) -> ByteArray | None:
+    """Grey image of a keyframe from the map file."""
+    if keyframe not in saved.images:
+        return None
+    content = np.frombuffer(saved.images[keyframe], np.uint8)
+    return np.asarray(cv2.imdecode(content, cv2.IMREAD_GRAYSCALE), np.uint8)
+
+
+def _write(
+    saved: SavedMap,
+    file_format: ExportFormat,
+    output: Path,
+    images: ImageOfKeyframe | None,
+    bar: Progress,
+    *,
+    frames: bool,
+    force: bool,
+) -> None:
+    contents = saved.contents
+    task = bar.add_task("images", total=len(contents.keyframes), visible=images is not None)
+
+    def show(done: int, total: int) -> None:
+        bar.update(task, completed=done, total=total)
+
+    if file_format is ExportFormat.NERFSTUDIO:
+        export_nerfstudio(contents, output, images=images, replace=force, progress=show)
+    elif file_format in _FOLDERS:
+        binary = file_format is ExportFormat.COLMAP
+        export_colmap(contents, output, images=images, binary=binary, replace=force, progress=show)
+    elif file_format in _POINTS:
+        coloured = contents if images is None else with_colours(contents, images)
+        export_points(coloured, output, str(file_format))
+    elif file_format is ExportFormat.G2O:
+        export_g2o(contents, output)
+    else:
+        path = frame_path(saved) if frames else keyframe_path(contents)
+        export_trajectory(path, output, str(file_format))
+
+
+def frame_path(saved: SavedMap) -> Trajectory:
+    """All images of the last run in the map's world.
+
+    Raises
+    ------
+    DatasetError
+        If the map has none.
+    """
+    path = saved.trajectory()
+    if path.lost.all():
+        raise DatasetError("the map has no frames of a run; leave --frames out for its keyframes")
+    T_w0 = saved.contents.keyframes.T_wc[0]
+    return Trajectory(path.timestamps, T_w0 @ path.T_wc, path.lost, path.indices)
+
+
+def _what(saved: SavedMap, file_format: ExportFormat) -> str:
+    contents = saved.contents
+    if file_format in _POINTS:
+        return f"A cloud of {len(contents.points)} points"
+    if file_format in _PATHS:
+        return "The path"
+    if file_format is ExportFormat.G2O:
+        return f"The graph of {len(contents.keyframes)} keyframes"
+    return f"The map of {len(contents.keyframes)} keyframes and {len(contents.points)} points"
+
+
+def _progress(console: Console) -> Progress:
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``orbslam2py view``: a run long past in the viewer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from orbslam2py.cli.display import log_to
+from orbslam2py.cli.viewing import ViewerHost, ViewerPort
+from orbslam2py.datasets import open_input
+from orbslam2py.errors import DatasetError
+from orbslam2py.runs.feeds import is_sequence
+
+
+def view(
+    folder: Annotated[Path, typer.Argument(help="Folder of the run.", metavar="RUN_FOLDER")] = Path(
+        "runs/latest"
+    ),
+    sequence: Annotated[
+        str | None,
+        typer.Option(
+            help="The sequence, video or folder that was run: its images are shown, too, and its "
+            "ground truth.",
+            metavar="SEQUENCE",
+        ),
+    ] = None,
+    viewer_port: ViewerPort = None,
+    viewer_host: ViewerHost = None,
+) -> None:
+    """Show a finished run in the browser, with a slider for the time, until Ctrl-C.
+
+    **Example**
+
+        orbslam2py view runs/06
+
+        orbslam2py view runs/06 --sequence dataset/sequences/06
+    """
+    from orbslam2py.viewer.live import announce, wait_for_interrupt  # noqa: PLC0415  # slow to load
+    from orbslam2py.viewer.replay import Replay, RunFolder  # noqa: PLC0415
+    from orbslam2py.viewer.server import LOOPBACK  # noqa: PLC0415
+
+    log_to(Console(stderr=True), quiet=False)
+    run = RunFolder.read(folder)
+    images = None
+    if sequence is not None:
+        opened = open_input(sequence, run.sensor, settings=str(folder / "settings.yaml"))
+        if not is_sequence(opened):
+            raise DatasetError("--sequence names a camera, whose images are gone; name a recording")
+        images = opened
+    replay = Replay(run, images, host=viewer_host or LOOPBACK, port=viewer_port)
+    try:
+        announce(replay.address, open_browser=True)
+        wait_for_interrupt()
+    finally:
+        replay.stop()

@@ -1,0 +1,273 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A part of a map: some keyframes, what they see, and a tree that spans them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbslam2py._arrays import FloatArray, IntArray
+from orbslam2py.errors import MapFileError
+from orbslam2py.maps.contents import (
+    Covisibility,
+    Keyframes,
+    MapContents,
+    Observations,
+    RemovedKeyframes,
+)
+from orbslam2py.maps.edits.spanning_tree import count_covisibility, spanning_parents
+
+BoolArray = NDArray[np.bool_]
+
+#: A point that loses an observation is dropped with so much weight or less (2 with depth, 1 else),
+#: as in `erase_observation` of ``src/cpp/map/map_points.cpp``.
+_DYING_COUNT = 2
+
+
+def crop_to_times(contents: MapContents, begin: float, end: float) -> MapContents:
+    """Keep the keyframes of a span of time, and what they see (`keep_keyframes`).
+
+    Parameters
+    ----------
+    contents
+        The map.
+    begin, end
+        Time stamps [s], both included.
+
+    Raises
+    ------
+    MapFileError
+        If no keyframe is left.
+    """
+    return keep_keyframes(contents, keyframes_of_times(contents, begin, end))
+
+
+def keyframes_of_times(contents: MapContents, begin: float, end: float) -> BoolArray:
+    """Which keyframes, bool (k,), are of a span of time; see `crop_to_times`."""
+    times = contents.keyframes.timestamps
+    kept = (times >= begin) & (times <= end)
+    if not kept.any():
+        first, last = times.min(initial=np.inf), times.max(initial=-np.inf)
+        raise MapFileError(
+            f"nothing of the map is left: no keyframe is of {begin:.6f} to {end:.6f} s; they are "
+            f"of {first:.6f} to {last:.6f} s"
+        )
+    return np.asarray(kept)
+
+
+def crop_to_box(
+    contents: MapContents, low: FloatArray, high: FloatArray, *, points_too: bool = False
+) -> MapContents:
+    """Keep the keyframes whose cameras stood in a box, and what they see (`keep_keyframes`).
+
+    Parameters
+    ----------
+    contents
+        The map.
+    low, high
+        Corners (3,) of the box in the map's world, both included.
+    points_too
+        Drop points that lie outside of the box as well.
+
+    Raises
+    ------
+    MapFileError
+        If no keyframe is left.
+    """
+    kept = keyframes_in_box(contents, low, high)
+    points = inside_box(contents.points.positions, low, high) if points_too else None
+    return keep_keyframes(contents, kept, points)
+
+
+def keyframes_in_box(contents: MapContents, low: FloatArray, high: FloatArray) -> BoolArray:
+    """Which keyframes, bool (k,), stood in a box; see `crop_to_box`."""
+    centres = contents.keyframes.T_wc[:, :3, 3]
+    kept = inside_box(centres, low, high)
+    if not kept.any():
+        raise MapFileError(
+            f"nothing of the map is left: no camera stood in the box from {_corner(low)} to "
+            f"{_corner(high)}; they stood in {_corner(centres.min(axis=0))} to "
+            f"{_corner(centres.max(axis=0))}"
+        )
+    return kept
+
+
+def inside_box(positions: FloatArray, low: FloatArray, high: FloatArray) -> BoolArray:
+    """Which positions (n, 3) lie in a box, its faces included; bool (n,)."""
+    return np.asarray(np.all((positions >= low) & (positions <= high), axis=1))
+
+
+def keep_keyframes(
+    contents: MapContents, kept: BoolArray, kept_points: BoolArray | None = None
+) -> MapContents:
+    """Keep some keyframes of a map, and what they see.
+
+    Points live by the map's own rule: one that has lost an observation needs more than one
+    observation with depth, or more than two without. Connections are counted anew; keyframes whose
+    parent went hang on their strongest neighbour. If keyframe 0 went, the first one that is left
+    takes its number, since it becomes the root. The world stays.
+
+    Parameters
+    ----------
+    contents
+        The map.
+    kept
+        Which keyframes, bool (k,), at least one.
+    kept_points
+        Which points may stay, bool (p,); all of them by default.
+
+    Returns
+    -------
+    MapContents
+        A map that fulfils all invariants if `contents` does.
+
+    Raises
+    ------
+    MapFileError
+        If no keyframe is kept.
+    """
+    if not kept.any():
+        raise MapFileError("nothing of the map is left; keep at least one keyframe")
+    stay = np.ones(len(contents.points), bool) if kept_points is None else kept_points
+    sightings = _surviving_observations(contents, kept, stay)
+    observations = Observations(
+        contents.observations.point[sightings],
+        contents.observations.keyframe[sightings],
+        contents.observations.keypoint[sightings],
+    )
+    keyframes = _select(contents.keyframes, kept)
+    covisibility = count_covisibility(observations, keyframes.ids)
+    parents, provisional = spanning_parents(keyframes, covisibility)
+    cropped = replace(
+        contents,
+        keyframes=replace(keyframes, parent=parents, provisional_parent=provisional),
+        removed_keyframes=_still_hanging(contents.removed_keyframes, keyframes.ids),
+        observations=observations,
+        covisibility=covisibility,
+        loop_edges=contents.loop_edges[np.isin(contents.loop_edges, keyframes.ids).all(axis=1)],
+    )
+    cropped = _select_points(cropped, np.isin(contents.points.ids, observations.point))
+    root = int(keyframes.ids[0])
+    return cropped if root == 0 else _renumbered(cropped, root)
+
+
+def _surviving_observations(
+    contents: MapContents, kept: BoolArray, kept_points: BoolArray
+) -> BoolArray:
+    """Which observations (o,) stay: of kept keyframes and of points that do not die of the loss."""
+    observations, keyframes = contents.observations, contents.keyframes
+    there = kept[np.searchsorted(keyframes.ids, observations.keyframe)]
+    row = np.searchsorted(contents.points.ids, observations.point)
+    weight = np.where(keyframes.depth[contents.observed_keypoints] > 0, 2, 1)
+    n = len(contents.points)
+    left = np.bincount(row[there], weight[there], n)
+    lost = np.bincount(row[~there], minlength=n) > 0
+    lives = kept_points & (left > np.where(lost, _DYING_COUNT, 0))
+    return np.asarray(there & lives[row])
+
+
+def _select(keyframes: Keyframes, kept: BoolArray) -> Keyframes:
+    counts = np.diff(keyframes.offsets)
+    keypoints = np.repeat(kept, counts)
+    arrays: dict[str, NDArray[Any]] = {}
+    for name, array in keyframes.arrays():
+        if name == "offsets":
+            arrays[name] = np.concatenate([[0], np.cumsum(counts[kept])]).astype(np.int64)
+        elif name in _OF_KEYPOINTS:
+            arrays[name] = array[keypoints] if len(array) else array
+        else:
+            arrays[name] = array[kept]
+    return Keyframes(**arrays)
+
+
+_OF_KEYPOINTS = {
+    *("keypoints", "raw_keypoints", "octave", "angle", "response", "descriptors", "depth"),
+    *("right_u", "colours"),
+}
+
+
+def _still_hanging(removed: RemovedKeyframes, living: IntArray) -> RemovedKeyframes:
+    """Those that were removed before and hang, however indirectly, on a keyframe that is kept."""
+    reached = np.isin(removed.parent, living)
+    while True:
+        more = reached | np.isin(removed.parent, removed.ids[reached])
+        if (more == reached).all():
+            break
+        reached = more
+    return RemovedKeyframes(**{name: array[reached] for name, array in removed.arrays()})
+
+
+def _select_points(contents: MapContents, kept: BoolArray) -> MapContents:
+    """Drop points; a point whose reference keyframe went refers to its first observer."""
+    observations = contents.observations
+    points = replace(
+        contents.points, **{name: array[kept] for name, array in contents.points.arrays()}
+    )
+    first = observations.keyframe[np.searchsorted(observations.point, points.ids)]
+    referred = np.isin(points.reference_keyframe, contents.keyframes.ids)
+    reference = np.where(referred, points.reference_keyframe, first)
+    points = replace(points, reference_keyframe=reference)
+    return refresh_distances(replace(contents, points=points), ~referred)
+
+
+def refresh_distances(contents: MapContents, which: BoolArray) -> MapContents:
+    """Work the range of distances of some points out anew, from their reference keyframes.
+
+    Raul Mur-Artal et al., "ORB-SLAM", 2015, section III-C; ``docs/method/map.md#map-points``.
+
+    Parameters
+    ----------
+    contents
+        The map.
+    which
+        Which points, bool (p,).
+    """
+    points, keyframes, observations = contents.points, contents.keyframes, contents.observations
+    if not which.any():
+        return contents
+    row = np.searchsorted(points.ids, observations.point)
+    seen = np.flatnonzero(which[row] & (observations.keyframe == points.reference_keyframe[row]))
+    row = row[seen]
+    seer = np.searchsorted(keyframes.ids, observations.keyframe[seen])
+    distance = np.linalg.norm(points.positions[row] - keyframes.T_wc[seer, :3, 3], axis=1)
+    camera = keyframes.camera[seer]
+    factor = contents.cameras.scale_factor[camera].astype(np.float64)
+    level = keyframes.octave[contents.observed_keypoints[seen]]
+    farthest, nearest = points.max_distance.copy(), points.min_distance.copy()
+    farthest[row] = distance * factor**level
+    nearest[row] = farthest[row] / factor ** (contents.cameras.n_levels[camera] - 1)
+    return replace(contents, points=replace(points, min_distance=nearest, max_distance=farthest))
+
+
+def _renumbered(contents: MapContents, root: int) -> MapContents:
+    """Give the keyframe with the lowest id the number 0, which the root has."""
+
+    def new(ids: IntArray) -> IntArray:
+        return np.where(ids == root, 0, ids)
+
+    keyframes, points, edges = contents.keyframes, contents.points, contents.covisibility
+    # Points that the old keyframe 0 made were not made by the new one.
+    reference = new(points.reference_keyframe)
+    made_by_old = points.first_keyframe == 0
+    return replace(
+        contents,
+        keyframes=replace(keyframes, ids=new(keyframes.ids), parent=new(keyframes.parent)),
+        removed_keyframes=replace(
+            contents.removed_keyframes, parent=new(contents.removed_keyframes.parent)
+        ),
+        points=replace(
+            points,
+            reference_keyframe=reference,
+            first_keyframe=np.where(made_by_old, reference, new(points.first_keyframe)),
+        ),
+        observations=replace(contents.observations, keyframe=new(contents.observations.keyframe)),
+        covisibility=Covisibility(new(edges.a), new(edges.b), edges.weight),
+        loop_edges=new(contents.loop_edges),
+    )
+
+
+def _corner(position: FloatArray) -> str:
+    return "(" + ", ".join(f"{value:g}" for value in position) + ")"

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where a map is in a world that is known otherwise: by a true path, by points, by a length."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from orbslam2py._arrays import FloatArray
+from orbslam2py.errors import MapFileError
+from orbslam2py.maps.contents import MapContents
+from orbslam2py.maps.units import unit_of
+from orbslam2py.trajectory import MAX_DIFFERENCE, Similarity, Trajectory, align, associate
+
+#: Fewest positions that tell how a map lies.
+_FEWEST = 3
+
+#: Positions lie on a line, as far as can be told, if they spread so much less across it.
+_THIN = 1e-3
+
+#: Positions that are nearer than this are one.
+_SAME_PLACE = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """How a map comes into another world; `transform_map` takes it there.
+
+    Attributes
+    ----------
+    similarity
+        From the map's world to the other; its scale is 1 for a map that sees metres.
+    n_pairs
+        Positions that told it.
+    rmse
+        Of the distances that are left between them [m]; 0 where a length alone told it.
+    on_a_line
+        The positions lie on a line: the turn around it is not known, and was chosen small.
+    """
+
+    similarity: Similarity
+    n_pairs: int
+    rmse: float
+    on_a_line: bool
+
+
+def place_by_trajectory(
+    contents: MapContents, truth: Trajectory, *, max_difference: float = MAX_DIFFERENCE
+) -> Placement:
+    """Lay the keyframes on the true poses of the same times (Umeyama, PAMI 1991).
+
+    Parameters
+    ----------
+    contents
+        The map; its unit is fitted as well if it is that of a single camera.
+    truth
+        Poses of the camera; only positions count.
+    max_difference
+        Of time stamps that belong together [s].
+
+    Raises
+    ------
+    MapFileError
+        If fewer than three keyframes have a true pose at their time, or all stood at one place.
+    """
+    keyframes = contents.keyframes
+    there = truth.select(~truth.lost)
+    rows, poses = associate(keyframes.timestamps, there.timestamps, max_difference)
+    if len(rows) < _FEWEST:
+        raise MapFileError(
+            f"only {len(rows)} of {len(keyframes)} keyframes have a true pose within "
+            f"{max_difference:g} s, and it takes {_FEWEST}; give the truth of the sequence that "
+            "the map was made of"
+        )
+    return place_by_points(contents, keyframes.T_wc[rows, :3, 3], there.positions[poses])
+
+
+def place_by_points(contents: MapContents, positions: FloatArray, known: FloatArray) -> Placement:
+    """Lay positions in the map on where they are known to be (Umeyama, PAMI 1991).
+
+    Parameters
+    ----------
+    contents
+        The map; its unit is fitted as well if it is that of a single camera.
+    positions
+        In the map's world, (m, 3), at least three.
+    known
+        The same places in the other world, (m, 3).
+
+    Raises
+    ------
+    MapFileError
+        If there are fewer than three, or all are at one place.
+    """
+    if len(positions) < _FEWEST:
+        raise MapFileError(
+            f"{len(positions)} known points do not tell how the map lies; give at least {_FEWEST}, "
+            "not on one line"
+        )
+    spreads = [_spread(places) for places in (positions, known)]
+    if min(spread[0] for spread in spreads) < _SAME_PLACE:
+        raise MapFileError("the known points are all at one place; give some that are apart")
+    similarity = align(positions, known, with_scale=unit_of(contents) != "m")
+    left = np.linalg.norm(similarity.apply(positions) - known, axis=1)
+    return Placement(
+        similarity=similarity,
+        n_pairs=len(positions),
+        rmse=float(np.sqrt(np.mean(left**2))),
+        on_a_line=any(spread[1] < _THIN * spread[0] for spread in spreads),
+    )
+
+
+def place_by_length(
+    contents: MapContents, first: FloatArray, second: FloatArray, metres: float
+) -> Placement:
+    """Give the map of a single camera metres: two places in it are so far apart.
+
+    Parameters
+    ----------
+    contents
+        The map.
+    first, second
+        Positions in the map's world, (3,).
+    metres
+        Their distance.
+
+    Raises
+    ------
+    MapFileError
+        If the map has metres already, the places are one, or the length is not above 0.
+    """
+    if unit_of(contents) == "m":
+        raise MapFileError(
+            "the map has metres already, from the baseline or the depth images; correct these in "
+            "the settings if its lengths are wrong"
+        )
+    if not (np.isfinite(metres) and metres > 0):
+        raise MapFileError(f"a length of {metres:g} m says nothing; give one above 0")
+    distance = float(np.linalg.norm(np.subtract(second, first)))
+    if distance < _SAME_PLACE:
+        raise MapFileError("both ends of the length are at one place; give two that are apart")
+    # Keyframe 0 stays where it is: the origin as a rule, so nothing moves but for the size.
+    scale = metres / distance
+    centre = contents.keyframes.T_wc[0, :3, 3]
+    return Placement(Similarity(scale, np.eye(3), (1 - scale) * centre), 2, 0.0, on_a_line=False)
+
+
+def _spread(positions: FloatArray) -> FloatArray:
+    """Standard deviations along the principal axes, descending."""
+    centred = positions - positions.mean(axis=0)
+    return np.asarray(np.linalg.svd(centred, compute_uv=False) / np.sqrt(len(positions)))

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A map moved into another world: turned, shifted, and scaled."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from orbslam2py.maps.contents import MapContents
+from orbslam2py.trajectory import Similarity
+from orbslam2py.trajectory.rotations import inverse_poses
+
+
+def transform_map(contents: MapContents, similarity: Similarity) -> MapContents:
+    """Move a map as a whole; everything in it that has a length or a direction follows.
+
+    With a scale other than 1, so do depths, the distances from which points are searched, the
+    baselines of cameras, and what frames that hang on keyframes are scaled by (`Keyframes.scale`).
+    Pixels stay what they are.
+
+    Parameters
+    ----------
+    contents
+        The map.
+    similarity
+        From the map's world to the new one. A map that sees metres (stereo, RGB-D) fits its camera
+        only with a scale of 1.
+
+    Returns
+    -------
+    MapContents
+        The same map in the new world; `similarity`'s inverse leads back but for rounding.
+    """
+    keyframes, points, cameras = contents.keyframes, contents.points, contents.cameras
+    scale = similarity.scale
+    moved = keyframes.with_poses(inverse_poses(similarity.apply_to_poses(keyframes.T_wc)))
+    known = keyframes.depth > 0
+    depth = np.where(known, scale * keyframes.depth, keyframes.depth).astype(np.float32)
+    return replace(
+        contents,
+        cameras=replace(cameras, bf=scale * cameras.bf),
+        keyframes=replace(moved, depth=depth, scale=scale * keyframes.scale),
+        points=replace(
+            points,
+            positions=similarity.apply(points.positions),
+            mean_directions=points.mean_directions @ similarity.R.T,
+            min_distance=scale * points.min_distance,
+            max_distance=scale * points.max_distance,
+        ),
+    )

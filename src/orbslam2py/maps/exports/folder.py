@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The folder of an export, and the images in it, without the lens' distortion."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from orbslam2py._arrays import ByteArray
+from orbslam2py._files import atomic_folder, atomic_write
+from orbslam2py.errors import DatasetError
+from orbslam2py.maps.contents import MapContents
+from orbslam2py.maps.exports.colours import ColourSampler
+from orbslam2py.maps.exports.images import ImageOfKeyframe, Progress, View, image_name
+
+
+@contextlib.contextmanager
+def export_folder(folder: str | Path, made_of: set[str], *, replace: bool) -> Iterator[Path]:
+    """Make the folder of an export; it appears only when everything was written.
+
+    Parameters
+    ----------
+    folder
+        Where to: new, empty, or with `replace` an earlier export.
+    made_of
+        What an export of this kind has in its folder; a folder with anything else is not replaced.
+    replace
+        Replace an earlier export.
+
+    Raises
+    ------
+    DatasetError
+        If there is something that must stay.
+    OSError
+        If it cannot be written.
+    """
+    folder = Path(folder)
+    if folder.exists() and not folder.is_dir():
+        raise DatasetError(f"{folder} is not a folder; give another one")
+    held = {path.name for path in folder.iterdir()} if folder.exists() else set()
+    if held and not replace:
+        raise DatasetError(
+            f"{folder} is not empty; give another folder, or ask for an earlier export to be "
+            "replaced (--force)"
+        )
+    if held - made_of:
+        raise DatasetError(
+            f"{folder} holds other files ({min(held - made_of)}), which would be lost; give "
+            "another folder"
+        )
+    with atomic_folder(folder) as made:
+        yield made
+
+
+def write_images(
+    contents: MapContents, folder: Path, images: ImageOfKeyframe, progress: Progress | None = None
+) -> tuple[list[View], MapContents]:
+    """Write the keyframes' images as PNG files, as a pinhole camera would see them.
+
+    The camera keeps its matrix; what a lens bends out of the image is cut off, and where it bends
+    in nothing, the image is black. Images of another size than the camera's (small copies) are
+    taken for scaled ones.
+
+    Parameters
+    ----------
+    contents
+        The map.
+    folder
+        Where to; made if it does not exist.
+    images
+        Where they come from; keyframes without one are left out.
+    progress
+        Called after every keyframe.
+
+    Returns
+    -------
+    views : list of View
+        One per image.
+    contents : MapContents
+        With colours from the images where there were none.
+
+    Raises
+    ------
+    DatasetError
+        If no keyframe has an image.
+    OSError
+        If one cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    views = []
+    sampler = ColourSampler(contents)
+    ids = contents.keyframes.ids.tolist()
+    for row, number in enumerate(ids):
+        image = images(number)
+        if image is not None:
+            sampler.look_at(row, image)
+            straight = _undistorted(contents, row, image)
+            _write_png(folder / image_name(number), straight)
+            height, width = image.shape[:2]
+            views.append(View(row, image_name(number), width, height, undistorted=True))
+        if progress is not None:
+            progress(row + 1, len(ids))
+    if not views:
+        raise DatasetError(
+            "no keyframe has an image; give the sequence that the map was made of, or leave the "
+            "images out"
+        )
+    return views, sampler.coloured()
+
+
+def _undistorted(contents: MapContents, row: int, image: ByteArray) -> ByteArray:
+    cameras, camera = contents.cameras, int(contents.keyframes.camera[row])
+    distortion = cameras.distortion[camera]
+    if not np.any(distortion):
+        return image
+    x = image.shape[1] / int(cameras.width[camera])
+    y = image.shape[0] / int(cameras.height[camera])
+    # Scaling an image moves the centre of a pixel: it stays at half a pixel from the edge.
+    K = np.array(
+        [
+            [x * cameras.fx[camera], 0.0, x * (cameras.cx[camera] + 0.5) - 0.5],
+            [0.0, y * cameras.fy[camera], y * (cameras.cy[camera] + 0.5) - 0.5],
+            [0.0, 0.0, 1.0],
+        ]
+    )
+    return np.asarray(cv2.undistort(image, K, distortion), np.uint8)
+
+
+def _write_png(path: Path, image: ByteArray) -> None:
+    shown = image if image.ndim == 2 else image[:, :, ::-1]
+    _, content = cv2.imencode(".png", shown)
+    with atomic_write(path, binary=True) as stream:
+        stream.write(content.tobytes())

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Images of keyframes: where they come from, and how an export shows them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from orbslam2py._arrays import ByteArray, FloatArray
+from orbslam2py.errors import DatasetError
+from orbslam2py.maps.contents import MapContents
+from orbslam2py.settings import Settings
+from orbslam2py.trajectory import associate
+
+#: Gives the image of a keyframe by its id, uint8 (h, w) grey or (h, w, 3) RGB; None: there is none.
+ImageOfKeyframe = Callable[[int], ByteArray | None]
+
+#: Called after every image with how many are done and how many there are.
+Progress = Callable[[int, int], None]
+
+#: Time stamps of a keyframe and of its image are the same text, read twice [s].
+_SAME_TIME = 1e-3
+
+
+class _HasImage(Protocol):
+    @property
+    def image(self) -> ByteArray: ...
+
+
+class ImageSequence(Protocol):
+    """What `images_of` takes: a sequence as from `orbslam2py.open_sequence`, or alike.
+
+    Attributes
+    ----------
+    settings
+        Tell the order of the colours (``camera.rgb``).
+    timestamps
+        Seconds, float64 (n,).
+    """
+
+    @property
+    def settings(self) -> Settings: ...  # noqa: D102
+    @property
+    def timestamps(self) -> FloatArray: ...  # noqa: D102
+
+    def load(self, index: int, /) -> _HasImage:
+        """Read (and rectify) a frame; its ``image`` is that of the only, left or colour camera."""
+        ...
+
+
+def images_of(contents: MapContents, sequence: ImageSequence) -> ImageOfKeyframe:
+    """Find the keyframes' images in the sequence that the map was made of, by their time stamps.
+
+    Parameters
+    ----------
+    contents
+        The map.
+    sequence
+        Opened for the same sensor, so that images of a pair are rectified as they were then.
+
+    Returns
+    -------
+    callable
+        ``image(keyframe_id)``: uint8 (h, w) or (h, w, 3) RGB; None for a keyframe of another time.
+
+    Raises
+    ------
+    DatasetError
+        If no keyframe's time stamp is in the sequence.
+    """
+    keyframes = contents.keyframes
+    rows, indices = associate(keyframes.timestamps, sequence.timestamps, _SAME_TIME)
+    if not len(rows):
+        raise DatasetError(
+            "no image of the sequence has the time stamp of a keyframe (keyframes "
+            f"{_span(keyframes.timestamps)}, images {_span(sequence.timestamps)}); give the "
+            "sequence that the map was made of"
+        )
+    frames = dict(zip(keyframes.ids[rows].tolist(), indices.tolist(), strict=True))
+    to_rgb = not sequence.settings.camera.rgb
+
+    def image_of(keyframe_id: int) -> ByteArray | None:
+        index = frames.get(keyframe_id)
+        if index is None:
+            return None
+        image = sequence.load(index).image
+        if image.ndim == 2:
+            return image
+        return np.ascontiguousarray(image[:, :, 2::-1] if to_rgb else image[:, :, :3])
+
+    return image_of
+
+
+def _span(timestamps: FloatArray) -> str:
+    if not len(timestamps):
+        return "none"
+    return f"{timestamps[0]:.3f} to {timestamps[-1]:.3f} s"
+
+
+@dataclass(frozen=True)
+class View:
+    """A keyframe as an export shows it."""
+
+    row: int
+    """Of the keyframe in `Keyframes`."""
+    name: str
+    """File of its image, below the folder of images."""
+    width: int
+    """Of that image [px]."""
+    height: int
+    undistorted: bool
+    """The image shows what a pinhole camera sees; otherwise the lens distorts it."""
+
+
+def views_without_images(contents: MapContents, names: Mapping[int, str] | None) -> list[View]:
+    """Views of all keyframes on images that are elsewhere, as the camera took them.
+
+    Parameters
+    ----------
+    contents
+        The map.
+    names
+        Files by keyframe id; by default ``keyframe_000012.png`` and so on.
+    """
+    keyframes, cameras = contents.keyframes, contents.cameras
+    distorts = np.any(cameras.distortion != 0, axis=1)
+    return [
+        View(
+            row,
+            image_name(number) if names is None else names[number],
+            int(cameras.width[camera]),
+            int(cameras.height[camera]),
+            not distorts[camera],
+        )
+        for row, (number, camera) in enumerate(
+            zip(keyframes.ids.tolist(), keyframes.camera.tolist(), strict=True)
+        )
+        if names is None or number in names
+    ]
+
+
+def image_name(keyframe_id: int) -> str:
+    """Name of the file of a keyframe's image."""
+    return f"keyframe_{keyframe_id:06d}.png"
+
+
+def pixel_scale(contents: MapContents, view: View) -> tuple[float, float]:
+    """Pixels of a view's image per pixel of the camera, in x and y."""
+    camera = int(contents.keyframes.camera[view.row])
+    cameras = contents.cameras
+    return view.width / int(cameras.width[camera]), view.height / int(cameras.height[camera])

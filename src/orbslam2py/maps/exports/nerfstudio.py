@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Maps as data for nerfstudio, which trains radiance fields and splats."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orbslam2py._arrays import FloatArray
+from orbslam2py._files import atomic_write
+from orbslam2py.maps.contents import Cameras, MapContents
+from orbslam2py.maps.exports.folder import export_folder, write_images
+from orbslam2py.maps.exports.images import (
+    ImageOfKeyframe,
+    Progress,
+    View,
+    pixel_scale,
+    views_without_images,
+)
+from orbslam2py.maps.ply import write_ply
+from orbslam2py.maps.units import unit_of
+
+#: From the map's world (y down) to one whose z points up; the same transform that nerfstudio
+#: applies to models of COLMAP.
+_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0, 0, 0, 1]])
+
+#: From OpenGL's camera (y up, looking along -z) to OpenCV's (y down, looking along +z).
+_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
+
+_POINTS = "sparse_pc.ply"
+
+
+def export_nerfstudio(
+    contents: MapContents,
+    folder: str | Path,
+    *,
+    images: ImageOfKeyframe | None = None,
+    image_names: Mapping[int, str] | None = None,
+    replace: bool = False,
+    progress: Progress | None = None,
+) -> None:
+    """Write a map as ``transforms.json`` with its points in ``sparse_pc.ply``, and ``images``.
+
+    ``transform_matrix`` maps the camera in OpenGL's axes (x right, y up, looking along -z) to a
+    world whose z points up; ``applied_transform`` is what turned the map's world into that one. The
+    centre of the top-left pixel is (0.5, 0.5), half a pixel more than here (M. Tancik et al.,
+    "Nerfstudio", SIGGRAPH 2023; "Data conventions" in its documentation).
+
+    Parameters
+    ----------
+    contents
+        The map; the unit of length stays (one camera: the map's own).
+    folder
+        Where to: new, empty, or with `replace` an earlier export.
+    images
+        Where the keyframes' images come from (`images_of`): they are written without the lens'
+        distortion; keyframes without one are left out. Without `images` none are written, and the
+        cameras are those that took them, with the lens' coefficients.
+    image_names
+        Paths, absolute or below the folder, of images that are elsewhere, by keyframe id, where
+        `images` is not given; keyframes without one are left out.
+    replace
+        Replace an earlier export.
+    progress
+        ``progress(done, total)`` after every image.
+
+    Raises
+    ------
+    DatasetError
+        If the folder holds something that must stay, or no keyframe has an image.
+    OSError
+        If something cannot be written; what was there is kept then.
+    """
+    with export_folder(folder, {"transforms.json", _POINTS, "images"}, replace=replace) as made:
+        if images is None:
+            views = views_without_images(contents, image_names)
+            below = "" if image_names is not None else "images/"
+        else:
+            views, contents = write_images(contents, made / "images", images, progress)
+            below = "images/"
+        with atomic_write(made / "transforms.json") as stream:
+            stream.write(json.dumps(_transforms(contents, views, below), indent=2) + "\n")
+        write_ply(
+            made / _POINTS,
+            contents.points.positions @ _UP[:3, :3].T,
+            colours=contents.point_colours(),
+            unit=unit_of(contents),
+            frame="world of transforms.json: z up",
+        )
+
+
+def _transforms(contents: MapContents, views: list[View], below: str) -> dict[str, Any]:
+    poses = camera_to_world(contents.keyframes.T_wc)
+    frames: list[dict[str, Any]] = []
+    cameras = [_camera(contents, view) for view in views]
+    # What all images share stands once, as in files of a single camera.
+    shared = cameras[0] if all(camera == cameras[0] for camera in cameras) else {}
+    for view, camera in zip(views, cameras, strict=True):
+        frame = {
+            "file_path": f"{below}{view.name}",
+            "transform_matrix": poses[view.row].tolist(),
+            "colmap_im_id": int(contents.keyframes.ids[view.row]) + 1,
+        }
+        frames.append(frame if shared else camera | frame)
+    return {
+        "camera_model": "OPENCV",
+        **shared,
+        "ply_file_path": _POINTS,
+        "applied_transform": _UP[:3].tolist(),
+        "frames": frames,
+    }
+
+
+def camera_to_world(T_wc: FloatArray) -> FloatArray:
+    """Turn poses (k, 4, 4) of OpenCV's cameras into nerfstudio's, in the world whose z is up."""
+    return np.asarray(_UP @ T_wc @ _OPENGL)
+
+
+def _camera(contents: MapContents, view: View) -> dict[str, float]:
+    cameras: Cameras = contents.cameras
+    row = int(contents.keyframes.camera[view.row])
+    sx, sy = pixel_scale(contents, view)
+    lens = np.zeros(5) if view.undistorted else cameras.distortion[row]
+    k1, k2, p1, p2, k3 = lens.tolist()
+    return {
+        "w": view.width,
+        "h": view.height,
+        "fl_x": float(sx * cameras.fx[row]),
+        "fl_y": float(sy * cameras.fy[row]),
+        "cx": float(sx * (cameras.cx[row] + 0.5)),
+        "cy": float(sy * (cameras.cy[row] + 0.5)),
+        "k1": k1,
+        "k2": k2,
+        "k3": k3,
+        "p1": p1,
+        "p2": p2,
+    }

@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The map's points as a cloud, PLY or PCD."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from orbslam2py.errors import MapFileError
+from orbslam2py.maps.contents import MapContents
+from orbslam2py.maps.pcd import write_pcd
+from orbslam2py.maps.ply import write_ply
+from orbslam2py.maps.units import unit_of
+
+
+def export_points(contents: MapContents, path: str | Path, file_format: str | None = None) -> None:
+    """Write the points in the map's world, coloured where the map has colours (`with_colours`).
+
+    Parameters
+    ----------
+    contents
+        The map.
+    path
+        The file; replaced only when everything was written.
+    file_format
+        ``ply`` or ``pcd``; by default what the name ends with.
+
+    Raises
+    ------
+    MapFileError
+        If the format is another, or not told.
+    OSError
+        If it cannot be written; an existing file is kept then.
+    """
+    path = Path(path)
+    writers = {"ply": write_ply, "pcd": write_pcd}
+    wanted = file_format or path.suffix.lower().lstrip(".")
+    if wanted not in writers:
+        raise MapFileError(f"{path} is no name for points; give one that ends with .ply or .pcd")
+    write = writers[wanted]
+    points = contents.points.positions
+    colours = contents.point_colours()
+    write(path, points, colours=colours, unit=unit_of(contents), frame="world of the map")

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The keyframes' way through the map's world as a trajectory file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from orbslam2py.errors import DatasetError
+from orbslam2py.maps.contents import MapContents
+from orbslam2py.trajectory import (
+    Trajectory,
+    TrajectoryFormat,
+    write_euroc,
+    write_kitti,
+    write_tum,
+)
+
+
+def keyframe_path(contents: MapContents) -> Trajectory:
+    """Return the keyframes' poses in the map's world, in the order of their ids."""
+    return Trajectory(contents.keyframes.timestamps, contents.keyframes.T_wc)
+
+
+def export_trajectory(
+    trajectory: Trajectory, path: str | Path, file_format: TrajectoryFormat | str
+) -> None:
+    """Write a trajectory in the format of TUM, KITTI or EuRoC.
+
+    Parameters
+    ----------
+    trajectory
+        Poses camera to world, such as `keyframe_path` gives. Lost ones are left out; KITTI's format
+        has no time stamps, so there one line belongs to each pose that is left.
+    path
+        The file; replaced only when everything was written.
+    file_format
+        One of `TrajectoryFormat`, or its name.
+
+    Raises
+    ------
+    DatasetError
+        For ``auto``, or what is no format.
+    OSError
+        If it cannot be written; an existing file is kept then.
+    """
+    kept = trajectory.select(~trajectory.lost)
+    kept = Trajectory(kept.timestamps, kept.T_wc)
+    file_format = TrajectoryFormat.of(file_format)
+    if file_format is TrajectoryFormat.TUM:
+        write_tum(path, kept)
+    elif file_format is TrajectoryFormat.KITTI:
+        write_kitti(path, kept)
+    elif file_format is TrajectoryFormat.EUROC:
+        write_euroc(path, kept)
+    else:
+        raise DatasetError("a file to be written needs a format: tum, kitti or euroc")

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Points of a map as a PCD file (Point Cloud Library)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from orbslam2py._arguments import array_of
+from orbslam2py._arrays import ByteArray, FloatArray
+from orbslam2py._files import atomic_write
+from orbslam2py.errors import DatasetError
+
+_FRAME = "camera frame of keyframe 0: x right, y down, z forward"
+
+_HEADER = """\
+# .PCD v0.7 - Point Cloud Data file format
+# {comment}
+VERSION 0.7
+FIELDS {fields}
+SIZE {fours}
+TYPE {types}
+COUNT {ones}
+WIDTH {n}
+HEIGHT 1
+VIEWPOINT 0 0 0 1 0 0 0
+POINTS {n}
+DATA binary
+"""
+
+
+def write_pcd(
+    path: str | Path,
+    points: FloatArray,
+    *,
+    colours: ByteArray | None = None,
+    unit: str = "m",
+    frame: str = _FRAME,
+) -> None:
+    """Write points as a binary PCD file, version 0.7, an unordered cloud.
+
+    The colour is the field ``rgb`` as the Point Cloud Library packs it: 0x00RRGGBB in the bits of a
+    float32 (R. B. Rusu, S. Cousins, "3D is here: Point Cloud Library", ICRA 2011; "The PCD file
+    format" in its documentation).
+
+    Parameters
+    ----------
+    path
+        The file; replaced only when everything was written.
+    points
+        Positions (p, 3) in the frame of keyframe 0's camera; written as float32.
+    colours
+        Red, green and blue of every point, uint8 (p, 3); no such field if None.
+    unit
+        Of the positions, for the comment in the file.
+    frame
+        What the axes are, for the comment in the file.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written; an existing file is kept then.
+    DatasetError
+        If the points are no such array, or there is not one colour per point.
+    """
+    names = ["x", "y", "z"]
+    table = array_of(points, "points", (-1, 3), finite=False).astype("<f4")
+    if colours is not None:
+        if len(colours) != len(points):
+            raise DatasetError(
+                f"{len(points)} points, but {len(colours)} colours; give one per point"
+            )
+        names.append("rgb")
+        red, green, blue = colours.astype("<u4").reshape(-1, 3).T
+        packed = (red << 16 | green << 8 | blue).astype("<u4").view("<f4")
+        table = np.column_stack([table, packed])
+    count = len(names)
+    header = _HEADER.format(
+        comment=f"{frame} [{unit}]",
+        fields=" ".join(names),
+        fours=" ".join(["4"] * count),
+        types=" ".join(["F"] * count),
+        ones=" ".join(["1"] * count),
+        n=len(points),
+    )
+    with atomic_write(path, binary=True) as stream:
+        stream.write(header.encode())
+        stream.write(np.ascontiguousarray(table, "<f4").tobytes())

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Where the keyframes of a map should see its points, and where they did."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbslam2py._arrays import FloatArray, IntArray
+from orbslam2py.maps.contents import MapContents
+
+
+def reprojection_errors(contents: MapContents) -> FloatArray:
+    """Tell how far keypoints are from where their points are expected.
+
+    Returns
+    -------
+    array of float64 (o,)
+        Undistorted pixels, one per observation.
+    """
+    keyframes, observations = contents.keyframes, contents.observations
+    rows = np.searchsorted(keyframes.ids, observations.keyframe)
+    points = np.searchsorted(contents.points.ids, observations.point)
+    expected = project_points(contents, rows, points, np.zeros(len(rows), bool))
+    seen = keyframes.keypoints[contents.observed_keypoints]
+    return np.asarray(np.linalg.norm(expected - seen, axis=1))
+
+
+def project_points(
+    contents: MapContents, rows: IntArray, points: IntArray, bent: NDArray[np.bool_]
+) -> FloatArray:
+    """Tell where keyframes see points.
+
+    Parameters
+    ----------
+    contents
+        The map.
+    rows, points
+        Rows of keyframes and of points, (s,) each.
+    bent
+        Through the lens, with OpenCV's distortion, or as a pinhole camera; bool (s,).
+
+    Returns
+    -------
+    array of float64 (s, 2)
+        Pixels; the centre of the first is (0, 0).
+    """
+    keyframes, cameras = contents.keyframes, contents.cameras
+    T = keyframes.T_cw[rows]
+    X = np.einsum("sij,sj->si", T[:, :3, :3], contents.points.positions[points]) + T[:, :3, 3]
+    x, y = X[:, 0] / X[:, 2], X[:, 1] / X[:, 2]
+    camera = keyframes.camera[rows]
+    k1, k2, p1, p2, k3 = np.where(bent, cameras.distortion[camera].T, 0.0)
+    r2 = x * x + y * y
+    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    u = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
+    v = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
+    return np.stack(
+        [cameras.fx[camera] * u + cameras.cx[camera], cameras.fy[camera] * v + cameras.cy[camera]],
+        axis=1,
+    )

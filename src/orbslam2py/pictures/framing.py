@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which part of a plane is seen: a window that follows what grows in it, without a jump."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from orbslam2py._arrays import FloatArray
+
+#: What is to be seen stays this far from the border, relative to the window.
+_MARGIN = 0.04
+#: A new window has room for what comes next.
+_HEADROOM = 1.3
+#: A window this much too large is made smaller.
+_TOO_LARGE = 2.6
+#: How fast a window moves to where it is to be [1/s].
+_SPEED = 3.5
+#: The smallest window shows so much [world's unit].
+_SMALLEST = 0.2
+
+
+@dataclass(frozen=True)
+class Framing:
+    """A window to the plane, on its way to where it is to be.
+
+    Its state is (x and y of its middle, logarithm of the lengths that a pixel shows).
+    """
+
+    state: FloatArray
+    """(3,)"""
+    speed: FloatArray
+    """(3,) change of the state a second."""
+    goal: FloatArray
+    """(3,) the state that it moves to."""
+    size: tuple[int, int]
+    """Width and height of the picture [px]."""
+
+    @property
+    def unit_per_pixel(self) -> float:
+        """Length of the plane that a pixel shows."""
+        return float(np.exp(self.state[2]))
+
+    def to_pixels(self, places: npt.NDArray[np.floating]) -> FloatArray:
+        """Pixels (..., 2) of places (..., 2) in the plane, whose y goes up."""
+        middle = 0.5 * (np.array(self.size) - 1)
+        scale = np.array([1.0, -1.0]) / self.unit_per_pixel
+        return np.asarray((places - self.state[:2]) * scale + middle)
+
+    def shows(self, low: FloatArray, high: FloatArray, state: FloatArray | None = None) -> bool:
+        """Whether a box of the plane lies inside, and is not lost in it."""
+        x, y, log_scale = self.state if state is None else state
+        half = 0.5 * np.array(self.size) * np.exp(log_scale)
+        inside = np.abs(np.stack([low, high]) - (x, y)).max(axis=0) <= (1 - 2 * _MARGIN) * half
+        fitting = _fit(low, high, self.size)[2]
+        return bool(inside.all() and log_scale - fitting < np.log(_TOO_LARGE))
+
+    def follow(self, low: FloatArray, high: FloatArray, seconds: float) -> Framing:
+        """Move on for some time, so that a box of the plane stays in sight.
+
+        The way to the goal is that of a critically damped spring: it begins and ends softly.
+
+        Parameters
+        ----------
+        low, high : array of float64, (2,)
+            Corners of what is to be seen.
+        seconds : float
+            Time that passes.
+        """
+        goal = self.goal
+        if not self.shows(low, high, goal):
+            goal = _fit(low, high, self.size, _HEADROOM)
+        off = self.state - goal
+        decay = np.exp(-_SPEED * seconds)
+        pull = self.speed + _SPEED * off
+        unit = np.array([*(2 * [self.unit_per_pixel]), 1.0 / max(self.size)])
+        if (np.abs(off) + np.abs(self.speed) < 0.2 * unit).all():  # nobody sees the rest
+            return replace(self, state=goal, speed=np.zeros(3), goal=goal)
+        return replace(
+            self,
+            state=goal + (off + pull * seconds) * decay,
+            speed=(self.speed - _SPEED * pull * seconds) * decay,
+            goal=goal,
+        )
+
+
+def frame_all(low: FloatArray, high: FloatArray, size: tuple[int, int]) -> Framing:
+    """Make a window that shows a box of the plane, with some room around it.
+
+    Parameters
+    ----------
+    low, high : array of float64, (2,)
+        Corners of what is to be seen.
+    size : (int, int)
+        Width and height of the picture [px].
+    """
+    state = _fit(low, high, size, _HEADROOM)
+    return Framing(state=state, speed=np.zeros(3), goal=state, size=size)
+
+
+def _fit(
+    low: FloatArray, high: FloatArray, size: tuple[int, int], headroom: float = 1.0
+) -> FloatArray:
+    extent = np.maximum(high - low, _SMALLEST) / (1 - 2 * _MARGIN)
+    middle = 0.5 * (low + high)
+    return np.array([middle[0], middle[1], np.log(headroom * (extent / size).max())])

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Colours of everything that is drawn, as (red, green, blue).
+
+People with any kind of colour blindness tell them apart (after Okabe and Ito, "Color universal
+design", 2008, made brighter for a dark ground); what matters most differs in shape as well.
+"""
+
+from __future__ import annotations
+
+#: Red, green, blue, 0 to 255 each.
+Colour = tuple[int, int, int]
+
+GROUND: Colour = (15, 18, 23)
+PANEL: Colour = (24, 28, 35)
+FRAME: Colour = (52, 58, 68)
+TEXT: Colour = (232, 236, 241)
+FAINT_TEXT: Colour = (150, 158, 170)
+HALO: Colour = (8, 10, 12)
+
+#: Keypoints that are matched to the map, and the state in which there are such.
+MAPPED: Colour = (40, 224, 176)
+#: Keypoints of visual odometry, matched to the frame before only.
+VISUAL_ODOMETRY: Colour = (255, 170, 30)
+#: Keypoints that are matched to nothing.
+UNMATCHED: Colour = (150, 150, 158)
+#: Between the two views in which a single camera starts, and the state of waiting for a start.
+STARTING: Colour = (245, 228, 80)
+LOST: Colour = (244, 92, 44)
+#: Images that were not looked at.
+NOT_TRACKED: Colour = (96, 103, 114)
+
+POINTS: Colour = (214, 196, 160)
+COVISIBILITY: Colour = (58, 92, 118)
+KEYFRAME: Colour = (110, 186, 240)
+PATH: Colour = (240, 243, 247)
+#: The path as it was when the images came.
+ONLINE_PATH: Colour = (178, 150, 214)
+#: Points of the local map, which the present image is matched with.
+LOCAL_POINTS: Colour = (255, 122, 72)
+SPANNING_TREE: Colour = (86, 180, 233)
+CAMERA: Colour = MAPPED
+LOOP: Colour = (238, 140, 200)
+TRUTH: Colour = (120, 150, 40)
+NOW: Colour = (255, 255, 255)
+
+#: Stages of tracking, in plots.
+STAGE_COLOURS: dict[str, Colour] = {
+    "extract": (86, 180, 233),
+    "stereo": (0, 158, 115),
+    "predict": (240, 228, 66),
+    "local_map": (230, 159, 0),
+    "keyframe": (204, 121, 167),
+}

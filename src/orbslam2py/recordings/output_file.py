@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A file that grows for as long as a run takes, and appears when it is whole."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+import shutil
+from collections.abc import Iterable
+from pathlib import Path
+
+from orbslam2py._files import reason_of
+from orbslam2py.errors import OutputFileError
+
+#: So much is left free on a disk, for what else a run has to write [bytes].
+RESERVE = 32 * 2**20
+
+
+class OutputFile:
+    """A hidden file beside the one that it becomes.
+
+    The disk is never filled to the brim: the last part of such a file is what makes it readable.
+
+    Parameters
+    ----------
+    path : str or Path
+        What it becomes.
+    what : str
+        What messages call it: "video".
+    suffixes : iterable of str
+        Endings that the name may have, in lower case.
+
+    Attributes
+    ----------
+    path : Path
+        As given.
+    temporary : Path
+        Where to write.
+
+    Raises
+    ------
+    OutputFileError
+        If it can be told already that nothing will come of it.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], what: str, suffixes: Iterable[str]) -> None:
+        self.path = Path(path)
+        self._what = what
+        _check_name(self.path, what, list(suffixes))
+        target = Path(os.path.realpath(self.path))
+        _check_folder(self.path, target)
+        self._target = target
+        token = f"{os.getpid()}-{secrets.token_hex(4)}"
+        # Who writes it looks at the ending, so that one stays the last.
+        self.temporary = target.with_name(f".{target.stem}.{token}.tmp{target.suffix.lower()}")
+        self.require_room()
+
+    def require_room(self) -> None:
+        """See that there is room for more.
+
+        Raises
+        ------
+        OutputFileError
+            If the disk is all but full.
+        """
+        try:
+            free = shutil.disk_usage(self._target.parent).free
+        except OSError as error:
+            raise self.error(reason_of(error)) from error
+        if free < RESERVE:
+            raise self.error(
+                f"the disk is full but for {RESERVE // 2**20} MB that are left to the run's other "
+                "files; take a place with more room"
+            )
+
+    def error(self, why: str) -> OutputFileError:
+        """Make an error that names the file."""
+        return OutputFileError(f"cannot write the {self._what} {self.path}: {why}")
+
+    def publish(self) -> None:
+        """Give it its name; a file that was there is replaced.
+
+        Raises
+        ------
+        OutputFileError
+            If that cannot be done.
+        """
+        try:
+            self.temporary.replace(self._target)
+        except OSError as error:
+            raise self.error(reason_of(error)) from error
+
+    def discard(self) -> None:
+        """Remove what was written and has no name."""
+        with contextlib.suppress(OSError):
+            self.temporary.unlink()
+
+
+def _check_name(path: Path, what: str, suffixes: list[str]) -> None:
+    if path.suffix.lower() not in suffixes:
+        *others, last = suffixes
+        names = f"{', '.join(others)} or {last}" if others else last
+        raise OutputFileError(f"{path} does not end like a {what}; name it with {names}")
+    if path.is_dir():
+        raise OutputFileError(f"{path} is a folder; give the name of a file in it")
+
+
+def _check_folder(path: Path, target: Path) -> None:
+    folder = target.parent
+    if not folder.is_dir():
+        raise OutputFileError(f"there is no folder {path.parent} for {path.name}; make it first")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise OutputFileError(f"{path} cannot be written: no right to write into {path.parent}")

@@ -1,0 +1,324 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A recording of a run for Rerun's viewer, to be scrubbed through: images, map, plots, events."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from orbslam2py._arrays import ByteArray, FloatArray
+from orbslam2py.errors import OrbSlamError
+from orbslam2py.maps import MapChanges
+from orbslam2py.pictures.palette import (
+    COVISIBILITY,
+    KEYFRAME,
+    LOOP,
+    MAPPED,
+    PATH,
+    POINTS,
+    STARTING,
+    TRUTH,
+    UNMATCHED,
+    VISUAL_ODOMETRY,
+    Colour,
+)
+from orbslam2py.recordings.growing_map import GrowingMap
+from orbslam2py.recordings.output_file import OutputFile
+from orbslam2py.settings import Settings
+from orbslam2py.slam.events import (
+    Event,
+    KeyframeAdded,
+    LoopClosed,
+    MapChanged,
+    Relocalized,
+    TrackingLost,
+)
+from orbslam2py.slam.records import TrackingRecord
+from orbslam2py.trajectory import Trajectory
+from orbslam2py.viewer.paths import lay_truth
+from orbslam2py.viewer.watching import FrameView
+
+#: Points and keyframes with neighbouring ids are one entity, which is written when one changes.
+_POINT_PAGE, _KEYFRAME_PAGE = 4096, 64
+#: Seconds of the recording between two states of the map, and of what is as long as the run.
+_MAP_EVERY, _PATHS_EVERY = 0.25, 1.0
+_JPEG_QUALITY = 85
+#: Looks at the free space happen once in so many images.
+_LOOK = 8
+#: Half width, half height and depth of a camera's shape, relative to its size.
+_CORNERS = np.array([(-1, -0.75, 1.2), (1, -0.75, 1.2), (1, 0.75, 1.2), (-1, 0.75, 1.2)])
+
+
+class RerunRecorder:
+    """Writes all that can be seen of a run into a file for `Rerun <https://rerun.io>`_'s viewer.
+
+    Nothing is sent anywhere: the recording goes to the file alone. Needs
+    ``pip install "orbslam2py[rerun]"``.
+
+    Parameters
+    ----------
+    path : str or Path
+        Ends with ``.rrd``. The file appears when it is whole; one that was there is replaced.
+    settings : Settings, optional
+        For the shape of the camera.
+    ground_truth : Trajectory, optional
+        Laid beside the estimate as it grows.
+    with_scale : bool
+        The map has a unit of its own (a single camera): scale the truth to it.
+
+    Raises
+    ------
+    OrbSlamError
+        If Rerun is not installed.
+    OutputFileError
+        If it can be told already that there will be no file.
+    """
+
+    name = "the recording"
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        settings: Settings | None = None,
+        ground_truth: Trajectory | None = None,
+        with_scale: bool = False,
+    ) -> None:
+        self._rr = _import_rerun()
+        self._file = OutputFile(path, "recording", [".rrd"])
+        self._truth, self._with_scale = ground_truth, with_scale
+        self._map = GrowingMap()
+        self._stream = self._open(settings)
+        self._begin: float | None = None
+        self._now = 0.0
+        self._n_images = self._n_records = 0
+        self._closed = False
+        self._map_due = self._paths_due = 0.0
+        self._stale_points: set[int] = set()
+        self._stale_keyframes: set[int] = set()
+        self._last: tuple[str, str] = ("", "")
+
+    @property
+    def path(self) -> Path:
+        """Where it will be."""
+        return self._file.path
+
+    # ---- what is told ----------------------------------------------------------------------------
+    def on_map(self, changes: MapChanges) -> None:
+        """Take over what has changed; it is written a few times a second."""
+        if changes.restarted:
+            if self._n_records:
+                self._log("world/map", self._rr.Clear(recursive=True))
+            self._stale_points, self._stale_keyframes = set(), set()
+        self._map.apply(changes)
+        points = np.concatenate([changes.points_set.ids, changes.points_removed])
+        keyframes = np.concatenate([changes.keyframes_set.ids, changes.keyframes_removed])
+        self._stale_points.update(np.unique(points // _POINT_PAGE).tolist())
+        self._stale_keyframes.update(np.unique(keyframes // _KEYFRAME_PAGE).tolist())
+
+    def on_event(self, event: Event) -> None:
+        """Note what has happened."""
+        text, level = _in_words(event)
+        self._say(text, level)
+
+    def on_frame(self, view: FrameView) -> None:
+        """Write an image and what was found in it."""
+        for record in view.earlier:
+            self._take(record)
+        self._take(view.record)
+        if self._n_images % _LOOK == 0:
+            self._file.require_room()
+        self._n_images += 1
+        self._write_image(view)
+        if self._now >= self._map_due:
+            self._map_due = self._now + _MAP_EVERY
+            self._write_map()
+        if self._now >= self._paths_due:
+            self._paths_due = self._now + _PATHS_EVERY
+            self._write_paths()
+
+    def close(self) -> None:
+        """Finish the file; it appears under its name."""
+        if self._closed:
+            return
+        self._closed = True
+        try:
+            if self._n_images:
+                self._write_map()
+                self._write_paths()
+            self._stream.flush()
+            self._stream.disconnect()  # closes the file
+            if self._n_images:
+                self._file.publish()
+        finally:
+            self._file.discard()
+
+    # ---- to the file -----------------------------------------------------------------------------
+    def _open(self, settings: Settings | None) -> Any:
+        rr = self._rr
+        # Without properties: these would hold the moment, and make two recordings differ.
+        stream = rr.RecordingStream("orbslam2py", send_properties=False)
+        stream.save(self._file.temporary, default_blueprint=_layout())
+        stream.log("world", rr.ViewCoordinates.RDF, static=True)
+        if settings is not None:
+            camera = settings.camera
+            known = camera.width is not None and camera.height is not None
+            stream.log(
+                "world/camera/image",
+                rr.Pinhole(
+                    image_from_camera=camera.matrix,
+                    resolution=(camera.width, camera.height) if known else None,
+                    camera_xyz=rr.ViewCoordinates.RDF,
+                ),
+                static=True,
+            )
+        return stream
+
+    def _log(self, entity: str, what: object) -> None:
+        self._stream.log(entity, what)
+
+    def _take(self, record: TrackingRecord) -> None:
+        """Go on to the time of an image, and write its figures and its pose."""
+        rr = self._rr
+        if self._begin is None:
+            self._begin = record.timestamp
+        self._now = record.timestamp - self._begin
+        self._stream.set_time("time", duration=self._now)
+        self._stream.set_time("frame", sequence=self._n_records)
+        self._n_records += 1
+        self._map.add_frame(record)
+        self._log("plots/inliers", rr.Scalars(record.n_inliers))
+        self._log("plots/matches", rr.Scalars(record.n_matches))
+        for stage, took in record.milliseconds.items():
+            self._log(f"plots/milliseconds/{stage}", rr.Scalars(took))
+        if (record.state.name, str(record.reason)) != self._last:
+            self._last = (record.state.name, str(record.reason))
+            self._say(": ".join(part for part in self._last if part), "INFO")
+        if record.T_wc is not None:
+            T_wc = record.T_wc
+            pose = rr.Transform3D(translation=T_wc[:3, 3], mat3x3=T_wc[:3, :3])
+            self._log("world/camera", pose)
+
+    def _say(self, text: str, level: str) -> None:
+        self._log("events", self._rr.TextLog(text, level=level))
+
+    def _write_image(self, view: FrameView) -> None:
+        rr, pixels = self._rr, view.pixels
+        jpeg = rr.EncodedImage(contents=_as_jpeg(view.image), media_type="image/jpeg")
+        self._log("world/camera/image", jpeg)
+        kinds = {
+            "mapped": (view.matched, MAPPED, 3.0),
+            "visual_odometry": (view.visual_odometry, VISUAL_ODOMETRY, 3.0),
+            "unmatched": (~view.matched & ~view.visual_odometry, UNMATCHED, 1.0),
+        }
+        for name, (which, colour, radius) in kinds.items():
+            marks = rr.Points2D(pixels[which], colors=colour, radii=radius)
+            self._log(f"world/camera/image/keypoints/{name}", marks)
+        lines = np.zeros((0, 4)) if view.start_lines is None else view.start_lines
+        self._log(
+            "world/camera/image/start",
+            rr.LineStrips2D(lines.reshape(-1, 2, 2), colors=STARTING),
+        )
+        shown = self._map.picture(view.local_points, renew=False).local_points
+        self._log("world/map/local_points", rr.Points3D(shown, colors=MAPPED, radii=_px(2.5)))
+
+    def _write_map(self) -> None:
+        rr = self._rr
+        for page in sorted(self._stale_points):
+            points = self._map.points_between(page * _POINT_PAGE, (page + 1) * _POINT_PAGE)
+            drawn = rr.Points3D(points, colors=POINTS, radii=_px(1.5))
+            self._log(f"world/map/points/{page}", drawn)
+        size = self._camera_size()
+        for page in sorted(self._stale_keyframes):
+            T_wc = self._map.keyframes_between(page * _KEYFRAME_PAGE, (page + 1) * _KEYFRAME_PAGE)
+            self._lines(f"world/map/keyframes/{page}", _camera_shapes(T_wc, size), KEYFRAME, 1.0)
+        self._stale_points, self._stale_keyframes = set(), set()
+
+    def _write_paths(self) -> None:
+        scene = self._map.picture()
+        pieces = np.split(scene.path, np.flatnonzero(scene.path_gaps)) if len(scene.path) else []
+        self._lines("world/map/path", [piece for piece in pieces if len(piece)], PATH, 1.5)
+        self._lines("world/map/covisibility", list(scene.covisibility), COVISIBILITY, 0.5)
+        self._lines("world/map/loop_edges", list(scene.loop_edges), LOOP, 2.0)
+        if self._truth is not None:
+            laid = lay_truth(self._map.trajectory(), self._truth, with_scale=self._with_scale)
+            if laid is not None:
+                self._lines("world/map/ground_truth", [laid.positions], TRUTH, 1.5)
+
+    def _lines(self, entity: str, strips: list[FloatArray], colour: Colour, width: float) -> None:
+        lines = self._rr.LineStrips3D(strips, colors=colour, radii=_px(width))
+        self._log(entity, lines)
+
+    def _camera_size(self) -> float:
+        """Half width of a keyframe's shape: what looks right beside the path."""
+        T_wc = self._map.picture(renew=False).keyframes[:, :3, 3]
+        steps = np.linalg.norm(np.diff(T_wc, axis=0), axis=1)
+        return float(0.3 * np.median(steps)) if len(steps) else 0.05
+
+
+def _import_rerun() -> Any:
+    try:
+        import rerun as module  # noqa: PLC0415
+    except ImportError as error:
+        raise OrbSlamError('recording needs rerun: pip install "orbslam2py[rerun]"') from error
+    return module
+
+
+def _layout() -> object:
+    """Image, plots and events on the left, the map on the right."""
+    import rerun.blueprint as layout  # noqa: PLC0415
+
+    left = layout.Vertical(
+        layout.Spatial2DView(origin="world/camera/image", name="image"),
+        layout.TimeSeriesView(
+            contents=["plots/inliers", "plots/matches"], origin="plots", name="matches"
+        ),
+        layout.TimeSeriesView(origin="plots/milliseconds", name="milliseconds"),
+        layout.TextLogView(origin="events", name="events"),
+        row_shares=[4, 2, 2, 2],
+    )
+    right = layout.Spatial3DView(origin="world", name="map")
+    return layout.Blueprint(layout.Horizontal(left, right), collapse_panels=True)
+
+
+def _px(width: float) -> float:
+    """A radius in pixels of the screen: negative ones are such."""
+    return -width
+
+
+def _as_jpeg(image: ByteArray) -> bytes:
+    given = image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_RGB2BGR)
+    quality = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY]
+    return bytes(cv2.imencode(".jpg", given, quality)[1])
+
+
+def _camera_shapes(T_wc: npt.NDArray[np.floating], size: float) -> list[FloatArray]:
+    """One line a camera (9, 3), world, around what it sees."""
+    apex = np.zeros(3)
+    a, b, c, d = size * _CORNERS
+    corners = np.array([apex, a, b, apex, c, d, apex, b, c, d, a])
+    turned = np.einsum("kij,nj->kni", T_wc[:, :3, :3], corners)
+    return list(turned + T_wc[:, None, :3, 3])
+
+
+def _in_words(event: Event) -> tuple[str, str]:
+    """What has happened, and how much that matters."""
+    if isinstance(event, LoopClosed):
+        moved = f"{event.translation:.3g} and {event.rotation_deg:.2g} degrees"
+        pair = f"keyframe {event.current_keyframe} to {event.matched_keyframe}"
+        return f"loop closed, {pair}, {event.n_inliers} inliers, moved by {moved}", "WARN"
+    if isinstance(event, TrackingLost):
+        return f"lost: {event.reason}", "ERROR"
+    if isinstance(event, Relocalized):
+        return "found again", "WARN"
+    if isinstance(event, MapChanged):
+        return f"the map is another one: {event.cause}", "WARN"
+    if isinstance(event, KeyframeAdded):
+        size = f"{event.n_keyframes} keyframes, {event.n_map_points} points"
+        return f"keyframe {event.keyframe} mapped: {size}", "DEBUG"
+    return type(event).__name__, "INFO"

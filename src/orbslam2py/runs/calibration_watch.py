@@ -1,0 +1,256 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Whether a calibration fits the first images of a run; told once, and the run goes on."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import threading
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from orbslam2py import _core as core
+from orbslam2py._arrays import ByteArray
+from orbslam2py.calibration.data_misfit import find_data_misfit, find_pair_misfit
+from orbslam2py.calibration.pair_rows import PairRows, disparities_of, measure_rows
+from orbslam2py.calibration.self_calibration import CalibrationGains, calibration_gains
+from orbslam2py.calibration.tracks import PointTracker, TrackedPair
+from orbslam2py.calibration.two_views import PointPair, without_gross_errors
+from orbslam2py.datasets.base import Images
+from orbslam2py.errors import OrbSlamError
+from orbslam2py.settings.comparison import compare_calibrations
+from orbslam2py.settings.fit import FitThresholds, Misfit, find_misfit
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings.settings import Settings
+from orbslam2py.slam.frame_source import FrameSource, timed_images
+
+_log = logging.getLogger(__name__)
+
+#: Images that are looked at; every so many begins new points, and a pair's rows are measured.
+N_IMAGES, _EVERY, _N_ROWS = 49, 8, 3
+#: Pairs of images that decide: those with most motion, and so many points of each.
+_N_PAIRS, _N_POINTS = 8, 150
+#: Least median motion of a pair's points, in image widths: less tells nothing.
+_MOTION = 0.012
+_LEAST_POINTS = 60
+
+
+@dataclass(frozen=True)
+class _MovedPair:
+    motion: float
+    frames: tuple[int, int]
+    points: PointPair
+
+
+class CalibrationWatch:
+    """Looks at the first images of a run, after they were tracked, and warns once.
+
+    It takes images only and touches nothing of the system.
+
+    Parameters
+    ----------
+    settings : Settings
+        The calibration that is used.
+    sensor : Sensor
+        What the images come from.
+    known : Settings, optional
+        The calibration that comes with the images, if one does.
+    in_background : bool
+        Judge the points in a thread of its own, since the next image does not wait.
+    thresholds : FitThresholds, optional
+        The limits.
+
+    Attributes
+    ----------
+    rows : list of PairRows
+        What the first pairs of a stereo camera said.
+    gains : CalibrationGains or None
+        What the points said, when they have been judged.
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        sensor: Sensor,
+        *,
+        known: Settings | None = None,
+        in_background: bool = False,
+        thresholds: FitThresholds | None = None,
+    ) -> None:
+        self._settings, self._sensor, self._known = settings, sensor, known
+        self._limits = thresholds or FitThresholds()
+        self._tracker = PointTracker(every=_EVERY, least=_LEAST_POINTS)
+        self._in_background = in_background
+        self._thread: threading.Thread | None = None
+        self._n_seen = 0
+        self._size = (0, 0)
+        self._begun: dict[int, Images] = {}
+        self.rows: list[PairRows] = []
+        self.gains: CalibrationGains | None = None
+        self._pairs: list[_MovedPair] = []
+        self._misfit: Misfit | None = None
+        self._done = False
+
+    def look(self, images: Images) -> None:
+        """Take the next images of the run; they have been tracked, so they are good ones."""
+        if self._done:
+            return
+        if self._n_seen == 0:
+            self._size = images.image.shape[1], images.image.shape[0]
+            self._tell(self._misfit_of_size())
+        if not self._done:
+            self._follow(images)
+        self._n_seen += 1
+        if self._n_seen >= N_IMAGES and not self._done:
+            self._judge()
+
+    def finish(self) -> Misfit | None:
+        """Judge what there is, if fewer images came, and say what did not fit."""
+        if not self._done:
+            self._judge()
+        if self._thread is not None:
+            self._thread.join()
+        return self._misfit
+
+    def _misfit_of_size(self) -> Misfit | None:
+        if self._known is not None and self._known != self._settings:
+            misfit = compare_calibrations(self._settings, self._known, self._size, self._limits)
+            if misfit is not None:
+                return misfit
+        return find_misfit(self._settings, self._size, self._limits)
+
+    def _follow(self, images: Images) -> None:
+        grey = self._grey(images.image)
+        if self._n_seen % _EVERY == 0:
+            self._begun[self._n_seen] = images
+            self._measure_rows(grey, images)
+        for pair in self._tracker.add(grey, images.mask):
+            self._keep(pair)
+
+    def _grey(self, image: ByteArray) -> ByteArray:
+        return core.to_grey(image, self._settings.camera.rgb)
+
+    def _measure_rows(self, grey: ByteArray, images: Images) -> None:
+        if images.right is None or len(self.rows) == _N_ROWS:
+            return
+        rows = measure_rows(grey, self._grey(images.right))
+        if rows is not None:
+            self.rows.append(rows)
+        if len(self.rows) == _N_ROWS:
+            self._tell(find_pair_misfit(self.rows, self._limits))
+
+    def _keep(self, pair: TrackedPair) -> None:
+        motion = float(np.median(np.linalg.norm(pair.second - pair.first, axis=1)))
+        if motion < _MOTION * self._size[0]:
+            return
+        good = without_gross_errors(PointPair(pair.first, pair.second))
+        if good is not None and len(good.first) >= _LEAST_POINTS:
+            self._pairs.append(_MovedPair(motion, pair.frames, good))
+
+    def _judge(self) -> None:
+        self._done = True
+        if 0 < len(self.rows) < _N_ROWS:
+            self._tell(find_pair_misfit(self.rows, self._limits))
+        if self._misfit is not None or len(self._pairs) < self._limits.least_pairs:
+            return
+        if self._in_background:
+            self._thread = threading.Thread(target=self._judge_points, name="calibration watch")
+            self._thread.start()
+        else:
+            self._judge_points()
+
+    def _judge_points(self) -> None:
+        most = sorted(self._pairs, key=lambda pair: (-pair.motion, pair.frames))[:_N_PAIRS]
+        pairs = [self._with_depths(pair) for pair in most]
+        camera = self._settings.camera
+        self.gains = calibration_gains(camera, pairs)
+        self._tell(find_data_misfit(camera, pairs, self.gains, self._limits))
+        self._begun.clear()
+        self._pairs.clear()
+
+    def _with_depths(self, pair: _MovedPair) -> PointPair:
+        n = len(pair.points.first)
+        chosen = np.linspace(0, n - 1, min(n, _N_POINTS)).astype(np.int64)
+        first, second = pair.points.first[chosen], pair.points.second[chosen]
+        images = self._begun[pair.frames[0]]
+        if self._sensor is Sensor.RGBD and images.depth is not None:
+            height, width = images.depth.shape
+            columns, rows = np.rint(first).astype(np.int64).T
+            rows, columns = np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)
+            depths = np.nan_to_num(images.depth[rows, columns].astype(np.float64))
+            return PointPair(first, second, depths)
+        if self._sensor is Sensor.STEREO and images.right is not None:
+            found = disparities_of(self._grey(images.image), self._grey(images.right), first)
+            with np.errstate(divide="ignore"):
+                return PointPair(first, second, np.where(found > 0, 1.0 / found, 0.0))
+        return PointPair(first, second)
+
+    def _tell(self, misfit: Misfit | None) -> None:
+        if misfit is None or self._misfit is not None:
+            return
+        self._misfit, self._done = misfit, True
+        _log.warning("%s", misfit)
+
+
+def settings_beside(source: object) -> Settings | None:
+    """Return the calibration that comes with the images, whichever is used; None if none does."""
+    default = getattr(source, "default_settings", None)
+    if default is None:
+        return None
+    try:
+        settings: Settings = default()
+    except (OrbSlamError, OSError):
+        # What comes with the images is not asked for if the user has given something else.
+        return None
+    return settings
+
+
+def check_calibration(
+    source: FrameSource,
+    settings: Settings | None = None,
+    *,
+    thresholds: FitThresholds | None = None,
+) -> Misfit | None:
+    """Look at the first images of a sequence and judge whether a calibration fits them.
+
+    The same as `orbslam2py.run_sequence` does on the way: size and middle of the images, what is
+    known of the data set, the rows of a stereo pair, and whether another focal length or lens
+    explains better how the first 49 images move. Logs the misfit as a warning.
+
+    Parameters
+    ----------
+    source : sequence, or iterable of frames
+        As from `orbslam2py.open_sequence`, or whatever gives frames with a ``timestamp`` and
+        ``images``, consecutive ones.
+    settings : Settings, optional
+        The calibration; by default the source's own.
+
+    Returns
+    -------
+    Misfit or None
+        What was seen, its likely cause and the remedy, also as text; None if nothing speaks
+        against the calibration. That is no proof: a camera that moves straight on does not tell
+        its focal length.
+
+    Raises
+    ------
+    StateError
+        If the source was opened for another sensor than the settings are for.
+    DatasetError, ImageError
+        If images cannot be read.
+
+    Examples
+    --------
+    >>> sequence = orb.open_sequence("rgbd_dataset_freiburg1_desk", "rgbd")  # doctest: +SKIP
+    >>> print(orb.check_calibration(sequence, orb.Settings.load("tum3", "rgbd")))  # doctest: +SKIP
+    """
+    images_of: Any = source
+    own: Settings = images_of.settings if settings is None else settings
+    watch = CalibrationWatch(
+        own, own.sensor, known=settings_beside(images_of), thresholds=thresholds
+    )
+    for _, images in itertools.islice(timed_images(images_of, own.sensor), N_IMAGES):
+        watch.look(Images(images.image, images.right, images.depth, images.mask))
+    return watch.finish()

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How far every frame is from the ground truth, and where that is worst."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from orbslam2py._arrays import FloatArray, IntArray
+from orbslam2py.runs.report import RunEvaluation
+from orbslam2py.runs.result import RunResult
+from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory, associate
+
+#: So many places are told, this part of the run apart at least.
+_N_WORST, _APART = 4, 0.06
+
+
+def position_errors(path: Trajectory, truth: Trajectory, metres: float) -> FloatArray:
+    """Take the distance of every pose to the true one at its time.
+
+    Parameters
+    ----------
+    path, truth
+        Both in one frame and unit.
+    metres
+        Length of that unit [m].
+
+    Returns
+    -------
+    array of float64, (n,)
+        Metres for every pose of `path`, nan where there is no true one.
+    """
+    errors = np.full(len(path), np.nan)
+    i, j = associate(path.timestamps, truth.timestamps, MAX_DIFFERENCE)
+    errors[i] = metres * np.linalg.norm(path.positions[i] - truth.positions[j], axis=1)
+    return errors
+
+
+def worst_places(errors: FloatArray) -> IntArray:
+    """Find the largest errors that are some way apart, the largest first.
+
+    Parameters
+    ----------
+    errors
+        In the order of the frames, (n,), nan where they are not known.
+
+    Returns
+    -------
+    array of int64, (k,)
+        Indices; each is the largest error around it, none is below the median.
+    """
+    known = np.isfinite(errors)
+    if not known.any():
+        return np.zeros(0, np.int64)
+    left = np.where(known, errors, -np.inf)
+    apart = max(1, int(_APART * len(errors)))
+    floor = float(np.median(errors[known]))
+    found: list[int] = []
+    while len(found) < _N_WORST:
+        worst = int(np.argmax(left))
+        if not (left[worst] >= floor and left[worst] > 0):
+            break
+        around = errors[max(0, worst - apart) : worst + apart + 1]
+        if errors[worst] >= np.nanmax(around):  # else it is the flank of one that was taken
+            found.append(worst)
+        left[max(0, worst - apart) : worst + apart + 1] = -np.inf
+    return np.array(found, np.int64)
+
+
+def worst_frames(result: RunResult, evaluation: RunEvaluation) -> IntArray:
+    """Positions in `RunResult.rows` of the worst places of a run, (k,)."""
+    path = result.tracked_trajectory()
+    return path.indices[worst_places(position_errors(path, evaluation.truth, 1.0))]
+
+
+def truth_of_frames(result: RunResult, evaluation: RunEvaluation) -> tuple[Trajectory, list[str]]:
+    """Take the true pose of every frame that has one, in the estimate's frame and unit.
+
+    Returns
+    -------
+    truth, texts
+        Poses at the true poses' own times, and their time stamps for a file, with nanoseconds.
+    """
+    times = np.array([float(row.timestamp) for row in result.rows])
+    _, j = associate(times, evaluation.truth.timestamps, MAX_DIFFERENCE)
+    truth = evaluation.truth.select(np.unique(j))
+    return truth, [f"{time:.9f}" for time in truth.timestamps]

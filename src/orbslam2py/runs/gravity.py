@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which way is up, in the frame of the first keyframe, so that height is height."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from orbslam2py._arrays import FloatArray
+from orbslam2py.evaluation import match_poses
+from orbslam2py.trajectory import Trajectory
+from orbslam2py.trajectory.rotations import nearest_rotations
+
+#: Where up is in a camera that is held level.
+_UP_IN_CAMERA = np.array([0.0, -1.0, 0.0])
+#: Cosine of the angle between up and the cameras' own up, on average: below, a file of ground truth
+#: has another world than its layout promises (or the camera looks down), and nothing is claimed.
+_LEAST_AGREEMENT = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Height:
+    """The direction in which height is measured, and what that is called."""
+
+    up: FloatArray
+    """Unit vector (3,) in the frame of the first keyframe's camera."""
+    label: str
+    """For an axis."""
+
+    @classmethod
+    def of_first_keyframe(cls) -> Height:
+        """Take the first camera's own up: nothing tells how it was held."""
+        return cls(_UP_IN_CAMERA, "up in the\nfirst keyframe")
+
+    def of(self, positions: FloatArray) -> FloatArray:
+        """Height (n,) of positions (n, 3), from the first keyframe's."""
+        return np.asarray(positions @ self.up)
+
+
+def height_of(sequence: Any, estimate: Trajectory, truth: Trajectory | None) -> Height:
+    """Find the direction of gravity from ground truth whose world has a known one.
+
+    Parameters
+    ----------
+    sequence
+        Where the images are from; its ``up_in_truth`` is the direction of up in the world of its
+        ground truth, None or missing if that is not known.
+    estimate
+        Tracked poses.
+    truth
+        Ground truth in its own world.
+
+    Returns
+    -------
+    Height
+        Along gravity, or along the up of the first keyframe where gravity is not known.
+    """
+    up_in_truth = getattr(sequence, "up_in_truth", None)
+    if up_in_truth is None or truth is None or not len(estimate):
+        return Height.of_first_keyframe()
+    i, j = match_poses(estimate, truth)
+    # By the orientations: positions along a straight way leave the turn around it open.
+    R_estimate_truth = nearest_rotations(
+        np.sum(estimate.T_wc[i, :3, :3] @ np.swapaxes(truth.T_wc[j, :3, :3], 1, 2), axis=0)
+    )
+    up: FloatArray = R_estimate_truth @ (up_in_truth / np.linalg.norm(up_in_truth))
+    if float(np.mean(estimate.T_wc[i, :3, :3] @ _UP_IN_CAMERA @ up)) < _LEAST_AGREEMENT:
+        return Height.of_first_keyframe()
+    return Height(up, "height over\nthe start")

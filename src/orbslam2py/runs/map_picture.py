@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The picture of a saved map: the paths of its runs, its keyframes and points, from above."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from orbslam2py._arrays import FloatArray
+from orbslam2py.maps.saved_map import SavedMap
+from orbslam2py.maps.units import unit_of
+from orbslam2py.runs.plots import draw_trajectory
+from orbslam2py.trajectory import Trajectory
+
+
+def draw_map(path: Path, saved: SavedMap, *, title: str) -> None:
+    """Draw a saved map into a PNG file, as seen in the first keyframe's camera.
+
+    Parameters
+    ----------
+    path
+        Where to write.
+    saved
+        The map.
+    title
+        First line above the picture.
+    """
+    contents = saved.contents
+    keyframes = contents.keyframes
+    T_0w = keyframes.T_cw[0]
+    paths = [saved.trajectory(run) for run in range(len(saved.runs))]
+    paths = [one.select(~one.lost) for one in paths if not one.lost.all()]
+    if not paths:
+        paths = [Trajectory(keyframes.timestamps, T_0w @ keyframes.T_wc)]
+    seconds, gaps = _one_after_the_other(paths)
+    rows = np.searchsorted(keyframes.ids, contents.loop_edges)
+    centres = _moved(T_0w, keyframes.T_wc[:, :3, 3])
+    runs = "run" if len(saved.runs) == 1 else "runs"
+    draw_trajectory(
+        path,
+        title=title,
+        subtitle=f"{len(saved.runs)} {runs}, {len(keyframes)} keyframes, "
+        f"{len(contents.points)} points",
+        positions=np.concatenate([one.positions for one in paths]),
+        seconds=seconds,
+        keyframes=centres,
+        points=_moved(T_0w, contents.points.positions),
+        loops=centres[rows],
+        gaps=gaps,
+        unit=unit_of(contents),
+    )
+
+
+def _one_after_the_other(paths: list[Trajectory]) -> tuple[FloatArray, np.ndarray]:
+    """Seconds of all poses as if the runs had followed each other, and where there is a gap."""
+    seconds, gaps, begin = [], [], 0.0
+    for one in paths:
+        since = one.timestamps - one.timestamps[0]
+        # Lost frames have been left out: their numbers are missing.
+        missing = np.diff(one.indices, prepend=one.indices[0]) > 1
+        missing[0] = begin > 0
+        seconds.append(begin + since)
+        gaps.append(missing)
+        begin += float(since[-1]) + 1.0
+    return np.concatenate(seconds), np.concatenate(gaps)
+
+
+def _moved(T: FloatArray, positions: FloatArray) -> FloatArray:
+    return np.asarray(positions @ T[:3, :3].T + T[:3, 3])

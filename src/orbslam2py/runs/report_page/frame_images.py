@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Images of some frames with the map points in them: frame_images.zip."""
+
+from __future__ import annotations
+
+import logging
+import zipfile
+from pathlib import Path
+from typing import TypeGuard, cast
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from orbslam2py._arrays import ByteArray, FloatArray, IntArray
+from orbslam2py._files import atomic_write, describe_error
+from orbslam2py.datasets.base import LiveSource, Sequence, Source
+from orbslam2py.errors import OrbSlamError
+from orbslam2py.runs.feeds import is_sequence
+from orbslam2py.runs.result import RunResult
+from orbslam2py.settings.settings import Settings
+from orbslam2py.trajectory.rotations import inverse_poses
+
+_log = logging.getLogger(__name__)
+
+#: Keyframes that are shown, spread evenly over those of the last map.
+_N_KEYFRAMES = 8
+#: Frames in which tracking was lost that are shown.
+_N_LOST = 4
+#: Of the images [px].
+_WIDTH = 480
+_QUALITY = 72
+
+#: Fill and rim of a point [BGR]: seen on light and dark ground, whatever colours one can see.
+_FILL, _RIM = (66, 228, 240), (60, 40, 0)
+
+
+def has_images(source: Source) -> TypeGuard[Sequence]:
+    """Whether images can be read again: those of a camera are gone."""
+    return is_sequence(cast("Sequence | LiveSource", source))
+
+
+def choose_frames(result: RunResult, extra: IntArray | None = None) -> list[int]:
+    """Choose the frames whose images tell most.
+
+    Parameters
+    ----------
+    result : RunResult
+        A run that has ended.
+    extra : array of int64, optional
+        Positions of frames in `RunResult.rows` that are to be among them.
+
+    Returns
+    -------
+    list of int
+        Positions in `RunResult.rows`, ascending: some keyframes of the last map, those of its
+        loops, the first images of losses, and the extra ones.
+    """
+    keyframes = result.keyframes.indices
+    spread = np.unique(np.linspace(0, max(0, len(keyframes) - 1), _N_KEYFRAMES).astype(np.int64))
+    chosen = set(keyframes[spread].tolist()) if len(keyframes) else set()
+    snapshot = result.snapshot
+    if len(keyframes) == len(snapshot.keyframe_ids):
+        of_loops = np.isin(snapshot.keyframe_ids, snapshot.loop_edges[:3])
+        chosen |= set(keyframes[of_loops].tolist())
+    states = ["OK", *(row.state for row in result.rows)]
+    began = [i for i in range(len(result.rows)) if states[i] == "OK" and states[i + 1] == "LOST"]
+    chosen |= set(began[:_N_LOST])
+    chosen |= set([] if extra is None else extra.tolist())
+    return sorted(chosen)
+
+
+def write_frame_images(path: Path, result: RunResult, positions: list[int]) -> None:
+    """Write images of frames as JPEG into one ZIP file, named by their numbers in the sequence.
+
+    Points of the map that a keyframe observes are marked where they should be seen from its pose.
+    A frame whose image cannot be read again is left out.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    with (
+        atomic_write(path, binary=True) as stream,
+        zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive,
+    ):
+        for position in positions:
+            row = result.rows[position]
+            image = _read(result.sequence, row.index)
+            if image is not None:
+                points = _points_seen(result, position)
+                jpeg = draw_frame(image, points, result.settings)
+                # A date of its own would make the bytes of two equal runs differ.
+                archive.writestr(zipfile.ZipInfo(f"{row.index:06d}.jpg"), jpeg)
+
+
+def draw_frame(image: ByteArray, points: FloatArray, settings: Settings) -> bytes:
+    """Draw an image small, with points in it.
+
+    Parameters
+    ----------
+    image
+        uint8 (h, w), (h, w, 3) or (h, w, 4), as the sequence gives it.
+    points
+        In the camera's frame, float64 (p, 3), lengths in any unit.
+    settings
+        Of the camera: its lens, the order of colours.
+
+    Returns
+    -------
+    bytes
+        A JPEG file.
+    """
+    shown = _as_bgr(image, rgb=settings.camera.rgb)
+    height, width = shown.shape[:2]
+    scale = min(1.0, _WIDTH / width)
+    size = (max(1, round(scale * width)), max(1, round(scale * height)))
+    shown = np.asarray(cv2.resize(shown, size, interpolation=cv2.INTER_AREA), np.uint8)
+    front = points[points[:, 2] > 1e-6]
+    if len(front):
+        camera = settings.camera
+        origin = np.zeros(3)
+        pixels = cv2.projectPoints(front, origin, origin, camera.matrix, camera.distortion)[0]
+        pixels = pixels[:, 0] * scale
+        inside = np.all((pixels > -1) & (pixels < np.array(size) + 1), axis=1)
+        for radius, colour in ((3, _RIM), (2, _FILL)):
+            for u, v in np.rint(pixels[inside]).astype(int).tolist():
+                cv2.circle(shown, (u, v), radius, colour, -1)
+    done, jpeg = cv2.imencode(".jpg", shown, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+    assert done
+    return jpeg.tobytes()
+
+
+def _read(source: Source, index: int) -> ByteArray | None:
+    if not has_images(source):
+        return None
+    try:
+        return source.load(index).image
+    except (OrbSlamError, OSError) as error:
+        _log.debug("no picture of frame %d: %s", index, describe_error(error))
+        return None
+
+
+def _as_bgr(image: ByteArray, *, rgb: bool) -> npt.NDArray[np.uint8]:
+    if image.ndim == 2:
+        return np.repeat(image[:, :, None], 3, axis=2)
+    three = image[:, :, 2::-1] if rgb else image[:, :, :3]
+    return np.ascontiguousarray(three)
+
+
+def _points_seen(result: RunResult, position: int) -> FloatArray:
+    """Points that the keyframe made of a frame observes, in its camera's frame, (p, 3)."""
+    snapshot = result.snapshot
+    found = np.flatnonzero(result.keyframes.indices == position)
+    if not len(found) or len(result.keyframes) != len(snapshot.keyframe_ids):
+        return np.zeros((0, 3))
+    keyframe = int(found[0])
+    seen = result.sightings[result.sightings[:, 1] == snapshot.keyframe_ids[keyframe], 0]
+    known = np.isin(snapshot.point_ids, seen)
+    T_cw = inverse_poses(snapshot.keyframe_T_wc[keyframe][None])[0]
+    points: FloatArray = snapshot.point_positions[known] @ T_cw[:3, :3].T + T_cw[:3, 3]
+    return points

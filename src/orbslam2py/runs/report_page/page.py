@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""One page that holds all it needs: text, drawings, style, script, images."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from pathlib import Path
+from typing import Any
+
+from orbslam2py._version import __version__
+from orbslam2py.runs.report_page import sections
+from orbslam2py.runs.report_page.markup import Markup, element, join, section, table
+from orbslam2py.runs.report_page.path_section import path_section
+from orbslam2py.runs.report_page.round_numbers import NONE
+from orbslam2py.runs.report_page.run_folder import RunFolder
+from orbslam2py.runs.report_page.scene import script_data
+from orbslam2py.runs.report_page.story import Story
+
+_FOLDER = Path(__file__).parents[2] / "data" / "report_page"
+
+
+def run_page(run: RunFolder) -> str:
+    """Make the page of a run."""
+    story = Story.of(run)
+    report = run.report
+    parts = {
+        "path": path_section(story),
+        "error": sections.error_section(story),
+        "tracking": sections.tracking_section(story),
+        "times": sections.time_section(story),
+        "images": sections.images_section(story),
+        "maps": sections.maps_section(story),
+        "figures": sections.figures_section(story),
+        "repeat": repeat_section(report),
+    }
+    titles = {"error": "Error", "figures": "All figures", "maps": "Earlier maps"}
+    links = [(name, titles.get(name, name.capitalize())) for name, part in parts.items() if part]
+    told = f"{report.get('sensor')}, {report.get('layout')}"
+    when = report.get("started")
+    subtitle = (
+        f"{told}{f', {_date(str(when))}' if when else ''}, orbslam2py {report.get('version')}"
+    )
+    body = join(_warning(report), sections.tiles(story), *parts.values())
+    return whole_page(run.name, subtitle, links, body, script_data(story))
+
+
+def whole_page(
+    title: str,
+    subtitle: str,
+    links: list[tuple[str, str]],
+    body: Markup,
+    data: Markup,
+) -> str:
+    """Put head, style, script and data around the parts of a page.
+
+    Nothing in the page may load anything or run a script, but for the one script that belongs to
+    it: the page's own policy says so to the browser.
+    """
+    style, script = (
+        (_FOLDER / name).read_text(encoding="utf-8") for name in ("page.css", "page.js")
+    )
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    policy = f"default-src 'none'; script-src 'sha256-{digest}'; "
+    policy += "style-src 'unsafe-inline'; img-src data:"
+    head = join(
+        Markup('<meta charset="utf-8">'),
+        Markup(f'<meta http-equiv="Content-Security-Policy" content="{policy}">'),
+        Markup('<meta name="viewport" content="width=device-width, initial-scale=1">'),
+        Markup('<meta name="color-scheme" content="light dark">'),
+        Markup(f'<meta name="generator" content="orbslam2py {__version__}">'),
+        Markup('<link rel="icon" href="data:,">'),
+        element("title", f"{title} - orbslam2py"),
+        Markup(f"<style>{style}</style>"),
+    )
+    switch = element("button", "Dark or light", type="button", id="theme", hidden=True)
+    navigation = element("nav", *(element("a", text, href=f"#{name}") for name, text in links),
+                         aria_label="Parts of the page")  # fmt: skip
+    header = element(
+        "header", element("div", element("h1", title), element("p", subtitle)), switch, navigation
+    )
+    cursor = element("aside", id="cursor", hidden=True, aria_live="polite")
+    footer = element("footer", f"Made by orbslam2py {__version__}. The page loads nothing.")
+    content = join(header, element("main", body), footer, cursor, data)
+    return (
+        f'<!doctype html>\n<html lang="en">\n<head>{head}</head>\n'
+        f"<body>{content}\n<script>{script}</script></body>\n</html>\n"
+    )
+
+
+def repeat_section(report: dict[str, Any]) -> Markup:
+    """What repeats the run: command, options, machine, settings."""
+    command = report.get("command")
+    if command:
+        told = join(
+            element("pre", element("code", command)),
+            element("p", f"in the folder {report.get('command_folder')}", class_="note"),
+        )
+    else:
+        told = element("p", "The run was started from Python: no command was given.")
+    options = {
+        "sensor": report.get("sensor"),
+        "deterministic": report.get("deterministic"),
+        "realtime": report.get("realtime"),
+        "seed": report.get("seed"),
+        **report.get("options", {}),
+    }
+    rows: list[list[str | Markup]] = [
+        [name.replace("_", " "), _said(value)] for name, value in options.items()
+    ]
+    machine: list[list[str | Markup]] = [
+        [name.replace("_gb", " [GB]"), _said(value)]
+        for name, value in report.get("machine", {}).items()
+    ]
+    return section(
+        "repeat",
+        "Repeat",
+        told,
+        element(
+            "div",
+            element("div", element("h3", "Options"), table([], rows)),
+            element("div", element("h3", "Machine"), table([], machine)) if machine else None,
+            class_="pair tables",
+        ),
+        element("details", element("summary", "Settings of the camera and the features"),
+                element("pre", element("code", str(report.get("settings", ""))))),
+    )  # fmt: skip
+
+
+def _date(text: str) -> str:
+    """An ISO date as people write it: minutes are enough."""
+    day, _, time = text.partition("T")
+    return f"{day} {time[:5]}" if time else day
+
+
+def _said(value: object) -> str:
+    if value is None:
+        return NONE
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return str(value)
+
+
+def _warning(report: dict[str, Any]) -> Markup | None:
+    """What one should know before one reads on."""
+    said = []
+    if not report.get("tracked"):
+        said.append("No frame has a pose: see Tracking for the reasons, and what helps.")
+    elif report.get("lost_at_end"):
+        said.append("Tracking was lost at the end of the run.")
+    if report.get("interrupted"):
+        seen = f"{report.get('seen_frames')} of {report.get('frames')} frames"
+        said.append(f"The run was interrupted after {seen}.")
+    if report.get("sensor") == "mono" and report.get("tracked") and not report.get("ate_scale"):
+        said.append(
+            "Lengths are in the map's own units: a single camera cannot see metres, and no ground "
+            "truth tells them."
+        )
+    if not said:
+        return None
+    return element("div", *(element("p", text) for text in said), class_="warning", role="note")

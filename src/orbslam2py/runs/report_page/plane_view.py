@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""From where a path is looked at when it is drawn flat."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from orbslam2py._arrays import FloatArray
+
+#: By so much a camera must have gone up or down more than forward to be looked at from behind.
+_MORE = 2.0
+
+
+@dataclass(frozen=True)
+class View:
+    """Which axes of the first keyframe a picture shows, and what they are called."""
+
+    right: int
+    up: int
+    up_sign: float
+    right_name: str
+    up_name: str
+
+    def flatten(self, positions: FloatArray) -> FloatArray:
+        """Positions (n, 3) to the picture's right and up, (n, 2)."""
+        flat: FloatArray = positions[:, [self.right, self.up]] * np.array([1.0, self.up_sign])
+        return flat
+
+
+FROM_ABOVE = View(0, 2, 1.0, "right", "forward")
+FROM_BEHIND = View(0, 1, -1.0, "right", "up")
+
+
+def choose_view(positions: FloatArray) -> View:
+    """Look from above, or from behind where the camera went up or down more than forward."""
+    if len(positions) < 2:
+        return FROM_ABOVE
+    extent = np.ptp(positions, axis=0)
+    return FROM_BEHIND if extent[1] > _MORE * extent[2] else FROM_ABOVE

@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a run has left in its folder, read back."""
+
+from __future__ import annotations
+
+import csv
+import json
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from orbslam2py._arrays import FloatArray, IntArray
+from orbslam2py._files import describe_error
+from orbslam2py.errors import DatasetError
+from orbslam2py.maps.ply import read_points
+from orbslam2py.runs.frame_table import STAGES
+from orbslam2py.runs.result import empty_trajectory
+from orbslam2py.trajectory import Trajectory, read_tum
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """The columns of frames.csv, (n,) each; nan where a field is empty."""
+
+    index: IntArray
+    """Number in the sequence."""
+    timestamps: FloatArray
+    """Seconds."""
+    state: npt.NDArray[np.str_]
+    reason: list[str]
+    map_index: FloatArray
+    inliers: FloatArray
+    is_keyframe: npt.NDArray[np.bool_]
+    visual_odometry: npt.NDArray[np.bool_]
+    has_pose: npt.NDArray[np.bool_]
+    """Whether there is a pose."""
+    milliseconds: dict[str, FloatArray]
+    """Per stage."""
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+    @property
+    def seconds(self) -> FloatArray:
+        """Time since the first frame, (n,)."""
+        seconds: FloatArray = self.timestamps - self.timestamps[:1].sum()
+        return seconds
+
+
+@dataclass(frozen=True, eq=False)
+class RunFolder:
+    """A run as its files tell it."""
+
+    folder: Path
+    report: dict[str, Any]
+    frames: Frames
+    path: Trajectory
+    """Of the last map, after the last optimisation."""
+    earlier: list[Trajectory]
+    """Of the maps before it, each in a frame of its own."""
+    keyframes: Trajectory
+    truth: Trajectory | None
+    """True poses in the frame and unit of `path`."""
+    points: FloatArray
+    """Map points (p, 3) in the frame and unit of `path`."""
+    images: dict[int, bytes]
+    """JPEG of some frames by their number in the sequence."""
+
+    @property
+    def name(self) -> str:
+        """Of the sequence."""
+        return str(self.report.get("sequence", self.folder.name))
+
+    @property
+    def is_monocular(self) -> bool:
+        """Whether lengths are in a unit of the map's own."""
+        return self.report.get("sensor") == "mono"
+
+    @property
+    def metres(self) -> float:
+        """What lengths are multiplied by to be in `unit`."""
+        scale = self.report.get("ate_scale")
+        return float(scale) if self.is_monocular and scale else 1.0
+
+    @property
+    def unit(self) -> str:
+        """Of lengths, after they were multiplied by `metres`."""
+        return "units" if self.is_monocular and not self.report.get("ate_scale") else "m"
+
+
+def read_run(folders: Path | Sequence[Path]) -> RunFolder:
+    """Read the folder of a run; of several, each file from the first that has it.
+
+    Raises
+    ------
+    DatasetError
+        If it is none, or what every run writes is not there or not whole.
+    """
+    places = [folders] if isinstance(folders, Path) else list(folders)
+    report = _read_report(places)
+    frames_file = _find(places, "frames.csv")
+    if frames_file is None:
+        raise DatasetError(
+            f"{places[0]} holds no whole run: frames.csv is missing; run the sequence again"
+        )
+    earlier: list[Trajectory] = []
+    while (file := _find(places, f"trajectory_map{len(earlier)}.txt")) is not None:
+        earlier.append(read_tum(file))
+    points = _find(places, "points.ply")
+    truth = _find(places, "groundtruth_aligned.txt")
+    return RunFolder(
+        folder=places[0],
+        report=report,
+        frames=read_frames(frames_file),
+        path=_read_path(places, "trajectory.txt"),
+        earlier=earlier,
+        keyframes=_read_path(places, "keyframes.txt"),
+        truth=None if truth is None else read_tum(truth),
+        points=np.zeros((0, 3)) if points is None else read_points(points),
+        images=_read_images(_find(places, "frame_images.zip")),
+    )
+
+
+def _find(places: list[Path], name: str) -> Path | None:
+    return next((place / name for place in places if (place / name).is_file()), None)
+
+
+def _read_report(places: list[Path]) -> dict[str, Any]:
+    folder = places[0]
+    if not folder.is_dir():
+        raise DatasetError(f"{folder} is no folder; give one that orbslam2py run has written")
+    file = _find(places, "report.json")
+    if file is None:
+        raise DatasetError(
+            f"{folder} holds no run: report.json is missing; give a folder that orbslam2py run has "
+            "written"
+        )
+    try:
+        report = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise DatasetError(
+            f"{file} cannot be read: {describe_error(error)}; run the sequence again"
+        ) from error
+    if not (isinstance(report, dict) and {"sequence", "sensor", "frames"} <= report.keys()):
+        raise DatasetError(f"{file} is no report of a run; give another folder")
+    return report
+
+
+def _read_path(places: list[Path], name: str) -> Trajectory:
+    file = _find(places, name)
+    return empty_trajectory() if file is None else read_tum(file)
+
+
+def _read_images(file: Path | None) -> dict[int, bytes]:
+    if file is None:
+        return {}
+    try:
+        with zipfile.ZipFile(file) as archive:
+            names = [name for name in archive.namelist() if Path(name).stem.isdigit()]
+            return {int(Path(name).stem): archive.read(name) for name in sorted(names)}
+    except (OSError, zipfile.BadZipFile) as error:
+        raise DatasetError(
+            f"{file} cannot be read: {describe_error(error)}; remove it, the page is made without"
+        ) from error
+
+
+def read_frames(path: Path) -> Frames:
+    """Read frames.csv.
+
+    Raises
+    ------
+    DatasetError
+        Naming the file, and the line if one is wrong.
+    """
+    try:
+        with path.open(newline="", encoding="utf-8") as stream:
+            header, *rows = csv.reader(stream)
+        columns = {name: [row[k] for row in rows] for k, name in enumerate(header)}
+        return _frames_of(columns)
+    except (OSError, UnicodeDecodeError) as error:
+        raise DatasetError(
+            f"{path} cannot be read: {describe_error(error)}; run the sequence again"
+        ) from error
+    except (ValueError, KeyError, IndexError) as error:
+        raise DatasetError(
+            f"{path} is no whole table of frames ({error}); run the sequence again"
+        ) from error
+
+
+def _frames_of(columns: dict[str, list[str]]) -> Frames:
+    def numbers(name: str) -> FloatArray:
+        return np.array([text or "nan" for text in columns[name]], dtype=np.float64)
+
+    return Frames(
+        index=np.array(columns["index"], dtype=np.int64),
+        timestamps=np.array(columns["timestamp"], dtype=np.float64),
+        state=np.array(columns["state"], dtype=np.str_),
+        reason=columns["reason"],
+        map_index=numbers("map"),
+        inliers=numbers("inliers"),
+        is_keyframe=np.array([text == "1" for text in columns["keyframe"]], bool),
+        visual_odometry=np.array([text == "1" for text in columns["visual_odometry"]], bool),
+        has_pose=np.array([text != "" for text in columns["tx"]], bool),
+        milliseconds={
+            stage: numbers(f"ms_{stage}") for stage in STAGES if f"ms_{stage}" in columns
+        },
+    )

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The picture of a run: trajectory.png."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from orbslam2py.evaluation import Alignment
+from orbslam2py.runs.frame_errors import position_errors
+from orbslam2py.runs.plots import draw_trajectory
+from orbslam2py.runs.report import RunEvaluation
+from orbslam2py.runs.result import RunResult
+from orbslam2py.runs.timeline import Timeline
+from orbslam2py.settings.sensor import Sensor
+
+#: So many poses must have a true one at their time before they tell how long a unit is.
+_POSES_FOR_SCALE = 3
+
+
+def anchored_points(result: RunResult) -> npt.NDArray[np.float64]:
+    """Map points (p, 3) in the frame of keyframe 0, like the trajectories."""
+    snapshot = result.snapshot
+    if not len(snapshot.keyframe_T_wc):
+        return snapshot.point_positions
+    T_0w = np.linalg.inv(snapshot.keyframe_T_wc[0])
+    points: npt.NDArray[np.float64] = snapshot.point_positions @ T_0w[:3, :3].T + T_0w[:3, 3]
+    return points
+
+
+def _loop_positions(result: RunResult) -> npt.NDArray[np.float64]:
+    """Both ends of every loop of the last map, (l, 2, 3), in the frame of keyframe 0."""
+    snapshot = result.snapshot
+    rows = np.searchsorted(snapshot.keyframe_ids, snapshot.loop_edges)
+    return np.asarray(result.keyframes.positions[rows])
+
+
+def draw_run(
+    path: Path, result: RunResult, evaluation: RunEvaluation | None, report: dict[str, Any]
+) -> None:
+    """Draw trajectory.png.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    last = result.tracked_trajectory()
+    timeline = Timeline.of(result.rows, len(result.trajectories) - 1)
+    begin = float(result.rows[0].timestamp)
+    truth = None
+    subtitle = (
+        f"{report['tracked']} of {report['frames']} frames tracked, "
+        f"{report['keyframes']} keyframes, {report['map_points']} points"
+    )
+    scale, unit = metres_per_unit(result, evaluation), "m"
+    if scale is None:
+        scale, unit = 1.0, "units"
+    errors = None
+    if evaluation is not None:
+        if report["ate_rmse_m"] is not None:
+            errors = position_errors(last, evaluation.truth, scale)
+        truth = (evaluation.truth.timestamps - begin, scale * evaluation.truth.positions)
+        if report["ate_rmse_m"] is not None:
+            subtitle += f", ATE {report['ate_rmse_m']:.4f} m"
+    draw_trajectory(
+        path,
+        title=f"{report['sequence']} ({report['sensor']})",
+        subtitle=subtitle,
+        positions=scale * last.positions,
+        seconds=last.timestamps - begin,
+        keyframes=scale * result.keyframes.positions,
+        points=scale * anchored_points(result),
+        truth=truth,
+        loops=scale * _loop_positions(result),
+        gaps=timeline.gaps_before(last.indices),
+        errors=errors,
+        timeline=timeline,
+        unit=unit,
+        height=None if evaluation is None else evaluation.height,
+    )
+
+
+def metres_per_unit(result: RunResult, evaluation: RunEvaluation | None) -> float | None:
+    """Tell what lengths of the map are multiplied by for metres; None where nobody knows.
+
+    A single camera's unit of length is its own: only ground truth tells how long it is.
+    """
+    if result.options.sensor is not Sensor.MONOCULAR:
+        return 1.0
+    if evaluation is None or evaluation.figures.alignment is not Alignment.SIM3:
+        return None
+    enough = evaluation.figures.matched_poses >= _POSES_FOR_SCALE
+    return evaluation.figures.transform.scale if enough else None

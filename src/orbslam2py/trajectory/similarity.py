@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Transforms between worlds of different units, and how they are found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from orbslam2py._arguments import array_of
+from orbslam2py._arrays import FloatArray
+from orbslam2py.errors import DatasetError
+
+
+@dataclass(frozen=True, eq=False)
+class Similarity:
+    """A similarity transform ``y = scale * R @ x + t``.
+
+    Attributes
+    ----------
+    scale
+        Ratio of lengths, above 0.
+    R
+        Rotation, float64 (3, 3).
+    t
+        Translation, float64 (3,).
+    """
+
+    scale: float
+    R: FloatArray
+    t: FloatArray
+
+    @classmethod
+    def identity(cls) -> Similarity:
+        """Make the transform that changes nothing."""
+        return cls(1.0, np.eye(3), np.zeros(3))
+
+    def inverse(self) -> Similarity:
+        """Make the transform that undoes this one."""
+        return Similarity(1 / self.scale, self.R.T, -(self.R.T @ self.t) / self.scale)
+
+    def apply(self, points: FloatArray) -> FloatArray:
+        """Transform points (n, 3); returns float64 (n, 3)."""
+        moved: FloatArray = self.scale * points @ self.R.T + self.t
+        return moved
+
+    def apply_to_poses(self, T_wc: FloatArray) -> FloatArray:
+        """Transform poses (n, 4, 4), camera to world: positions as points, orientations turned."""
+        moved: FloatArray = T_wc.copy()
+        moved[:, :3, :3] = self.R @ T_wc[:, :3, :3]
+        moved[:, :3, 3] = self.apply(T_wc[:, :3, 3])
+        return moved
+
+
+def align(points: FloatArray, targets: FloatArray, *, with_scale: bool = False) -> Similarity:
+    """Find the transform that moves points nearest to their targets (Umeyama, PAMI 1991).
+
+    Parameters
+    ----------
+    points, targets
+        float64 (n, 3), at least one.
+    with_scale
+        Whether lengths may change. They do not if one of the sets is a single place, where no
+        scale can be seen; a rotation that cannot be seen is chosen so that nothing is turned.
+
+    Returns
+    -------
+    Similarity
+        Always finite.
+
+    Raises
+    ------
+    DatasetError
+        If they are no such arrays.
+    """
+    points = array_of(points, "points", (-1, 3), finite=False)
+    targets = array_of(targets, "targets", (-1, 3), finite=False)
+    if len(points) != len(targets) or not len(points):
+        raise DatasetError(
+            f"{len(points)} points cannot be aligned to {len(targets)} targets; give one target "
+            "per point, at least one"
+        )
+    centre, target_centre = points.mean(axis=0), targets.mean(axis=0)
+    x, y = points - centre, targets - target_centre
+    U, stretch, Vt = np.linalg.svd(y.T @ x / len(x))
+    signs = np.array([1.0, 1.0, np.sign(np.linalg.det(U) * np.linalg.det(Vt))])
+    R = U @ (signs[:, None] * Vt) if stretch[0] > 0 else np.eye(3)
+    scale = 1.0
+    spread, target_spread = np.mean(np.sum(x**2, axis=1)), np.mean(np.sum(y**2, axis=1))
+    if with_scale and spread > 1e-18 and target_spread > 1e-18:
+        fitted = float(np.sum(stretch * signs) / spread)
+        scale = fitted if fitted > 1e-12 else 1.0
+    return Similarity(scale, R, target_centre - scale * R @ centre)

@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a person watches: the map while it grows, or that of a run long past."""
+
+from orbslam2py.viewer.live import LiveView, Viewer
+from orbslam2py.viewer.publisher import Publisher
+from orbslam2py.viewer.watching import FrameView, QueueState, Watcher
+
+__all__ = [
+    "FrameView",
+    "LiveView",
+    "Publisher",
+    "QueueState",
+    "Viewer",
+    "Watcher",
+]

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The image side of the page: what the camera sees, how it goes, a keyframe that was chosen."""
+
+from __future__ import annotations
+
+import html
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from orbslam2py._arrays import ByteArray
+from orbslam2py.pictures.album import KeyframePicture
+from orbslam2py.pictures.overlay import Marks, Status, draw_overlay, fit_size
+from orbslam2py.viewer.plots import Plots
+from orbslam2py.viewer.watching import FrameView
+
+if TYPE_CHECKING:
+    import viser
+
+#: Pictures are sent at most so large [px].
+_ROOM = (640, 480)
+_QUALITY = 82
+_WIDTH = 460
+
+
+def overlaid(view: FrameView) -> ByteArray:
+    """The image with its keypoints, as it is sent, red, green, blue."""
+    features = view.features
+    unmatched = ~features.inliers
+    marks = Marks(
+        mapped=view.pixels[view.matched],
+        visual_odometry=view.pixels[view.visual_odometry],
+        unmatched=view.pixels[unmatched],
+        start_lines=np.zeros((0, 4)) if view.start_lines is None else view.start_lines,
+    )
+    height, width = view.image.shape[:2]
+    return draw_overlay(view.image, marks, size=fit_size((width, height), _ROOM))
+
+
+def status_of(view: FrameView, n_keyframes: int, n_points: int, n_dropped: int) -> Status:
+    """What the line below the image says."""
+    queue, record = view.queue, view.record
+    return Status(
+        state=record.state,
+        reason=str(record.reason),
+        localization=view.localization,
+        n_keyframes=n_keyframes,
+        n_points=n_points,
+        n_matches=int(np.count_nonzero(view.matched)),
+        n_visual_odometry=int(np.count_nonzero(view.visual_odometry)),
+        frames_per_second=queue.frames_per_second,
+        n_dropped=n_dropped,
+    )
+
+
+class LeftPanel:
+    """Image, status line, plots and keyframe, docked to the left.
+
+    Parameters
+    ----------
+    server : viser.ViserServer
+        The page.
+    """
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        gui = server.gui
+        panel = gui.add_panel()
+        empty = np.full((240, 320, 3), 24, np.uint8)
+        with panel.add_tab("Camera"):
+            self._image = gui.add_image(empty, format="jpeg", jpeg_quality=_QUALITY)
+            self._status = gui.add_html(_status_html(None, ""))
+            self.plots = Plots(server)
+        with panel.add_tab("Keyframe"):
+            self._keyframe_text = gui.add_html(_text("Click a keyframe in the map."))
+            self._keyframe_image = gui.add_image(
+                empty, format="jpeg", jpeg_quality=_QUALITY, visible=False
+            )
+        panel.dock_left()
+        panel.set_width(_WIDTH)
+
+    def show_image(self, picture: ByteArray) -> None:
+        """Show what the camera sees, red, green, blue."""
+        self._image.image = picture
+
+    def show_status(self, status: Status | None, note: str = "") -> None:
+        """Say how it goes, and one more thing."""
+        self._status.content = _status_html(status, note)
+
+    def show_keyframe(self, lines: list[str], picture: KeyframePicture | None) -> None:
+        """Show what is known of a keyframe."""
+        self._keyframe_text.content = _text("\n".join(lines))
+        self._keyframe_image.visible = picture is not None
+        if picture is not None:
+            self._keyframe_image.image = picture.image
+
+
+def thumbnail(picture: ByteArray, width: int = 200) -> ByteArray:
+    """A small one, for the image plane of the camera."""
+    size = (width, max(1, round(picture.shape[0] * width / picture.shape[1])))
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _status_html(status: Status | None, note: str) -> str:
+    if status is None:
+        mode, words, numbers, colour = "", "waiting for images", "", (150, 158, 170)
+    else:
+        mode, words, numbers, colour = status.mode, status.words, status.numbers, status.colour
+    style = "padding:0.3em 0.9em 0.1em;font-size:0.85em;line-height:1.5"
+    chip = f"border-left:0.4em solid rgb{colour};padding-left:0.6em"
+    more = f'<div style="opacity:0.8">{html.escape(note)}</div>' if note else ""
+    return (
+        f'<div style="{style}"><div style="{chip}"><b>{html.escape(mode)}</b> '
+        f"{html.escape(words)}</div>"
+        f'<div style="opacity:0.8">{html.escape(numbers)}</div>{more}</div>'
+    )
+
+
+def _text(text: str) -> str:
+    style = "padding:0.5em 0.9em;font-size:0.85em;line-height:1.5;white-space:pre-wrap"
+    return f'<div style="{style}">{html.escape(text)}</div>'

@@ -1,0 +1,271 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The page: a scene, a panel with the image, switches; shared by all browsers that look."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from orbslam2py._arrays import ByteArray, FloatArray, IntArray
+from orbslam2py.pictures.album import Album, KeyframePicture
+from orbslam2py.viewer.actions import Neighbours
+from orbslam2py.viewer.controls import add_view_controls
+from orbslam2py.viewer.follow import Follow, Follower, whole_view
+from orbslam2py.viewer.left_panel import LeftPanel
+from orbslam2py.viewer.map_model import KEYFRAME_IDS, MapModel, Stale
+from orbslam2py.viewer.point_colours import ColourBy, PointColours
+from orbslam2py.viewer.scene import Scene, Selection
+from orbslam2py.viewer.server import address_of, start_server, stop_server
+
+if TYPE_CHECKING:
+    import viser
+
+#: Pages of points that are sent at a time; after a loop all of them are stale.
+_PAGES = 24
+#: Neighbours of a keyframe that are named.
+_NAMED = 12
+
+
+class Page:
+    """What browsers show, whatever it comes from.
+
+    Parameters
+    ----------
+    host : str
+        Where it is served.
+    port : int, optional
+        See `start_server`.
+    title : str
+        For its head.
+    on_client : callable
+        Called when a browser has come, in a thread of its own.
+
+    Attributes
+    ----------
+    lock : threading.RLock
+        To be held by whoever draws.
+    model : MapModel
+        The map that is shown.
+    scene, left
+        The parts.
+    neighbours : callable
+        Tells which keyframes share points with one, and how many.
+    """
+
+    def __init__(
+        self, *, host: str, port: int | None, title: str, on_client: Callable[[], None]
+    ) -> None:
+        self.server = start_server(host, port)
+        self.address = address_of(self.server)
+        self.lock = threading.RLock()
+        self.model = MapModel()
+        self._colours = PointColours(self.model)
+        self._follower = Follower()
+        self._album = Album()
+        self._stale = Stale()
+        self._selected: int | None = None
+        self._T_wc: FloatArray | None = None
+        self._on_client = on_client
+        self.neighbours: Callable[[int], Neighbours] = lambda keyframe: []
+        gui = self.server.gui
+        gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
+        gui.set_panel_label(title)
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(300)
+        self.left = LeftPanel(self.server)
+        self.scene = Scene(self.server, self.model, self._colours, self._select)
+        add_view_controls(self.server, self)
+        self.server.on_client_connect(self._connected)
+
+    @property
+    def is_watched(self) -> bool:
+        """Whether a browser shows it."""
+        return bool(self.server.get_clients())
+
+    def _connected(self, client: viser.ClientHandle) -> None:
+        with self.lock:
+            self._on_client()
+            if self._T_wc is not None and self._follower.mode is not Follow.FREE:
+                self._follower.move(client, self._T_wc, self.scene.size)
+            else:
+                self.show_all(client)
+
+    def tell(self, title: str, text: str) -> None:
+        """Say something in all browsers, for a while."""
+        for client in self.server.get_clients().values():
+            client.add_notification(title, text, auto_close_seconds=8.0)
+
+    def stop(self) -> None:
+        """End it; browsers say that they have lost it."""
+        stop_server(self.server)
+        with self.lock:
+            self._album.close()
+
+    # ---- drawing, with the lock held -------------------------------------------------------------
+    def restart(self) -> None:
+        """Another map has begun."""
+        self._album.clear()
+        self._selected = None
+        self.scene.draw_selection(None)
+        for path in ("path", "online", "truth"):
+            self.scene.draw_path(path, np.zeros((0, 2, 3)))
+
+    def draw_map(self, at_most: int | None = _PAGES) -> None:
+        """Draw what has changed in the map, of very much a part at a time."""
+        self._gather_stale()
+        if self._colours.update_span():
+            self._stale.points |= set(self.model.points)
+        late = set(sorted(self._stale.points, reverse=True)[at_most:]) if at_most else set()
+        moved = bool(self._stale.keyframes)
+        self._stale.points -= late
+        with self.server.atomic():
+            self.scene.draw(self._stale)
+            if moved and self._selected is not None:
+                self._draw_selected()
+        self._stale = Stale(points=late)
+
+    def _gather_stale(self) -> None:
+        new = self.model.take_stale()
+        if new.everything:
+            self._stale = new
+            return
+        old = self._stale
+        self._stale = Stale(
+            old.everything,
+            old.points | new.points,
+            old.keyframes | new.keyframes,
+            old.covisibility | new.covisibility,
+            old.tree | new.tree,
+            old.loops or new.loops,
+        )
+
+    def colour_points(self, ids: IntArray, colours: ByteArray) -> None:
+        """Remember the colours (n, 3) in which points are seen."""
+        changed = self.model.colour_points(ids, colours)
+        if self._colours.by is ColourBy.IMAGE:
+            self._stale.points |= changed & set(self.model.points)
+
+    def fit_size(self, local_points: IntArray, T_wc: FloatArray | None) -> None:
+        """Make cameras and points as large as the distance of what is seen asks for."""
+        places = self.model.positions_of(local_points)
+        if not len(places):  # as in the first image
+            pages = self.model.points.values()
+            places = np.concatenate([places, *(page.positions for page in pages)])
+        if T_wc is None or not len(places):
+            return
+        distance = float(np.median(np.linalg.norm(places - T_wc[:3, 3], axis=1)))
+        if self.scene.fit_size(distance):
+            self._stale.keyframes |= set((self.model.keyframe_ids // KEYFRAME_IDS).tolist())
+
+    def show_camera(self, T_wc: FloatArray | None, image: ByteArray | None, aspect: float) -> None:
+        """Show where the camera is, and let the views follow."""
+        self.scene.draw_camera(T_wc, image, aspect)
+        if T_wc is None:
+            return
+        self._T_wc = T_wc
+        self._follower.turn(T_wc)
+        self._move_views()
+
+    def keep_keyframe(
+        self, keyframe: int, image: ByteArray, n_keypoints: int, n_matched: int
+    ) -> None:
+        """Keep the picture of a keyframe, for who clicks it."""
+        self._album.add(keyframe, KeyframePicture(image, n_keypoints, n_matched))
+
+    # ---- what a person asks for, in threads of the server ----------------------------------------
+    def show_layer(self, layer: str, visible: bool) -> None:
+        """Show or hide a layer."""
+        with self.lock:
+            self.scene.show(layer, visible)
+
+    def follow(self, mode: Follow) -> None:
+        """Move the views with the camera, or not."""
+        with self.lock:
+            self._follower.mode = mode
+            for client in self.server.get_clients().values():
+                if mode is Follow.FREE:
+                    client.camera.up_direction = (0.0, -1.0, 0.0)
+            self._move_views()
+
+    def set_distance(self, factor: float) -> None:
+        """Follow from farther away, or nearer."""
+        with self.lock:
+            self._follower.distance = factor
+            self._move_views()
+
+    def _move_views(self) -> None:
+        if self._T_wc is not None:
+            for client in self.server.get_clients().values():
+                self._follower.move(client, self._T_wc, self.scene.size)
+
+    def show_all(self, client: viser.ClientHandle) -> None:
+        """Let a browser see the whole map."""
+        with self.lock:
+            places = [page.positions for page in self.model.points.values() if len(page.ids)]
+            if not places:
+                return
+            _look(client, *whole_view(np.concatenate(places).astype(np.float64)))
+
+    def look_from(self, eye: FloatArray, target: FloatArray) -> None:
+        """Let all browsers look from one place to another, and stay there."""
+        with self.lock:
+            self._follower.mode = Follow.FREE
+            for client in self.server.get_clients().values():
+                _look(client, eye, target)
+
+    def set_point_size(self, factor: float) -> None:
+        """Draw points larger or smaller."""
+        with self.lock:
+            self.scene.set_point_size(factor)
+
+    def colour_by(self, what: ColourBy) -> None:
+        """Colour points by something else."""
+        with self.lock:
+            self._colours.by = what
+            self._stale.points |= set(self.model.points)
+            self.draw_map(at_most=None)
+
+    def _select(self, keyframe: int) -> None:
+        with self.lock:
+            self._selected = keyframe
+            self._draw_selected()
+
+    def _draw_selected(self) -> None:
+        assert self._selected is not None
+        keyframe = self._selected
+        near = self.neighbours(keyframe)
+        ids = np.array([other for other, _ in near], np.int64)
+        self.scene.draw_selection(Selection(keyframe, ids))
+        picture = self._album.find(keyframe)
+        self.left.show_keyframe(self._describe(keyframe, near, picture), picture)
+
+    def _describe(
+        self, keyframe: int, near: Neighbours, picture: KeyframePicture | None
+    ) -> list[str]:
+        row = np.flatnonzero(self.model.keyframe_ids == keyframe)
+        if not len(row):
+            return [f"Keyframe {keyframe} has been removed: others see the same."]
+        seconds = float(self.model.keyframe_timestamps[row[0]])
+        lines = [f"Keyframe {keyframe}, taken at {seconds:.3f} s"]
+        if picture is not None:
+            lines.append(
+                f"{picture.n_keypoints} keypoints, {picture.n_matched} matched to the map then"
+            )
+        if near:
+            named = ", ".join(
+                f"{other}" if weight is None else f"{other} ({weight})"
+                for other, weight in near[:_NAMED]
+            )
+            more = f" and {len(near) - _NAMED} more" if len(near) > _NAMED else ""
+            lines.append(f"Neighbours (points shared): {named}{more}")
+        return lines
+
+
+def _look(client: viser.ClientHandle, eye: FloatArray, target: FloatArray) -> None:
+    with client.atomic():
+        client.camera.up_direction = (0.0, -1.0, 0.0)
+        client.camera.position = eye
+        client.camera.look_at = target

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The camera's path in the world of the map: as it is now, as first tracked, and the true one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from orbslam2py._arrays import FloatArray
+from orbslam2py.evaluation import align
+from orbslam2py.slam.records import TrackingRecord
+from orbslam2py.trajectory import Trajectory
+from orbslam2py.trajectory.association import associate
+
+#: A path is drawn with at most so many corners.
+MAX_CORNERS = 4000
+#: So many poses must have a true one at their time before the truth is laid beside them.
+_MIN_PAIRS = 5
+#: What the true path must span along one axis [m]: a camera that stands tells no rotation.
+_MIN_SPAN = 1e-3
+#: Poses belong together if their time stamps differ by less [s].
+_SAME_TIME = 0.02
+
+
+@dataclass
+class OnlinePath:
+    """Poses as they were when the images came, never corrected."""
+
+    _map_index: int = -1
+    _positions: list[FloatArray] = field(default_factory=list)
+    _gaps: list[bool] = field(default_factory=list)
+    _after_gap: bool = True
+
+    def add(self, record: TrackingRecord) -> None:
+        """Take the pose of an image, if it has one."""
+        if record.map_index != self._map_index:
+            self._map_index = record.map_index
+            self._positions, self._gaps, self._after_gap = [], [], True
+        T_wc = record.T_wc
+        if T_wc is None:
+            self._after_gap = True
+            return
+        self._positions.append(T_wc[:3, 3])
+        self._gaps.append(self._after_gap)
+        self._after_gap = False
+
+    def lines(self) -> FloatArray:
+        """Ends of the pieces, (s, 2, 3) world."""
+        if not self._positions:
+            return np.zeros((0, 2, 3))
+        return pieces(np.array(self._positions), np.array(self._gaps))
+
+
+def pieces(positions: FloatArray, after_gap: np.ndarray | None = None) -> FloatArray:
+    """Cut a path into pieces between its corners, thinned where there are very many.
+
+    Parameters
+    ----------
+    positions : array (n, 3)
+        Corners, in order.
+    after_gap : array of bool (n,), optional
+        No piece leads to these.
+
+    Returns
+    -------
+    array (s, 2, 3)
+        Ends of the pieces.
+    """
+    if len(positions) < 2:
+        return np.zeros((0, 2, 3))
+    gap = np.zeros(len(positions), np.bool_) if after_gap is None else after_gap
+    step = -(-len(positions) // MAX_CORNERS)
+    kept = np.arange(len(positions)) % step == 0
+    kept |= gap | np.append(gap[1:], True)  # both ends of every gap, and the last corner
+    corners = positions[kept]
+    return np.asarray(np.stack([corners[:-1], corners[1:]], axis=1)[~gap[kept][1:]])
+
+
+@dataclass(frozen=True)
+class LaidTruth:
+    """The true path, moved to where it fits the estimate best."""
+
+    positions: FloatArray
+    """(n, 3) world of the map."""
+    error: float
+    """Root mean square distance of the poses that were compared [m]."""
+
+
+def lay_truth(path: Trajectory, truth: Trajectory, *, with_scale: bool) -> LaidTruth | None:
+    """Move the true path onto the estimated one (Umeyama, PAMI 1991).
+
+    Parameters
+    ----------
+    path : Trajectory
+        The estimate, in the world of the map.
+    truth : Trajectory
+        What it should be, in a world of its own.
+    with_scale : bool
+        Also scale: the map of a single camera has its own unit.
+
+    Returns
+    -------
+    LaidTruth or None
+        None while too few poses are known to have a true one.
+    """
+    known = path.select(~path.lost)
+    i, j = associate(known.timestamps, truth.timestamps, _SAME_TIME)
+    if len(i) < _MIN_PAIRS:
+        return None
+    estimated, true = known.positions[i], truth.positions[j]
+    if np.ptp(true, axis=0).max() < _MIN_SPAN:
+        return None
+    moved = align(true, estimated, with_scale=with_scale)
+    off = moved.apply(true) - estimated
+    error = float(np.sqrt(np.mean(np.sum(off**2, axis=1)))) / moved.scale
+    return LaidTruth(moved.apply(truth.positions), error)

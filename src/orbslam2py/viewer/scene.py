@@ -1,0 +1,337 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The three-dimensional part of the page: nodes of viser that show a `MapModel`.
+
+What has changed is sent, page by page; what a layer holds is hidden with its parent node.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from orbslam2py._arrays import ByteArray, FloatArray, IntArray
+from orbslam2py.pictures.palette import (
+    CAMERA,
+    COVISIBILITY,
+    KEYFRAME,
+    LOCAL_POINTS,
+    LOOP,
+    NOW,
+    ONLINE_PATH,
+    PATH,
+    SPANNING_TREE,
+    TRUTH,
+    Colour,
+)
+from orbslam2py.trajectory.rotations import quaternions_from_rotations
+from orbslam2py.viewer.map_model import MapModel, Stale
+from orbslam2py.viewer.point_colours import PointColours
+
+if TYPE_CHECKING:
+    import viser
+
+#: What can be seen, and what a person calls it; those that are hidden at first are in `HIDDEN`.
+LAYERS = {
+    "points": "Map points",
+    "local": "Points of the local map",
+    "keyframes": "Keyframes",
+    "covisibility": "Covisibility",
+    "tree": "Spanning tree",
+    "loops": "Loop edges",
+    "camera": "Camera",
+    "path": "Path",
+    "online": "Path as first tracked",
+    "truth": "Ground truth",
+}
+HIDDEN = frozenset({"tree", "online"})
+
+#: Half the width of a keyframe's frustum, as a part of the distance to what is seen.
+_SIZE = 0.03
+#: That size stays until the fitting one differs by so much: all keyframes are drawn anew then.
+_SIZE_TOLERANCE = 1.6
+#: Diameter of a point at size 1, in those sizes.
+_POINT = 0.15
+#: A frustum: its apex, then the corners of its image.
+_CORNERS = np.array([(0, 0, 0), (-1, -0.75, 0.6), (1, -0.75, 0.6), (1, 0.75, 0.6), (-1, 0.75, 0.6)])
+_EDGES = np.array([(0, 1), (0, 2), (0, 3), (0, 4), (1, 2), (2, 3), (3, 4), (4, 1)])
+_FACES = np.array([(0, 2, 1), (0, 3, 2), (0, 4, 3), (0, 1, 4), (1, 2, 3), (1, 3, 4)], np.uint32)
+#: Of the sight of a camera that is not known better [rad].
+_FOV = 0.9
+
+
+@dataclass
+class Selection:
+    """A keyframe that somebody has clicked, and its neighbours."""
+
+    keyframe: int
+    neighbours: IntArray
+    """(n,) ids."""
+
+
+class Scene:
+    """Draws a map, a camera and its paths.
+
+    Not for several threads at a time.
+
+    Parameters
+    ----------
+    server : viser.ViserServer
+        The page.
+    model : MapModel
+        The map.
+    colours : PointColours
+        Of its points.
+    on_click : callable
+        Told the id of a keyframe that somebody clicks.
+    """
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        model: MapModel,
+        colours: PointColours,
+        on_click: Callable[[int], None],
+    ) -> None:
+        self._scene = server.scene
+        self._model = model
+        self._colours = colours
+        self._on_click = on_click
+        self._nodes: dict[str, Any] = {}
+        self.point_size = 1.0
+        #: Half the width of a keyframe's frustum, in the unit of the map.
+        self.size = 0.0
+        self.fov = _FOV
+        self._scene.set_up_direction("-y")  # that of the first camera
+        self._scene.configure_environment_map(None)  # nothing here mirrors, and it takes a while
+        self._scene.configure_default_lights(enabled=True, cast_shadow=False)
+        self._layers = {
+            name: self._scene.add_frame(f"/{name}", show_axes=False, visible=name not in HIDDEN)
+            for name in LAYERS
+        }
+        self._scene.add_frame("/selection", show_axes=False)
+
+    def show(self, layer: str, visible: bool) -> None:
+        """Show or hide a layer."""
+        self._layers[layer].visible = visible
+
+    def clear(self) -> None:
+        """Remove all but the layers themselves."""
+        for node in self._nodes.values():
+            node.remove()
+        self._nodes = {}
+
+    # ---- the map ---------------------------------------------------------------------------------
+    def draw(self, stale: Stale) -> None:
+        """Draw what has changed in the map."""
+        if stale.everything:
+            self.clear()
+        for number in sorted(stale.points):
+            self.draw_points(number)
+        for number in sorted(stale.keyframes):
+            self._draw_keyframes(number)
+        for number in sorted(stale.covisibility):
+            edges = self._model.edges_in_page(self._model.covisibility, number)
+            self._lines(f"/covisibility/{number}", edges, COVISIBILITY, 1.0)
+        for number in sorted(stale.tree):
+            edges = self._model.edges_in_page(self._model.spanning_tree, number)
+            self._lines(f"/tree/{number}", edges, SPANNING_TREE, 1.5)
+        if stale.loops:
+            rows = self._model.rows_of(self._model.loop_edges)
+            ends = self._model.keyframe_T_wc[rows][:, :, :3, 3]
+            self._lines("/loops/all", ends, LOOP, 3.0)
+
+    def draw_points(self, number: int) -> None:
+        """Draw a page of points."""
+        name = f"/points/{number}"
+        page = self._model.points.get(number)
+        if page is None or not len(page.ids):
+            self._remove(name)
+            return
+        self._nodes[name] = self._scene.add_point_cloud(
+            name,
+            page.positions,
+            self._colours.of_page(number),
+            point_size=self._point_size,
+            point_shape="circle",
+            point_shading="flat",
+            precision="float32",
+        )
+
+    def set_point_size(self, factor: float) -> None:
+        """Draw points larger or smaller than usual."""
+        self.point_size = factor
+        for name, node in self._nodes.items():
+            if name.startswith("/points/"):
+                node.point_size = self._point_size
+
+    @property
+    def _point_size(self) -> float:
+        return max(1e-6, _POINT * self.size * self.point_size)
+
+    def fit_size(self, distance: float) -> bool:
+        """Make cameras and points as large as what is seen at a distance asks for.
+
+        Returns
+        -------
+        bool
+            Whether everything is to be drawn anew.
+        """
+        fitting = _SIZE * distance
+        if fitting <= 0 or (self.size / _SIZE_TOLERANCE <= fitting <= self.size * _SIZE_TOLERANCE):
+            return False
+        self.size = fitting
+        self.set_point_size(self.point_size)
+        return True
+
+    def draw_local(self, ids: IntArray) -> None:
+        """Draw the points of the local map."""
+        positions = self._model.positions_of(ids)
+        if not len(positions):
+            self._remove("/local/points")
+            return
+        self._nodes["/local/points"] = self._scene.add_point_cloud(
+            "/local/points",
+            positions,
+            np.array(LOCAL_POINTS, np.uint8),
+            point_size=1.35 * self._point_size,
+            point_shape="circle",
+            point_shading="flat",
+            precision="float32",
+        )
+
+    def _draw_keyframes(self, number: int) -> None:
+        rows = self._model.rows_in_page(number)
+        T_wc = self._model.keyframe_T_wc[rows]
+        lines, bodies = f"/keyframes/lines{number}", f"/keyframes/bodies{number}"
+        self._lines(lines, _frusta(T_wc, self.size), KEYFRAME, 1.5)
+        if not len(T_wc):
+            self._remove(bodies)
+            return
+        node = self._scene.add_batched_meshes_simple(
+            bodies,
+            vertices=(self.size * _CORNERS).astype(np.float32),
+            faces=_FACES,
+            batched_wxyzs=_quaternions(T_wc),
+            batched_positions=T_wc[:, :3, 3],
+            batched_colors=KEYFRAME,
+            opacity=0.18,
+            side="double",
+            flat_shading=True,
+            lod="off",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+
+        def clicked(event: viser.SceneNodePointerEvent[Any]) -> None:
+            row = _nearest_to_ray(
+                self._model.keyframe_T_wc[:, :3, 3],
+                np.array(event.ray_origin),
+                np.array(event.ray_direction),
+            )
+            if row is not None:
+                self._on_click(int(self._model.keyframe_ids[row]))
+
+        node.on_click(clicked)
+        self._nodes[bodies] = node
+
+    # ---- the camera ------------------------------------------------------------------------------
+    def draw_camera(self, T_wc: FloatArray | None, image: ByteArray | None, aspect: float) -> None:
+        """Draw where the camera is now, with what it sees; nothing while nobody knows."""
+        if T_wc is None:
+            self._remove("/camera/now")
+            return
+        wxyz, position = _quaternions(T_wc[None])[0], T_wc[:3, 3]
+        node = self._nodes.get("/camera/now")
+        if node is not None and node.aspect == aspect:
+            node.wxyz, node.position, node.scale = wxyz, position, 2.6 * self.size
+            if image is not None:
+                node.image = image
+            return
+        self._nodes["/camera/now"] = self._scene.add_camera_frustum(
+            "/camera/now",
+            fov=self.fov,
+            aspect=aspect,
+            scale=2.6 * self.size,
+            thickness=2.5,
+            thickness_units="screen",
+            color=CAMERA,
+            image=image,
+            format="jpeg",
+            wxyz=wxyz,
+            position=position,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+
+    def draw_path(self, layer: str, lines: FloatArray) -> None:
+        """Draw one of the paths: ``path``, ``online`` or ``truth``, (s, 2, 3)."""
+        colour, width = {
+            "path": (PATH, 2.5),
+            "online": (ONLINE_PATH, 1.5),
+            "truth": (TRUTH, 2.0),
+        }[layer]
+        self._lines(f"/{layer}/all", lines, colour, width)
+
+    def draw_selection(self, selection: Selection | None) -> None:
+        """Mark a keyframe, and the way to its neighbours."""
+        model = self._model
+        row = np.zeros(0, np.int64)
+        if selection is not None:
+            row = np.flatnonzero(model.keyframe_ids == selection.keyframe)
+        if selection is None or not len(row):
+            self._remove("/selection/keyframe")
+            self._remove("/selection/neighbours")
+            return
+        T_wc = model.keyframe_T_wc[row]
+        self._lines("/selection/keyframe", _frusta(T_wc, 1.3 * self.size), NOW, 3.0)
+        pairs = np.column_stack(
+            [np.full_like(selection.neighbours, selection.keyframe), selection.neighbours]
+        )
+        ends = model.keyframe_T_wc[model.rows_of(pairs)][:, :, :3, 3]
+        self._lines("/selection/neighbours", ends, NOW, 1.5)
+
+    # ---- nodes -----------------------------------------------------------------------------------
+    def _lines(self, name: str, ends: FloatArray, colour: Colour, width: float) -> None:
+        if not len(ends):
+            self._remove(name)
+            return
+        known = self._nodes.get(name)
+        if known is not None:
+            known.points = ends.astype(np.float32)
+            return
+        self._nodes[name] = self._scene.add_line_segments(
+            name,
+            ends.astype(np.float32),
+            np.array(colour, np.uint8),
+            thickness=width,
+            thickness_units="screen",
+        )
+
+    def _remove(self, name: str) -> None:
+        node = self._nodes.pop(name, None)
+        if node is not None:
+            node.remove()
+
+
+def _frusta(T_wc: FloatArray, size: float) -> FloatArray:
+    """Edges of the frusta of cameras, (8 k, 2, 3)."""
+    corners = np.einsum("kij,cj->kci", T_wc[:, :3, :3], size * _CORNERS) + T_wc[:, None, :3, 3]
+    return np.asarray(corners[:, _EDGES].reshape(-1, 2, 3))
+
+
+def _quaternions(T_wc: FloatArray) -> FloatArray:
+    """Orientations w, x, y, z (k, 4)."""
+    return np.asarray(quaternions_from_rotations(T_wc[:, :3, :3])[:, [3, 0, 1, 2]])
+
+
+def _nearest_to_ray(places: FloatArray, origin: FloatArray, direction: FloatArray) -> int | None:
+    """Row of the place that a ray passes at the smallest angle, in front of its origin."""
+    if not len(places):
+        return None
+    away = places - origin
+    along = away @ (direction / np.linalg.norm(direction))
+    cosine = along / np.maximum(np.linalg.norm(away, axis=1), 1e-12)
+    return int(np.argmax(cosine))

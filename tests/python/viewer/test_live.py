@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The live viewer in a real browser: what is seen, and what its switches do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orbslam2py import Sensor, System, TrackingState, Viewer
+from orbslam2py.maps import load_map
+from orbslam2py.pictures.palette import KEYFRAME, LOCAL_POINTS, MAPPED
+from support.browser import Browser, Page
+from support.small_sequences import new_system, play, sequence
+from support.viewer_pages import (
+    amount,
+    click_on,
+    map_part,
+    open_viewer,
+    picture,
+    wait_until,
+    wait_until_checked,
+    wait_until_seen,
+)
+
+pytestmark = pytest.mark.watchdog(300)
+pytest.importorskip("viser", reason="the viewer's extra is not installed")
+
+N_FRAMES = 30
+
+
+@dataclass
+class Show:
+    """A system with a small map, its viewer, and a page that shows it."""
+
+    system: System
+    viewer: Viewer
+    page: Page
+    browser: Browser
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with Browser() as browser:
+        yield browser
+
+
+@pytest.fixture
+def show(browser: Browser) -> Iterator[Show]:
+    with (
+        new_system(Sensor.RGBD, wait_for_mapping=True) as system,
+        Viewer(
+            system, port=0, truth=sequence(Sensor.RGBD).ground_truth(), open_browser=False
+        ) as viewer,
+    ):
+        page = open_viewer(browser, viewer.address)
+        play(system, N_FRAMES)
+        assert system.wait_until_idle(60)
+        yield Show(system, viewer, page, browser)
+        page.close()
+
+
+def test_image_map_cameras_and_figures_are_seen(show: Show, tmp_path: Path) -> None:
+    def complete(seen: np.ndarray) -> bool:
+        middle = map_part(seen)
+        points, cameras = amount(middle, LOCAL_POINTS), amount(middle, KEYFRAME, 40)
+        return points > 300 and cameras > 60 and amount(middle, MAPPED, 50) > 60
+
+    seen = wait_until_seen(show.page, complete, "points, keyframes and camera")
+    left = seen[:, :430]
+    assert amount(left, MAPPED, 40) > 300  # keypoints in the image
+    image = left[80:380, 20:400]
+    assert image.std() > 30  # a picture, and no grey rectangle
+    text = show.page.wait_for("document.body.innerText")
+    assert "SLAM" in text
+    assert f"{show.system.n_keyframes} keyframes" in text
+    assert "from the ground truth" in text
+    plots = "document.querySelectorAll('.uplot canvas').length"
+    assert show.page.evaluate(plots) == 2
+    assert all("THREE.Clock" in error for error in show.page.errors), show.page.errors
+
+
+def test_nothing_is_asked_of_other_computers(show: Show) -> None:
+    wait_until_seen(show.page, lambda seen: amount(map_part(seen), LOCAL_POINTS) > 300, "points")
+    own = show.viewer.address.removeprefix("http://")
+    for request in show.page.requests:
+        assert request.startswith(("data:", f"blob:http://{own}/", f"http://{own}", f"ws://{own}"))
+    assert own.startswith("127.0.0.1:")
+
+
+def test_layers_are_switched_off_and_on(show: Show) -> None:
+    def shown(seen: np.ndarray) -> bool:
+        return amount(map_part(seen), LOCAL_POINTS) > 300
+
+    wait_until_seen(show.page, shown, "local points")
+    click_on(show.page, "Points of the local map")
+    wait_until_seen(
+        show.page, lambda seen: amount(map_part(seen), LOCAL_POINTS) < 20, "no local points"
+    )
+    click_on(show.page, "Points of the local map")
+    wait_until_seen(show.page, shown, "local points again")
+
+
+def test_localization_mode_is_switched(show: Show) -> None:
+    click_on(show.page, "Localization")
+    wait_until(lambda: show.system.localization_mode, "localization mode")
+    play(show.system, 3, first=N_FRAMES)
+    show.page.wait_for("document.body.innerText.includes('LOCALIZATION')")
+    click_on(show.page, "Localization")
+    wait_until(lambda: not show.system.localization_mode, "no localization mode")
+    assert show.system.wait_until_idle(60)
+    # And the page shows what somebody else switches.
+    show.system.localization_mode = True
+    play(show.system, 3, first=N_FRAMES + 3)
+    wait_until_checked(show.page, "Localization")
+
+
+def test_reset_begins_a_new_map_and_the_page_goes_on(show: Show) -> None:
+    n_before = show.system.n_map_points
+    click_on(show.page, "Reset")
+    wait_until(show.system.pipeline.reset_requested.is_set, "the wish for a reset")
+    play(show.system, 4, first=N_FRAMES)
+    assert show.system.n_resets == 1
+    assert show.system.n_map_points < n_before
+    show.page.wait_for(
+        f"document.body.innerText.includes('{show.system.n_keyframes} keyframe')", 60
+    )
+    wait_until_seen(show.page, lambda seen: amount(map_part(seen), LOCAL_POINTS) > 100, "points")
+
+
+def test_optimize_is_told(show: Show) -> None:
+    click_on(show.page, "Optimize")
+    wait_until(lambda: len(show.system.full_adjustments) == 1, "a full adjustment")
+    show.page.wait_for("document.body.innerText.includes('Optimized: ')", 50)
+
+
+def test_the_map_is_saved(show: Show, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    click_on(show.page, "Save map")
+    show.page.wait_for("document.body.innerText.includes('The map is in ')", 50)
+    saved = list(tmp_path.glob("map-*.orbmap"))
+    assert len(saved) == 1
+    assert len(load_map(saved[0]).contents.keyframes.ids) == show.system.n_keyframes
+
+
+def test_stop_is_told_to_the_loop_that_reads_images(show: Show) -> None:
+    assert not show.viewer.stopped.is_set()
+    click_on(show.page, "Stop")
+    assert show.viewer.stopped.wait(60)
+
+
+def test_a_keyframe_that_is_clicked_is_shown(show: Show) -> None:
+    wait_until_seen(show.page, lambda seen: amount(map_part(seen), KEYFRAME, 40) > 60, "keyframes")
+    # The camera is followed from behind: the keyframe before it is in the middle, below it.
+    rows, columns = np.nonzero(
+        np.abs(picture(show.page)[300:, 470:890].astype(int) - np.array(KEYFRAME)).max(axis=2) < 40
+    )
+    place = float(470 + np.median(columns)), float(300 + np.percentile(rows, 80))
+    show.page.mouse("mouseMoved", *place)
+    show.page.mouse("mousePressed", *place)
+    show.page.mouse("mouseReleased", *place)
+    click_on(show.page, "Keyframe")
+    show.page.wait_for("document.body.innerText.includes('Neighbours (points shared)')", 50)
+    assert "matched to the map then" in show.page.evaluate("document.body.innerText")
+
+
+def test_browsers_that_reload_or_are_killed_change_nothing(show: Show) -> None:
+    show.page.go(show.viewer.address)
+    with Browser() as other:
+        for _ in range(3):
+            open_viewer(other, show.viewer.address)
+        play(show.system, 2, first=N_FRAMES)
+        other.kill()
+    records = play(show.system, 4, first=N_FRAMES + 2)
+    assert all(record.state is TrackingState.OK for record in records)
+    wait_until_seen(show.page, lambda seen: amount(map_part(seen), LOCAL_POINTS) > 300, "points")
+
+
+def test_a_page_left_open_over_the_end_stays(browser: Browser) -> None:
+    with new_system(Sensor.RGBD, wait_for_mapping=True) as system:
+        viewer = Viewer(system, port=0, open_browser=False)
+        page = open_viewer(browser, viewer.address)
+        play(system, 5)
+        viewer.close()
+        play(system, 2, first=5)  # nobody looks any more
+        assert system.pipeline.frame_watchers == ()
+    page.wait_for("document.body.innerText.includes('Whole map')", 50)
+    page.close()

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A run long past in the viewer."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orbslam2py import DatasetError, MapFileError, Sensor, run_sequence
+from orbslam2py.maps import MapArrays
+from orbslam2py.pictures.palette import KEYFRAME
+from orbslam2py.runs import RunOptions, SystemOptions
+from orbslam2py.viewer.replay import Replay, RunFolder
+from support.browser import Browser
+from support.small_sequences import sequence
+from support.viewer_pages import (
+    amount,
+    click_on,
+    map_part,
+    open_viewer,
+    wait_until,
+    wait_until_seen,
+)
+
+pytestmark = pytest.mark.watchdog(200)
+pytest.importorskip("viser", reason="the viewer's extra is not installed")
+
+N_FRAMES = 30
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("runs") / "run"
+    options = RunOptions(Sensor.RGBD, SystemOptions(deterministic=True), max_frames=N_FRAMES)
+    run_sequence(sequence(Sensor.RGBD), options, output=folder)
+    return folder
+
+
+@pytest.fixture
+def replay(folder: Path) -> Iterator[Replay]:
+    replay = Replay(RunFolder.read(folder), sequence(Sensor.RGBD), port=0)
+    yield replay
+    replay.stop()
+
+
+def test_the_map_in_the_folder_is_that_of_the_run(folder: Path) -> None:
+    arrays = MapArrays.load(folder / "map.npz")
+    assert len(arrays.keyframe_ids) == len((folder / "keyframes.txt").read_text().splitlines())
+    assert np.array_equal(arrays.keyframe_T_wc[0], np.eye(4))
+    assert len(arrays.point_ids) > 500
+    assert np.isin(arrays.point_first_keyframes, arrays.keyframe_ids).all()
+    assert len(arrays.spanning_tree) == len(arrays.keyframe_ids) - 1
+
+
+def test_at_every_time_the_map_is_as_far_as_it_was_seen(replay: Replay, folder: Path) -> None:
+    arrays = MapArrays.load(folder / "map.npz")
+    model = replay.page.model
+    sizes = []
+    for position in (N_FRAMES - 1, 0, 12, 5):
+        replay._move_to(position)
+        wait_until(lambda wanted=position: replay.position == wanted, "the image")
+        now = sequence(Sensor.RGBD).timestamps[position]
+        with replay.page.lock:
+            assert (model.keyframe_timestamps <= now + 1e-6).all()
+            shown = np.sort(np.concatenate([part.ids for part in model.points.values()]))
+            first = arrays.point_first_keyframes[np.isin(arrays.point_ids, shown)]
+            assert np.isin(first, model.keyframe_ids).all()
+            sizes.append(len(shown))
+    assert sizes[0] == len(arrays.point_ids)
+    assert sizes[1] <= sizes[3] <= sizes[2] <= sizes[0]
+    assert sizes[1] < sizes[0]
+
+
+def test_it_is_seen_and_played(replay: Replay) -> None:
+    with Browser() as browser:
+        page = open_viewer(browser, replay.address)
+        wait_until_seen(
+            page, lambda seen: amount(map_part(seen), KEYFRAME, 40) > 60, "keyframes of the run"
+        )
+        seen = wait_until_seen(page, lambda seen: seen[80:380, 20:400].std() > 30, "the image")
+        assert seen.shape[2] == 3
+        page.wait_for("document.body.innerText.includes('image 29, ')")
+        click_on(page, "Play")
+        wait_until(lambda: replay.position < N_FRAMES - 1, "the beginning")
+        wait_until(lambda: replay.position == N_FRAMES - 1, "the end")
+        page.close()
+
+
+def test_a_folder_that_is_none_of_a_run_is_named(tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match="is no folder of a run"):
+        RunFolder.read(tmp_path)
+
+
+def test_a_map_that_is_cut_off_is_named(folder: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "run"
+    shutil.copytree(folder, copy)
+    data = (copy / "map.npz").read_bytes()
+    (copy / "map.npz").write_bytes(data[: len(data) // 2])
+    with pytest.raises(MapFileError, match=r"map\.npz is no file of a map, or not whole"):
+        RunFolder.read(copy)
+
+
+def test_without_a_map_the_path_is_shown_and_that_is_said(
+    folder: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    copy = tmp_path / "run"
+    shutil.copytree(folder, copy)
+    (copy / "map.npz").unlink()
+    run = RunFolder.read(copy)
+    assert run.map is None
+    assert len(run.path) == N_FRAMES
+    assert "only the path is shown" in caplog.text
