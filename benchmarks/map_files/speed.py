@@ -31,7 +31,7 @@ from orbslam2py import System, load_vocabulary
 from orbslam2py import _core as core
 from orbslam2py.maps import SavedMap, load_map, restore_contents, save_map, take_contents
 from orbslam2py.maps.contents import take_changes
-from orbslam2py.maps.map_rows import all_rows, keypoint_rows, map_rows
+from orbslam2py.maps.map_rows import Row, all_rows, keypoint_rows, map_rows
 from orbslam2py.maps.map_writer import MapWriter
 
 
@@ -67,25 +67,28 @@ def longest_wait(slam_map: core.Map) -> tuple[float, float]:
 def increment(path: Path, slam_map: core.Map, saved: SavedMap) -> float:
     """Seconds of the commit of one new keyframe, and of 500 points that moved with it."""
     ids = saved.contents.keyframes.ids
-    newest, points = int(ids[-1]), saved.contents.points.ids[-500:].tolist()
+    points = saved.contents.points.ids[-500:].tolist()
     times = []
     with contextlib.closing(MapWriter(path)) as writer:
         before = take_changes(slam_map, ids[:0], None)
-        rows = list(all_rows(saved))
-        for _ in range(5):
-            without = [row for row in rows if row[0] != "keypoints" or row[1][0] != newest]
-            writer.commit(without, lambda table, key: False)
-            writer._written["keypoints"].pop((newest,), None)
+        late = set(ids[-5:].tolist())
+        rows = all_rows(saved)
+        writer.commit(row for row in rows if row[0] != "keypoints" or row[1][0] not in late)
+        for newest in range(len(ids) - 5, len(ids)):
             for point in points:
                 slam_map.set_position(point, slam_map.point_position(point) + 0.001)
+            known = np.delete(ids, newest)
             begin = time.perf_counter()
-            changes = take_changes(slam_map, ids[:-1], before)
-            pages = set(changes.pages.tolist())
-            new = [*map_rows(changes.contents, changes.changed_keyframes)]
-            new.append(list(keypoint_rows(changes.contents))[-1])
-            writer.commit(new, lambda table, key, pages=pages: key[0] not in pages)
+            before = take_changes(slam_map, known, before)
+            pages = set(before.pages.tolist())
+            new = [*map_rows(before.contents, before.changed_keyframes)]
+            new.append(list(keypoint_rows(before.contents))[newest])
+
+            def unchanged(table: str, key: Row, looked_at: set[int] = pages) -> bool:
+                return table not in ("map_points", "observations") or key[0] not in looked_at
+
+            writer.commit(new, unchanged)
             times.append(time.perf_counter() - begin)
-            before = changes
     return statistics.median(times)
 
 
