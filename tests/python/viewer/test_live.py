@@ -137,9 +137,7 @@ def test_optimize_is_told(show: Show) -> None:
     show.page.wait_for("document.body.innerText.includes('Optimized: ')", 50)
 
 
-def test_the_map_is_saved(
-    show: Show, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_map_is_saved(show: Show, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     click_on(show.page, "Save map")
     show.page.wait_for("document.body.innerText.includes('The map is in ')", 50)
