@@ -37,7 +37,7 @@ _log = logging.getLogger(__name__)
 _WAITING_VIEWS = 4
 #: After a look at the map that took a second, the next one waits for so many: loops move all of it.
 _REST = 4.0
-#: Seconds after which a thread that computes in Python lets another one in. Python's own are ten times
+#: Seconds after which a thread that computes in Python lets another in. Python's own are ten times
 #: as many, for which tracking would wait again and again within one image.
 _SWITCH_INTERVAL = 5e-4
 #: Images over which the rate is measured.
