@@ -66,10 +66,11 @@ def _stamp(
     picture: ByteArray, places: npt.NDArray[np.int64], shape: npt.NDArray[np.int64], colour: Colour
 ) -> None:
     """Colour the pixels of a shape (s, 2) around each of the places (n, 2), x and y."""
-    pixels = (places[:, None] + shape).reshape(-1, 2)
-    inside = (pixels >= 0).all(axis=1) & (pixels < picture.shape[1::-1]).all(axis=1)
-    columns, rows = pixels[inside].T
-    picture[rows, columns] = colour
+    height, width = picture.shape[:2]
+    columns = (places[:, :1] + shape[:, 0]).ravel()
+    rows = (places[:, 1:] + shape[:, 1]).ravel()
+    inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
+    picture[rows[inside], columns[inside]] = colour
 
 
 def status_of(view: FrameView, n_keyframes: int, n_points: int, n_dropped: int) -> Status:
