@@ -52,7 +52,8 @@ def test_keypoints_have_the_colour_of_what_they_are_matched_with() -> None:
 
 def test_while_a_single_camera_starts_its_lines_are_drawn() -> None:
     picture = overlaid(view(np.array([[20.0, 80.0, 120.0, 80.0]])))
-    assert (np.abs(picture[322, 100:460].astype(int) - STARTING).max(axis=1) < 60).mean() > 0.8
+    off = np.abs(picture[321:323, 100:460].astype(int) - STARTING).max(axis=2)
+    assert (off.min(axis=0) < 80).all()  # smoothed over two rows
 
 
 def test_the_status_counts_what_is_seen() -> None:
