@@ -111,6 +111,7 @@ class Viewing:
         """Show a system; see `orbslam2py.run_sequence`."""
         if self._view is None:
             return contextlib.nullcontext()
+        from orbslam2py.viewer.live import FRAME_RATE  # noqa: PLC0415
         from orbslam2py.viewer.publisher import Publisher  # noqa: PLC0415
 
         recorded = is_sequence(self._sequence)
@@ -121,7 +122,7 @@ class Viewing:
             stop=self._stop_run,
             folder=Path("runs"),
         )
-        return Publisher(system, [self._view])
+        return Publisher(system, [self._view], frame_rate=FRAME_RATE)
 
     def count(self, row: FrameRow) -> None:
         """Take note of a frame that was dropped."""

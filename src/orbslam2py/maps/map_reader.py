@@ -29,6 +29,9 @@ _Group = TypeVar("_Group")
 
 _COPY = "use a copy of the file"
 
+#: Characters of what is quoted in a message.
+_LONGEST = 200
+
 
 def load_map(path: str | os.PathLike[str], *, images: bool = False) -> SavedMap:
     """Read a map file.
@@ -101,14 +104,21 @@ def _refusing(named: str) -> Iterator[None]:
     try:
         yield
     except MapFileError as error:
-        raise MapFileError(f"{named}: {error}; the file is damaged, {_COPY}") from error
-    except sqlite3.Error as error:
+        problem = _one_line(error)
+        raise MapFileError(f"{named}: {problem}; the file is damaged, {_COPY}") from error
+    except (sqlite3.Error, UnicodeError) as error:
         if "locked" in str(error):
             raise MapFileError(f"{named} is locked by another program; wait for it") from error
-        raise MapFileError(f"{named} cannot be read: {error}; {_COPY}") from error
+        raise MapFileError(f"{named} cannot be read: {_one_line(error)}; {_COPY}") from error
     except SettingsError as error:
-        problem = " ".join(str(error).split())
+        problem = _one_line(error)
         raise MapFileError(f"{named}: its settings are wrong: {problem}; {_COPY}") from error
+
+
+def _one_line(error: Exception) -> str:
+    """What an error says, however much of a damaged file it quotes."""
+    text = " ".join(str(error).split())
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
 
 
 def _check_schema(connection: sqlite3.Connection) -> None:

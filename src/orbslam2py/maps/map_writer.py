@@ -261,6 +261,8 @@ def check_map_target(path: str | os.PathLike[str]) -> None:
 
 
 def _check_target(path: Path, named: str) -> None:
+    if not path.parent.is_dir():
+        raise MapFileError(f"cannot write {named}: no such folder; make the folder first")
     if path.is_dir():
         raise MapFileError(f"cannot write {named}: it is a folder; give the name of a file")
     if path.exists() and not path.is_file():

@@ -22,6 +22,7 @@ from orbslam2py.runs.outputs import OutputWriter, link_latest, prepare_output_fo
 from orbslam2py.runs.report import RunEvaluation, evaluate_run, make_report
 from orbslam2py.runs.result import RunResult
 from orbslam2py.runs.runner import Progress, SequenceRunner, Watch
+from orbslam2py.slam.options import Setup
 from orbslam2py.trajectory.trajectory import Trajectory
 from orbslam2py.vocabulary.vocabulary import load_vocabulary
 
@@ -124,6 +125,15 @@ def run_sequence(
     folder = None if output is None else path_of(output, "output")
     if not isinstance(vocabulary, core.Vocabulary):
         vocabulary = load_vocabulary(vocabulary)
+    if options.load_map is not None:  # before anything is made
+        Setup.of(
+            sequence.settings,
+            options.sensor,
+            vocabulary,
+            options.load_map,
+            options.initial_pose,
+            options.allow_other_setup,
+        )
     if options.save_map is not None:
         check_map_target(options.save_map)
     runner = SequenceRunner(sequence, sequence.settings, vocabulary, options)

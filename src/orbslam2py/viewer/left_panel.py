@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from orbslam2py._arrays import ByteArray
 from orbslam2py.pictures.album import KeyframePicture
-from orbslam2py.pictures.overlay import Marks, Status, draw_overlay, fit_size
+from orbslam2py.pictures.overlay import Marks, Status, draw_marks, fit_size, to_rgb
+from orbslam2py.pictures.palette import HALO, MAPPED, UNMATCHED, VISUAL_ODOMETRY, Colour
 from orbslam2py.viewer.plots import Plots
 from orbslam2py.viewer.watching import FrameView
 
@@ -23,19 +25,52 @@ _ROOM = (640, 480)
 _QUALITY = 82
 _WIDTH = 460
 
+# Shapes of marks, as offsets in pixels.
+_X, _Y = (axis.ravel() for axis in np.meshgrid(np.arange(-6, 7), np.arange(-6, 7)))
+_OFFSETS = np.column_stack([_X, _Y])
+_ACROSS, _AROUND = np.maximum(abs(_X), abs(_Y)), abs(_X) + abs(_Y)
+_DOT = _OFFSETS[(_ACROSS == 0) | ((_AROUND == 1) & (_X + _Y > 0))]
+_SQUARE = _OFFSETS[(_ACROSS == 4) | (_ACROSS <= 1)]
+_SQUARE_RIM = _OFFSETS[(_ACROSS >= 2) & (_ACROSS <= 5)]
+_DIAMOND = _OFFSETS[(_AROUND == 5) | (_AROUND == 4)]
+_DIAMOND_RIM = _OFFSETS[(_AROUND == 6) | (_AROUND == 3)]
+
 
 def overlaid(view: FrameView) -> ByteArray:
-    """The image with its keypoints, as it is sent, red, green, blue."""
-    features = view.features
-    unmatched = ~features.inliers
-    marks = Marks(
-        mapped=view.pixels[view.matched],
-        visual_odometry=view.pixels[view.visual_odometry],
-        unmatched=view.pixels[unmatched],
-        start_lines=np.zeros((0, 4)) if view.start_lines is None else view.start_lines,
-    )
+    """The image with its keypoints, as it is sent, red, green, blue.
+
+    Drawn ten times a second beside tracking, so by whole arrays and without smooth edges, in a
+    tenth of the time that `orbslam2py.pictures.draw_overlay` takes.
+    """
     height, width = view.image.shape[:2]
-    return draw_overlay(view.image, marks, size=fit_size((width, height), _ROOM))
+    size = fit_size((width, height), _ROOM)
+    small = cv2.resize(view.image, size, interpolation=cv2.INTER_LINEAR)
+    picture = to_rgb(np.asarray(small, np.uint8))
+    scale = np.array(size) / (width, height)
+    places = np.rint((view.pixels + 0.5) * scale - 0.5).astype(np.int64)
+    unmatched = ~view.features.inliers
+    _stamp(picture, places[unmatched], _DOT, UNMATCHED)
+    for chosen, shape, rim, colour in (
+        (view.matched, _SQUARE, _SQUARE_RIM, MAPPED),
+        (view.visual_odometry, _DIAMOND, _DIAMOND_RIM, VISUAL_ODOMETRY),
+    ):
+        # Dark around bright: marks are seen on a white wall and in the night.
+        _stamp(picture, places[chosen], rim, HALO)
+        _stamp(picture, places[chosen], shape, colour)
+    if view.start_lines is not None:
+        draw_marks(picture, Marks(start_lines=view.start_lines), scale)
+    return picture
+
+
+def _stamp(
+    picture: ByteArray, places: npt.NDArray[np.int64], shape: npt.NDArray[np.int64], colour: Colour
+) -> None:
+    """Colour the pixels of a shape (s, 2) around each of the places (n, 2), x and y."""
+    height, width = picture.shape[:2]
+    columns = (places[:, :1] + shape[:, 0]).ravel()
+    rows = (places[:, 1:] + shape[:, 1]).ravel()
+    inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
+    picture[rows[inside], columns[inside]] = colour
 
 
 def status_of(view: FrameView, n_keyframes: int, n_points: int, n_dropped: int) -> Status:

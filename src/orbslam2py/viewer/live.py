@@ -33,6 +33,8 @@ _log = logging.getLogger(__name__)
 
 #: Seconds between two drawings of what need not be drawn with every image.
 _PATHS, _PLOTS, _LOCAL = 1.0, 0.5, 0.3
+#: Images a second that are shown at most: they are drawn beside tracking, on the same cores.
+FRAME_RATE = 10.0
 #: Seconds without news after which all of it is drawn.
 _STILL = 0.4
 #: What takes a second is done again after so many.
@@ -338,7 +340,7 @@ class Viewer:
         self._view = LiveView(host=host, port=port)
         self.address = self._view.address
         self._view.attach(system, truth=truth, stop=self.stopped.set)
-        self._publisher = Publisher(system, [self._view])
+        self._publisher = Publisher(system, [self._view], frame_rate=FRAME_RATE)
         announce(self.address, open_browser=open_browser)
 
     def look_from(self, eye: npt.ArrayLike, target: npt.ArrayLike) -> None:

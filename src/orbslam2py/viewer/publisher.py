@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 import math
+import sys
 import threading
 import time
 import weakref
@@ -36,6 +37,9 @@ _log = logging.getLogger(__name__)
 _WAITING_VIEWS = 4
 #: After a look at the map that took a second, the next one waits for so many: loops move all of it.
 _REST = 4.0
+#: Seconds after which a thread that computes in Python lets another in. Python's own are ten times
+#: as many, for which tracking would wait again and again within one image.
+_SWITCH_INTERVAL = 5e-4
 #: Images over which the rate is measured.
 _RATE_IMAGES = 30
 
@@ -192,6 +196,14 @@ class Publisher:
 
     # ---- in the publisher's thread ---------------------------------------------------------------
     def _run(self) -> None:
+        before = sys.getswitchinterval()
+        sys.setswitchinterval(min(before, _SWITCH_INTERVAL))
+        try:
+            self._publish()
+        finally:
+            sys.setswitchinterval(before)
+
+    def _publish(self) -> None:
         closing = False
         while not closing:
             with self._condition:

@@ -10,6 +10,7 @@ import logging
 import os
 import socket
 import sys
+import warnings
 import webbrowser
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -58,6 +59,8 @@ def start_server(host: str = LOOPBACK, port: int | None = None) -> viser.ViserSe
 
     with _quiet():
         server = viser.ViserServer(host=host, port=chosen, verbose=False)
+    # A browser may close at any moment, also between two lines that move its view.
+    warnings.filterwarnings("ignore", r"Queued a \w+ on a closed connection", UserWarning)
     # It offers to share the page through somebody's server.
     server.request_share_url = lambda verbose=True: None  # type: ignore[method-assign]
     return server

@@ -98,7 +98,7 @@ def test_a_run_that_finds_nothing_of_the_map_says_so(
 ) -> None:
     command("run", sequence, "--save", "a.orbmap", "--output", "first")
     options = SyntheticOptions(
-        world="two_rooms", sensor=Sensor.RGBD, frames=6, size=(320, 240), seed=9
+        world="two-rooms", sensor=Sensor.RGBD, frames=6, size=(320, 240), seed=9
     )
     elsewhere = SyntheticSequence(options).write(tmp_path / "elsewhere")
     other = ("--load", "a.orbmap", "--allow-other-setup", "--save", "b.orbmap")

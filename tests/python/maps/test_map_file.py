@@ -174,7 +174,7 @@ def test_every_flipped_bit_in_the_data_is_noticed(tmp_path: Path) -> None:
         ("UPDATE keypoints SET count = 3 WHERE keyframe = 0", "wrong length"),
         ("UPDATE keypoints SET count = 1 << 60 WHERE keyframe = 0", "wrong length"),
         ("UPDATE keypoints SET depths = positions WHERE keyframe = 0", "wrong length"),
-        ("UPDATE keypoints SET angles = depths WHERE keyframe = 0", "keypoint"),
+        ("UPDATE keypoints SET octaves = substr(descriptors, 1, count)", "keypoint"),
         ("DELETE FROM keypoints WHERE keyframe = 1", "belong together"),
         ("DELETE FROM keyframes WHERE id = 0", "keyframe"),
         ("DELETE FROM keyframes", "keyframe"),

@@ -16,7 +16,7 @@ from orbslam2py._arrays import ByteArray
 from support.browser import Browser, BrowserError, Page
 
 #: Seconds until something must be seen, on a computer that draws without graphics hardware.
-PATIENCE = 30.0
+PATIENCE = 60.0
 WIDTH, HEIGHT = 1200, 800
 #: Where the map is seen: between the two panels.
 _MAP = slice(470, 890)
@@ -87,7 +87,7 @@ def wait_until_seen(page: Page, condition: Callable[[ByteArray], bool], what: st
         seen = picture(page)
         if condition(seen):
             return seen
-        page.evaluate("new Promise(requestAnimationFrame)")
+        page.evaluate("new Promise(done => setTimeout(done, 50))")
     path = Path(tempfile.mkdtemp(prefix="viewer-")) / "seen.png"
     page.screenshot(path)
     raise BrowserError(f"not seen within {PATIENCE} s: {what}; what was seen is in {path}")

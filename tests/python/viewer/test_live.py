@@ -67,7 +67,7 @@ def test_image_map_cameras_and_figures_are_seen(show: Show, tmp_path: Path) -> N
     def complete(seen: np.ndarray) -> bool:
         middle = map_part(seen)
         points, cameras = amount(middle, LOCAL_POINTS), amount(middle, KEYFRAME, 40)
-        return points > 300 and cameras > 60 and amount(middle, MAPPED, 50) > 60
+        return points > 300 and cameras > 60 and amount(middle, MAPPED, tolerance=65) > 40
 
     seen = wait_until_seen(show.page, complete, "points, keyframes and camera")
     left = seen[:, :430]
