@@ -21,6 +21,7 @@ from benchmarks.harness.arguments import new_parser
 from orbslam2py import OrbSlamError, Sensor, System, TrackingState, open_sequence
 from orbslam2py.datasets import Sequence
 from orbslam2py.evaluation import Alignment, evaluate_trajectory
+from orbslam2py.slam.frame_source import track_images
 from orbslam2py.trajectory import Trajectory
 from orbslam2py.trajectory.rotations import rotation_angles
 
@@ -29,7 +30,7 @@ def run(sequence: Sequence, first: int, last: int, **options: object) -> System:
     """Track some frames; the system has been shut down, with all results."""
     with System(sensor=sequence.sensor, deterministic=True, **options) as slam:  # type: ignore[arg-type]
         for frame in islice(iter(sequence), first, last):
-            slam._track_any(frame.images, frame.timestamp, False)
+            track_images(slam, frame.images, frame.timestamp)
     return slam
 
 
@@ -62,7 +63,7 @@ def localised(sequence: Sequence, n: int, path: Path, mapped: Trajectory) -> str
     with System(load_map=path, deterministic=True) as slam:
         slam.localization_mode = True
         for frame in islice(iter(sequence), n):
-            records.append(slam._track_any(frame.images, frame.timestamp, False))
+            records.append(track_images(slam, frame.images, frame.timestamp))
     ok = {r.timestamp: r.T_wc for r in records if r.state is TrackingState.OK}
     known = mapped.select(~mapped.lost)
     pairs = [(ok[t], T) for t, T in zip(known.timestamps, known.T_wc, strict=True) if t in ok]

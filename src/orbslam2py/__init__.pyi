@@ -35,7 +35,7 @@ from .slam.events import MapChanged as MapChanged
 from .slam.events import Relocalized as Relocalized
 from .slam.events import TrackingLost as TrackingLost
 from .slam.full_bundle_adjustment import FullAdjustmentRecord as FullAdjustmentRecord
-from .slam.map_optimization import optimize_map as optimize_map
+from .slam.full_bundle_adjustment import optimize_map as optimize_map
 from .slam.records import FrameFeatures as FrameFeatures
 from .slam.records import Reason as Reason
 from .slam.records import TrackingRecord as TrackingRecord

@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from orbslam2py.cli.run import run_and_show
+from orbslam2py.cli.run_and_show import run_and_show
+from orbslam2py.cli.run_options import NoReportFlag, QuietFlag
 from orbslam2py.cli.viewing import (
     ViewerExit,
     ViewerFlag,
@@ -30,16 +31,14 @@ def demo(
         int | None, typer.Option(help="Number of images [one lap and a bit].", min=10)
     ] = None,
     output: Annotated[Path, typer.Option(help="Folder for the results.")] = DEFAULT_OUTPUT,
-    no_report: Annotated[
-        bool, typer.Option("--no-report", help="Do not write the page report.html.")
-    ] = False,
+    no_report: NoReportFlag = False,
     viewer: ViewerFlag = False,
     viewer_port: ViewerPort = None,
     viewer_host: ViewerHost = None,
     viewer_exit: ViewerExit = False,
     video: VideoOption = None,
     record: RecordOption = None,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
+    quiet: QuietFlag = False,
 ) -> None:
     """Track a camera once around a synthetic corridor: needs no data.
 

@@ -40,7 +40,8 @@ def view(
         orbslam2py view runs/06 --sequence dataset/sequences/06
     """
     from orbslam2py.viewer.live import announce, wait_for_interrupt  # noqa: PLC0415  # slow to load
-    from orbslam2py.viewer.replay import Replay, RunFolder  # noqa: PLC0415
+    from orbslam2py.viewer.replay import Replay  # noqa: PLC0415
+    from orbslam2py.viewer.run_folder import RunFolder  # noqa: PLC0415
     from orbslam2py.viewer.server import LOOPBACK  # noqa: PLC0415
 
     log_to(Console(stderr=True), quiet=False)

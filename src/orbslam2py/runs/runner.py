@@ -11,10 +11,9 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import asdict, replace
 from datetime import datetime
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
-import numpy.typing as npt
 
 from orbslam2py import _core as core
 from orbslam2py._files import describe_error
@@ -28,6 +27,7 @@ from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.result import DROPPED, FrameRow, RunResult
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
+from orbslam2py.slam.frame_source import track_images
 from orbslam2py.slam.records import TrackingRecord
 from orbslam2py.slam.system import System
 from orbslam2py.trajectory.trajectory import Trajectory
@@ -211,21 +211,12 @@ class SequenceRunner:
         return _row(frame, record, str(record.reason))
 
     def _call(self, system: System, images: Images, timestamp: float) -> TrackingRecord:
-        mask = images.mask
-        if self._options.sensor is Sensor.STEREO:
-            right = _second(images.right)
-            if mask is None:
-                return system.track_stereo(images.image, right, timestamp)
-            # The mask is the left image's; what it hides there needs no partner.
-            return system.track_stereo(images.image, right, timestamp, mask=(mask, None))
-        if self._options.sensor is Sensor.RGBD:
-            depth = _second(images.depth)
-            if mask is None:
-                return system.track_rgbd(images.image, depth, timestamp)
-            return system.track_rgbd(images.image, depth, timestamp, mask=mask)
-        if mask is None:
-            return system.track_monocular(images.image, timestamp)
-        return system.track_monocular(images.image, timestamp, mask=mask)
+        sensor = self._options.sensor
+        second = images.right if sensor is Sensor.STEREO else images.depth
+        if second is None and sensor is not Sensor.MONOCULAR:
+            # Not a spoilt frame, which is skipped: all others lack it, too.
+            raise DatasetError("the sequence delivers no second image for this sensor")
+        return track_images(system, images, timestamp)
 
     def _skip(self, frame: FedFrame, error: Exception) -> FrameRow:
         reason = describe_error(error)
@@ -313,9 +304,3 @@ def _renumber(trajectory: Trajectory, positions: list[int]) -> Trajectory:
 
 def _row(frame: FedFrame, record: TrackingRecord | None, reason: str) -> FrameRow:
     return FrameRow(frame.index, frame.text, record, reason)
-
-
-def _second(array: npt.NDArray[Any] | None) -> npt.NDArray[Any]:
-    if array is None:
-        raise DatasetError("the sequence delivers no second image for this sensor")
-    return array

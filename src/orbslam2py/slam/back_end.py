@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from typing import Any
 
 from orbslam2py import _core as core
 from orbslam2py._worker import Worker
+from orbslam2py.errors import MapFileError
+from orbslam2py.maps.map_keeper import MapKeeper
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.events import (
     Callbacks,
@@ -21,6 +24,11 @@ from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord, FullBun
 from orbslam2py.slam.local_mapping import LocalMapping
 from orbslam2py.slam.loop_closing import LoopClosing
 from orbslam2py.slam.options import SystemOptions
+
+_log = logging.getLogger(__name__)
+
+#: Seconds that a reset waits for a worker before it says who is late.
+RESET_PATIENCE = 60.0
 
 
 class BackEnd:
@@ -124,6 +132,16 @@ class BackEnd:
             **self.loop_closing.statistics.summary(),
             **self.adjustment.statistics.summary(),
         }
+
+
+def abandon(back_end: BackEnd, keeper: MapKeeper) -> None:
+    """End the threads of a system that was dropped without shutdown."""
+    try:
+        keeper.stop_autosave()
+    except MapFileError as unsaved:
+        _log.error("while a system was dropped: %s", unsaved)
+    for error in back_end.finish(drain=False, wait_for_adjustment=False, timeout=RESET_PATIENCE):
+        _log.error("while a system was dropped", exc_info=error)
 
 
 # The workers' threads must not hold the system that owns them, or it would never be dropped: these

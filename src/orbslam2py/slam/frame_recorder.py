@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from orbslam2py import _core as core
 from orbslam2py.maps.saved_map import RecordedFrames
-from orbslam2py.slam.records import FrameFeatures
 from orbslam2py.trajectory.trajectory import Trajectory
 
 
@@ -78,38 +77,3 @@ class FrameRecorder:
         return Trajectory(
             timestamps=poses.timestamps, T_wc=poses.T_wc, lost=poses.lost, indices=poses.frames
         )
-
-
-def accepted_keypoints(frame: core.TrackedFrame) -> npt.NDArray[np.bool_]:
-    """Which keypoints have a point that agrees with the pose, (n,)."""
-    accepted: npt.NDArray[np.bool_] = (frame.map_points >= 0) & (frame.outlier == 0)
-    return accepted
-
-
-def pixels_as_given(frame: core.Frame) -> npt.NDArray[np.float32]:
-    """Where the keypoints lie in the image as it came, not undistorted, (n, 2)."""
-    raw = frame.raw_keypoints
-    return raw if len(raw) else frame.keypoints
-
-
-def frame_features(
-    frame: core.TrackedFrame, inliers: npt.NDArray[np.bool_] | None = None
-) -> FrameFeatures:
-    """Copy the keypoints of a frame and what they were matched to.
-
-    Parameters
-    ----------
-    frame : orbslam2py._core.TrackedFrame
-        The frame.
-    inliers : array of bool, (n,), optional
-        `accepted_keypoints` as they were before points were made or dropped.
-    """
-    features = frame.features
-    return FrameFeatures(
-        keypoints=features.keypoints,
-        levels=features.levels,
-        depths=features.depth,
-        map_point_ids=frame.map_points,
-        inliers=accepted_keypoints(frame) if inliers is None else inliers,
-        colours=features.colours,
-    )

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What `System.run` takes: anything that gives images and time stamps, whoever made it."""
+"""What a system tracks: anything that gives images and time stamps, whoever made it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +12,10 @@ import numpy.typing as npt
 from orbslam2py._arguments import shown
 from orbslam2py.errors import ImageError, StateError
 from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.records import TrackingRecord
+
+if TYPE_CHECKING:
+    from orbslam2py.slam.system import System
 
 _Array = TypeVar("_Array", npt.NDArray[np.uint8], npt.NDArray[np.generic])
 
@@ -90,8 +94,31 @@ def timed_images(source: FrameSource, sensor: Sensor) -> Iterator[tuple[float, S
             yield timestamp, source.load(index)
 
 
-def present(array: _Array | None, what: str, timestamp: float) -> _Array:
-    """Return an image that must be there; raises `ImageError` if it is None."""
+def track_images(
+    system: System, images: SomeImages, timestamp: float, *, details: bool = False
+) -> TrackingRecord:
+    """Track the images of one moment, by the call for the system's sensor.
+
+    Raises
+    ------
+    ImageError
+        If the image that the sensor needs beside the first is missing.
+    StateError, ImageError, WorkerError
+        As for `System.track_stereo`.
+    """
+    mask = images.mask
+    if system.sensor is Sensor.MONOCULAR:
+        return system.track_monocular(images.image, timestamp, mask=mask, details=details)
+    if system.sensor is Sensor.RGBD:
+        depth = _present(images.depth, "depth image", timestamp)
+        return system.track_rgbd(images.image, depth, timestamp, mask=mask, details=details)
+    right = _present(images.right, "right image", timestamp)
+    # The mask is the left image's; what it hides there needs no partner.
+    pair = None if mask is None else (mask, None)
+    return system.track_stereo(images.image, right, timestamp, mask=pair, details=details)
+
+
+def _present(array: _Array | None, what: str, timestamp: float) -> _Array:
     if array is None:
         raise ImageError(f"the frame of {timestamp:.6f} s has no {what}, which this sensor needs")
     return array

@@ -13,11 +13,13 @@ import logging
 import os
 import threading
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from orbslam2py import _core as core
 from orbslam2py._timing import StageStatistics, StageTimer
 from orbslam2py._worker import Worker, WorkerState
+from orbslam2py.maps.contents import MapContents, restore_contents, take_contents
+from orbslam2py.maps.units import unit_of
 
 _log = logging.getLogger(__name__)
 
@@ -212,3 +214,43 @@ class FullBundleAdjustment:
         )
         self._on_done(record)
         return record
+
+
+def optimize_map(
+    contents: MapContents, *, time_limit: float | None = None
+) -> tuple[MapContents, FullAdjustmentRecord]:
+    """Refine all keyframes and points of a map together, as `System.optimize` does.
+
+    Keyframe 0 stays where it is. Without a time limit the same map gives the same bytes.
+
+    Parameters
+    ----------
+    contents
+        The map, as from `load_map`.
+    time_limit
+        Seconds after which it ends; what was reached by then is used.
+
+    Returns
+    -------
+    contents
+        The refined map.
+    record
+        Size, cost before and after.
+
+    Raises
+    ------
+    MapFileError
+        If the contents are impossible.
+    """
+    slam_map = restore_contents(contents)
+    nobody: Worker[int] = Worker("local mapping", lambda _: None, threaded=False)
+    adjustment = FullBundleAdjustment(
+        slam_map,
+        nobody,
+        time_limit=time_limit,
+        monocular=unit_of(contents) != "m",
+        threaded=False,
+        on_done=lambda _: None,
+    )
+    record = adjustment.run()
+    return replace(take_contents(slam_map), map_index=contents.map_index), record

@@ -15,11 +15,11 @@ import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
-from orbslam2py.slam.frame_recorder import pixels_as_given
 from orbslam2py.slam.front_end import intrinsics
 from orbslam2py.slam.local_mapping import LocalMapping
 from orbslam2py.slam.records import Reason
 from orbslam2py.slam.thresholds import InitializationThresholds
+from orbslam2py.slam.watched_frame import pixels_as_given
 
 _log = logging.getLogger(__name__)
 

@@ -6,124 +6,39 @@ Mur-Artal and Tardos, "ORB-SLAM2", 2017, figure 2; ``docs/method/index.md``.
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import math
 import threading
-from collections.abc import Callable, Iterator
-
-import numpy as np
-import numpy.typing as npt
+from collections.abc import Callable
+from dataclasses import asdict
 
 from orbslam2py import _core as core
 from orbslam2py._arguments import is_number, shown
-from orbslam2py._arrays import ByteArray, FloatArray, IntArray
+from orbslam2py._arrays import ByteArray
 from orbslam2py._timing import StageStatistics, StageTimer
-from orbslam2py.errors import ImageError, MapFileError, StateError
+from orbslam2py.errors import ImageError
 from orbslam2py.maps.contents import restore_contents
-from orbslam2py.maps.saved_map import SavedMap
+from orbslam2py.maps.map_keeper import MapKeeper, encode_image
 from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import Settings
-from orbslam2py.slam.back_end import BackEnd
+from orbslam2py.slam.back_end import RESET_PATIENCE, BackEnd
 from orbslam2py.slam.events import Callbacks, Relocalized, TrackingLost
-from orbslam2py.slam.frame_recorder import FrameRecorder, frame_features, pixels_as_given
+from orbslam2py.slam.frame_recorder import FrameRecorder
 from orbslam2py.slam.front_end import FrontEnd
 from orbslam2py.slam.initialization import DepthInitializer, Initializer, MonocularInitializer
 from orbslam2py.slam.keyframe_decision import KeyframeDecision
 from orbslam2py.slam.localization_mode import LocalizationSwitch
-from orbslam2py.slam.map_keeper import MapKeeper
-from orbslam2py.slam.options import SystemOptions
+from orbslam2py.slam.options import Setup, SystemOptions
 from orbslam2py.slam.pose_search import PoseSearch
-from orbslam2py.slam.records import (
-    FrameFeatures,
-    Reason,
-    TrackingOutcome,
-    TrackingRecord,
-    TrackingState,
-)
+from orbslam2py.slam.records import Reason, TrackingOutcome, TrackingRecord, TrackingState
 from orbslam2py.slam.relocalization import Relocalizer
 from orbslam2py.slam.thresholds import TrackingThresholds
 from orbslam2py.slam.tracking import Tracking
+from orbslam2py.slam.watched_frame import FrameWatcher, WatchedFrame, frame_features
 
 _log = logging.getLogger(__name__)
 
-#: Seconds that a reset waits for a worker before it says who is late.
-RESET_PATIENCE = 60.0
-
 #: Makes a frame of images: takes its id and a timer.
 BuildFrame = Callable[[int, StageTimer], core.Frame]
-
-
-class CallGuard:
-    """Allows one call at a time; a second one raises instead of waiting."""
-
-    def __init__(self, what: str) -> None:
-        self._what = what
-        self._lock = threading.Lock()
-
-    @contextlib.contextmanager
-    def __call__(self) -> Iterator[None]:
-        """Enter the guarded call."""
-        if not self._lock.acquire(blocking=False):
-            raise StateError(f"{self._what} is already running in another thread")
-        try:
-            yield
-        finally:
-            self._lock.release()
-
-
-class WatchedFrame:
-    """What a watcher is given after every image; copies are made when they are asked for.
-
-    Valid only during the call: the frame goes on to be the one that the next is compared with.
-
-    Parameters
-    ----------
-    image : array of uint8, (h, w) or (h, w, 3) or (h, w, 4)
-        As the caller gave it, who may use the memory again.
-    record : TrackingRecord
-        What tracking says about it.
-    frame : orbslam2py._core.TrackedFrame
-        Keypoints and what they are matched with.
-    inliers : array of bool, (n,), optional
-        See `FrameFeatures.inliers`.
-    tracking : Tracking
-        The state machine, as the frame left it.
-    """
-
-    def __init__(
-        self,
-        image: ByteArray,
-        record: TrackingRecord,
-        frame: core.TrackedFrame,
-        inliers: npt.NDArray[np.bool_] | None,
-        tracking: Tracking,
-    ) -> None:
-        self.image = image
-        self.record = record
-        self._frame = frame
-        self._inliers = inliers
-        self._tracking = tracking
-
-    def features(self) -> FrameFeatures:
-        """Keypoints and matches."""
-        return self.record.features or frame_features(self._frame, self._inliers)
-
-    def pixels(self) -> npt.NDArray[np.float32]:
-        """Where the keypoints lie in the image as it came, (n, 2)."""
-        return pixels_as_given(self._frame.features)
-
-    def local_points(self) -> IntArray:
-        """Ids of the points of the local map, (p,)."""
-        return self._tracking.local_points
-
-    def start_lines(self) -> FloatArray | None:
-        """While a single camera's map begins: pixels in the first view and now, (m, 4)."""
-        return self._tracking.start_lines
-
-
-#: Called after every image, in the thread of the track call.
-FrameWatcher = Callable[[WatchedFrame], None]
 
 
 class Pipeline:
@@ -133,12 +48,8 @@ class Pipeline:
 
     Parameters
     ----------
-    settings : Settings
-        Calibration and extractor settings.
-    sensor : Sensor
-        What the images come from.
-    vocabulary : orbslam2py._core.Vocabulary
-        Visual words.
+    setup : Setup
+        Camera and visual words, and the map to begin in: tracking is lost then and searches it.
     options : SystemOptions
         How to work.
     callbacks : Callbacks
@@ -152,25 +63,24 @@ class Pipeline:
         Whether the map stays as it is.
     recorder : FrameRecorder
         Where every frame was.
+    keeper : MapKeeper
+        The map in files.
     reset_requested : threading.Event
         When set, the next image begins a new map.
     frame_watchers : tuple of callables
         Told of every image; assign another tuple to add one. They must be quick and not raise.
     """
 
-    def __init__(
-        self,
-        settings: Settings,
-        sensor: Sensor,
-        vocabulary: core.Vocabulary,
-        options: SystemOptions,
-        callbacks: Callbacks,
-    ) -> None:
+    def __init__(self, setup: Setup, options: SystemOptions, callbacks: Callbacks) -> None:
+        sensor = setup.sensor
         self._sensor = sensor
         self._waits_for_mapping = options.wait_for_mapping and not options.deterministic
-        self.front_end = FrontEnd(settings, sensor, check_calibration=options.check_calibration)
+        self._keeps_images = options.keyframe_images
+        self.front_end = FrontEnd(
+            setup.settings, sensor, check_calibration=options.check_calibration
+        )
         self.back_end = back_end = BackEnd(sensor, options, callbacks)
-        self.tracking = _make_tracking(settings, sensor, vocabulary, back_end, options.seed)
+        self.tracking = _make_tracking(setup, back_end, options.seed)
         self.localization = LocalizationSwitch(
             back_end.map, 1 if sensor.has_depth else 2, back_end.map_workers
         )
@@ -182,29 +92,24 @@ class Pipeline:
         self._start_failed = False
         self._next_frame_id = 0
         self._last_timestamp = -math.inf
+        if setup.loaded is not None:
+            contents = setup.loaded.contents
+            restore_contents(contents, back_end.map, setup.vocabulary, back_end.keyframe_index)
+            self.tracking.begin_in_loaded_map(setup.initial_pose)
+        self.keeper = MapKeeper(
+            back_end.map,
+            self.recorder.recorded,
+            setup.settings,
+            setup.identity,
+            seed=options.seed,
+            options=asdict(options),
+            earlier=setup.loaded,
+        )
 
     def start(self) -> None:
         """Start the workers' threads, now that everything refers to everything it needs."""
         for worker in self.back_end.workers:
             worker.start()
-
-    def begin_in(
-        self, saved: SavedMap, vocabulary: core.Vocabulary, initial_pose: core.Pose | None
-    ) -> None:
-        """Take over a saved map, before `start`: tracking is lost and searches it.
-
-        Parameters
-        ----------
-        saved : SavedMap
-            The map.
-        vocabulary : orbslam2py._core.Vocabulary
-            Describes its keyframes.
-        initial_pose : Pose or None
-            ``T_cw`` where the camera may be.
-        """
-        back_end = self.back_end
-        restore_contents(saved.contents, back_end.map, vocabulary, back_end.keyframe_index)
-        self.tracking.begin_in_loaded_map(initial_pose)
 
     # ---- one image -------------------------------------------------------------------------------
     def process(
@@ -223,14 +128,8 @@ class Pipeline:
         details : bool
             The record is to hold keypoints and matches.
         """
-        back_end, tracking = self.back_end, self.tracking
-        for worker in back_end.workers:
-            worker.raise_if_failed()
-        if self.reset_requested.is_set():
-            self._reset()
-        self._check_timestamp(timestamp)
-        self.localization.apply()
-
+        self._make_ready(timestamp)
+        tracking = self.tracking
         timer = StageTimer()
         if self._waits_for_mapping:
             with timer("wait"):
@@ -250,10 +149,20 @@ class Pipeline:
         self._keep(frame, outcome)
         record = self._record(frame, outcome, timer, details=details)
         self._announce(state_before, record)
-        back_end.mapping.start()
+        self.back_end.mapping.start()
         for watch in watchers:
             watch(WatchedFrame(image, record, frame, outcome.inliers, tracking))
+        if self._keeps_images and record.is_keyframe:
+            self.keeper.keep_image(record.reference_keyframe, encode_image(image))
         return record
+
+    def _make_ready(self, timestamp: float) -> None:
+        for worker in self.back_end.workers:
+            worker.raise_if_failed()
+        if self.reset_requested.is_set():
+            self._reset()
+        self._check_timestamp(timestamp)
+        self.localization.apply()
 
     def _check_timestamp(self, timestamp: float) -> None:
         if not (is_number(timestamp) and math.isfinite(timestamp)):
@@ -346,23 +255,9 @@ class Pipeline:
         self._start_failed = False
 
 
-def abandon(back_end: BackEnd, keeper: MapKeeper) -> None:
-    """End the threads of a system that was dropped without shutdown."""
-    try:
-        keeper.stop_autosave()
-    except MapFileError as unsaved:
-        _log.error("while a system was dropped: %s", unsaved)
-    for error in back_end.finish(drain=False, wait_for_adjustment=False, timeout=RESET_PATIENCE):
-        _log.error("while a system was dropped", exc_info=error)
-
-
-def _make_tracking(
-    settings: Settings,
-    sensor: Sensor,
-    vocabulary: core.Vocabulary,
-    back_end: BackEnd,
-    seed: int,
-) -> Tracking:
+def _make_tracking(setup: Setup, back_end: BackEnd, seed: int) -> Tracking:
+    sensor, vocabulary = setup.sensor, setup.vocabulary
+    max_keyframe_interval = setup.settings.max_keyframe_interval
     slam_map, mapping = back_end.map, back_end.mapping
     initializer: Initializer
     if sensor is Sensor.MONOCULAR:
@@ -373,7 +268,7 @@ def _make_tracking(
         slam_map,
         vocabulary,
         sensor,
-        settings.max_keyframe_interval,
+        max_keyframe_interval,
         Relocalizer(slam_map, back_end.keyframe_index, seed),
         TrackingThresholds(),
     )
@@ -383,8 +278,6 @@ def _make_tracking(
         mapping,
         initializer=initializer,
         search=search,
-        keyframe_decision=KeyframeDecision(
-            slam_map, mapping.worker, sensor, settings.max_keyframe_interval
-        ),
+        keyframe_decision=KeyframeDecision(slam_map, mapping.worker, sensor, max_keyframe_interval),
         has_depth=sensor.has_depth,
     )

@@ -14,19 +14,20 @@ import numpy.typing as npt
 
 from orbslam2py import _core as core
 from orbslam2py._arguments import patience_of
+from orbslam2py._call_guard import CallGuard
 from orbslam2py.errors import MapFileError, StateError, WorkerError
 from orbslam2py.maps.contents import MapContents, take_contents
 from orbslam2py.maps.saved_map import SavedMap
 from orbslam2py.maps.snapshot import MapSnapshot, keyframe_trajectory, take_snapshot
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
+from orbslam2py.slam.back_end import abandon
 from orbslam2py.slam.events import Callbacks, LoopClosed
-from orbslam2py.slam.frame_source import FrameSource, SomeImages, present, timed_images
+from orbslam2py.slam.frame_source import FrameSource, timed_images, track_images
 from orbslam2py.slam.front_end import Mask, PairMask
 from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
-from orbslam2py.slam.map_keeper import MapKeeper, encode_image
 from orbslam2py.slam.options import Setup, SystemOptions
-from orbslam2py.slam.pipeline import BuildFrame, CallGuard, Pipeline, abandon
+from orbslam2py.slam.pipeline import BuildFrame, Pipeline
 from orbslam2py.slam.records import TrackingRecord, TrackingState
 from orbslam2py.trajectory.trajectory import Trajectory
 
@@ -130,18 +131,13 @@ class System:
         )
         setup = Setup.of(settings, sensor, vocabulary, load_map, initial_pose, allow_other_setup)
         self.sensor, self.settings, self.vocabulary = setup.sensor, setup.settings, setup.vocabulary
-        self.pipeline = Pipeline(
-            self.settings, self.sensor, self.vocabulary, self.options, Callbacks.of(callbacks)
-        )
-        if setup.loaded is not None:
-            self.pipeline.begin_in(setup.loaded, self.vocabulary, setup.initial_pose)
-        self._keeper = MapKeeper(
-            self.pipeline.back_end.map, self.pipeline.recorder, setup, self.options
-        )
+        self.pipeline = Pipeline(setup, self.options, Callbacks.of(callbacks))
         self._guard = CallGuard("tracking")
         self._shut_down = False
         self.pipeline.start()
-        self._finalizer = weakref.finalize(self, abandon, self.pipeline.back_end, self._keeper)
+        self._finalizer = weakref.finalize(
+            self, abandon, self.pipeline.back_end, self.pipeline.keeper
+        )
 
     # ---- tracking --------------------------------------------------------------------------------
     def track_stereo(
@@ -304,21 +300,9 @@ class System:
             If a file is missing.
         """
         images_in_time = timed_images(source, self.sensor)
-        records = [self._track_any(images, t, details) for t, images in images_in_time]
+        records = [track_images(self, images, t, details=details) for t, images in images_in_time]
         self.wait_until_idle()
         return records
-
-    def _track_any(self, images: SomeImages, timestamp: float, details: bool) -> TrackingRecord:
-        mask = images.mask
-        if self.sensor is Sensor.MONOCULAR:
-            return self.track_monocular(images.image, timestamp, mask=mask, details=details)
-        if self.sensor is Sensor.RGBD:
-            depth = present(images.depth, "depth image", timestamp)
-            return self.track_rgbd(images.image, depth, timestamp, mask=mask, details=details)
-        right = present(images.right, "right image", timestamp)
-        # The mask is the left image's; what it hides there needs no partner.
-        pair = None if mask is None else (mask, None)
-        return self.track_stereo(images.image, right, timestamp, mask=pair, details=details)
 
     def _require(self, sensor: Sensor, call: str) -> None:
         if self.sensor is not sensor:
@@ -333,10 +317,7 @@ class System:
         with self._guard():
             if self._shut_down:
                 raise StateError("the system has been shut down; make a new one")
-            record = self.pipeline.process(timestamp, build, image, details=details)
-            if self.options.keyframe_images and record.is_keyframe:
-                self._keeper.keep_image(record.reference_keyframe, encode_image(image))
-            return record
+            return self.pipeline.process(timestamp, build, image, details=details)
 
     # ---- control ---------------------------------------------------------------------------------
     @property
@@ -446,7 +427,7 @@ class System:
             drain=drain, wait_for_adjustment=wait_for_adjustment, timeout=timeout
         )
         try:
-            self._keeper.stop_autosave()
+            self.pipeline.keeper.stop_autosave()
         except MapFileError as unsaved:
             errors.append(unsaved)
         # Only now: should a Ctrl-C come before, the threads are still ended with the interpreter.
@@ -471,7 +452,7 @@ class System:
             If the map has no keyframes yet, or the file cannot be written; a file that was there is
             kept.
         """
-        self._keeper.save(path)
+        self.pipeline.keeper.save(path)
 
     def autosave(self, path: str | Path, every: float = 10.0) -> None:
         """Keep a map file up to date from now on: only what has changed is written.
@@ -486,11 +467,11 @@ class System:
         every : float
             Seconds from one save to the next.
         """
-        self._keeper.autosave(path, every)
+        self.pipeline.keeper.autosave(path, every)
 
     def saved_map(self) -> SavedMap:
         """Everything that `save_map` would write at this moment."""
-        return self._keeper.saved_map()
+        return self.pipeline.keeper.saved_map()
 
     def map_contents(self) -> MapContents:
         """Everything that the map is, as arrays; may be called while the system runs."""

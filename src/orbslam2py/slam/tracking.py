@@ -16,13 +16,13 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._timing import StageTimer
-from orbslam2py.slam.frame_recorder import accepted_keypoints
 from orbslam2py.slam.initialization import Initializer
 from orbslam2py.slam.keyframe_decision import KeyframeClock, KeyframeDecision
 from orbslam2py.slam.local_mapping import LocalMapping
 from orbslam2py.slam.localization_mode import FirstEstimateInFixedMap
 from orbslam2py.slam.pose_search import MotionModel, PoseSearch
 from orbslam2py.slam.records import PoseEstimate, Reason, TrackingOutcome, TrackingState
+from orbslam2py.slam.watched_frame import accepted_keypoints
 
 _log = logging.getLogger(__name__)
 

@@ -27,8 +27,8 @@ from orbslam2py._arrays import ByteArray
 from orbslam2py._files import describe_error
 from orbslam2py.maps.changes import MapChanges, MapFollower
 from orbslam2py.slam.events import Event
-from orbslam2py.slam.pipeline import WatchedFrame
 from orbslam2py.slam.system import System
+from orbslam2py.slam.watched_frame import WatchedFrame
 from orbslam2py.viewer.watching import FrameView, QueueState, Watcher
 
 _log = logging.getLogger(__name__)

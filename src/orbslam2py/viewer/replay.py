@@ -3,31 +3,25 @@
 
 from __future__ import annotations
 
-import csv
-import json
 import logging
 import threading
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 
-from orbslam2py._arrays import ByteArray, FloatArray, IntArray
+from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py._files import describe_error
 from orbslam2py.datasets import Sequence
-from orbslam2py.errors import DatasetError, OrbSlamError, SettingsError
-from orbslam2py.maps.changes import KeyframesSet, MapChanges, PointsSet
-from orbslam2py.maps.map_arrays import MapArrays
+from orbslam2py.errors import OrbSlamError
 from orbslam2py.pictures.overlay import Status, fit_size, to_rgb
-from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.records import TrackingState
-from orbslam2py.trajectory import Trajectory, read_tum
+from orbslam2py.viewer.history import changes_until
 from orbslam2py.viewer.left_panel import thumbnail
 from orbslam2py.viewer.page import Page
 from orbslam2py.viewer.paths import lay_truth, pieces
-from orbslam2py.viewer.plots import SPAN, STAGES
+from orbslam2py.viewer.plots import SPAN
+from orbslam2py.viewer.run_folder import RunFolder
 from orbslam2py.viewer.server import LOOPBACK
 
 _log = logging.getLogger(__name__)
@@ -35,70 +29,6 @@ _log = logging.getLogger(__name__)
 _ROOM = (640, 480)
 #: Images a second while it plays.
 _RATE = 15.0
-
-
-@dataclass(frozen=True, eq=False)
-class RunFolder:
-    """What is shown of a run, read from its folder."""
-
-    name: str
-    sensor: Sensor
-    indices: IntArray
-    """(n,) number of every image in its sequence."""
-    timestamps: FloatArray
-    """(n,) seconds."""
-    states: list[str]
-    reasons: list[str]
-    figures: FloatArray
-    """(n, 2 + stages) inliers, milliseconds in all and by stage; 0 where there are none."""
-    path: Trajectory
-    """After the last optimisation; the world is the first keyframe."""
-    online: Trajectory
-    """As first tracked."""
-    map: MapArrays | None
-
-    @classmethod
-    def read(cls, folder: Path) -> RunFolder:
-        """Read the files of a run.
-
-        Raises
-        ------
-        DatasetError
-            If it is no folder of a run, or a file in it is not whole.
-        OSError
-            If a file cannot be read.
-        """
-        if not (folder / "report.json").is_file() or not (folder / "frames.csv").is_file():
-            raise DatasetError(
-                f"{folder} is no folder of a run: it has no report.json and frames.csv; "
-                "give one that orbslam2py run has written"
-            )
-        try:
-            report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
-            name, sensor = f"{report['sequence']} ({report['sensor']})", Sensor(report["sensor"])
-        except (ValueError, KeyError, TypeError, SettingsError) as error:
-            raise DatasetError(f"{folder / 'report.json'} is no report of a run") from error
-        rows = _read_frames(folder / "frames.csv")
-        if not (folder / "map.npz").is_file():
-            _log.warning(
-                "no map.npz in %s: only the path is shown; run the sequence again to see its map",
-                folder,
-            )
-        return cls(
-            name=name,
-            sensor=sensor,
-            indices=np.array([int(row["index"]) for row in rows], np.int64),
-            timestamps=np.array([float(row["timestamp"]) for row in rows]),
-            states=[row["state"] for row in rows],
-            reasons=[row["reason"] for row in rows],
-            figures=np.array([[_figure(row, key) for key in _FIGURES] for row in rows]),
-            path=_read_path(folder / "trajectory.txt"),
-            online=_read_path(folder / "trajectory_online.txt"),
-            map=MapArrays.load(folder / "map.npz") if (folder / "map.npz").is_file() else None,
-        )
-
-
-_FIGURES = ("inliers", "ms_track", *(f"ms_{stage}" for stage in STAGES))
 
 
 class Replay:
@@ -207,7 +137,7 @@ class Replay:
             self._shown = position
             now = float(run.timestamps[position])
             if run.map is not None:
-                page.model.apply(_changes_until(run.map, page, now))
+                page.model.apply(changes_until(run.map, page.model, now))
             T_wc = self._pose_at(position)
             page.fit_size(np.zeros(0, np.int64), T_wc)
             page.draw_map(at_most=None)
@@ -285,62 +215,3 @@ class Replay:
         points_of = self._run.map.covisibility
         pairs = points_of[(points_of == keyframe).any(axis=1)]
         return [(int(other), None) for other in pairs[pairs != keyframe]]
-
-
-def _changes_until(arrays: MapArrays, page: Page, now: float) -> MapChanges:
-    """What turns the map that a page shows into the last one as far as it was seen until a time."""
-    model = page.model
-    there = arrays.keyframe_timestamps <= now + 1e-6
-    ids = arrays.keyframe_ids[there]
-    new = np.flatnonzero(there & ~np.isin(arrays.keyframe_ids, model.keyframe_ids))
-    shown_points = np.concatenate(
-        [np.zeros(0, np.int64), *(part.ids for part in model.points.values())]
-    )
-    seen = np.isin(arrays.point_first_keyframes, ids)
-    new_points = np.flatnonzero(seen & ~np.isin(arrays.point_ids, shown_points))
-    tree = arrays.spanning_tree
-    parents = dict(tree.tolist())
-    return MapChanges(
-        map_index=0,
-        restarted=False,
-        keyframes_set=KeyframesSet(
-            arrays.keyframe_ids[new],
-            arrays.keyframe_T_wc[new],
-            arrays.keyframe_timestamps[new],
-            np.array([parents.get(i, -1) for i in arrays.keyframe_ids[new].tolist()], np.int64),
-        ),
-        keyframes_removed=np.setdiff1d(model.keyframe_ids, ids),
-        points_set=PointsSet(
-            arrays.point_ids[new_points],
-            arrays.point_positions[new_points],
-            arrays.point_observations[new_points],
-        ),
-        points_removed=np.setdiff1d(shown_points, arrays.point_ids[seen]),
-        covisibility=_between(arrays.covisibility, ids),
-        loop_edges=_between(arrays.loop_edges, ids),
-        spanning_tree=_between(tree, ids),
-    )
-
-
-def _between(pairs: IntArray, ids: IntArray) -> IntArray:
-    found: IntArray = pairs[np.isin(pairs, ids).all(axis=1)]
-    return found
-
-
-def _read_frames(path: Path) -> list[dict[str, str]]:
-    with path.open(encoding="utf-8", newline="") as stream:
-        rows = list(csv.DictReader(stream))
-    if not rows or not {"index", "timestamp", "state", "reason"} <= set(rows[0]):
-        raise DatasetError(f"{path} lists no frames; give the folder of a run that saw images")
-    return rows
-
-
-def _figure(row: dict[str, str], key: str) -> float:
-    text = row.get(key)
-    return float(text) if text else 0.0
-
-
-def _read_path(path: Path) -> Trajectory:
-    if not path.is_file():
-        return Trajectory(np.zeros(0), np.zeros((0, 4, 4)))
-    return read_tum(path)

@@ -26,7 +26,7 @@ from orbslam2py.pictures.palette import (
     TRUTH,
     Colour,
 )
-from orbslam2py.trajectory.rotations import quaternions_from_rotations
+from orbslam2py.viewer.frusta import CORNERS, FACES, frusta, nearest_to_ray, orientations
 from orbslam2py.viewer.map_model import MapModel, Stale
 from orbslam2py.viewer.point_colours import PointColours
 
@@ -54,10 +54,6 @@ _SIZE = 0.03
 _SIZE_TOLERANCE = 1.6
 #: Diameter of a point at size 1, in those sizes.
 _POINT = 0.15
-#: A frustum: its apex, then the corners of its image.
-_CORNERS = np.array([(0, 0, 0), (-1, -0.75, 0.6), (1, -0.75, 0.6), (1, 0.75, 0.6), (-1, 0.75, 0.6)])
-_EDGES = np.array([(0, 1), (0, 2), (0, 3), (0, 4), (1, 2), (2, 3), (3, 4), (4, 1)])
-_FACES = np.array([(0, 2, 1), (0, 3, 2), (0, 4, 3), (0, 1, 4), (1, 2, 3), (1, 3, 4)], np.uint32)
 #: Of the sight of a camera that is not known better [rad].
 _FOV = 0.9
 
@@ -206,15 +202,15 @@ class Scene:
         rows = self._model.rows_in_page(number)
         T_wc = self._model.keyframe_T_wc[rows]
         lines, bodies = f"/keyframes/lines{number}", f"/keyframes/bodies{number}"
-        self._lines(lines, _frusta(T_wc, self.size), KEYFRAME, 1.5)
+        self._lines(lines, frusta(T_wc, self.size), KEYFRAME, 1.5)
         if not len(T_wc):
             self._remove(bodies)
             return
         node = self._scene.add_batched_meshes_simple(
             bodies,
-            vertices=(self.size * _CORNERS).astype(np.float32),
-            faces=_FACES,
-            batched_wxyzs=_quaternions(T_wc),
+            vertices=(self.size * CORNERS).astype(np.float32),
+            faces=FACES,
+            batched_wxyzs=orientations(T_wc),
             batched_positions=T_wc[:, :3, 3],
             batched_colors=KEYFRAME,
             opacity=0.18,
@@ -226,7 +222,7 @@ class Scene:
         )
 
         def clicked(event: viser.SceneNodePointerEvent[Any]) -> None:
-            row = _nearest_to_ray(
+            row = nearest_to_ray(
                 self._model.keyframe_T_wc[:, :3, 3],
                 np.array(event.ray_origin),
                 np.array(event.ray_direction),
@@ -243,7 +239,7 @@ class Scene:
         if T_wc is None:
             self._remove("/camera/now")
             return
-        wxyz, position = _quaternions(T_wc[None])[0], T_wc[:3, 3]
+        wxyz, position = orientations(T_wc[None])[0], T_wc[:3, 3]
         node = self._nodes.get("/camera/now")
         if node is not None and node.aspect == aspect:
             node.wxyz, node.position, node.scale = wxyz, position, 2.6 * self.size
@@ -286,7 +282,7 @@ class Scene:
             self._remove("/selection/neighbours")
             return
         T_wc = model.keyframe_T_wc[row]
-        self._lines("/selection/keyframe", _frusta(T_wc, 1.3 * self.size), NOW, 3.0)
+        self._lines("/selection/keyframe", frusta(T_wc, 1.3 * self.size), NOW, 3.0)
         pairs = np.column_stack(
             [np.full_like(selection.neighbours, selection.keyframe), selection.neighbours]
         )
@@ -314,24 +310,3 @@ class Scene:
         node = self._nodes.pop(name, None)
         if node is not None:
             node.remove()
-
-
-def _frusta(T_wc: FloatArray, size: float) -> FloatArray:
-    """Edges of the frusta of cameras, (8 k, 2, 3)."""
-    corners = np.einsum("kij,cj->kci", T_wc[:, :3, :3], size * _CORNERS) + T_wc[:, None, :3, 3]
-    return np.asarray(corners[:, _EDGES].reshape(-1, 2, 3))
-
-
-def _quaternions(T_wc: FloatArray) -> FloatArray:
-    """Orientations w, x, y, z (k, 4)."""
-    return np.asarray(quaternions_from_rotations(T_wc[:, :3, :3])[:, [3, 0, 1, 2]])
-
-
-def _nearest_to_ray(places: FloatArray, origin: FloatArray, direction: FloatArray) -> int | None:
-    """Row of the place that a ray passes at the smallest angle, in front of its origin."""
-    if not len(places):
-        return None
-    away = places - origin
-    along = away @ (direction / np.linalg.norm(direction))
-    cosine = along / np.maximum(np.linalg.norm(away, axis=1), 1e-12)
-    return int(np.argmax(cosine))

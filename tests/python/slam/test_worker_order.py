@@ -8,8 +8,8 @@ import threading
 import pytest
 
 from orbslam2py import OrbSlamError, StateError, WorkerError
+from orbslam2py._call_guard import CallGuard
 from orbslam2py._worker import Worker, WorkerState
-from orbslam2py.slam.pipeline import CallGuard
 from support.worker_steps import NAME, Gate, eventually
 
 pytestmark = pytest.mark.watchdog(10)

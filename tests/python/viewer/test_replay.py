@@ -14,7 +14,8 @@ from orbslam2py import DatasetError, MapFileError, Sensor, run_sequence
 from orbslam2py.maps import MapArrays
 from orbslam2py.pictures.palette import KEYFRAME
 from orbslam2py.runs import RunOptions, SystemOptions
-from orbslam2py.viewer.replay import Replay, RunFolder
+from orbslam2py.viewer.replay import Replay
+from orbslam2py.viewer.run_folder import RunFolder
 from support.browser import Browser
 from support.small_sequences import sequence
 from support.viewer_pages import (

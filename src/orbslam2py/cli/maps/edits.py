@@ -32,7 +32,7 @@ from orbslam2py.maps import (
 from orbslam2py.maps.edits.crop import inside_box, keyframes_in_box, keyframes_of_times
 from orbslam2py.maps.edits.saved import crop_saved_map
 from orbslam2py.maps.units import unit_of
-from orbslam2py.slam.map_optimization import optimize_map
+from orbslam2py.slam.full_bundle_adjustment import optimize_map
 
 MapFile = Annotated[Path, typer.Argument(help="Map file.")]
 Output = Annotated[Path, typer.Option("--output", "-o", help="Map file to write.")]

@@ -10,24 +10,28 @@ import math
 import os
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
+from orbslam2py._arrays import IntArray
 from orbslam2py._version import __version__
 from orbslam2py.errors import MapFileError, StateError
 from orbslam2py.maps.contents import ChangedContents, MapContents, take_changes, take_contents
 from orbslam2py.maps.map_file import save_map
 from orbslam2py.maps.map_rows import Row, keypoint_rows, map_rows, run_rows, settings_rows
 from orbslam2py.maps.map_writer import MapWriter
-from orbslam2py.maps.saved_map import Run, SavedMap
-from orbslam2py.slam.frame_recorder import FrameRecorder
-from orbslam2py.slam.options import Setup, SystemOptions
+from orbslam2py.maps.saved_map import RecordedFrames, Run, SavedMap, VocabularyIdentity
+from orbslam2py.settings.settings import Settings
 
 _log = logging.getLogger(__name__)
+
+#: Gives the frames of a map that hang on known keyframes: ``recorded(map_index, keyframe_ids)``.
+Recorded = Callable[[int, IntArray], RecordedFrames]
 
 
 class MapKeeper:
@@ -39,12 +43,18 @@ class MapKeeper:
     ----------
     slam_map : orbslam2py._core.Map
         The map.
-    recorder : FrameRecorder
-        Where the frames were.
-    setup : Setup
-        Camera and visual words, and what the map was loaded from.
-    options : SystemOptions
+    recorded : callable
+        Gives the frames that a file is to hold.
+    settings : Settings
+        Of the camera.
+    vocabulary : VocabularyIdentity
+        The visual words.
+    seed : int
         Of the present run.
+    options : mapping
+        Those of the system, by their names.
+    earlier : SavedMap, optional
+        What the map was loaded from.
 
     Attributes
     ----------
@@ -55,23 +65,24 @@ class MapKeeper:
     def __init__(
         self,
         slam_map: core.Map,
-        recorder: FrameRecorder,
-        setup: Setup,
-        options: SystemOptions,
+        recorded: Recorded,
+        settings: Settings,
+        vocabulary: VocabularyIdentity,
+        *,
+        seed: int,
+        options: Mapping[str, Any],
+        earlier: SavedMap | None,
     ) -> None:
         self._map = slam_map
-        self._recorder = recorder
-        self._settings = setup.settings
-        self._vocabulary = setup.identity
-        earlier = setup.loaded
+        self._recorded = recorded
+        self._settings = settings
+        self._vocabulary = vocabulary
         self._earlier_runs = earlier.runs if earlier is not None else ()
         self._images: dict[int, bytes] = dict(earlier.images) if earlier is not None else {}
         self._first_map = slam_map.epoch
         self._images_of = self._first_map
         started = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
-        self._run = Run(
-            f"orbslam2py {__version__}", started, options.seed, dataclasses.asdict(options)
-        )
+        self._run = Run(f"orbslam2py {__version__}", started, seed, options)
         self._autosave: _Autosave | None = None
 
     def keep_image(self, keyframe: int, jpeg: bytes) -> None:
@@ -105,7 +116,7 @@ class MapKeeper:
 
     def _present_run(self, contents: MapContents) -> Run:
         known = np.concatenate([contents.keyframes.ids, contents.removed_keyframes.ids])
-        frames = self._recorder.recorded(contents.map_index, known)
+        frames = self._recorded(contents.map_index, known)
         return dataclasses.replace(self._run, frames=frames)
 
     # ---- all the time ----------------------------------------------------------------------------

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A run on the terminal: a bar while it goes, a table at its end, the exit code."""
+
+from __future__ import annotations
+
+import contextlib
+import shlex
+import sys
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+
+from orbslam2py._files import describe_error
+from orbslam2py.cli.display import (
+    Display,
+    log_to,
+    print_error,
+    progress_bar,
+    report_table,
+    tell_repeated,
+)
+from orbslam2py.cli.exit_codes import ExitCode
+from orbslam2py.cli.interrupts import StopOnInterrupt
+from orbslam2py.cli.viewing import ViewerOptions, Viewing
+from orbslam2py.cli.watching import file_watchers, watch_all
+from orbslam2py.datasets.base import LiveSource, Sequence
+from orbslam2py.runs.options import RunOptions
+from orbslam2py.runs.outputs import new_output_folder
+from orbslam2py.runs.remedies import why_nothing_was_tracked
+from orbslam2py.runs.result import FrameRow
+from orbslam2py.runs.run import FinishedRun, run_sequence
+from orbslam2py.slam.system import System
+from orbslam2py.vocabulary.vocabulary import load_vocabulary
+
+
+def run_and_show(
+    sequence: Sequence | LiveSource,
+    options: RunOptions,
+    *,
+    vocabulary: Path | None = None,
+    output: Path | None = None,
+    force: bool = False,
+    report_page: bool = True,
+    viewer: ViewerOptions | None = None,
+    quiet: bool = False,
+    video: Path | None = None,
+    record: Path | None = None,
+) -> ExitCode:
+    """Run, with a progress bar and a table at the end; returns the exit code."""
+    console = Console(quiet=quiet)
+    errors = Console(stderr=True)
+    log_to(errors, quiet=quiet)
+    n_frames = options.n_frames(sequence)
+    words = load_vocabulary(vocabulary)  # until here a Ctrl-C leaves nothing behind
+    with contextlib.ExitStack() as page:
+        with StopOnInterrupt() as interrupt:
+            files = page.enter_context(file_watchers(sequence, options, video, record))
+            viewing = Viewing(viewer or ViewerOptions(), sequence, interrupt.event)
+            page.enter_context(viewing)
+            with progress_bar(console) as bar:
+                display = Display(bar, n_frames)
+
+                def progress(row: FrameRow, system: System) -> None:
+                    display.show(row, system)
+                    viewing.count(row)
+                    files.count(row)
+
+                done = run_sequence(
+                    sequence,
+                    options,
+                    vocabulary=words,
+                    output=output or new_output_folder(sequence.name),
+                    force=force,
+                    report_page=report_page,
+                    command=shlex.join(["orbslam2py", *sys.argv[1:]]),
+                    progress=progress,
+                    control=viewing.control,
+                    watch=watch_all(viewing.watch, files.watch),
+                )
+        tell_repeated()
+        console.print(report_table(done.report))
+        folder = escape(str(done.folder))
+        console.print(f"Results are in [bold]{folder}[/]", highlight=False, soft_wrap=True)
+        html = done.folder / "report.html" if done.folder is not None else None
+        if report_page and html is not None and html.is_file():
+            text = f"To look at them: [bold]{escape(str(html))}[/]"
+            console.print(text, highlight=False, soft_wrap=True)
+        files.tell(console)
+        code = _conclude(done, errors)
+        viewing.stay(console, done.folder)
+    interrupted = interrupt.event.is_set() and not done.result.is_live  # also while writing
+    if code is not ExitCode.FAILED and interrupted:
+        return ExitCode.INTERRUPTED
+    return code
+
+
+def _conclude(done: FinishedRun, errors: Console) -> ExitCode:
+    result = done.result
+    for problem in done.problems:
+        print_error(errors, "Error", problem)
+    if result.error is not None:
+        what = describe_error(result.error)
+        print_error(errors, "Error", f"{what} (what was done until then is saved)")
+    if result.error is not None or done.problems:
+        return ExitCode.FAILED
+    if result.n_tracked == 0 and not result.interrupted:
+        print_error(errors, "Nothing could be tracked", why_nothing_was_tracked(result.rows))
+        return ExitCode.NOTHING_TRACKED
+    return ExitCode.OK

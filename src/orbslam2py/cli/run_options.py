@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The options of ``orbslam2py run``: what the images are, how to work, and what to write."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from orbslam2py.settings.sensor import Sensor
+
+# ---- the images ----------------------------------------------------------------------------------
+SequenceArgument = Annotated[
+    str,
+    typer.Argument(
+        help="Folder of a TUM RGB-D, KITTI odometry or EuRoC sequence; folder of images; "
+        "video file; number of a camera (ends with Ctrl-C)."
+    ),
+]
+SensorOption = Annotated[
+    Sensor | None,
+    typer.Option(help="What the images come from [the richest there are images for]."),
+]
+SettingsOption = Annotated[
+    str | None,
+    typer.Option(
+        help="Built-in name (tum1, kitti04-12, euroc, ...) or ORB-SLAM YAML file; "
+        "found by itself where the sequence tells.",
+        metavar="NAME_OR_FILE",
+    ),
+]
+StartOption = Annotated[int, typer.Option(help="First frame.", min=0)]
+StrideOption = Annotated[int, typer.Option(help="Take every so many frames.", min=1)]
+MaxFramesOption = Annotated[int | None, typer.Option(help="Take at most so many frames.", min=1)]
+FpsOption = Annotated[
+    float | None,
+    typer.Option(
+        help="Images per second of a folder of images [that of the settings] or a video [its "
+        "own time stamps]; what a camera is asked for.",
+    ),
+]
+TimesOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="File with a time stamp per image of a folder or video: decimal seconds or whole "
+        "nanoseconds, with the images' file names or without (rgb.txt, data.csv)."
+    ),
+]
+MaskOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="Where to look: an 8-bit image, 0 = ignore, or a folder with one per image.",
+        metavar="FILE_OR_FOLDER",
+    ),
+]
+RealtimeFlag = Annotated[
+    bool,
+    typer.Option("--realtime", help="Follow the time stamps; drop frames as a camera would."),
+]
+
+
+# ---- the method ----------------------------------------------------------------------------------
+VocabularyOption = Annotated[
+    Path | None, typer.Option(help="Vocabulary file; the one of the package if not given.")
+]
+DeterministicFlag = Annotated[
+    bool, typer.Option("--deterministic", help="Map inline: the same bytes in every run.")
+]
+LoopClosingFlag = Annotated[
+    bool,
+    typer.Option(
+        "--loop-closing/--no-loop-closing",
+        help="Recognise places seen before and take out the drift.",
+    ),
+]
+FullAdjustmentFlag = Annotated[
+    bool,
+    typer.Option(
+        "--full-adjustment/--no-full-adjustment", help="After a loop, refine the whole map."
+    ),
+]
+FullAdjustmentTimeLimitOption = Annotated[
+    float | None,
+    typer.Option(help="Seconds after which that ends with what it has reached.", metavar="SECONDS"),
+]
+FinalAdjustmentFlag = Annotated[
+    bool,
+    typer.Option(
+        "--final-adjustment", help="At the end, refine the finished map before it is written."
+    ),
+]
+SeedOption = Annotated[int, typer.Option(help="Seed of all random draws.", min=0)]
+
+
+# ---- maps of other runs, and for others ----------------------------------------------------------
+LoadOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="Begin in a map that was saved before; its settings serve if --settings gives no "
+        "others.",
+        metavar="FILE",
+    ),
+]
+InitialPoseOption = Annotated[
+    str | None,
+    typer.Option(
+        help="Where in the loaded map the camera may be: tried before all else.",
+        metavar="X,Y,Z[,QX,QY,QZ,QW]",
+    ),
+]
+AllowOtherSetupFlag = Annotated[
+    bool,
+    typer.Option(
+        "--allow-other-setup",
+        help="Load the map although it is of another camera or other visual words.",
+    ),
+]
+LocalizeOption = Annotated[
+    int | None,
+    typer.Option(
+        help="Localization mode, in which the map stays as it is: after so many frames; "
+        "without a number from the first on, in a loaded map.",
+        min=0,
+        metavar="[N]",
+    ),
+]
+SaveOption = Annotated[
+    Path | None, typer.Option(help="Save the last map in this file.", metavar="FILE")
+]
+AutosaveOption = Annotated[
+    float | None,
+    typer.Option(help="Save it every so many seconds on the way as well.", metavar="SECONDS"),
+]
+SaveImagesFlag = Annotated[
+    bool,
+    typer.Option("--save-images", help="Keep a small grey image of every keyframe in the map."),
+]
+
+
+# ---- the results ---------------------------------------------------------------------------------
+OutputOption = Annotated[
+    Path | None, typer.Option(help="Folder for the results [runs/SEQUENCE-TIME].")
+]
+ForceFlag = Annotated[
+    bool, typer.Option("--force", help="Write into an output folder that is not empty.")
+]
+NoReportFlag = Annotated[
+    bool, typer.Option("--no-report", help="Do not write the page report.html.")
+]
+QuietFlag = Annotated[bool, typer.Option("--quiet", help="Only errors.")]

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What can be seen of a frame: its keypoints, their matches, and more for those who watch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from orbslam2py import _core as core
+from orbslam2py._arrays import ByteArray, FloatArray, IntArray
+from orbslam2py.slam.records import FrameFeatures, TrackingRecord
+
+if TYPE_CHECKING:
+    from orbslam2py.slam.tracking import Tracking
+
+
+class WatchedFrame:
+    """What a watcher is given after every image; copies are made when they are asked for.
+
+    Valid only during the call: the frame goes on to be the one that the next is compared with.
+
+    Parameters
+    ----------
+    image : array of uint8, (h, w) or (h, w, 3) or (h, w, 4)
+        As the caller gave it, who may use the memory again.
+    record : TrackingRecord
+        What tracking says about it.
+    frame : orbslam2py._core.TrackedFrame
+        Keypoints and what they are matched with.
+    inliers : array of bool, (n,), optional
+        See `FrameFeatures.inliers`.
+    tracking : Tracking
+        The state machine, as the frame left it.
+    """
+
+    def __init__(
+        self,
+        image: ByteArray,
+        record: TrackingRecord,
+        frame: core.TrackedFrame,
+        inliers: npt.NDArray[np.bool_] | None,
+        tracking: Tracking,
+    ) -> None:
+        self.image = image
+        self.record = record
+        self._frame = frame
+        self._inliers = inliers
+        self._tracking = tracking
+
+    def features(self) -> FrameFeatures:
+        """Keypoints and matches."""
+        return self.record.features or frame_features(self._frame, self._inliers)
+
+    def pixels(self) -> npt.NDArray[np.float32]:
+        """Where the keypoints lie in the image as it came, (n, 2)."""
+        return pixels_as_given(self._frame.features)
+
+    def local_points(self) -> IntArray:
+        """Ids of the points of the local map, (p,)."""
+        return self._tracking.local_points
+
+    def start_lines(self) -> FloatArray | None:
+        """While a single camera's map begins: pixels in the first view and now, (m, 4)."""
+        return self._tracking.start_lines
+
+
+#: Called after every image, in the thread of the track call.
+FrameWatcher = Callable[[WatchedFrame], None]
+
+
+def accepted_keypoints(frame: core.TrackedFrame) -> npt.NDArray[np.bool_]:
+    """Which keypoints have a point that agrees with the pose, (n,)."""
+    accepted: npt.NDArray[np.bool_] = (frame.map_points >= 0) & (frame.outlier == 0)
+    return accepted
+
+
+def pixels_as_given(frame: core.Frame) -> npt.NDArray[np.float32]:
+    """Where the keypoints lie in the image as it came, not undistorted, (n, 2)."""
+    raw = frame.raw_keypoints
+    return raw if len(raw) else frame.keypoints
+
+
+def frame_features(
+    frame: core.TrackedFrame, inliers: npt.NDArray[np.bool_] | None = None
+) -> FrameFeatures:
+    """Copy the keypoints of a frame and what they were matched to.
+
+    Parameters
+    ----------
+    frame : orbslam2py._core.TrackedFrame
+        The frame.
+    inliers : array of bool, (n,), optional
+        `accepted_keypoints` as they were before points were made or dropped.
+    """
+    features = frame.features
+    return FrameFeatures(
+        keypoints=features.keypoints,
+        levels=features.levels,
+        depths=features.depth,
+        map_point_ids=frame.map_points,
+        inliers=accepted_keypoints(frame) if inliers is None else inliers,
+        colours=features.colours,
+    )
