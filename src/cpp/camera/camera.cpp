@@ -90,7 +90,9 @@ void RadialTangential::undistort(const Pinhole& pinhole, std::vector<float>& xy)
 
 Camera::Camera(const CameraOptions& options)
     : options_(options),
-      pinhole_(options.pinhole), image_size_(options.image_size), bf_(options.bf) {
+      pinhole_(options.pinhole),
+      image_size_(options.image_size),
+      bf_(options.bf) {
   check(options);
   lens_ = make_lens(options.distortion);
   bounds_ = bounds_of(*lens_, pinhole_, image_size_);

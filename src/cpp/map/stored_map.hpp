@@ -62,9 +62,10 @@ struct StoredMap {
 void check_stored_map(const StoredMap& stored);
 
 /// The frame of keyframe `row`, not described yet.
-std::shared_ptr<Frame> restore_frame(const StoredMap& stored, std::size_t row,
-                                     const std::vector<std::shared_ptr<const Camera>>& cameras,
-                                     const std::vector<std::shared_ptr<const ScalePyramid>>& scales);
+std::shared_ptr<Frame> restore_frame(
+    const StoredMap& stored, std::size_t row,
+    const std::vector<std::shared_ptr<const Camera>>& cameras,
+    const std::vector<std::shared_ptr<const ScalePyramid>>& scales);
 
 /// The cameras and pyramids of restore_frame(). Throws MapFileError for impossible ones.
 std::vector<std::shared_ptr<const Camera>> restore_cameras(const StoredMap& stored);

@@ -19,7 +19,8 @@ constexpr float kMaxCoordinate = 1e6F;
 /// Ids are looked up in tables as long as the largest id, so a small map may not have huge ones.
 /// Culling leaves several dozen ids unused for every one that lives.
 constexpr std::int64_t kIdsPerRow = 4096;
-constexpr std::int64_t kFewKeyframeIds = std::int64_t{1} << 20, kFewPointIds = std::int64_t{1} << 24;
+constexpr std::int64_t kFewKeyframeIds = std::int64_t{1} << 20,
+                       kFewPointIds = std::int64_t{1} << 24;
 
 [[noreturn]] void refuse(const std::string& what) { throw MapFileError(what); }
 
@@ -68,7 +69,8 @@ void check_cameras(const StoredMap& stored) {
     }
   }
   for (const auto& camera : restore_cameras(stored)) {
-    if (!camera->lens().is_identity() && !stored.keypoints.raw_keypoints && stored.n_keypoints > 0) {
+    if (!camera->lens().is_identity() && !stored.keypoints.raw_keypoints &&
+        stored.n_keypoints > 0) {
       refuse("the raw keypoints of a camera with a distorting lens are missing");
     }
   }
@@ -112,7 +114,8 @@ class KeyFrameCheck {
     }
     if (!std::isfinite(rows_.timestamps[i])) refuse("the time stamp of " + name + " is not finite");
     if (!positive(rows_.scale[i])) refuse("the scale of " + name + " is not positive");
-    if (rows_.camera[i] < 0 || rows_.camera[i] >= static_cast<std::int64_t>(stored_.cameras.size())) {
+    if (rows_.camera[i] < 0 ||
+        rows_.camera[i] >= static_cast<std::int64_t>(stored_.cameras.size())) {
       refuse(name + " has the camera " + std::to_string(rows_.camera[i]) + ", which is not there");
     }
   }
@@ -199,8 +202,8 @@ void check_point_row(const StoredMap& stored, std::size_t i) {
   const auto& rows = stored.points;
   const Vector3& d = rows.mean_directions[i];
   const double squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-  const bool good = finite(rows.positions[i]) && squared <= 1 + 1e-6 &&
-                    rows.min_distance[i] >= 0 && rows.max_distance[i] >= rows.min_distance[i] &&
+  const bool good = finite(rows.positions[i]) && squared <= 1 + 1e-6 && rows.min_distance[i] >= 0 &&
+                    rows.max_distance[i] >= rows.min_distance[i] &&
                     std::isfinite(rows.max_distance[i]) && rows.n_visible[i] >= 1 &&
                     rows.n_visible[i] <= kMaxCount && rows.n_found[i] >= 0 &&
                     rows.n_found[i] <= kMaxCount && rows.first_keyframe[i] >= 0 &&
