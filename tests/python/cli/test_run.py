@@ -163,7 +163,7 @@ def test_deterministic_runs_write_the_same_bytes(command: CommandLine, rgbd: Pat
     for name in ("a", "b"):
         arguments = ("--sensor", "rgbd", "--output", name, "--deterministic", "--quiet")
         assert command("run", rgbd, *arguments).code == 0
-    for file in RUN_FILES - {"report.json", "frames.csv", "trajectory.png"}:
+    for file in RUN_FILES - {"report.json", "report.html", "frames.csv", "trajectory.png"}:
         assert Path("a", file).read_bytes() == Path("b", file).read_bytes(), file
     assert Results(Path("a")).report["deterministic"] is True
 
