@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 
 from orbslam2py.errors import MapFileError
@@ -31,5 +30,4 @@ def save_map(saved: SavedMap, path: str | os.PathLike[str]) -> None:
         raise MapFileError(
             f"cannot write {path}: there are no keyframes in the map yet; save it later"
         )
-    with contextlib.closing(MapWriter(path)) as writer:
-        writer.commit(all_rows(saved))
+    MapWriter(path, once=True).commit(all_rows(saved))

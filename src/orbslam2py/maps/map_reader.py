@@ -54,7 +54,9 @@ def load_map(path: str | os.PathLike[str], *, images: bool = False) -> SavedMap:
     named, file = str(path), Path(path)
     _check_header(file, named)
     with _refusing(named):
-        with contextlib.closing(connect(file, "ro")) as connection:
+        # A writer that was killed may have left a journal: SQLite takes back what it says first.
+        interrupted = file.with_name(f"{file.name}-journal").exists()
+        with contextlib.closing(connect(file, "rw" if interrupted else "ro")) as connection:
             connection.execute("PRAGMA cell_size_check = ON")
             connection.execute("BEGIN")  # all tables as of one commit
             _check_schema(connection)

@@ -51,9 +51,12 @@ class MapWriter:
     ----------
     path
         The map file; replaced by the first commit.
+    once
+        There will be one commit only: nothing is touched any more once the file is in its place.
     """
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
+    def __init__(self, path: str | os.PathLike[str], *, once: bool = False) -> None:
+        self._once = once
         self.path = Path(os.path.realpath(path))
         self._named = str(path)
         self._connection: sqlite3.Connection | None = None
@@ -113,6 +116,10 @@ class MapWriter:
                 connection.execute("PRAGMA synchronous = OFF")
                 connection.executescript(CREATE)
                 n = self._change(connection, rows, lambda table, key: False)
+                if not self._once:
+                    # Readers see the last commit while the next is written, and so does whoever
+                    # comes after a crash. Switched on here, where a kill does no harm.
+                    connection.execute("PRAGMA journal_mode = WAL")
             _sync(temporary)
             _end_old_log(self.path)
             temporary.replace(self.path)
@@ -122,11 +129,9 @@ class MapWriter:
             with contextlib.suppress(OSError):
                 temporary.unlink()
             raise
-        self._connection = connect(self.path, "rw")
-        # Readers see the last commit while the next is written, and so does whoever comes after
-        # a crash.
-        self._connection.execute("PRAGMA journal_mode = WAL")
-        self._connection.execute("PRAGMA synchronous = NORMAL")
+        if not self._once:
+            self._connection = connect(self.path, "rw")
+            self._connection.execute("PRAGMA synchronous = NORMAL")
         return n
 
     def _change(
@@ -284,20 +289,20 @@ def _check_target(path: Path, named: str) -> None:
 
 
 def _end_old_log(path: Path) -> None:
-    """Put the log of a crashed writer into the file that is about to be replaced.
+    """Put the log of a killed writer into the file that is about to be replaced.
 
     Else it would be taken for the new file's.
     """
-    log = path.with_name(f"{path.name}-wal")
-    if path.exists() and log.exists():
+    logs = [path.with_name(f"{path.name}{suffix}") for suffix in _SIDE_FILES]
+    if path.exists() and any(log.exists() for log in logs):
         with (
             contextlib.suppress(sqlite3.Error, OSError),
             contextlib.closing(connect(path, "rw")) as connection,
         ):
             connection.execute("PRAGMA journal_mode = DELETE")
-    for suffix in _SIDE_FILES:
+    for log in logs:
         with contextlib.suppress(FileNotFoundError):
-            path.with_name(f"{path.name}{suffix}").unlink()
+            log.unlink()
 
 
 def _sync(path: Path) -> None:

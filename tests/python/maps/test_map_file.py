@@ -99,6 +99,22 @@ def test_another_program_can_read_while_it_grows(tmp_path: Path) -> None:
         assert small_map().contents.first_difference(load_map(path).contents) is None
 
 
+def test_a_journal_that_a_killed_program_left_is_taken_back(tmp_path: Path) -> None:
+    path = written(tmp_path)
+    journal = path.with_name(f"{path.name}-journal")
+    with closing(sqlite3.connect(path, isolation_level=None)) as connection:
+        connection.execute("PRAGMA cache_spill = 1")
+        connection.execute("PRAGMA cache_size = 1")
+        connection.execute("BEGIN")
+        connection.execute("UPDATE keypoints SET responses = zeroblob(length(responses))")
+        half_done, log = path.read_bytes(), journal.read_bytes()
+        connection.execute("ROLLBACK")
+    path.write_bytes(half_done)
+    journal.write_bytes(log)
+    assert small_map().contents.first_difference(load_map(path).contents) is None
+    assert list(tmp_path.iterdir()) == [path]
+
+
 # ---- bad input --------------------------------------------------------------------------------
 def _refused(path: Path, what: str, remedy: str = "") -> None:
     before = path.read_bytes() if path.is_file() else b""
