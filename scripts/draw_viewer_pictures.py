@@ -3,7 +3,9 @@
 
     .venv/bin/python scripts/draw_viewer_pictures.py SEQUENCE [--sensor S] [--output PNG]
 
-Needs the extra ``viewer`` and Chromium. Without a sequence the demo's corridor is run.
+Needs the extra ``viewer`` and Chromium. Without a sequence the demo's corridor is run. The picture
+of the documentation: ``--frames 400 --look 3 -7 -10 3 0.5 -0.5 --without "Points of the local map"
+Covisibility``.
 """
 
 from __future__ import annotations
