@@ -105,6 +105,8 @@ def _conclude(done: FinishedRun, errors: Console) -> ExitCode:
     if result.error is not None or done.problems:
         return ExitCode.FAILED
     if result.n_tracked == 0 and not result.interrupted:
-        print_error(errors, "Nothing could be tracked", why_nothing_was_tracked(result.rows))
+        doubted = bool(result.calibration_warnings)
+        why = why_nothing_was_tracked(result.rows, calibration_is_doubted=doubted)
+        print_error(errors, "Nothing could be tracked", why)
         return ExitCode.NOTHING_TRACKED
     return ExitCode.OK

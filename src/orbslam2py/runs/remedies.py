@@ -43,11 +43,14 @@ def what_helps(reason: Reason | str) -> str:
     return next((text for known, text in _WHAT_HELPS.items() if known.value == str(reason)), "")
 
 
-def why_nothing_was_tracked(rows: Sequence[FrameRow]) -> str:
+def why_nothing_was_tracked(
+    rows: Sequence[FrameRow], *, calibration_is_doubted: bool = False
+) -> str:
     """Name the commonest reason of a run without a pose, how common it was, and what helps.
 
     That the first of two views was taken is a step on the way, and told only if there is nothing
-    else; frames that could not be read count as one reason, told by the first of them.
+    else; frames that could not be read count as one reason, told by the first of them. If a warning
+    spoke against the calibration, that comes first, and other remedies only after it.
     """
     reasons = Counter(row.reason for row in rows if row.state != "SKIPPED" and row.reason)
     skipped = [row.reason for row in rows if row.state == "SKIPPED"]
@@ -60,6 +63,10 @@ def why_nothing_was_tracked(rows: Sequence[FrameRow]) -> str:
         return skipped[0] + more
     if not reason:
         return "no frames"
-    told = f"{reason} ({count} of {len(rows)} frames)"
+    of_frames = "1 frame" if len(rows) == 1 else f"{len(rows)} frames"
+    told = f"{reason} ({count} of {of_frames})"
     remedy = what_helps(reason)
+    if calibration_is_doubted:
+        told = f"most likely because of the calibration, see the warning above; seen: {told}"
+        return f"{told}; if the calibration is right, what helps: {remedy}" if remedy else told
     return f"{told}; what helps: {remedy}" if remedy else told
