@@ -86,6 +86,9 @@ def run_and_show(
         if report_page and html is not None and html.is_file():
             text = f"To look at them: [bold]{escape(str(html))}[/]"
             console.print(text, highlight=False, soft_wrap=True)
+        if done.result.saved_map is not None:
+            saved = escape(str(done.result.saved_map))
+            console.print(f"Map saved in [bold]{saved}[/]", highlight=False, soft_wrap=True)
         files.tell(console)
         code = _conclude(done, errors)
         viewing.stay(console, done.folder)

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
+from orbslam2py._arguments import number_of
 from orbslam2py.runs.result import DROPPED, FrameRow
 from orbslam2py.slam.records import Reason
 
@@ -59,12 +60,12 @@ def why_nothing_was_tracked(
         reasons[Reason.FIRST_VIEW.value] = waiting
     reason, count = next(iter(reasons.most_common(1)), ("", 0))
     if len(skipped) > count:
-        more = f" (and {len(skipped) - 1} more frames skipped)" if len(skipped) > 1 else ""
+        others = number_of(len(skipped) - 1, "more frame")
+        more = f" (and {others} skipped)" if len(skipped) > 1 else ""
         return skipped[0] + more
     if not reason:
         return "no frames"
-    of_frames = "1 frame" if len(rows) == 1 else f"{len(rows)} frames"
-    told = f"{reason} ({count} of {of_frames})"
+    told = f"{reason} ({count} of {number_of(len(rows), 'frame')})"
     remedy = what_helps(reason)
     if calibration_is_doubted:
         told = f"most likely because of the calibration, see the warning above; seen: {told}"

@@ -10,6 +10,7 @@ from typing import Any
 
 from orbslam2py._version import __version__
 from orbslam2py.runs.report_page import sections
+from orbslam2py.runs.report_page.explained import compared_over, is_of_last_map_only
 from orbslam2py.runs.report_page.markup import Markup, element, join, section, table
 from orbslam2py.runs.report_page.path_section import path_section
 from orbslam2py.runs.report_page.round_numbers import NONE
@@ -165,6 +166,8 @@ def _notes(report: dict[str, Any]) -> Markup | None:
         said.append(f"No frame has a pose{likely}: see Tracking for the reasons, and what helps.")
     elif report.get("lost_at_end") and not warnings:
         said.append("Tracking was lost at the end of the run.")
+    if report.get("ate_rmse_m") is not None and is_of_last_map_only(report):
+        said.append(f"The errors are {compared_over(report)}: earlier maps are not in them.")
     if report.get("interrupted"):
         seen = f"{report.get('seen_frames')} of {report.get('frames')} frames"
         said.append(f"The run was interrupted after {seen}.")
