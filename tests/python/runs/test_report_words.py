@@ -98,3 +98,21 @@ def test_every_stage_beside_tracking_is_explained() -> None:
         measured |= {f"{name}.{stage}" for stage in found}
     assert len(measured) > 10
     assert measured <= set(STAGES_BESIDE)
+
+
+def test_map_points_are_seen_on_light_and_dark_ground() -> None:
+    """By the contrast of colours that WCAG 2 wants for graphics: at least 3."""
+    style = (ROOT / "src/orbslam2py/data/report_page/page.css").read_text()
+    grounds = re.findall("--ground: #([0-9a-f]{6})", style)
+    points = re.findall("--points: #([0-9a-f]{6})", style)
+    assert len(grounds) == len(points) == 3
+    for ground, point in zip(grounds, points, strict=True):
+        low, high = sorted([luminance(ground), luminance(point)])
+        assert (high + 0.05) / (low + 0.05) > 3.0
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance of a colour, by WCAG 2."""
+    parts = [int(colour[k : k + 2], 16) / 255 for k in (0, 2, 4)]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
