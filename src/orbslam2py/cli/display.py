@@ -233,7 +233,7 @@ def report_table(report: dict[str, Any]) -> Table:
     table.add_section()
     for stage, numbers in report["milliseconds"].items():
         table.add_row(
-            f"{stage} [ms]",
+            escape(f"{stage} [ms]"),
             f"median {numbers['median']:.2f}  mean {numbers['mean']:.2f}  p99 {numbers['p99']:.2f}",
         )
     return table

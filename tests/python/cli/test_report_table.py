@@ -82,3 +82,9 @@ def test_a_loaded_map_is_told_in_words() -> None:
     line = line_with("relocalisations", table)
     assert line == "relocalisations │ 1, the first finding in the loaded map"
     assert line_with("relocalisations", printed("k", relocalisations=2)) == "relocalisations │ 2"
+
+
+def test_times_have_their_unit() -> None:
+    times = {"median": 1.0, "mean": 1.5, "p99": 2.0}
+    line = line_with("track", printed("k", milliseconds={"track": times}))
+    assert line == "track [ms] │ median 1.00 mean 1.50 p99 2.00"

@@ -183,6 +183,7 @@ def test_it_is_told_when_nothing_can_be_tracked(caplog: pytest.LogCaptureFixture
     wrong = replace(scaled(world(Sensor.MONOCULAR).settings, 0.65), orb=OrbSettings(n_features=30))
     finished = run(wrong, images(Sensor.MONOCULAR))
     assert finished.result.n_tracked == 0
+    assert finished.result.calibration_warnings == misfits(caplog)
     assert len(misfits(caplog)) == 1
 
 
