@@ -147,9 +147,9 @@ class OutputWriter:
         self._write(
             "report.json", lambda path: _write_text(path, json.dumps(report, indent=2) + "\n")
         )
+        self._remove_stale()  # before the page, which reads the folder
         if page:
             self._write_page(result, evaluation)
-        self._remove_stale()
 
     def _write_page(self, result: RunResult, evaluation: RunEvaluation | None) -> None:
         worst = None if evaluation is None else worst_frames(result, evaluation)
