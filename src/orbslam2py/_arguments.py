@@ -200,3 +200,8 @@ def array_of(
     if finite and not np.isfinite(array).all():
         raise error(f"{what} holds a number that is not finite; leave such entries out")
     return array
+
+
+def number_of(count: int, noun: str) -> str:
+    """A count with its noun: ``1 frame``, ``2 frames``."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

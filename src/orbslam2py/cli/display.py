@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import logging
 from collections import Counter
+from collections.abc import Callable
 from typing import Any
 
 from rich.console import Console
@@ -12,6 +13,12 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn
 from rich.table import Table
 
+from orbslam2py._arguments import number_of
+from orbslam2py.runs.report_page.explained import (
+    compared_over,
+    loaded_map_words,
+    relocalisations_words,
+)
 from orbslam2py.runs.result import FrameRow
 from orbslam2py.slam.system import System
 
@@ -132,6 +139,7 @@ _UNTOLD = {
     *("sequence", "sensor", "milliseconds", "settings", "losses", "warnings"),
     *("options", "command", "command_folder", "machine"),
     *("lost_frames", "lost_seconds", "longest_loss_seconds"),
+    *("matched_of_poses", "true_path_m"),
 }
 
 #: Keys that hold frames by reason, and how the table calls them.
@@ -148,6 +156,8 @@ def _rows_of(key: str, value: Any, report: dict[str, Any]) -> list[tuple[str, st
         unit = "units" if report["sensor"] == "mono" else "m"
         return [("loop", _describe_loop(loop, unit)) for loop in value]
     text = f"{value:.4f}" if isinstance(value, float) else str(value)
+    if key in _IN_WORDS:
+        return [_IN_WORDS[key](report)]
     if key == "final_adjustment":
         text = _describe_adjustment(value)
     elif key == "lost":
@@ -157,6 +167,41 @@ def _rows_of(key: str, value: Any, report: dict[str, Any]) -> list[tuple[str, st
     elif key == "full_adjustments":
         text = f"{sum(entry['used'] for entry in value)} of {len(value)} used" if value else ""
     return [(key.replace("_", " "), text)] if text else []
+
+
+def _error_row(report: dict[str, Any]) -> tuple[str, str]:
+    return "ate rmse m", " ".join([f"{report['ate_rmse_m']:.4f}", compared_over(report)]).strip()
+
+
+def _poses_row(report: dict[str, Any]) -> tuple[str, str]:
+    of_poses = number_of(report.get("matched_of_poses", report["matched_poses"]), "pose")
+    text = f"{report['matched_poses']} of {of_poses} of the last map"
+    return "poses compared with the truth", text
+
+
+def _path_row(report: dict[str, Any]) -> tuple[str, str]:
+    text = f"{report['matched_path_m']:.2f} m"
+    if report.get("true_path_m") is not None:
+        text = f"{report['matched_path_m']:.2f} of {report['true_path_m']:.2f} m"
+    return "of the true path compared", text
+
+
+def _loaded_row(report: dict[str, Any]) -> tuple[str, str]:
+    return "loaded map", loaded_map_words(report)
+
+
+def _relocalisations_row(report: dict[str, Any]) -> tuple[str, str]:
+    return "relocalisations", relocalisations_words(report)
+
+
+#: Keys that the table tells in words.
+_IN_WORDS: dict[str, Callable[[dict[str, Any]], tuple[str, str]]] = {
+    "ate_rmse_m": _error_row,
+    "matched_poses": _poses_row,
+    "matched_path_m": _path_row,
+    "loaded_map": _loaded_row,
+    "relocalisations": _relocalisations_row,
+}
 
 
 def _describe_adjustment(entry: dict[str, Any]) -> str:
@@ -169,8 +214,9 @@ def _describe_losses(report: dict[str, Any]) -> str:
     if not report["lost"]:
         return "never"
     times = "once" if report["lost"] == 1 else f"{report['lost']} times"
+    frames = number_of(report["lost_frames"], "frame")
     return (
-        f"{times}, {report['lost_frames']} frames, {report['lost_seconds']:.1f} s in all, "
+        f"{times}, {frames}, {report['lost_seconds']:.1f} s in all, "
         f"{report['longest_loss_seconds']:.1f} s at the longest"
     )
 
@@ -187,7 +233,7 @@ def report_table(report: dict[str, Any]) -> Table:
     table.add_section()
     for stage, numbers in report["milliseconds"].items():
         table.add_row(
-            f"{stage} [ms]",
+            escape(f"{stage} [ms]"),
             f"median {numbers['median']:.2f}  mean {numbers['mean']:.2f}  p99 {numbers['p99']:.2f}",
         )
     return table

@@ -86,6 +86,9 @@ def run_and_show(
         if report_page and html is not None and html.is_file():
             text = f"To look at them: [bold]{escape(str(html))}[/]"
             console.print(text, highlight=False, soft_wrap=True)
+        if done.result.saved_map is not None:
+            saved = escape(str(done.result.saved_map))
+            console.print(f"Map saved in [bold]{saved}[/]", highlight=False, soft_wrap=True)
         files.tell(console)
         code = _conclude(done, errors)
         viewing.stay(console, done.folder)
@@ -105,6 +108,8 @@ def _conclude(done: FinishedRun, errors: Console) -> ExitCode:
     if result.error is not None or done.problems:
         return ExitCode.FAILED
     if result.n_tracked == 0 and not result.interrupted:
-        print_error(errors, "Nothing could be tracked", why_nothing_was_tracked(result.rows))
+        doubted = bool(result.calibration_warnings)
+        why = why_nothing_was_tracked(result.rows, calibration_is_doubted=doubted)
+        print_error(errors, "Nothing could be tracked", why)
         return ExitCode.NOTHING_TRACKED
     return ExitCode.OK

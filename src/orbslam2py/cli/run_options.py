@@ -143,7 +143,11 @@ OutputOption = Annotated[
     Path | None, typer.Option(help="Folder for the results [runs/SEQUENCE-TIME].")
 ]
 ForceFlag = Annotated[
-    bool, typer.Option("--force", help="Write into an output folder that is not empty.")
+    bool,
+    typer.Option(
+        "--force",
+        help="Write into an output folder that is not empty; results of an earlier run there go.",
+    ),
 ]
 NoReportFlag = Annotated[
     bool, typer.Option("--no-report", help="Do not write the page report.html.")

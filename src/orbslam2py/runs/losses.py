@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from orbslam2py._arguments import number_of
 from orbslam2py.runs.remedies import what_helps
 from orbslam2py.runs.result import FrameRow
 from orbslam2py.slam.records import TrackingRecord, TrackingState
@@ -104,8 +105,9 @@ def last_loss_warning(losses: Sequence[Loss]) -> str | None:
     if not losses or losses[-1].found_again:
         return None
     loss = losses[-1]
+    frames = number_of(loss.n_frames, "frame")
     text = (
-        f"lost at the end: no pose from frame {loss.index} on ({loss.n_frames} frames, "
+        f"lost at the end: no pose from frame {loss.index} on ({frames}, "
         f"{loss.seconds:.1f} s), because of {loss.reason}"
     )
     remedy = what_helps(loss.reason)

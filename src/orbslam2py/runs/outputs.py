@@ -35,6 +35,9 @@ _NOT_ALWAYS = (
     *("report.html", "frame_images.zip"),
 )
 
+#: What else a run writes; the settings are not among them, which are nobody's result.
+_ALWAYS = ("frames.csv", "points.ply", "map.npz", "report.json")
+
 
 def new_output_folder(name: str) -> Path:
     """A folder that does not exist yet: ``runs/<name>-<time>``, below the working folder."""
@@ -76,6 +79,19 @@ def prepare_output_folder(folder: Path, *, force: bool) -> Path:
             f"cannot write to {folder}: {reason_of(error)}; give another folder with --output"
         ) from error
     return folder
+
+
+def remove_earlier_results(folder: Path) -> None:
+    """Remove the results of an earlier run, so that none looks like one of the run that begins.
+
+    Only from a folder in which a run has written, and only what runs write; the settings stay.
+    """
+    if not any((folder / name).is_file() for name in ("report.json", "frames.csv")):
+        return
+    for path in (path for name in (*_ALWAYS, *_NOT_ALWAYS) for path in folder.glob(name)):
+        if path.is_file():
+            with contextlib.suppress(OSError):
+                path.unlink()
 
 
 def link_latest(folder: Path) -> None:
@@ -131,9 +147,9 @@ class OutputWriter:
         self._write(
             "report.json", lambda path: _write_text(path, json.dumps(report, indent=2) + "\n")
         )
+        self._remove_stale()  # before the page, which reads the folder
         if page:
             self._write_page(result, evaluation)
-        self._remove_stale()
 
     def _write_page(self, result: RunResult, evaluation: RunEvaluation | None) -> None:
         worst = None if evaluation is None else worst_frames(result, evaluation)

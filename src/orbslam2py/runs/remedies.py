@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
+from orbslam2py._arguments import number_of
 from orbslam2py.runs.result import DROPPED, FrameRow
 from orbslam2py.slam.records import Reason
 
@@ -43,11 +44,14 @@ def what_helps(reason: Reason | str) -> str:
     return next((text for known, text in _WHAT_HELPS.items() if known.value == str(reason)), "")
 
 
-def why_nothing_was_tracked(rows: Sequence[FrameRow]) -> str:
+def why_nothing_was_tracked(
+    rows: Sequence[FrameRow], *, calibration_is_doubted: bool = False
+) -> str:
     """Name the commonest reason of a run without a pose, how common it was, and what helps.
 
     That the first of two views was taken is a step on the way, and told only if there is nothing
-    else; frames that could not be read count as one reason, told by the first of them.
+    else; frames that could not be read count as one reason, told by the first of them. If a warning
+    spoke against the calibration, that comes first, and other remedies only after it.
     """
     reasons = Counter(row.reason for row in rows if row.state != "SKIPPED" and row.reason)
     skipped = [row.reason for row in rows if row.state == "SKIPPED"]
@@ -56,10 +60,14 @@ def why_nothing_was_tracked(rows: Sequence[FrameRow]) -> str:
         reasons[Reason.FIRST_VIEW.value] = waiting
     reason, count = next(iter(reasons.most_common(1)), ("", 0))
     if len(skipped) > count:
-        more = f" (and {len(skipped) - 1} more frames skipped)" if len(skipped) > 1 else ""
+        others = number_of(len(skipped) - 1, "more frame")
+        more = f" (and {others} skipped)" if len(skipped) > 1 else ""
         return skipped[0] + more
     if not reason:
         return "no frames"
-    told = f"{reason} ({count} of {len(rows)} frames)"
+    told = f"{reason} ({count} of {number_of(len(rows), 'frame')})"
     remedy = what_helps(reason)
+    if calibration_is_doubted:
+        told = f"most likely because of the calibration, see the warning above; seen: {told}"
+        return f"{told}; if the calibration is right, what helps: {remedy}" if remedy else told
     return f"{told}; what helps: {remedy}" if remedy else told

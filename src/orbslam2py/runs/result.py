@@ -92,6 +92,8 @@ class RunResult:
     """The one of the finished map, if it was asked for; the last of these."""
     warnings: list[str] = field(default_factory=list)
     """What the result suffers from: a calibration that does not fit, a loss until the end."""
+    calibration_warnings: list[str] = field(default_factory=list)
+    """Those of them that speak against the settings: of the lens, or of the depth images."""
     n_lost_by_camera: int = 0
     """Images of a camera that came while an earlier one was being tracked."""
     is_live: bool = False

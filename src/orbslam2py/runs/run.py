@@ -18,7 +18,12 @@ from orbslam2py.maps.map_writer import check_map_target
 from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.losses import find_losses, last_loss_warning
 from orbslam2py.runs.options import RunOptions
-from orbslam2py.runs.outputs import OutputWriter, link_latest, prepare_output_folder
+from orbslam2py.runs.outputs import (
+    OutputWriter,
+    link_latest,
+    prepare_output_folder,
+    remove_earlier_results,
+)
 from orbslam2py.runs.report import RunEvaluation, evaluate_run, make_report
 from orbslam2py.runs.result import RunResult
 from orbslam2py.runs.runner import Progress, SequenceRunner, Watch
@@ -77,7 +82,8 @@ def run_sequence(
     output : str or Path, optional
         Folder for the results; nothing is written if None.
     force : bool
-        Accept an output folder that holds files.
+        Accept an output folder that holds files; the results of an earlier run are removed when
+        this one begins.
     progress : callable, optional
         ``progress(row, system)``, called after every frame.
     stop : threading.Event, optional
@@ -140,6 +146,7 @@ def run_sequence(
     runner.result.command = command
     if folder is not None:
         folder = prepare_output_folder(folder, force=force)
+        remove_earlier_results(folder)
         link_latest(folder)
     result = runner.run(progress, stop, control=control, watch=watch)
     warning = last_loss_warning(find_losses(result.rows))

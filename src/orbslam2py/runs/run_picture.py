@@ -13,6 +13,7 @@ from orbslam2py.evaluation import Alignment
 from orbslam2py.runs.frame_errors import position_errors
 from orbslam2py.runs.plots import draw_trajectory
 from orbslam2py.runs.report import RunEvaluation
+from orbslam2py.runs.report_page.explained import compared_over
 from orbslam2py.runs.result import RunResult
 from orbslam2py.runs.timeline import Timeline
 from orbslam2py.settings.sensor import Sensor
@@ -65,7 +66,7 @@ def draw_run(
             errors = position_errors(last, evaluation.truth, scale)
         truth = (evaluation.truth.timestamps - begin, scale * evaluation.truth.positions)
         if report["ate_rmse_m"] is not None:
-            subtitle += f", ATE {report['ate_rmse_m']:.4f} m"
+            subtitle += f", ATE {report['ate_rmse_m']:.4f} m {compared_over(report)}"
     draw_trajectory(
         path,
         title=f"{report['sequence']} ({report['sensor']})",

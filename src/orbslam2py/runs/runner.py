@@ -154,9 +154,8 @@ class SequenceRunner:
                 _log.warning("interrupted; saving what was done so far (%s)", seen)
             self._shut_down(system)
         self._save_map(system)
-        if self._watch is not None:
-            misfit = self._watch.finish()
-            result.warnings += [] if misfit is None else [str(misfit)]
+        result.calibration_warnings = self._calibration_warnings(system)
+        result.warnings += result.calibration_warnings
         self._collect(system)
         result.seconds = time.perf_counter() - begin
         return result
@@ -170,6 +169,11 @@ class SequenceRunner:
             known=settings_beside(self.result.sequence),
             in_background=in_time,
         )
+
+    def _calibration_warnings(self, system: System) -> list[str]:
+        misfit = None if self._watch is None else self._watch.finish()
+        found = [None if misfit is None else str(misfit), system.pipeline.front_end.depth_warning]
+        return [warning for warning in found if warning is not None]
 
     # ---- one pass over the frames ----------------------------------------------------------------
     def _process(self, system: System, progress: Progress | None, control: RunControl) -> None:

@@ -24,6 +24,11 @@ _LEAST, _MOST = 0.05, 200.0
 _USUAL = (1000.0, 5000.0, 1.0, 100.0, 10_000.0)
 #: Where the median of a depth image usually lies [m].
 _LIKELY = (0.3, 8.0)
+#: What is told.
+_TEXT = (
+    "depth images do not fit DepthMapFactor %g: their median is %.4g m; "
+    "DepthMapFactor: %g would make it %.4g m"
+)
 
 
 class DepthCheck:
@@ -33,12 +38,18 @@ class DepthCheck:
     ----------
     factor
         Raw units per metre as the settings have them.
+
+    Attributes
+    ----------
+    warning : str or None
+        What was told.
     """
 
     def __init__(self, factor: float) -> None:
         self._factor = factor
         self._left = N_CHECKED
         self._chances = N_LOOKED_AT
+        self.warning: str | None = None
 
     @property
     def done(self) -> bool:
@@ -58,14 +69,9 @@ class DepthCheck:
             return
         self._left = 0
         better = _fitting_factor(median)
-        _log.warning(
-            "depth images do not fit DepthMapFactor %g: their median is %.4g m; "
-            "DepthMapFactor: %g would make it %.4g m",
-            self._factor,
-            median / self._factor,
-            better,
-            median / better,
-        )
+        values = (self._factor, median / self._factor, better, median / better)
+        self.warning = _TEXT % values
+        _log.warning(_TEXT, *values)
 
 
 def _median_of_known(depth: npt.NDArray[np.generic]) -> float | None:

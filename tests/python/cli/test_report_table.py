@@ -54,3 +54,37 @@ def test_loops_are_in_the_unit_of_the_map(sensor: str, unit: str) -> None:
 def test_once() -> None:
     line = line_with("in all", printed("kkrlk"))
     assert line == "lost │ once, 2 frames, 0.2 s in all, 0.2 s at the longest"
+
+
+def test_one_frame_is_one() -> None:
+    assert "once, 1 frame, 0.1 s in all" in line_with("in all", printed("kkrk"))
+
+
+def test_errors_are_told_with_the_frames_that_they_are_of() -> None:
+    """After a new map the errors are of the last one: 2 poses of a run of 10 frames."""
+    figures = {"frames": 10, "tracked": 9, "matched_poses": 2, "matched_of_poses": 2}
+    lengths = {"matched_path_m": 0.123, "true_path_m": 1.5, "ate_rmse_m": 0.00254}
+    table = printed("k", **figures, **lengths)
+    assert line_with("ate", table) == "ate rmse m │ 0.0025 over 2 of 10 frames, the last map only"
+    assert (
+        line_with("poses", table) == "poses compared with the truth │ 2 of 2 poses of the last map"
+    )
+    assert line_with("path", table) == "of the true path compared │ 0.12 of 1.50 m"
+    whole = printed("k", **figures | {"tracked": 2}, **lengths)
+    assert line_with("ate", whole) == "ate rmse m │ 0.0025 over 2 of 10 frames"
+
+
+def test_a_loaded_map_is_told_in_words() -> None:
+    loaded = {"file": "office.orbmap", "keyframes": 12, "map_points": 3000, "runs": 1}
+    table = printed("k", loaded_map=loaded, relocalisations=1)
+    line = line_with("office", table)
+    assert line == "loaded map │ office.orbmap: 12 keyframes, 3000 map points, 1 run"
+    line = line_with("relocalisations", table)
+    assert line == "relocalisations │ 1, the first finding in the loaded map"
+    assert line_with("relocalisations", printed("k", relocalisations=2)) == "relocalisations │ 2"
+
+
+def test_times_have_their_unit() -> None:
+    times = {"median": 1.0, "mean": 1.5, "p99": 2.0}
+    line = line_with("track", printed("k", milliseconds={"track": times}))
+    assert line == "track [ms] │ median 1.00 mean 1.50 p99 2.00"

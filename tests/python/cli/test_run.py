@@ -296,6 +296,19 @@ def test_long_paths_are_printed_in_one_piece(command: CommandLine, rgbd: Path) -
 
 
 # ---- nothing tracked -----------------------------------------------------------------------------
+def test_a_doubted_calibration_is_named_first(command: CommandLine, rgbd: Path) -> None:
+    sequence = Path(shutil.copytree(rgbd, "black"))
+    for path in (sequence / "rgb").iterdir():
+        cv2.imwrite(str(path), np.zeros((240, 320), np.uint8))
+    settings = ("--settings", "tum1")  # of images of another size
+    done = command("run", sequence, "--sensor", "rgbd", *settings, "--output", "r")
+    assert done.code == 3
+    (warning,) = Results(Path("r")).report["warnings"]
+    last = done.err.rstrip().rpartition("\n")[2]
+    assert warning in done.err
+    assert last.startswith("Nothing could be tracked: most likely because of the calibration")
+
+
 def test_nothing_to_see(command: CommandLine, rgbd: Path) -> None:
     sequence = Path(shutil.copytree(rgbd, "black"))
     for path in (sequence / "rgb").iterdir():
@@ -310,7 +323,8 @@ def test_nothing_to_see(command: CommandLine, rgbd: Path) -> None:
     assert {row["reason"] for row in results.frames} == {"too few keypoints"}
     assert {row["state"] for row in results.frames} == {"NOT_INITIALIZED"}
     names = {path.name for path in results.folder.iterdir()}
-    assert names == {"frames.csv", "points.ply", "report.json", "settings.yaml"}, "nothing empty"
+    made = {"frames.csv", "map.npz", "points.ply", "report.html", "report.json", "settings.yaml"}
+    assert names == made, "no path without poses"
 
 
 def test_what_an_earlier_run_left_is_removed(command: CommandLine, rgbd: Path) -> None:

@@ -31,6 +31,7 @@ def test_a_saved_map_is_loaded_and_localised_in(command: CommandLine, sequence: 
     assert (done.code, done.err) == (0, "")
     first = Results(Path("first")).report
     assert first["saved_map"] == "a.orbmap"
+    assert "Map saved in a.orbmap" in done.out
     assert first["loaded_map"] is None
     before = Path("a.orbmap").read_bytes()
 
@@ -48,6 +49,7 @@ def test_a_saved_map_is_loaded_and_localised_in(command: CommandLine, sequence: 
     assert second["tracked"] == N
     assert second["map_points"] == first["map_points"]
     assert second["saved_map"] is None
+    assert "Map saved" not in done.out
     assert Path("a.orbmap").read_bytes() == before
     paths = [np.loadtxt(f"{run}/trajectory.txt")[:, 1:4] for run in ("first", "second")]
     assert np.abs(paths[0] - paths[1]).max() < 0.02

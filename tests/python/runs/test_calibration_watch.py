@@ -183,7 +183,18 @@ def test_it_is_told_when_nothing_can_be_tracked(caplog: pytest.LogCaptureFixture
     wrong = replace(scaled(world(Sensor.MONOCULAR).settings, 0.65), orb=OrbSettings(n_features=30))
     finished = run(wrong, images(Sensor.MONOCULAR))
     assert finished.result.n_tracked == 0
+    assert finished.result.calibration_warnings == misfits(caplog)
     assert len(misfits(caplog)) == 1
+
+
+def test_depth_that_does_not_fit_is_in_the_report(caplog: pytest.LogCaptureFixture) -> None:
+    right = world(Sensor.RGBD).settings
+    assert right.depth is not None
+    wrong = replace(right, depth=replace(right.depth, raw_per_metre=1.0))
+    finished = run(wrong, images(Sensor.RGBD)[:6])
+    (told,) = [line for line in finished.report["warnings"] if "DepthMapFactor" in line]
+    assert told in [record.getMessage() for record in caplog.records]
+    assert told in finished.result.calibration_warnings
 
 
 def test_a_right_run_has_no_warning(caplog: pytest.LogCaptureFixture) -> None:

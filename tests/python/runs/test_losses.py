@@ -99,7 +99,7 @@ def test_every_reason_has_a_remedy() -> None:
         ("fmfmfmfmn", "too few matches with the first view (4 of 9 frames)"),
         ("fmfmnnnn", "too few keypoints (4 of 8 frames)"),
         ("mmmn", "too few matches with the first view (3 of 4 frames)"),
-        ("f", "first of two views taken; waiting for the camera to move (1 of 1 frames)"),
+        ("f", "first of two views taken; waiting for the camera to move (1 of 1 frame)"),
         ("ssssnn", "image 0 is empty (and 3 more frames skipped)"),
         ("s", "image 0 is empty"),
     ],
@@ -108,6 +108,16 @@ def test_why_nothing_was_tracked_is_the_commonest_reason(letters: str, reason: s
     told = why_nothing_was_tracked(rows_of(letters))
     assert told.split("; what helps: ")[0] == reason
     assert ("what helps" in told) == ("s" not in letters)
+
+
+def test_a_doubted_calibration_comes_before_every_other_remedy() -> None:
+    told = why_nothing_was_tracked(rows_of("nnn"), calibration_is_doubted=True)
+    assert told.startswith("most likely because of the calibration, see the warning above")
+    assert "calibration" not in why_nothing_was_tracked(rows_of("nnn"))
+
+
+def test_one_frame_is_one() -> None:
+    assert "of 1 frame)" in why_nothing_was_tracked(rows_of("n"))
 
 
 def test_no_frames() -> None:

@@ -11,9 +11,15 @@ import pytest
 
 from orbslam2py import DatasetError, run_sequence
 from orbslam2py.runs import RunOptions, SystemOptions, run_picture
-from orbslam2py.runs.outputs import link_latest, prepare_output_folder, write_ply
+from orbslam2py.runs.outputs import (
+    link_latest,
+    prepare_output_folder,
+    remove_earlier_results,
+    write_ply,
+)
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.files import names_in
+from support.made_up_runs import made_up_run
 
 pytestmark = pytest.mark.watchdog(20)
 
@@ -104,3 +110,22 @@ def test_lengths_of_one_camera_are_metres_only_where_the_truth_tells(
     np.testing.assert_allclose(positions[-n:], drawn["positions"], atol=0.05)
     snapshot = done.result.snapshot.point_positions
     assert len(drawn["points"]) == len(snapshot)
+
+
+def test_results_of_an_earlier_run_are_gone_when_a_new_one_begins(tmp_path: Path) -> None:
+    """A run that is killed half way leaves nothing that looks like its result."""
+    run = made_up_run(tmp_path / "r", "kkkkkkllkkkk", maps="0" * 8 + "1" * 4)
+    results = {path.name for path in run.iterdir()} - {"settings.yaml"}
+    assert {"report.json", "trajectory.txt", "trajectory_map0.txt", "frames.csv"} <= results
+    for own in ("notes.txt", "office.orbmap", "trajectory_mine.txt"):
+        (run / own).write_text("mine")
+    remove_earlier_results(run)
+    left = {path.name for path in run.iterdir()}
+    assert left == {"settings.yaml", "notes.txt", "office.orbmap", "trajectory_mine.txt"}
+
+
+def test_a_folder_without_a_run_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "points.ply").write_text("mine")
+    (tmp_path / "trajectory.txt").write_text("mine")
+    remove_earlier_results(tmp_path)
+    assert len(list(tmp_path.iterdir())) == 2

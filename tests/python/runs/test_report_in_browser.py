@@ -125,6 +125,29 @@ def test_the_path_turns(browser: Browser, runs: dict[str, Path]) -> None:
     page.close()
 
 
+#: The smallest distance of the path to the border of the canvas, and its largest extent in parts.
+ROOM = """(() => {
+  const places = JSON.parse(document.getElementById("solid").dataset.reach);
+  const [left, top, right, bottom] = places;
+  return [Math.min(left, top, 1 - right, 1 - bottom), Math.max(right - left, bottom - top)];
+})()"""
+
+
+@pytest.mark.parametrize("width", [1440, 700, 390])
+def test_the_whole_path_is_seen_in_every_view(
+    browser: Browser, runs: dict[str, Path], width: int
+) -> None:
+    page = opened(browser, runs["full"], width)
+    for view in ("", "above", "side", "behind"):
+        if view:
+            page.click(f"[data-view={view}]")
+            page.evaluate(FRAME)
+        room, extent = page.evaluate(ROOM)
+        assert room > 0.02, view
+        assert extent > 0.6, "and not as a dot"
+    page.close()
+
+
 def test_one_cursor_over_all_plots(browser: Browser, runs: dict[str, Path]) -> None:
     page = opened(browser, runs["full"])
     said = "document.getElementById('cursor').innerText"

@@ -258,7 +258,7 @@ def test_worst_places() -> None:
 ELSEWHERE = {
     *("settings", "options", "command", "command_folder", "machine", "milliseconds", "losses"),
     *("loops", "full_adjustments", "lost_reasons", "initialisation_reasons"),
-    *("matched_from_s", "matched_to_s"),
+    *("matched_from_s", "matched_to_s", "warnings", "final_adjustment"),
 }
 
 

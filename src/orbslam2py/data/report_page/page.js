@@ -71,9 +71,43 @@ class Solid {
   look(from) {
     const views = { above: [0, Math.PI / 2], side: [Math.PI / 2, 0], behind: [0, 0], "near-behind": [-0.45, 0.55] };
     [this.turn, this.tilt] = views[from];
+    this.isFitted = true;
+    this.draw();
+  }
+
+  // Borders of the path, the truth and the keyframes in the picture, in its pixels.
+  reach() {
+    const box = [Infinity, Infinity, -Infinity, -Infinity], project = this.projector();
+    const add = (x, y, z) => {
+      const [u, v] = project(x, y, z);
+      [box[0], box[1], box[2], box[3]] = [Math.min(box[0], u), Math.min(box[1], v), Math.max(box[2], u), Math.max(box[3], v)];
+    };
+    for (const { positions } of [...this.paths, { positions: data.truth ?? [] }]) {
+      for (let k = 0; k < positions.length; k += 3) {
+        if (positions[k] !== null) add(positions[k], positions[k + 1], positions[k + 2]);
+      }
+    }
+    const poses = data.keyframes ?? [];
+    for (let k = 0; k < poses.length; k += 12) add(poses[k + 3], poses[k + 7], poses[k + 11]);
+    return box;
+  }
+
+  // Let all of it be seen, as large as the window allows; how near changes what perspective does.
+  fit(ratio) {
+    const { width, height } = this.canvas;
     this.zoom = 1;
     this.shift = [0, 0];
-    this.draw();
+    for (let turn = 0; turn < 12; turn += 1) {
+      const [left, top, right, bottom] = this.reach();
+      if (!(right >= left)) return;
+      const factor = Math.min((0.84 * width) / Math.max(1, right - left), (0.8 * height) / Math.max(1, bottom - top));
+      const wanted = Math.min(2.2, Math.max(0.05, this.zoom * factor));
+      this.shift = [this.shift[0] + (width - left - right) / 2 / ratio, this.shift[1] + (height - top - bottom) / 2 / ratio];
+      if (Math.abs(wanted / this.zoom - 1) < 0.002 && turn > 0) break;
+      this.zoom = Math.sqrt(this.zoom * wanted);
+    }
+    const [left, top, right, bottom] = this.reach();
+    this.shift = [this.shift[0] + (width - left - right) / 2 / ratio, this.shift[1] + (height - top - bottom) / 2 / ratio];
   }
 
   // Rows of the rotation from the first keyframe's axes (right, down, forward) to the screen's.
@@ -108,7 +142,11 @@ class Solid {
     const ratio = devicePixelRatio, { canvas } = this;
     canvas.width = Math.round(canvas.clientWidth * ratio);
     canvas.height = Math.round(canvas.clientHeight * ratio);
+    if (this.isFitted) this.fit(ratio);
     this.project = this.projector();
+    const [left, top, right, bottom] = this.reach();
+    const { width, height } = canvas;
+    canvas.dataset.reach = JSON.stringify([left / width, top / height, right / width, bottom / height]);
     this.pen = canvas.getContext("2d");
     this.pen.lineJoin = this.pen.lineCap = "round";
     this.style = getComputedStyle(root);
@@ -125,7 +163,7 @@ class Solid {
   colour(name) { return this.style.getPropertyValue(name).trim(); }
 
   drawPoints(ratio) {
-    const { pen, points } = this, size = 1.4 * ratio;
+    const { pen, points } = this, size = 2.2 * ratio;
     pen.fillStyle = this.colour("--points");
     for (let k = 0; k < points.length; k += 3) {
       const [u, v] = this.project(points[k], points[k + 1], points[k + 2]);
@@ -236,6 +274,7 @@ class Solid {
       const before = fingers.get(event.pointerId);
       if (!before) return;
       const [dx, dy] = [event.clientX - before[0], event.clientY - before[1]];
+      this.isFitted = false;
       if (fingers.size === 2) {
         const [other] = [...fingers].filter(([id]) => id !== event.pointerId).map(([, at]) => at);
         const apart = (x, y) => Math.max(10, Math.hypot(x - other[0], y - other[1]));
@@ -259,6 +298,7 @@ class Solid {
     canvas.addEventListener("keydown", (event) => {
       const keys = { ArrowLeft: [0.1, 0], ArrowRight: [-0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1] };
       if (keys[event.key]) {
+        this.isFitted = false;
         this.turn += keys[event.key][0];
         this.tilt = Math.min(Math.PI / 2, Math.max(-Math.PI / 2, this.tilt + keys[event.key][1]));
         this.draw();
@@ -277,6 +317,7 @@ class Solid {
   }
 
   near(factor) {
+    this.isFitted = false;
     this.zoom = Math.min(200, Math.max(0.1, this.zoom * factor));
     this.draw();
   }

@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from orbslam2py._arguments import number_of
 from orbslam2py.runs.report_page.round_numbers import NONE, short
 
 
@@ -26,12 +28,61 @@ class Figure:
         value = report.get(self.key)
         if value is None:
             return NONE
+        if self.key in _IN_WORDS:
+            return _IN_WORDS[self.key](report)
         if isinstance(value, bool):
             return "yes" if value else "no"
         if isinstance(value, float):
             return short(value, 4)
         return str(value)
 
+
+def compared_over(report: dict[str, Any]) -> str:
+    """Say which part of the run the errors are of, such as ``over 2 of 10 frames``."""
+    poses, frames = report.get("matched_poses"), report.get("frames")
+    if poses is None or frames is None:
+        return ""
+    told = f"over {poses} of {number_of(frames, 'frame')}"
+    return f"{told}, the last map only" if is_of_last_map_only(report) else told
+
+
+def is_of_last_map_only(report: dict[str, Any]) -> bool:
+    """Whether frames of earlier maps have poses, which the errors know nothing of."""
+    poses = report.get("matched_of_poses")
+    return poses is not None and poses < report.get("tracked", 0)
+
+
+def loaded_map_words(report: dict[str, Any]) -> str:
+    """Say which map a run began in."""
+    entry = report["loaded_map"]
+    held = (("keyframes", "keyframe"), ("map_points", "map point"), ("runs", "run"))
+    parts = [number_of(entry[key], noun) for key, noun in held if key in entry]
+    return f"{entry.get('file')}: {', '.join(parts)}"
+
+
+def relocalisations_words(report: dict[str, Any]) -> str:
+    """Say how often a lost camera was found, and that a loaded map begins with such a finding."""
+    count = int(report.get("relocalisations", 0))
+    if not count or report.get("loaded_map") is None:
+        return str(count)
+    if count == 1:
+        return "1, the first finding in the loaded map"
+    return f"{count}, the first of them in the loaded map"
+
+
+#: How a path was laid onto the truth.
+ALIGNMENTS = {
+    "se3": "turned and shifted",
+    "sim3": "turned, shifted and scaled",
+    "none": "as it is",
+}
+
+#: Figures that are told in words.
+_IN_WORDS: dict[str, Callable[[dict[str, Any]], str]] = {
+    "relocalisations": relocalisations_words,
+    "loaded_map": loaded_map_words,
+    "ate_alignment": lambda report: ALIGNMENTS.get(report["ate_alignment"], NONE),
+}
 
 #: Group by group, in the order in which they are read.
 FIGURES: dict[str, tuple[Figure, ...]] = {
@@ -44,8 +95,8 @@ FIGURES: dict[str, tuple[Figure, ...]] = {
         Figure("ate_keyframes_rmse_m", "ATE of keyframes", "m",
                "absolute error of the keyframes alone", -1),
         Figure("ate_alignment", "alignment", "",
-               "se3: turned and shifted; sim3: also scaled, for one camera"),
-        Figure("ate_scale", "scale", "", "factor of the alignment; 1 with se3"),
+               "how the path was laid onto the truth; scaled only for one camera"),
+        Figure("ate_scale", "scale", "", "factor of the alignment; 1 where nothing was scaled"),
         Figure("rpe_translation_rmse_m", "RPE, translation", "m",
                "error of the motion from one pose to the next", -1),
         Figure("rpe_rotation_rmse_deg", "RPE, rotation", "deg",
@@ -58,8 +109,9 @@ FIGURES: dict[str, tuple[Figure, ...]] = {
                "KITTI's error over segments of 100 to 800 m", -1),
         Figure("r_rel_deg_per_100m", "KITTI, rotation", "deg/100 m",
                "KITTI's error of rotation over the same segments", -1),
-        Figure("matched_poses", "compared poses", "", "poses with a true one at their time"),
-        Figure("matched_of_poses", "of poses", "", "poses there were"),
+        Figure("matched_poses", "compared poses", "",
+               "poses of the last map with a true one at their time: the errors are of these"),
+        Figure("matched_of_poses", "of poses", "", "poses of the last map"),
         Figure("matched_path_m", "compared path", "m",
                "length of the true path along the matched poses, without gaps"),
         Figure("true_path_m", "true path", "m", "length of the whole true path"),
@@ -83,7 +135,7 @@ FIGURES: dict[str, tuple[Figure, ...]] = {
         Figure("lost_at_end", "lost at the end", "",
                "whether there was no pose again until the end of the run"),
         Figure("relocalisations", "relocalisations", "",
-               "how often a lost camera was found again"),
+               "how often a lost camera was found; the first finding in a loaded map counts"),
         Figure("resets", "resets", "", "how often a map was given up", -1),
         Figure("interrupted", "interrupted", "", "whether Ctrl-C ended the run"),
     ),
@@ -108,10 +160,22 @@ FIGURES: dict[str, tuple[Figure, ...]] = {
         Figure("deterministic", "deterministic", "", "whether mapping ran inline"),
         Figure("realtime", "real time", "", "whether time stamps were followed"),
         Figure("seed", "seed", "", "of all random draws"),
+        Figure("loaded_map", "loaded map", "", "what the run began in"),
+        Figure("saved_map", "saved map", "", "the file that the last map was saved in"),
         Figure("started", "started", "", "date and time of the run's beginning"),
         Figure("version", "version", "", "of orbslam2py"),
     ),
 }  # fmt: skip
+
+#: Terms of the field, in plain words.
+TERMS = {
+    "ATE": "distance to the ground truth after the whole path was laid onto it (turned and "
+    "shifted; for one camera also scaled), root mean square",
+    "KITTI": "error of the motion over stretches of 100 to 800 m, in parts of their length",
+    "keyframes": "the frames that the map is made of",
+    "map points": "places in the world that at least two keyframes see",
+    "loops closed": "how often the camera came back to a place and the drift was taken out",
+}
 
 #: What the stages of tracking are.
 STAGES = {
@@ -120,4 +184,26 @@ STAGES = {
     "predict": "first pose: motion model, reference keyframe, relocalization",
     "local_map": "matching the local map, final pose",
     "keyframe": "deciding about and making a keyframe; beginning a map",
+}
+
+#: What the stages beside tracking are.
+STAGES_BESIDE = {
+    "mapping": "all of local mapping, for one keyframe",
+    "mapping.insert": "taking the keyframe into the map's graph",
+    "mapping.cull_points": "taking out new points that too few frames find",
+    "mapping.new_points": "making points from matches with neighbouring keyframes",
+    "mapping.fuse": "joining points that are one and the same",
+    "mapping.local_bundle_adjustment": "refining the keyframes and points around the newest",
+    "mapping.cull_keyframes": "taking out keyframes that others make superfluous",
+    "loop.detect": "looking for a place seen before",
+    "loop.verify": "whether the geometry agrees that it is this place",
+    "loop.wait": "waiting until mapping pauses",
+    "loop.plan": "where the keyframes and points around the loop belong",
+    "loop.graph": "spreading the correction over all keyframes",
+    "loop.apply": "moving the map",
+    "adjustment.gather": "collecting the whole map",
+    "adjustment.solve": "refining all keyframes and points together",
+    "adjustment.wait": "waiting until mapping pauses",
+    "adjustment.commit": "moving the map",
+    "adjustment.local": "refining what was made meanwhile",
 }

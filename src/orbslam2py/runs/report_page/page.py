@@ -10,6 +10,7 @@ from typing import Any
 
 from orbslam2py._version import __version__
 from orbslam2py.runs.report_page import sections
+from orbslam2py.runs.report_page.explained import compared_over, is_of_last_map_only
 from orbslam2py.runs.report_page.markup import Markup, element, join, section, table
 from orbslam2py.runs.report_page.path_section import path_section
 from orbslam2py.runs.report_page.round_numbers import NONE
@@ -41,7 +42,7 @@ def run_page(run: RunFolder) -> str:
     subtitle = (
         f"{told}{f', {_date(str(when))}' if when else ''}, orbslam2py {report.get('version')}"
     )
-    body = join(_warning(report), sections.tiles(story), *parts.values())
+    body = join(_warnings(report), _notes(report), sections.tiles(story), *parts.values())
     return whole_page(run.name, subtitle, links, body, script_data(story))
 
 
@@ -141,13 +142,32 @@ def _said(value: object) -> str:
     return str(value)
 
 
-def _warning(report: dict[str, Any]) -> Markup | None:
+def _warnings(report: dict[str, Any]) -> Markup | None:
+    """What the result suffers from, as the command has told it."""
+    told = report.get("warnings")
+    if not told:
+        return None
+    title = "Warning" if len(told) == 1 else f"{len(told)} warnings"
+    return element(
+        "div",
+        element("p", element("b", title)),
+        *(element("p", text[:1].upper() + text[1:]) for text in map(str, told)),
+        class_="warning serious",
+        role="alert",
+    )
+
+
+def _notes(report: dict[str, Any]) -> Markup | None:
     """What one should know before one reads on."""
     said = []
+    warnings = report.get("warnings") or []
     if not report.get("tracked"):
-        said.append("No frame has a pose: see Tracking for the reasons, and what helps.")
-    elif report.get("lost_at_end"):
+        likely = ", most likely for what the warning says" if warnings else ""
+        said.append(f"No frame has a pose{likely}: see Tracking for the reasons, and what helps.")
+    elif report.get("lost_at_end") and not warnings:
         said.append("Tracking was lost at the end of the run.")
+    if report.get("ate_rmse_m") is not None and is_of_last_map_only(report):
+        said.append(f"The errors are {compared_over(report)}: earlier maps are not in them.")
     if report.get("interrupted"):
         seen = f"{report.get('seen_frames')} of {report.get('frames')} frames"
         said.append(f"The run was interrupted after {seen}.")

@@ -10,7 +10,7 @@ import numpy as np
 from orbslam2py._arrays import FloatArray
 from orbslam2py.runs.remedies import what_helps
 from orbslam2py.runs.report_page import above, run_plots, stages
-from orbslam2py.runs.report_page.explained import FIGURES
+from orbslam2py.runs.report_page.explained import FIGURES, TERMS, compared_over
 from orbslam2py.runs.report_page.markup import Markup, element, join, section, table
 from orbslam2py.runs.report_page.path_section import frame_link
 from orbslam2py.runs.report_page.plane_view import choose_view
@@ -30,13 +30,14 @@ def tiles(story: Story) -> Markup:
     part = f"frames tracked ({100 * report.get('tracked_fraction', 0.0):.1f} %)"
     said = [(tracked, part)]
     if report.get("ate_rmse_m") is not None:
-        alignment = f"ATE, RMSE ({report.get('ate_alignment')})"
-        said.append((f"{short(report['ate_rmse_m'])} {story.run.unit}", alignment))
+        error = f"absolute error (ATE, RMSE) {compared_over(report)}"
+        said.append((f"{short(report['ate_rmse_m'])} {story.run.unit}", error))
     if report.get("t_rel_percent") is not None:
         said.append((f"{short(report['t_rel_percent'])} %", "KITTI's error of translation"))
-    length = _length(story.run.metres * story.run.path.positions)
+    if len(story.run.path) > 1:
+        length = _length(story.run.metres * story.run.path.positions)
+        said.append((f"{short(length)} {story.run.unit}", "length of the path"))
     said += [
-        (f"{short(length)} {story.run.unit}", "length of the path"),
         (str(report.get("keyframes", 0)), "keyframes"),
         (str(report.get("map_points", 0)), "map points"),
         (str(report.get("loops_closed", 0)), "loops closed"),
@@ -45,9 +46,17 @@ def tiles(story: Story) -> Markup:
     ]
     return element(
         "ul",
-        *(element("li", element("b", value), element("span", text)) for value, text in said),
+        *(
+            element("li", element("b", value), element("span", text), title=_meaning(text))
+            for value, text in said
+        ),
         class_="tiles",
     )
+
+
+def _meaning(text: str) -> str | None:
+    """What a tile's words mean, where they are not plain."""
+    return next((told for word, told in TERMS.items() if word in text), None)
 
 
 def error_section(story: Story) -> Markup | None:
@@ -81,7 +90,9 @@ def tracking_section(story: Story) -> Markup:
     if len(story.events) > _MOST_EVENTS:
         events.append(["", f"and {len(story.events) - _MOST_EVENTS} more: report.json"])
     happened = table(["when", "what happened"], events) if events else None
-    plots = figures(run_plots.inliers_plot(story), run_plots.keyframes_plot(story))
+    plots = None
+    if story.run.report.get("tracked"):
+        plots = figures(run_plots.inliers_plot(story), run_plots.keyframes_plot(story))
     quiet = element("p", "Never lost; no loop was closed.") if not (rows or events) else None
     return section(
         "tracking", "Tracking", run_plots.state_strip(story), quiet, reasons, happened, plots
@@ -181,7 +192,7 @@ def figures_section(story: Story) -> Markup:
             [element("b", figure.name), join(figure.value(story.run.report), " ",
              element("small", figure.unit)), join(figure.text, " ", element("code", figure.key))]
             for figure in group
-            if figure.key in story.run.report
+            if story.run.report.get(figure.key) is not None
         ]  # fmt: skip
         if rows:
             groups.append(element("div", element("h3", title), table([], rows, class_="figures")))

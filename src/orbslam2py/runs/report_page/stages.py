@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
-from orbslam2py.runs.report_page.explained import STAGES
+from orbslam2py.runs.report_page.explained import STAGES, STAGES_BESIDE
 from orbslam2py.runs.report_page.markup import Markup, element, join, table
 from orbslam2py.runs.report_page.round_numbers import round_ticks, short, tick_texts
 from orbslam2py.runs.report_page.run_folder import Frames
@@ -35,7 +35,14 @@ def stage_table(frames: Frames) -> Markup:
         label = join(element("b", name), element("small", text))
         figures = (np.median(ms), np.mean(ms), np.quantile(ms, 0.99), np.max(ms))
         lines.append([label, _box(ms, most, f"stage{number}"), *(short(float(f)) for f in figures)])
-    head = ["stage of tracking", f"0 to {short(most)} ms", "median", "mean", "p99", "largest"]
+    head = [
+        "stage of tracking",
+        f"0 to {short(most)} ms",
+        "median",
+        "mean",
+        "99 % within",
+        "largest",
+    ]
     note = (
         "Times in ms. The box holds the middle half of all frames, the bar in it is the median, "
         "the line reaches from 1 % to 99 %."
@@ -64,14 +71,15 @@ def _box(ms: FloatArray, most: float, look: str) -> Markup:
 def background_table(report: dict[str, Any]) -> Markup | None:
     """Times of what runs beside tracking, from report.json; None without any."""
     rows: list[list[str | Markup]] = [
-        [name, *(short(float(numbers[key])) for key in ("median", "mean", "p99")),
+        [join(element("b", name), element("small", STAGES_BESIDE.get(name, ""))),
+         *(short(float(numbers[key])) for key in ("median", "mean", "p99")),
          str(numbers["count"])]
         for name, numbers in report.get("milliseconds", {}).items()
         if name.startswith(("mapping", "loop", "adjustment"))
     ]  # fmt: skip
     if not rows:
         return None
-    head = ["stage beside tracking", "median [ms]", "mean [ms]", "p99 [ms]", "how often"]
+    head = ["stage beside tracking", "median [ms]", "mean [ms]", "99 % within [ms]", "how often"]
     return table(head, rows, class_="numbers")
 
 

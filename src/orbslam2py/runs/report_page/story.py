@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from orbslam2py._arguments import number_of
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.runs.frame_errors import position_errors, worst_places
 from orbslam2py.runs.report_page.round_numbers import short
@@ -99,7 +100,7 @@ def _events(run: RunFolder) -> list[Event]:
         where = np.flatnonzero(frames.index == entry["frame"])
         if len(where):
             end = "" if entry["found_again"] else ", not found again"
-            frames_text = "1 frame" if entry["frames"] == 1 else f"{entry['frames']} frames"
+            frames_text = number_of(entry["frames"], "frame")
             text = f"tracking lost for {frames_text} ({entry['seconds']:.1f} s{end}): "
             events.append(Event(int(where[0]), "lost", text + entry["reason"]))
     previous_map, previous_state = np.nan, ""
@@ -109,7 +110,7 @@ def _events(run: RunFolder) -> list[Event]:
         if number != previous_map and not np.isnan(previous_map):
             events.append(Event(position, "map", f"map {number:.0f} begun"))
         elif state == "OK" and previous_state == "LOST":
-            events.append(Event(position, "relocalised", "camera found again in the map"))
+            events.append(Event(position, "relocalised", _found(run, events)))
         previous_map, previous_state = number, state
     unit = "units" if run.is_monocular else "m"
     for entry in run.report.get("loops", []):
@@ -121,6 +122,14 @@ def _events(run: RunFolder) -> list[Event]:
     return sorted(events, key=lambda event: event.position)
 
 
+def _found(run: RunFolder, events: list[Event]) -> str:
+    """Say that the camera was found: for the first time, in a loaded map, or again."""
+    is_first = not any(event.kind == "relocalised" for event in events)
+    if is_first and run.report.get("loaded_map") is not None:
+        return "camera found in the loaded map"
+    return "camera found again in the map"
+
+
 def _what_happened(run: RunFolder, events: list[Event], position: int, place: int) -> str:
     """Say what was unusual around a frame."""
     frames = run.frames
@@ -128,7 +137,7 @@ def _what_happened(run: RunFolder, events: list[Event], position: int, place: in
     said = [event.text for event in events if near[event.position]]
     dropped = int(np.sum(frames.state[near] == "DROPPED"))
     if dropped:
-        said.append(f"{dropped} frames dropped")
+        said.append(f"{number_of(dropped, 'frame')} dropped")
     tracked = frames.state == "OK"
     usual = float(np.nanmedian(frames.inliers[tracked])) if tracked.any() else 0.0
     fewest = float(np.nanmin(frames.inliers[near & tracked], initial=np.inf))
