@@ -43,6 +43,16 @@ def test_what_does_not_show_through(
 
 
 @pytest.mark.parametrize(
+    "line", [("run",), ("synthesize",), ("evaluate",), ("evaluate", "est.txt"), ("map", "info")]
+)
+def test_what_is_missing_is_named(command: CommandLine, line: tuple[str, ...]) -> None:
+    done = command(*line)
+    assert done.code == 2, done.err
+    assert "Missing argument" in done.err
+    assert "Traceback" not in done.err
+
+
+@pytest.mark.parametrize(
     ("error", "text"),
     [
         (FileNotFoundError(2, "No such file or directory", "x"), "x: No such file or directory"),
