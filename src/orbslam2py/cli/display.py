@@ -59,7 +59,8 @@ class _ConsoleHandler(logging.Handler):
 
     def _print(self, record: logging.LogRecord, text: str) -> None:
         colour = "red" if record.levelno >= logging.ERROR else "yellow"
-        title = f"[bold {colour}]{record.levelname.capitalize()}:[/]"
+        name = "Note" if record.levelno < logging.WARNING else record.levelname.capitalize()
+        title = f"[bold {colour}]{name}:[/]"
         self._console.print(f"{title} {escape(text)}", highlight=False, soft_wrap=True)
 
 
@@ -70,6 +71,8 @@ def log_to(console: Console, *, quiet: bool) -> None:
     logger.handlers = [_ConsoleHandler(console)]
     logger.propagate = False
     logger.setLevel(logging.ERROR if quiet else logging.WARNING)
+    # What was guessed of the input is said as well.
+    logging.getLogger(f"{logger.name}.datasets").setLevel(logging.ERROR if quiet else logging.INFO)
 
 
 def tell_repeated() -> None:

@@ -8,10 +8,11 @@ from pathlib import Path
 from orbslam2py._arguments import is_whole, path_of
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.datasets.choose_settings import SettingsChoice
+from orbslam2py.datasets.depth_folders import DepthFolders, find_depth_pair
 from orbslam2py.datasets.image_folder import ImageFolder, image_files
 from orbslam2py.datasets.live import LiveCamera
 from orbslam2py.datasets.masks import MaskedCamera, MaskedSequence
-from orbslam2py.datasets.recognise import has_layout, open_sequence
+from orbslam2py.datasets.recognise import has_layout, is_depth_pair, open_sequence
 from orbslam2py.datasets.video import VideoSequence
 from orbslam2py.errors import DatasetError
 from orbslam2py.settings import Sensor
@@ -31,8 +32,9 @@ def open_input(
     Parameters
     ----------
     source
-        Folder of a TUM RGB-D, KITTI or EuRoC sequence, folder of images, video file, or number of
-        a camera (also as text, if there is no file of that name).
+        Folder of a TUM RGB-D, KITTI or EuRoC sequence, folder of images, folder with a folder of
+        images and one of depth, video file, or number of a camera (also as text, if there is no
+        file of that name).
     sensor
         What to deliver images for; by default the richest there is.
     settings
@@ -87,7 +89,10 @@ def _open_recorded(
         return VideoSequence(path, sensor, settings=settings, fps=fps, times=times)
     if path.is_dir() and not has_layout(path):
         if image_files(path):
+            _refuse_half_of_pair(path, sensor)
             return ImageFolder(path, sensor, settings=settings, fps=fps, times=times)
+        if is_depth_pair(path, sensor):
+            return DepthFolders(path, sensor, settings=settings, fps=fps, times=times)
         inner = sorted(child for child in path.iterdir() if child.is_dir() and image_files(child))
         if inner and not any(has_layout(child) for child in path.iterdir()):
             raise DatasetError(f"no images in {path} itself; did you mean {inner[0]}?")
@@ -100,3 +105,16 @@ def _open_recorded(
                 "which has its own time stamps"
             )
     return sequence
+
+
+def _refuse_half_of_pair(path: Path, sensor: Sensor | str | None) -> None:
+    """Name the folder above if RGB-D is wanted of one of the two folders of a pair."""
+    if sensor is None or Sensor(sensor) is not Sensor.RGBD:
+        return
+    above = path.resolve().parent
+    pair = None if has_layout(above) else find_depth_pair(above)
+    if pair is not None and path.resolve() in (pair.colour.path, pair.depth.path):
+        raise DatasetError(
+            f"{path} holds one half of a pair: images are in {pair.colour.path.name}, depth in "
+            f"{pair.depth.path.name}; give the folder of both, {above}"
+        )

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Folders with images and depth whose parts do not fit, and what the run says of those that do."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from support.command_line import CommandLine
+from support.spoilt_runs import N, expect_refused, run
+
+pytestmark = pytest.mark.watchdog(60)
+
+
+@pytest.fixture
+def phone(rgbd: Path, tmp_path: Path) -> Path:
+    """The images and the depth of a sequence under other names, with its settings."""
+    folder = tmp_path / "phone"
+    for old, new in (("rgb", "color"), ("depth", "depth16")):
+        (folder / new).mkdir(parents=True)
+        for k, path in enumerate(sorted((rgbd / old).iterdir())):
+            shutil.copy(path, folder / new / f"{k:04d}{path.suffix}")
+    shutil.copy(rgbd / "settings.yaml", tmp_path / "phone.yaml")
+    return folder
+
+
+def test_it_runs_and_says_what_was_paired(command: CommandLine, phone: Path) -> None:
+    done = run(command, phone, "rgbd", "--settings", "phone.yaml")
+    assert done.code == 0, done.err
+    (line,) = [line for line in done.err.splitlines() if line.startswith("Note: ")]
+    assert f"{N} images in color go with depth in depth16 by equal names" in line
+
+
+def test_quiet_says_nothing(command: CommandLine, phone: Path) -> None:
+    done = run(command, phone, "rgbd", "--settings", "phone.yaml", "--quiet")
+    assert done.code == 0, done.err
+    assert done.err == ""
+
+
+def test_half_of_it(command: CommandLine, phone: Path) -> None:
+    done = run(command, phone / "color", "rgbd", "--settings", "phone.yaml")
+    expect_refused(done, "depth in depth16", f"give the folder of both, {phone}")
+
+
+def test_a_missing_part(command: CommandLine, phone: Path) -> None:
+    sorted((phone / "depth16").iterdir())[0].unlink()
+    for k, path in enumerate(sorted((phone / "color").iterdir())):
+        path.rename(path.with_stem(f"c{k}"))
+    done = run(command, phone, "rgbd", "--settings", "phone.yaml")
+    expect_refused(done, f"color ({N} images, 8 bits)", f"depth16 ({N - 1} images", "rgb.txt")
