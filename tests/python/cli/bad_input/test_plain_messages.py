@@ -53,6 +53,27 @@ def test_what_is_missing_is_named(command: CommandLine, line: tuple[str, ...]) -
 
 
 @pytest.mark.parametrize(
+    ("name", "thing", "remedy"),
+    [
+        ("phone.yaml", "is a settings file", "give it with --settings; the sequence comes first"),
+        ("phone.YML", "is a settings file", "give it with --settings; the sequence comes first"),
+        ("office.orbmap", "is a map file", "give it with --load; the sequence comes first"),
+        ("list.txt", "is neither a video, nor a folder, nor a camera", "the folder of a sequence"),
+        ("noise.bin", "is neither a video, nor a folder, nor a camera", "the folder of a sequence"),
+        ("noise.mp4", "is no video that can be read", "convert it"),
+    ],
+)
+def test_files_that_are_no_sequence(
+    command: CommandLine, name: str, thing: str, remedy: str
+) -> None:
+    Path(name).write_text("Camera.fx: 500\n" * 90)
+    done = command("run", name, "--sensor", "rgbd", "--settings", "tum1")
+    assert done.code == 2, done.err
+    assert done.err.startswith(f"Error: {name} {thing}")
+    assert remedy in done.err
+
+
+@pytest.mark.parametrize(
     ("error", "text"),
     [
         (FileNotFoundError(2, "No such file or directory", "x"), "x: No such file or directory"),
