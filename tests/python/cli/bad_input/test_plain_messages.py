@@ -52,6 +52,13 @@ def test_what_is_missing_is_named(command: CommandLine, line: tuple[str, ...]) -
     assert "Traceback" not in done.err
 
 
+@pytest.mark.parametrize("option", [("--format", "ply"), ("--format=ply",)])
+def test_the_format_of_an_export_comes_first(command: CommandLine, option: tuple[str, ...]) -> None:
+    done = command("map", "export", "office.orbmap", "office.ply", *option)
+    assert done.code == 2, done.err
+    assert "the format comes first: orbslam2py map export ply FILE OUTPUT" in done.err
+
+
 @pytest.mark.parametrize(
     ("name", "thing", "remedy"),
     [
