@@ -153,6 +153,8 @@ def _rows_of(key: str, value: Any, report: dict[str, Any]) -> list[tuple[str, st
     text = f"{value:.4f}" if isinstance(value, float) else str(value)
     if key == "final_adjustment":
         text = _describe_adjustment(value)
+    elif key == "depth":
+        text = f"median {value['median_m']:.2f} m with DepthMapFactor {value['factor']:g}"
     elif key == "lost":
         text = _describe_losses(report)
     elif key == "lost_at_end":

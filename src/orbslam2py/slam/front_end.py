@@ -57,7 +57,7 @@ class FrontEnd:
         )
         self._pair_extractor = core.PairExtractor(options) if sensor is Sensor.STEREO else None
         self._check_calibration = check_calibration
-        self._depth_check: DepthCheck | None = DepthCheck(settings.depth_factor)
+        self.depth_check = DepthCheck(settings.depth_factor)
 
     def reset(self) -> None:
         """Let the next image have any size: a new map begins."""
@@ -141,10 +141,8 @@ class FrontEnd:
         if depth.dtype.kind not in "uif" or depth.dtype.itemsize > _LARGEST_NUMBER:
             raise ImageError(f"depth must hold numbers (uint16, float32...), got {depth.dtype}")
         _check_mask(mask, image, "mask")
-        if self._depth_check is not None:
-            self._depth_check.look(depth)
-            if self._depth_check.done:
-                self._depth_check = None
+        if not self.depth_check.done:
+            self.depth_check.look(depth)
         context = self._context_for(image)
         with timer("extract"):
             grey = core.to_grey(image, self._settings.camera.rgb)

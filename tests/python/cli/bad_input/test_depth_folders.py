@@ -6,9 +6,11 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
-from support.command_line import CommandLine
+from support.command_line import CommandLine, Results
 from support.spoilt_runs import N, expect_refused, run
 
 pytestmark = pytest.mark.watchdog(60)
@@ -50,3 +52,22 @@ def test_a_missing_part(command: CommandLine, phone: Path) -> None:
         path.rename(path.with_stem(f"c{k}"))
     done = run(command, phone, "rgbd", "--settings", "phone.yaml")
     expect_refused(done, f"color ({N} images, 8 bits)", f"depth16 ({N - 1} images", "rgb.txt")
+
+
+def test_the_median_of_depth_is_told(command: CommandLine, phone: Path) -> None:
+    done = run(command, phone, "rgbd", "--settings", "phone.yaml")
+    depth = Results(Path("r")).report["depth"]
+    assert depth["factor"] == 5000
+    assert f"median {depth['median_m']:.2f} m with DepthMapFactor 5000" in done.out
+    assert "Warning" not in done.err
+
+
+def test_depth_that_is_too_near_for_the_factor(command: CommandLine, phone: Path) -> None:
+    for path in (phone / "depth16").iterdir():
+        raw = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        cv2.imwrite(str(path), (raw / 5 / 3).astype(np.uint16))
+    done = run(command, phone, "rgbd", "--settings", "phone.yaml")
+    report = Results(Path("r")).report
+    assert report["depth"]["median_m"] < 0.5
+    assert "DepthMapFactor: 1000 makes it" in done.err
+    assert any("DepthMapFactor: 1000" in warning for warning in report["warnings"])
