@@ -66,7 +66,8 @@ class _ConsoleHandler(logging.Handler):
 
     def _print(self, record: logging.LogRecord, text: str) -> None:
         colour = "red" if record.levelno >= logging.ERROR else "yellow"
-        title = f"[bold {colour}]{record.levelname.capitalize()}:[/]"
+        name = "Note" if record.levelno < logging.WARNING else record.levelname.capitalize()
+        title = f"[bold {colour}]{name}:[/]"
         self._console.print(f"{title} {escape(text)}", highlight=False, soft_wrap=True)
 
 
@@ -77,6 +78,8 @@ def log_to(console: Console, *, quiet: bool) -> None:
     logger.handlers = [_ConsoleHandler(console)]
     logger.propagate = False
     logger.setLevel(logging.ERROR if quiet else logging.WARNING)
+    # What was guessed of the input is said as well.
+    logging.getLogger(f"{logger.name}.datasets").setLevel(logging.ERROR if quiet else logging.INFO)
 
 
 def tell_repeated() -> None:
@@ -160,6 +163,8 @@ def _rows_of(key: str, value: Any, report: dict[str, Any]) -> list[tuple[str, st
         return [_IN_WORDS[key](report)]
     if key == "final_adjustment":
         text = _describe_adjustment(value)
+    elif key == "depth":
+        text = f"median {value['median_m']:.2f} m with DepthMapFactor {value['factor']:g}"
     elif key == "lost":
         text = _describe_losses(report)
     elif key == "lost_at_end":

@@ -98,6 +98,11 @@ def evaluate(
     log_to(Console(stderr=True), quiet=False)
     if not math.isfinite(offset):
         raise DatasetError(f"--offset is {offset}; give a number of seconds")
+    if trajectory.is_dir():
+        raise DatasetError(
+            f"{trajectory} is a folder, no trajectory; the trajectory comes first: orbslam2py "
+            "evaluate TRAJECTORY GROUND_TRUTH"
+        )
     sensor = _sensor_of_run(trajectory)
     both = _read_both(trajectory, ground_truth, file_format, times, extrinsics, sensor)
     if offset and not both.on_clocks:

@@ -57,6 +57,8 @@ EXAMPLE = """
 
     orbslam2py run video.mp4 --sensor mono --settings my.yaml
 
+    orbslam2py run phone --sensor rgbd --settings phone.yaml
+
     orbslam2py run 0 --sensor mono --settings my.yaml
 
     orbslam2py run monday.mp4 --sensor mono --settings my.yaml --save office.orbmap

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ class RunCommand(typer.core.TyperCommand):
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Give ``--localize`` its number 0 where none follows."""
         complete: list[str] = []
-        for argument, following in zip(args, [*args[1:], ""], strict=True):
+        for argument, following in zip_longest(args, args[1:], fillvalue=""):
             complete.append(argument)
             if argument == "--localize" and not following.lstrip("-").isdecimal():
                 complete.append("0")

@@ -14,8 +14,9 @@ from orbslam2py.settings.sensor import Sensor
 SequenceArgument = Annotated[
     str,
     typer.Argument(
-        help="Folder of a TUM RGB-D, KITTI odometry or EuRoC sequence; folder of images; "
-        "video file; number of a camera (ends with Ctrl-C)."
+        help="Folder of a TUM RGB-D, KITTI odometry or EuRoC sequence; folder of images, "
+        "or one that holds a folder of images and one of depth; video file; number of a camera "
+        "(ends with Ctrl-C)."
     ),
 ]
 SensorOption = Annotated[

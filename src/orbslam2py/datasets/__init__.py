@@ -2,6 +2,7 @@
 """Images: TUM RGB-D, KITTI odometry, EuRoC, folders of images, videos, cameras."""
 
 from orbslam2py.datasets.base import Images, Layout, LiveFrame, LiveSource, Sequence, Source
+from orbslam2py.datasets.depth_folders import DepthFolders
 from orbslam2py.datasets.euroc import EurocSequence
 from orbslam2py.datasets.frames import Frame, FramesInOrder
 from orbslam2py.datasets.image_folder import ImageFolder
@@ -15,6 +16,7 @@ from orbslam2py.datasets.tum import TumSequence
 from orbslam2py.datasets.video import VideoReader, VideoSequence
 
 __all__ = [
+    "DepthFolders",
     "EurocSequence",
     "Frame",
     "FramesInOrder",

@@ -52,7 +52,7 @@ def read_image(path: Path, *, rgb: bool) -> ByteArray:
     ImageError
         If it is no complete 8-bit image.
     """
-    decoded = _decode(path)
+    decoded = read_any(path)
     if decoded.dtype != np.uint8:
         raise ImageError(f"{path} has {decoded.dtype} pixels; images must be 8 bits per channel")
     image = decoded.astype(np.uint8, copy=False)
@@ -74,7 +74,7 @@ def read_depth(path: Path) -> NDArray[np.generic]:
     ImageError
         If it is no complete image with one channel.
     """
-    depth = _decode(path)
+    depth = read_any(path)
     if depth.ndim == 3 and depth.shape[2] == 1:
         depth = depth[:, :, 0]
     if depth.ndim != 2:
@@ -82,7 +82,16 @@ def read_depth(path: Path) -> NDArray[np.generic]:
     return depth
 
 
-def _decode(path: Path) -> NDArray[np.generic]:
+def read_any(path: Path) -> NDArray[np.generic]:
+    """Read an image of any depth and number of channels as it is.
+
+    Raises
+    ------
+    DatasetError
+        If there is no such file.
+    ImageError
+        If it is no complete image.
+    """
     try:
         content = path.read_bytes()
     except FileNotFoundError:

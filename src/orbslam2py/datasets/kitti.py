@@ -15,7 +15,7 @@ from orbslam2py.datasets.base import Images, Layout, Stamps, require_frames
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.images import read_image
 from orbslam2py.datasets.recorded import RecordedSequence
-from orbslam2py.errors import DatasetError, SettingsError
+from orbslam2py.errors import DatasetError, ImageError, SettingsError
 from orbslam2py.settings import (
     CameraSettings,
     DepthSettings,
@@ -24,12 +24,17 @@ from orbslam2py.settings import (
     Settings,
     builtin_settings,
 )
+from orbslam2py.settings.fit import builtin_for_size
 from orbslam2py.trajectory import Trajectory, read_kitti
 
 _log = logging.getLogger(__name__)
 
 #: Numbers of the left and the right camera of the grey pair, which comes first, and the colour one.
 _PAIRS = ((0, 1), (2, 3))
+
+#: Which built-in settings there are, and the last sequence that they tell by number.
+_ALL_BUILT_IN = "kitti00-02, kitti03 or kitti04-12, by the number of the sequence"
+_LAST_NUMBERED = 12
 
 _CLOSE_FACTOR = 40.0
 _USUAL_RATE = 10.0
@@ -61,8 +66,7 @@ class KittiSequence(RecordedSequence):
     layout = Layout.KITTI
     up_in_truth = np.array([0.0, -1.0, 0.0])  # the world is the first camera, mounted level
     _missing_calibration = (
-        "calib.txt is missing; copy it there from the data set, or give --settings kitti00-02, "
-        "kitti03 or kitti04-12, by the number of the sequence"
+        f"calib.txt is missing; copy it there from the data set, or give --settings {_ALL_BUILT_IN}"
     )
 
     def __init__(
@@ -149,13 +153,20 @@ class KittiSequence(RecordedSequence):
             return None
         projections = _read_calibration(path)
         stereo = self.sensor is Sensor.STEREO
+        if not stereo and f"P{self._left}" not in projections and "P0" in projections:
+            _log.info(
+                "%s has no line 'P%d:'; taking P0, whose focal length and centre all rectified "
+                "cameras of KITTI share",
+                *(path, self._left),
+            )
+            projections[f"P{self._left}"] = projections["P0"]
         for number, side in ((self._left, "left"), (self._right, "right"))[: 1 + stereo]:
             if f"P{number}" not in projections:
                 colour = "grey" if number in _PAIRS[0] else "colour"
                 needed = ", needed for stereo" if side == "right" else ""
                 raise DatasetError(
                     f"{path} has no line 'P{number}:' ({side} {colour} camera){needed}; copy the "
-                    "sequence's own calib.txt there, or give settings"
+                    f"sequence's own calib.txt there, or give --settings {self._built_in()}"
                 )
         P = projections[f"P{self._left}"]
         try:
@@ -178,6 +189,21 @@ class KittiSequence(RecordedSequence):
             )
         except SettingsError as error:
             raise DatasetError(f"{path}: {error}") from error
+
+    def _built_in(self) -> str:
+        """Name the built-in settings that fit the first image or the number, all if none does."""
+        try:
+            height, width = read_image(self.image_path(0), rgb=True).shape[:2]
+        except (DatasetError, ImageError):
+            height, width = 0, 0
+        for name in builtin_for_size((width, height)):
+            if name.startswith("kitti"):
+                return f"{name} (images of {width} x {height})"
+        if re.fullmatch(r"\d\d", self.name) and int(self.name) <= _LAST_NUMBERED:
+            number = int(self.name)
+            name = "kitti00-02" if number < 3 else "kitti03" if number == 3 else "kitti04-12"
+            return f"{name} (sequence {self.name})"
+        return _ALL_BUILT_IN
 
     def _rate(self) -> float:
         steps = np.diff(self.timestamps)

@@ -3,18 +3,30 @@
 
 from __future__ import annotations
 
+import mimetypes
 from pathlib import Path
 
+import cv2
+
 from orbslam2py._arguments import is_whole, path_of
+from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.datasets.choose_settings import SettingsChoice
+from orbslam2py.datasets.depth_folders import DepthFolders, find_depth_pair
 from orbslam2py.datasets.image_folder import ImageFolder, image_files
+from orbslam2py.datasets.images import quiet_opencv
 from orbslam2py.datasets.live import LiveCamera
 from orbslam2py.datasets.masks import MaskedCamera, MaskedSequence
-from orbslam2py.datasets.recognise import has_layout, open_sequence
+from orbslam2py.datasets.recognise import has_layout, is_depth_pair, open_sequence
 from orbslam2py.datasets.video import VideoSequence
 from orbslam2py.errors import DatasetError
 from orbslam2py.settings import Sensor
+
+#: Files that belong to a run, but are not its sequence: endings, what they are, their option.
+_OTHER_FILES = (
+    ((".yaml", ".yml"), "settings", "--settings"),
+    ((".orbmap",), "map", "--load"),
+)
 
 
 def open_input(
@@ -31,8 +43,9 @@ def open_input(
     Parameters
     ----------
     source
-        Folder of a TUM RGB-D, KITTI or EuRoC sequence, folder of images, video file, or number of
-        a camera (also as text, if there is no file of that name).
+        Folder of a TUM RGB-D, KITTI or EuRoC sequence, folder of images, folder with a folder of
+        images and one of depth, video file, or number of a camera (also as text, if there is no
+        file of that name).
     sensor
         What to deliver images for; by default the richest there is.
     settings
@@ -84,10 +97,14 @@ def _open_recorded(
     times: str | Path | None,
 ) -> Sequence:
     if path.is_file():
+        _require_video(path)
         return VideoSequence(path, sensor, settings=settings, fps=fps, times=times)
     if path.is_dir() and not has_layout(path):
         if image_files(path):
+            _refuse_half_of_pair(path, sensor)
             return ImageFolder(path, sensor, settings=settings, fps=fps, times=times)
+        if is_depth_pair(path, sensor):
+            return DepthFolders(path, sensor, settings=settings, fps=fps, times=times)
         inner = sorted(child for child in path.iterdir() if child.is_dir() and image_files(child))
         if inner and not any(has_layout(child) for child in path.iterdir()):
             raise DatasetError(f"no images in {path} itself; did you mean {inner[0]}?")
@@ -100,3 +117,37 @@ def _open_recorded(
                 "which has its own time stamps"
             )
     return sequence
+
+
+def _require_video(path: Path) -> None:
+    """Say what a file is that cannot be a video by its name; what has no known name is tried."""
+    ending = path.suffix.lower()
+    for endings, what, option in _OTHER_FILES:
+        if ending in endings:
+            raise DatasetError(
+                f"{path} is a {what} file: give it with {option}; the sequence comes first"
+            )
+    kind = mimetypes.guess_type(path.name)[0] or ""
+    if ending in IMAGE_SUFFIXES or kind.startswith("video/"):
+        return
+    with quiet_opencv():
+        # Text is not tried: to OpenCV some of it is a film of characters.
+        readable = not kind.startswith("text/") and cv2.VideoCapture(str(path)).isOpened()
+    if not readable:
+        raise DatasetError(
+            f"{path} is neither a video, nor a folder, nor a camera; give the folder of a "
+            "sequence, a folder of images, a video or the number of a camera"
+        )
+
+
+def _refuse_half_of_pair(path: Path, sensor: Sensor | str | None) -> None:
+    """Name the folder above if RGB-D is wanted of one of the two folders of a pair."""
+    if sensor is None or Sensor(sensor) is not Sensor.RGBD:
+        return
+    above = path.resolve().parent
+    pair = None if has_layout(above) else find_depth_pair(above)
+    if pair is not None and path.resolve() in (pair.colour.path, pair.depth.path):
+        raise DatasetError(
+            f"{path} holds one half of a pair: images are in {pair.colour.path.name}, depth in "
+            f"{pair.depth.path.name}; give the folder of both, {above}"
+        )

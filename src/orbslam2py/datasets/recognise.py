@@ -8,6 +8,12 @@ from pathlib import Path
 from orbslam2py._arguments import path_of
 from orbslam2py.datasets.base import Layout
 from orbslam2py.datasets.choose_settings import SettingsChoice
+from orbslam2py.datasets.depth_folders import (
+    DepthFolders,
+    find_depth_pair,
+    folder_kinds,
+    no_depth_pair,
+)
 from orbslam2py.datasets.euroc import EurocSequence, find_root
 from orbslam2py.datasets.kitti import KittiSequence, find_cameras
 from orbslam2py.datasets.recorded import RecordedSequence
@@ -63,6 +69,27 @@ def has_layout(folder: Path) -> bool:
     return folder.is_dir() and bool(_layouts(folder))
 
 
+def is_depth_pair(folder: Path, sensor: Sensor | str | None) -> bool:
+    """Tell whether a folder has no layout, but a folder of images and a folder of depth.
+
+    Raises
+    ------
+    DatasetError
+        If RGB-D is wanted, or there is depth, and it cannot be told which folders are meant.
+    """
+    if not folder.is_dir() or has_layout(folder):
+        return False
+    if find_depth_pair(folder) is not None:
+        return True
+    kinds = folder_kinds(folder)
+    has_depth = sensor is None and any(kind.kind == "depth" for kind in kinds)
+    wants_depth = sensor is not None and Sensor(sensor) is Sensor.RGBD
+    meant = has_depth or (wants_depth and bool(kinds))
+    if meant and not any(has_layout(child) for child in folder.iterdir()):
+        raise no_depth_pair(folder, kinds)
+    return False
+
+
 def open_sequence(
     folder: str | Path,
     sensor: Sensor | str | None = None,
@@ -76,7 +103,8 @@ def open_sequence(
     Parameters
     ----------
     folder
-        TUM RGB-D, KITTI odometry or EuRoC (the sequence or its ``mav0``).
+        TUM RGB-D, KITTI odometry or EuRoC (the sequence or its ``mav0``), or a folder with a folder
+        of images and a folder of depth images.
     sensor
         What to deliver images for; by default the richest the folder has images for.
     settings
@@ -101,6 +129,8 @@ def open_sequence(
     folder = path_of(folder, "the folder of the sequence")
     if association is not None:
         association = path_of(association, "association")
+    if layout is None and association is None and is_depth_pair(folder, sensor):
+        return DepthFolders(folder, sensor, settings=settings)
     layout = recognise(folder) if layout is None else Layout(layout)
     if layout is Layout.TUM:
         return TumSequence(folder, sensor, settings=settings, association=association)

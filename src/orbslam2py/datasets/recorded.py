@@ -13,7 +13,6 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.datasets.base import (
     Images,
-    Layout,
     Stamps,
     choose_sensor,
 )
@@ -49,7 +48,7 @@ class RecordedSequence(FramesInOrder, ABC):
         If the settings are wrong.
     """
 
-    layout: Layout
+    layout: str
     #: Direction of up in the world of the ground truth, (3,); None if the layout does not tell it.
     up_in_truth: FloatArray | None = None
     #: Why there are no settings if none were found, and which of the built-in ones to give.

@@ -68,7 +68,7 @@ class UnposedSource:
             )
         self.settings: Settings = resolve_settings(settings, self.sensor)
         if fps is not None:
-            self.settings = replace(self.settings, camera=_with_rate(self.settings.camera, fps))
+            self.settings = replace(self.settings, camera=with_rate(self.settings.camera, fps))
         self._what = what
         self._size_checked = False
 
@@ -98,7 +98,8 @@ class UnposedSource:
             )
 
 
-def _with_rate(camera: CameraSettings, fps: float) -> CameraSettings:
+def with_rate(camera: CameraSettings, fps: float) -> CameraSettings:
+    """Return the camera with the rate that was given by hand."""
     try:
         return replace(camera, fps=fps)
     except SettingsError as error:

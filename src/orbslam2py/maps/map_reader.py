@@ -27,6 +27,7 @@ from orbslam2py.settings.settings import Settings
 
 _Group = TypeVar("_Group")
 
+_WRITTEN_BY = "give a file that 'orbslam2py run --save' or save_map has written"
 _COPY = "use a copy of the file"
 
 #: Characters of what is quoted in a message.
@@ -81,11 +82,9 @@ def _check_header(path: Path, named: str) -> None:
     if size == 0:
         raise MapFileError(f"{named} is empty; {_COPY}, or save the map again")
     if len(header) < 100 or not header.startswith(b"SQLite format 3\x00"):
-        raise MapFileError(f"{named} is not a map file; give a file that save_map has written")
+        raise MapFileError(f"{named} is not a map file; {_WRITTEN_BY}")
     if int.from_bytes(header[68:72], "big") != APPLICATION_ID:
-        raise MapFileError(
-            f"{named} is a database of another program; give a file that save_map has written"
-        )
+        raise MapFileError(f"{named} is a database of another program; {_WRITTEN_BY}")
     version = int.from_bytes(header[60:64], "big")
     if version > FORMAT_VERSION:
         raise MapFileError(

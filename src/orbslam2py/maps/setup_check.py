@@ -36,7 +36,8 @@ def check_camera(saved: SavedMap, settings: Settings) -> None:
     if differences:
         raise SettingsError(
             f"the map {saved.source} was made with another camera: {'; '.join(differences)}; "
-            "leave the settings out to take those of the map, or allow another setup"
+            "leave the settings out to take those of the map, or allow another setup "
+            "(--allow-other-setup, allow_other_setup=True)"
         )
 
 
@@ -47,7 +48,8 @@ def check_vocabulary(saved: SavedMap, present: VocabularyIdentity) -> None:
         raise MapFileError(
             f"the map {saved.source} was made with the vocabulary {made_with.name or 'in memory'} "
             f"({made_with.hash}), not with {present.name or 'the one given'} ({present.hash}); "
-            "give that vocabulary, or allow another setup"
+            "give that vocabulary, or allow another setup "
+            "(--allow-other-setup, allow_other_setup=True)"
         )
 
 

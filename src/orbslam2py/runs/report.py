@@ -120,6 +120,7 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "resets": result.n_resets,
         **losses,
         "initialisation_reasons": initialization_reasons(result),
+        "depth": depth_entry(result),
         "warnings": result.warnings,
         "interrupted": result.interrupted,
         "seconds": result.seconds,
@@ -150,6 +151,13 @@ def loaded_map_entry(loaded: SavedMap | None) -> dict[str, Any] | None:
         "map_points": len(loaded.contents.points),
         "runs": len(loaded.runs),
     }
+
+
+def depth_entry(result: RunResult) -> dict[str, Any] | None:
+    """What report.json says about the depth images; None without any."""
+    if result.median_depth is None:
+        return None
+    return {"median_m": result.median_depth, "factor": result.settings.depth_factor}
 
 
 def options_entry(options: RunOptions) -> dict[str, Any]:

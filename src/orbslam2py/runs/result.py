@@ -90,6 +90,8 @@ class RunResult:
     """Full bundle adjustments, also those that were given up."""
     final_adjustment: FullAdjustmentRecord | None = None
     """The one of the finished map, if it was asked for; the last of these."""
+    median_depth: float | None = None
+    """Of the first depth images [m]; None without depth."""
     warnings: list[str] = field(default_factory=list)
     """What the result suffers from: a calibration that does not fit, a loss until the end."""
     calibration_warnings: list[str] = field(default_factory=list)

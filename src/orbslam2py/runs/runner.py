@@ -17,7 +17,7 @@ import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py._files import describe_error
-from orbslam2py.datasets.base import Images, LiveSource, Sequence
+from orbslam2py.datasets.base import Images, Layout, LiveSource, Sequence
 from orbslam2py.errors import DatasetError, ImageError, OrbSlamError
 from orbslam2py.maps.map_arrays import MapArrays
 from orbslam2py.runs.calibration_watch import CalibrationWatch, settings_beside
@@ -25,6 +25,7 @@ from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.feeds import FedFrame, LiveFeed, RecordedFeed, is_sequence
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.result import DROPPED, FrameRow, RunResult
+from orbslam2py.settings.depth_check import doubt_of_tum_factor
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
 from orbslam2py.slam.frame_source import track_images
@@ -154,11 +155,23 @@ class SequenceRunner:
                 _log.warning("interrupted; saving what was done so far (%s)", seen)
             self._shut_down(system)
         self._save_map(system)
+        self._judge_depth(system)
         result.calibration_warnings = self._calibration_warnings(system)
         result.warnings += result.calibration_warnings
         self._collect(system)
         result.seconds = time.perf_counter() - begin
         return result
+
+    def _judge_depth(self, system: System) -> None:
+        """Keep how far the depth is, and doubt a factor that is only that of another data set."""
+        result = self.result
+        result.median_depth = system.pipeline.front_end.depth_check.median
+        if result.sequence.layout == Layout.TUM:
+            return
+        doubt = doubt_of_tum_factor(result.settings.depth_factor, result.median_depth)
+        if doubt is not None:
+            _log.warning("%s", doubt)
+            result.warnings.append(doubt)
 
     def _calibration_watch(self, in_time: bool) -> CalibrationWatch | None:
         if not self._options.system.check_calibration:

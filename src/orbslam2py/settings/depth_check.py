@@ -22,6 +22,9 @@ _STEP = 7
 _LEAST, _MOST = 0.05, 200.0
 #: Factors in use, the commonest first: millimetres, TUM, metres, centimetres, 0.1 mm.
 _USUAL = (1000.0, 5000.0, 1.0, 100.0, 10_000.0)
+_TUM_FACTOR, _MILLIMETRES = 5000.0, 1000.0
+#: Nearer than this the factor of TUM is doubted in other data [m].
+_NEAR = 0.5
 #: Where the median of a depth image usually lies [m].
 _LIKELY = (0.3, 8.0)
 #: What is told.
@@ -50,11 +53,17 @@ class DepthCheck:
         self._left = N_CHECKED
         self._chances = N_LOOKED_AT
         self.warning: str | None = None
+        self._medians: list[float] = []
 
     @property
     def done(self) -> bool:
         """Whether nothing further needs to be looked at."""
         return self._left == 0 or self._chances == 0
+
+    @property
+    def median(self) -> float | None:
+        """Median of those of the images looked at [m]; None if none had depth."""
+        return float(np.median(self._medians)) / self._factor if self._medians else None
 
     def look(self, depth: npt.NDArray[np.generic]) -> None:
         """Judge a raw depth image (height, width); one without depth does not count."""
@@ -64,6 +73,7 @@ class DepthCheck:
         median = _median_of_known(depth.reshape(-1)[::_STEP])
         if median is None:
             return
+        self._medians.append(median)
         self._left -= 1
         if _LEAST <= median / self._factor <= _MOST:
             return
@@ -72,6 +82,30 @@ class DepthCheck:
         values = (self._factor, median / self._factor, better, median / better)
         self.warning = _TEXT % values
         _log.warning(_TEXT, *values)
+
+
+def doubt_of_tum_factor(factor: float, median: float | None) -> str | None:
+    """Say that the factor of TUM RGB-D is likely wrong for data that is not in its layout.
+
+    Parameters
+    ----------
+    factor
+        Raw units per metre as the settings have them.
+    median
+        What it makes of the median of the depth [m]; None if there was no depth.
+
+    Returns
+    -------
+    str or None
+        None if there is nothing to say.
+    """
+    if factor != _TUM_FACTOR or median is None or median >= _NEAR:
+        return None
+    return (
+        f"depth has a median of only {median:.2f} m with DepthMapFactor {factor:g}, which is that "
+        f"of TUM RGB-D; if depth is in millimetres, DepthMapFactor: {_MILLIMETRES:g} makes it "
+        f"{median * factor / _MILLIMETRES:.2f} m"
+    )
 
 
 def _median_of_known(depth: npt.NDArray[np.generic]) -> float | None:

@@ -125,6 +125,11 @@ _SIZES = {
 MEASURE = "calibrate the camera at the size of these images (orbslam2py calibrate)"
 
 
+def builtin_for_size(size: tuple[int, int]) -> tuple[str, ...]:
+    """Name the built-in settings for images of this width and height [pixels]."""
+    return tuple(name for name, its_size in _SIZES.items() if its_size == size)
+
+
 @lru_cache(maxsize=1)
 def _known_cameras() -> tuple[tuple[str, CameraSettings], ...]:
     return tuple(

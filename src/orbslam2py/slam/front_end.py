@@ -57,12 +57,12 @@ class FrontEnd:
         )
         self._pair_extractor = core.PairExtractor(options) if sensor is Sensor.STEREO else None
         self._check_calibration = check_calibration
-        self._depth_check = DepthCheck(settings.depth_factor)
+        self.depth_check = DepthCheck(settings.depth_factor)
 
     @property
     def depth_warning(self) -> str | None:
         """What the first depth images said against the factor of the settings."""
-        return self._depth_check.warning
+        return self.depth_check.warning
 
     def reset(self) -> None:
         """Let the next image have any size: a new map begins."""
@@ -146,8 +146,8 @@ class FrontEnd:
         if depth.dtype.kind not in "uif" or depth.dtype.itemsize > _LARGEST_NUMBER:
             raise ImageError(f"depth must hold numbers (uint16, float32...), got {depth.dtype}")
         _check_mask(mask, image, "mask")
-        if not self._depth_check.done:
-            self._depth_check.look(depth)
+        if not self.depth_check.done:
+            self.depth_check.look(depth)
         context = self._context_for(image)
         with timer("extract"):
             grey = core.to_grey(image, self._settings.camera.rgb)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import logging
 import shutil
 from pathlib import Path
 
@@ -185,3 +186,36 @@ def test_kitti_calibration_without_the_colour_cameras(colour: Path) -> None:
     (colour / "calib.txt").write_text(f"{P2}\n")
     with pytest.raises(DatasetError, match=r"no line 'P3:' \(right colour camera\), needed for"):
         _ = open_sequence(colour).settings
+
+
+def test_kitti_one_colour_camera_with_grey_calibration(
+    colour: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (colour / "calib.txt").write_text(f"{P0}\n")
+    with caplog.at_level(logging.INFO):
+        camera = open_sequence(colour, Sensor.MONOCULAR).settings.camera
+    assert (camera.fx, camera.cx, camera.cy) == (700, 600, 180)
+    (said,) = [record.getMessage() for record in caplog.records]
+    assert "calib.txt has no line 'P2:'; taking P0" in said
+
+
+@pytest.mark.parametrize(
+    ("size", "name", "suggested"),
+    [
+        ((375, 1242), "anything", "give --settings kitti03 ("),
+        ((376, 1241), "05", "give --settings kitti00-02 ("),
+        (SIZE, "05", "give --settings kitti04-12 ("),
+        (SIZE, "13", "kitti00-02, kitti03 or kitti04-12, by the number"),
+        (SIZE, "anything", "kitti00-02, kitti03 or kitti04-12, by the number"),
+    ],
+)
+def test_kitti_without_a_line_suggests_what_is_built_in(
+    colour: Path, size: tuple[int, int], name: str, suggested: str
+) -> None:
+    folder = colour.rename(colour.parent / name)
+    save(folder / "image_2" / "000000.png", image(1, size))
+    (folder / "calib.txt").write_text(f"{P1}\n")
+    for sensor in (Sensor.MONOCULAR, Sensor.STEREO):
+        with pytest.raises(DatasetError, match="no line 'P2:'") as refused:
+            _ = open_sequence(folder, sensor).settings
+        assert suggested in str(refused.value)

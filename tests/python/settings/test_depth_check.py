@@ -13,7 +13,7 @@ import pytest
 from orbslam2py import Sensor
 from orbslam2py._timing import StageTimer
 from orbslam2py.settings import builtin_settings
-from orbslam2py.settings.depth_check import N_CHECKED, N_LOOKED_AT, DepthCheck
+from orbslam2py.settings.depth_check import N_CHECKED, N_LOOKED_AT, DepthCheck, doubt_of_tum_factor
 from orbslam2py.slam import front_end
 from orbslam2py.slam.front_end import FrontEnd
 from support.small_sequences import images, sequence
@@ -145,3 +145,23 @@ def test_front_end_changes_nothing(caplog: pytest.LogCaptureFixture) -> None:
     known = right.depth > 0
     np.testing.assert_allclose(frame.depth[known], 5000 * right.depth[known], rtol=1e-5)
     np.testing.assert_array_equal(depth, shown.depth)
+
+
+def test_the_median_is_kept_in_metres() -> None:
+    check = DepthCheck(1000)
+    assert check.median is None
+    for median in (1800, 1880, 1900):
+        check.look(depths(median))
+    assert check.median == pytest.approx(1.88, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("factor", "median", "doubted"),
+    [(5000, 0.38, True), (5000, 0.6, False), (1000, 0.38, False), (5000, None, False)],
+)
+def test_the_factor_of_tum_is_doubted(factor: float, median: float | None, doubted: bool) -> None:
+    doubt = doubt_of_tum_factor(factor, median)
+    assert (doubt is not None) == doubted
+    if doubt is not None:
+        assert "0.38 m with DepthMapFactor 5000" in doubt
+        assert "DepthMapFactor: 1000 makes it 1.90 m" in doubt

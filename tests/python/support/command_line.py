@@ -48,12 +48,15 @@ class Outcome:
 def logging_restored() -> Iterator[None]:
     """The command directs the package's log to its own console."""
     logger = logging.getLogger("orbslam2py")
+    datasets = logging.getLogger("orbslam2py.datasets")
     before = logger.handlers, logger.propagate, logger.level
+    level_of_datasets = datasets.level
     try:
         yield
     finally:
         logger.handlers, logger.propagate, level = before
         logger.setLevel(level)
+        datasets.setLevel(level_of_datasets)
 
 
 class CommandLine:

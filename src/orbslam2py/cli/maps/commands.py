@@ -15,7 +15,7 @@ from orbslam2py.cli.calibrate import Force, Quiet, check_target
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.maps.description import describe_map
 from orbslam2py.cli.maps.edits import MapFile, align, crop, optimize, save_edited
-from orbslam2py.cli.maps.export import export
+from orbslam2py.cli.maps.export import ExportCommand, export
 from orbslam2py.maps import load_map, map_differences, verify_map_file
 from orbslam2py.runs.map_picture import draw_map
 
@@ -111,4 +111,5 @@ for command, example in (
     (optimize, "optimize office.orbmap --output refined.orbmap"),
 ):
     command.__doc__ = EXAMPLE.format(command.__doc__, example)
-    app.command(command.__name__)(command)
+    own_class = ExportCommand if command is export else None
+    app.command(command.__name__, cls=own_class)(command)

@@ -5,11 +5,12 @@ from __future__ import annotations
 
 from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import cv2
 import numpy as np
 import typer
+import typer.core
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
@@ -56,6 +57,19 @@ class ExportFormat(str, Enum):
 _FOLDERS = (ExportFormat.COLMAP, ExportFormat.COLMAP_TEXT, ExportFormat.NERFSTUDIO)
 _POINTS = (ExportFormat.PLY, ExportFormat.PCD)
 _PATHS = (ExportFormat.TUM, ExportFormat.KITTI, ExportFormat.EUROC)
+
+
+class ExportCommand(typer.core.TyperCommand):
+    """Says where the format belongs to those who give it as an option."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Refuse ``--format``, which other commands have."""
+        if any(argument.split("=")[0] == "--format" for argument in args):
+            raise DatasetError(
+                "map export has no --format; the format comes first: orbslam2py map export ply "
+                "FILE OUTPUT"
+            )
+        return super().parse_args(ctx, args)
 
 
 def export(

@@ -27,7 +27,11 @@ def _refused(command: CommandLine, *arguments: object, message: str) -> None:
     [
         ("missing.orbmap", None, "there is no map file missing.orbmap; check the name"),
         ("empty.orbmap", b"", "empty.orbmap is empty"),
-        ("text.orbmap", b"Camera.fx: 500\n" * 20, "text.orbmap is not a map file"),
+        (
+            "text.orbmap",
+            b"Camera.fx: 500\n" * 20,
+            "is not a map file; give a file that 'orbslam2py run --save'",
+        ),
     ],
 )
 def test_files_that_are_no_maps(
@@ -62,6 +66,7 @@ def test_a_map_of_another_camera(command: CommandLine, rgbd: Path, tmp_path: Pat
     path = written(tmp_path)
     options = ("--sensor", "rgbd", "--settings", "tum1", "--load", path)
     _refused(command, rgbd, *options, message="another camera: Camera.fx is 517.306408")
+    _refused(command, rgbd, *options, message="allow another setup (--allow-other-setup")
 
 
 @pytest.mark.parametrize(

@@ -43,6 +43,44 @@ def test_what_does_not_show_through(
 
 
 @pytest.mark.parametrize(
+    "line", [("run",), ("synthesize",), ("evaluate",), ("evaluate", "est.txt"), ("map", "info")]
+)
+def test_what_is_missing_is_named(command: CommandLine, line: tuple[str, ...]) -> None:
+    done = command(*line)
+    assert done.code == 2, done.err
+    assert "Missing argument" in done.err
+    assert "Traceback" not in done.err
+
+
+@pytest.mark.parametrize("option", [("--format", "ply"), ("--format=ply",)])
+def test_the_format_of_an_export_comes_first(command: CommandLine, option: tuple[str, ...]) -> None:
+    done = command("map", "export", "office.orbmap", "office.ply", *option)
+    assert done.code == 2, done.err
+    assert "the format comes first: orbslam2py map export ply FILE OUTPUT" in done.err
+
+
+@pytest.mark.parametrize(
+    ("name", "thing", "remedy"),
+    [
+        ("phone.yaml", "is a settings file", "give it with --settings; the sequence comes first"),
+        ("phone.YML", "is a settings file", "give it with --settings; the sequence comes first"),
+        ("office.orbmap", "is a map file", "give it with --load; the sequence comes first"),
+        ("list.txt", "is neither a video, nor a folder, nor a camera", "the folder of a sequence"),
+        ("noise.bin", "is neither a video, nor a folder, nor a camera", "the folder of a sequence"),
+        ("noise.mp4", "is no video that can be read", "convert it"),
+    ],
+)
+def test_files_that_are_no_sequence(
+    command: CommandLine, name: str, thing: str, remedy: str
+) -> None:
+    Path(name).write_text("Camera.fx: 500\n" * 90)
+    done = command("run", name, "--sensor", "rgbd", "--settings", "tum1")
+    assert done.code == 2, done.err
+    assert done.err.startswith(f"Error: {name} {thing}")
+    assert remedy in done.err
+
+
+@pytest.mark.parametrize(
     ("error", "text"),
     [
         (FileNotFoundError(2, "No such file or directory", "x"), "x: No such file or directory"),

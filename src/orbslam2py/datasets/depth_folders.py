@@ -1,0 +1,287 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A folder of images beside a folder of depth images, without any list."""
+
+from __future__ import annotations
+
+import logging
+import re
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from orbslam2py.datasets.base import Images, Stamps
+from orbslam2py.datasets.choose_settings import SettingsChoice
+from orbslam2py.datasets.image_folder import image_files
+from orbslam2py.datasets.images import read_any, read_depth, read_image
+from orbslam2py.datasets.recorded import RecordedSequence
+from orbslam2py.datasets.unposed import chosen_stamps, with_rate
+from orbslam2py.errors import DatasetError, ImageError, OrbSlamError
+from orbslam2py.settings import Sensor, Settings
+from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory, associate
+
+_log = logging.getLogger(__name__)
+
+#: Names of folders with images of the camera, and with depth: they decide between several.
+_COLOUR_NAME = re.compile(r"colou?r|rgb|images?|img|frames?", re.IGNORECASE)
+_DEPTH_NAME = re.compile(r"depth", re.IGNORECASE)
+#: Whole numbers with so many digits are a time since 1970, in so many parts of a second.
+_PARTS_OF_SECOND = {19: 9, 16: 6, 13: 3}
+#: So much of the smaller folder must be found by name, or names do not tell what is a pair.
+_BY_NAME = 0.5
+
+
+@dataclass(frozen=True)
+class FolderKind:
+    """What a folder of images holds, told by the first of them.
+
+    Attributes
+    ----------
+    path
+        The folder.
+    n
+        Number of images.
+    kind
+        ``colour`` (8 bits), ``depth`` (16 bits or floating point, one channel) or ``other``.
+    pixels
+        How its images are called in messages.
+    size
+        Width and height of the first one.
+    """
+
+    path: Path
+    n: int
+    kind: str
+    pixels: str
+    size: tuple[int, int]
+
+    def __str__(self) -> str:
+        return f"{self.path.name} ({self.n} images, {self.pixels})"
+
+
+@dataclass(frozen=True)
+class DepthPair:
+    """The folder of the images and the folder of their depth."""
+
+    colour: FolderKind
+    depth: FolderKind
+
+
+def folder_kinds(folder: Path) -> list[FolderKind]:
+    """Look at the first image of every sub-folder that has images.
+
+    Raises
+    ------
+    DatasetError
+        If a folder cannot be listed.
+    """
+    inner = sorted(child for child in folder.iterdir() if child.is_dir())
+    return [_kind_of(child, files) for child in inner if (files := image_files(child))]
+
+
+def find_depth_pair(folder: Path) -> DepthPair | None:
+    """Return the two sub-folders with images and depth; None if that cannot be told."""
+    kinds = folder_kinds(folder)
+    colour = _only([one for one in kinds if one.kind == "colour"], _COLOUR_NAME)
+    depth = _only([one for one in kinds if one.kind == "depth"], _DEPTH_NAME)
+    return None if colour is None or depth is None else DepthPair(colour, depth)
+
+
+def no_depth_pair(folder: Path, kinds: list[FolderKind]) -> DatasetError:
+    """Say what is in a folder that should have had images and depth, and what to do."""
+    return DatasetError(
+        f"cannot tell images and depth in {folder}: it has {', '.join(map(str, kinds))}; keep one "
+        "folder of 8-bit images, such as color, and one of 16-bit depth, such as depth, or list "
+        "the files in rgb.txt and depth.txt ('time path' in every line)"
+    )
+
+
+class DepthFolders(RecordedSequence):
+    """Images and depth images in two folders side by side; see `datasets.base.Sequence`.
+
+    The folders are told by the first image of each, and by their names where that leaves a choice.
+    Images and depth belong together by time if all names are times, else by equal names, else by
+    their order if there are as many of both.
+
+    Parameters
+    ----------
+    folder
+        Where the two folders are.
+    sensor
+        RGB-D or monocular; by default RGB-D.
+    settings
+        Settings, a file, a built-in name, or None to let the folder decide.
+    fps
+        Images per second; by default the names if they are times, else the rate of the settings.
+    times
+        File with one time stamp per image.
+
+    Raises
+    ------
+    DatasetError
+        If the folders cannot be told, or what belongs together, or the time stamps do not fit.
+    SettingsError
+        If the settings are wrong.
+    """
+
+    layout = "images and depth"
+    _missing_calibration = (
+        "nothing tells what camera it is from; give --settings with a file or a built-in name"
+    )
+
+    def __init__(
+        self,
+        folder: str | Path,
+        sensor: Sensor | str | None = None,
+        *,
+        settings: SettingsChoice = None,
+        fps: float | None = None,
+        times: str | Path | None = None,
+    ) -> None:
+        folder = Path(folder)
+        pair = find_depth_pair(folder)
+        if pair is None:
+            raise no_depth_pair(folder, folder_kinds(folder))
+        super().__init__(folder, (Sensor.RGBD, Sensor.MONOCULAR), sensor, settings)
+        self._fps = fps
+        images = _files_in_time(pair.colour.path)
+        self._depth_paths: list[Path] | None = None
+        how = "images alone"
+        if self.sensor is Sensor.RGBD:
+            _require_equal_size(pair)
+            images, self._depth_paths, how = _paired(folder, pair, images)
+        self._paths, self._list_path = images, pair.colour.path
+        own = _stamps_of_names(images)
+        if fps is not None or times is not None:
+            otherwise: Stamps | float = 0.0  # not needed, and there may be no settings yet
+            told = "are the given ones"
+        else:
+            otherwise = own or self.settings.camera.fps
+            told = "are their names" if own else f"count {otherwise:g} images per second"
+        names = [path.name for path in images]
+        self._stamps = chosen_stamps(len(images), fps, times, otherwise, names)
+        if self._depth_paths is not None:
+            _log.info(
+                "%s: %d images in %s go with depth in %s %s; their times %s",
+                *(folder, len(images), pair.colour.path.name, pair.depth.path.name, how, told),
+            )
+
+    @cached_property
+    def settings(self) -> Settings:
+        """The settings the caller chose, or `default_settings`, with the rate that was given."""
+        chosen = self.default_settings() if self._chosen is None else self._chosen
+        if self._fps is None:
+            return chosen
+        return replace(chosen, camera=with_rate(chosen.camera, self._fps))
+
+    def image_path(self, index: int, /) -> Path:
+        """Return the file of the image of a frame."""
+        return self._paths[index]
+
+    def load(self, index: int, /) -> Images:
+        """Read the images of a frame; see `datasets.base.Sequence.load`."""
+        image_path, *depth_path = self._files(index)
+        image = read_image(image_path, rgb=self.settings.camera.rgb)
+        return Images(image, depth=read_depth(depth_path[0])) if depth_path else Images(image)
+
+    def ground_truth(self) -> Trajectory | None:
+        """Return None: there are no true poses."""
+        return None
+
+    def _files(self, index: int) -> tuple[Path, ...]:
+        if self._depth_paths is None:
+            return (self._paths[index],)
+        return self._paths[index], self._depth_paths[index]
+
+
+def _kind_of(folder: Path, files: list[Path]) -> FolderKind:
+    try:
+        first = read_any(files[0])
+    except (OrbSlamError, OSError):  # the run says so when it comes to the image
+        return FolderKind(folder, len(files), "other", "not readable", (0, 0))
+    size = (int(first.shape[1]), int(first.shape[0]))
+    one_channel = first.ndim == 2 or first.shape[2] == 1
+    pixels = "floating point" if first.dtype.kind == "f" else f"{8 * first.dtype.itemsize} bits"
+    kind = "other"
+    if first.dtype == np.uint8:
+        kind = "colour"
+    elif one_channel and (first.dtype == np.uint16 or first.dtype.kind == "f"):
+        kind, pixels = "depth", f"{pixels}, one channel"
+    return FolderKind(folder, len(files), kind, pixels, size)
+
+
+def _only(candidates: list[FolderKind], name: re.Pattern[str]) -> FolderKind | None:
+    """The only one; of several the only one that is called so."""
+    if len(candidates) > 1:
+        candidates = [one for one in candidates if name.match(one.path.name)]
+    return candidates[0] if len(candidates) == 1 else None
+
+
+def _require_equal_size(pair: DepthPair) -> None:
+    if pair.colour.size != pair.depth.size:
+        sizes = [f"{width} x {height}" for width, height in (pair.depth.size, pair.colour.size)]
+        raise ImageError(
+            f"depth in {pair.depth.path} is {sizes[0]}, the images in {pair.colour.path} are "
+            f"{sizes[1]}; bring both to the same size and view first"
+        )
+
+
+def _paired(
+    folder: Path, pair: DepthPair, images: list[Path]
+) -> tuple[list[Path], list[Path], str]:
+    """Return images, the depth of each, and how they were paired."""
+    depths = _files_in_time(pair.depth.path)
+    colour_stamps, depth_stamps = _stamps_of_names(images), _stamps_of_names(depths)
+    by_name = {path.stem: path for path in depths}
+    named = [path for path in images if path.stem in by_name]
+    how = "by equal names"
+    if colour_stamps and depth_stamps:
+        i, j = associate(colour_stamps.seconds, depth_stamps.seconds)
+        both = [(images[k], depths[m]) for k, m in zip(i.tolist(), j.tolist(), strict=True)]
+        how = f"by times no more than {MAX_DIFFERENCE} s apart"
+    elif len(named) >= _BY_NAME * min(len(images), len(depths)):
+        both = [(path, by_name[path.stem]) for path in named]
+    elif len(images) == len(depths):
+        both = list(zip(images, depths, strict=True))
+        how = f"in their order ({images[0].name} with {depths[0].name})"
+    else:
+        both = []
+    if not both:
+        raise DatasetError(
+            f"cannot pair images and depth in {folder}: {pair.colour} and {pair.depth} have "
+            "neither equal names nor equal counts; name them alike, or list them in rgb.txt and "
+            "depth.txt ('time path' in every line)"
+        )
+    left_out = len(images) - len(both)
+    if left_out:
+        _log.warning("%s: %d images have no depth image, left out", pair.colour.path, left_out)
+    return [image for image, _ in both], [depth for _, depth in both], how
+
+
+def _files_in_time(folder: Path) -> list[Path]:
+    """Images by their time if their names are times, where 0.25 is before 0.5, else by name."""
+    files = image_files(folder)
+    if any(_seconds_of(path.stem) is None for path in files):
+        return files
+    return sorted(files, key=lambda path: float(_seconds_of(path.stem) or 0))
+
+
+def _stamps_of_names(files: list[Path]) -> Stamps | None:
+    """Times that all names are: decimal seconds, or whole parts of a second since 1970."""
+    texts = [_seconds_of(path.stem) for path in files]
+    if None in texts:
+        return None
+    seconds = np.array([float(text) for text in texts if text is not None])
+    if (np.diff(seconds) <= 0).any():
+        return None
+    return Stamps(seconds, tuple(text for text in texts if text is not None), ())
+
+
+def _seconds_of(stem: str) -> str | None:
+    if re.fullmatch(r"\d+\.\d+", stem):
+        return stem
+    if not (re.fullmatch(r"[0-9]+", stem) and len(stem) in _PARTS_OF_SECOND):
+        return None
+    digits = _PARTS_OF_SECOND[len(stem)]
+    return f"{stem[:-digits]}.{stem[-digits:]}"
