@@ -28,6 +28,9 @@ from support.documents import ROOT, SHELL, SHOWN, Block, blocks_of, documents
 #: All blocks that are not run, with the reason; see `test_all_others_run`.
 NOT_RUN = {
     "installs packages",
+    "installs packages and opens a browser",
+    "opens a browser",
+    "needs another computer",
     "builds the checkout",
     "takes a minute; another test runs it",
     "needs a camera",
@@ -193,5 +196,5 @@ def test_all_others_run() -> None:
         if block.mark("not run") is not None
     }
     assert set(reasons.values()) <= NOT_RUN, reasons
-    assert len(reasons) <= 12, reasons
+    assert len(reasons) <= 16, reasons
     assert not os.environ.get("ORBSLAM2PY_VOCABULARY"), "the documents name the vocabulary"

@@ -50,7 +50,8 @@ def view(
         reference_keyframe=0,
         milliseconds={"track": 12.0},
     )
-    features = FrameFeatures(pixels, NOTHING, NOTHING, np.arange(len(pixels)), matched)
+    colours = np.zeros((0, 3), np.uint8)
+    features = FrameFeatures(pixels, NOTHING, NOTHING, np.arange(len(pixels)), matched, colours)
     return FrameView(
         image=image,
         record=record,

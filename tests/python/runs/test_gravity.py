@@ -110,7 +110,7 @@ def test_layouts_tell_it(tmp_path: Path, layout: str, sensor: str) -> None:
 def test_the_picture_of_a_run_uses_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     drawn: dict[str, Any] = {}
     monkeypatch.setattr(
-        "orbslam2py.runs.outputs.draw_trajectory", lambda _, **values: drawn.update(values)
+        "orbslam2py.runs.run_picture.draw_trajectory", lambda _, **values: drawn.update(values)
     )
     options = SyntheticOptions(world="corridor", sensor="rgbd", frames=8, size=(320, 240))
     done = run_sequence(

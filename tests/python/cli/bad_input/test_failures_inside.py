@@ -37,7 +37,7 @@ class After:
         ("process_new_keyframe", 1, "local mapping stopped: out of order"),
         ("cull_keyframes", 1, "local mapping stopped: out of order"),
         ("match_local_map", 5, "out of order"),
-        ("to_grey", 6, "out of order"),
+        ("build_rgbd_frame", 6, "out of order"),
     ],
 )
 def test_failure_inside(
