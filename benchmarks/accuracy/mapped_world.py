@@ -11,6 +11,7 @@ import numpy as np
 from orbslam2py import Sensor, System, TrackingRecord, TrackingState
 from orbslam2py.datasets import Images
 from orbslam2py.evaluation import PoseError, align, errors_through_keyframes
+from orbslam2py.slam.frame_source import track_images
 from orbslam2py.synthetic import SyntheticSequence
 
 SECONDS_PER_FRAME = 0.05
@@ -44,11 +45,7 @@ class MappedWorld:
         """Track the images, 50 ms after the last ones."""
         seconds = self._n_shown * SECONDS_PER_FRAME
         self._n_shown += 1
-        if images.right is not None:
-            return self.system.track_stereo(images.image, images.right, seconds)
-        if images.depth is not None:
-            return self.system.track_rgbd(images.image, images.depth, seconds)
-        return self.system.track_monocular(images.image, seconds)
+        return track_images(self.system, images, seconds)
 
     def black(self) -> Images:
         """Images in which nothing can be seen."""

@@ -57,7 +57,7 @@ EXAMPLE = """
 
     orbslam2py run video.mp4 --sensor mono --settings my.yaml
 
-    orbslam2py run phone --sensor rgbd --settings phone.yaml
+    orbslam2py run phone --sensor rgbd --settings camera.yaml
 
     orbslam2py run 0 --sensor mono --settings my.yaml
 

@@ -333,7 +333,8 @@ def test_what_an_earlier_run_left_is_removed(command: CommandLine, rgbd: Path) -
         cv2.imwrite(str(path), np.zeros((240, 320), np.uint8))
     assert command("run", "black", "--sensor", "rgbd", "--output", "r", "--force").code == 3
     names = {path.name for path in Path("r").iterdir()}
-    assert names == {"frames.csv", "points.ply", "report.json", "settings.yaml"}
+    made = {"frames.csv", "map.npz", "points.ply", "report.html", "report.json", "settings.yaml"}
+    assert names == made
 
 
 # ---- several maps --------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import shutil
 import tarfile
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -86,6 +87,9 @@ def _write_phone(folder: Path) -> None:
         assert shown.depth is not None
         write_image(folder / f"rgb/{i:03d}.png", shown.image)
         write_image(folder / f"depth/{i:03d}.png", shown.depth // 5)
+    assert walk.settings.depth is not None
+    depth = replace(walk.settings.depth, raw_per_metre=1000.0)
+    replace(walk.settings, depth=depth).save(folder.parent / "camera.yaml")
 
 
 def _write_vocabulary(folder: Path) -> None:

@@ -60,6 +60,14 @@ def loaded_map_words(report: dict[str, Any]) -> str:
     return f"{entry.get('file')}: {', '.join(parts)}"
 
 
+def depth_words(report: dict[str, Any]) -> str:
+    """Say how far the first depth images are, and with which factor."""
+    entry = report["depth"]
+    if entry is None:
+        return NONE
+    return f"median {entry['median_m']:.3g} m with DepthMapFactor {entry['factor']:g}"
+
+
 def relocalisations_words(report: dict[str, Any]) -> str:
     """Say how often a lost camera was found, and that a loaded map begins with such a finding."""
     count = int(report.get("relocalisations", 0))
@@ -81,6 +89,7 @@ ALIGNMENTS = {
 _IN_WORDS: dict[str, Callable[[dict[str, Any]], str]] = {
     "relocalisations": relocalisations_words,
     "loaded_map": loaded_map_words,
+    "depth": depth_words,
     "ate_alignment": lambda report: ALIGNMENTS.get(report["ate_alignment"], NONE),
 }
 
@@ -160,6 +169,7 @@ FIGURES: dict[str, tuple[Figure, ...]] = {
         Figure("deterministic", "deterministic", "", "whether mapping ran inline"),
         Figure("realtime", "real time", "", "whether time stamps were followed"),
         Figure("seed", "seed", "", "of all random draws"),
+        Figure("depth", "depth", "", "of the first depth images, in metres"),
         Figure("loaded_map", "loaded map", "", "what the run began in"),
         Figure("saved_map", "saved map", "", "the file that the last map was saved in"),
         Figure("started", "started", "", "date and time of the run's beginning"),

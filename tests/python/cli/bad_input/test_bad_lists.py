@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -55,6 +56,7 @@ def test_missing_lists(command: CommandLine, rgbd: Path) -> None:
     """The original reads them in an endless loop (OD-8)."""
     for path in rgbd.glob("*.txt"):
         path.unlink()
+    shutil.rmtree(rgbd / "depth")  # with it, images and depth would be paired by their names
     done = run(command, rgbd)
     assert done.code == 2
     assert str(rgbd) in done.err
