@@ -61,9 +61,9 @@ EXAMPLE = """
 
     orbslam2py run 0 --sensor mono --settings my.yaml
 
-    orbslam2py run monday.mp4 --sensor mono --settings my.yaml --save office.orbmap
+    orbslam2py run video.mp4 --sensor mono --settings my.yaml --save office.orbmap
 
-    orbslam2py run tuesday.mp4 --load office.orbmap --localize
+    orbslam2py run video.mp4 --load office.orbmap --localize
 """
 
 
