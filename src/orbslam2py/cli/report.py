@@ -53,7 +53,7 @@ def compare(
 
     **Example**
 
-        orbslam2py compare runs/a runs/b -o both.html
+        orbslam2py compare runs/06 runs/latest -o both.html
     """
     log_to(Console(stderr=True), quiet=False)
     comparison = compare_runs(runs)

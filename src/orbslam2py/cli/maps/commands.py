@@ -105,7 +105,7 @@ for command, example in (
     (verify, "verify office.orbmap"),
     (compare, "compare office.orbmap copy.orbmap"),
     (compact, "compact office.orbmap --output small.orbmap"),
-    (export, "export colmap office.orbmap office-colmap --images monday.mp4"),
+    (export, "export colmap office.orbmap office-colmap --images video.mp4"),
     (crop, "crop office.orbmap --output start.orbmap --from 0 --to 30"),
     (align, "align office.orbmap --output metric.orbmap --length 2.5 --between 0 12.4"),
     (optimize, "optimize office.orbmap --output refined.orbmap"),
