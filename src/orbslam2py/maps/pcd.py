@@ -10,9 +10,7 @@ import numpy as np
 from orbslam2py._arguments import array_of
 from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py._files import atomic_write
-from orbslam2py.errors import DatasetError
-
-_FRAME = "camera frame of keyframe 0: x right, y down, z forward"
+from orbslam2py.maps.ply import FIRST_KEYFRAME_AXES, check_colours
 
 _HEADER = """\
 # .PCD v0.7 - Point Cloud Data file format
@@ -36,7 +34,7 @@ def write_pcd(
     *,
     colours: ByteArray | None = None,
     unit: str = "m",
-    frame: str = _FRAME,
+    frame: str = FIRST_KEYFRAME_AXES,
 ) -> None:
     """Write points as a binary PCD file, version 0.7, an unordered cloud.
 
@@ -67,10 +65,7 @@ def write_pcd(
     names = ["x", "y", "z"]
     table = array_of(points, "points", (-1, 3), finite=False).astype("<f4")
     if colours is not None:
-        if len(colours) != len(points):
-            raise DatasetError(
-                f"{len(points)} points, but {len(colours)} colours; give one per point"
-            )
+        check_colours(len(points), len(colours))
         names.append("rgb")
         red, green, blue = colours.astype("<u4").reshape(-1, 3).T
         packed = (red << 16 | green << 8 | blue).astype("<u4").view("<f4")

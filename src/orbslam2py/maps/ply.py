@@ -19,7 +19,8 @@ _TYPES = {
     **{"uint32": "<u4", "float": "<f4", "float32": "<f4", "double": "<f8", "float64": "<f8"},
 }
 
-_FRAME = "camera frame of keyframe 0: x right, y down, z forward"
+#: What the axes of positions are, where nothing else is said.
+FIRST_KEYFRAME_AXES = "camera frame of keyframe 0: x right, y down, z forward"
 
 
 def write_ply(
@@ -28,7 +29,7 @@ def write_ply(
     *,
     colours: ByteArray | None = None,
     unit: str = "m",
-    frame: str = _FRAME,
+    frame: str = FIRST_KEYFRAME_AXES,
 ) -> None:
     """Write points as a binary PLY file that common viewers open.
 
@@ -57,10 +58,7 @@ def write_ply(
     fields = [(name, "<f4") for name in "xyz"]
     if colours is not None:
         fields += [(name, "u1") for name in ("red", "green", "blue")]
-        if len(colours) != len(positions):
-            raise DatasetError(
-                f"{len(positions)} points, but {len(colours)} colours; give one per point"
-            )
+        check_colours(len(positions), len(colours))
     vertices = np.zeros(len(positions), fields)
     for column, name in enumerate("xyz"):
         vertices[name] = positions[:, column]
@@ -76,6 +74,12 @@ def write_ply(
     with atomic_write(path, binary=True) as stream:
         stream.write(header.encode())
         stream.write(vertices.tobytes())
+
+
+def check_colours(n_points: int, n_colours: int) -> None:
+    """Raise DatasetError unless there is one colour per point."""
+    if n_points != n_colours:
+        raise DatasetError(f"{n_points} points, but {n_colours} colours; give one per point")
 
 
 def read_points(path: str | Path) -> FloatArray:
