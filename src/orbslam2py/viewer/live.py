@@ -71,7 +71,7 @@ class LiveView:
         self._control: RunActions | None = None
         self._answers: dict[str, Callable[..., object]] = {}
         self._n_dropped = 0
-        self._watches = False
+        self._watches = self._missed = False
         self._companion = Companion(
             host=host, port=port, title=title, answers=self._answers, on_end=self._ended
         )
@@ -146,16 +146,23 @@ class LiveView:
             earlier=tuple(_light(record) for record in view.earlier),
             queue=replace(view.queue, n_dropped=self._n_dropped),
         )
-        self._companion.show("on_frame", shown, self._system.localization_mode)
+        self._show("on_frame", shown, self._system.localization_mode)
 
     def on_map(self, changes: MapChanges) -> None:
         """Show what has become of the map."""
-        self._companion.show("on_map", changes)
+        self._show("on_map", changes)
 
     def on_event(self, event: Event) -> None:
         """Tell that a loop was closed."""
         if isinstance(event, LoopClosed):
-            self._companion.show("on_event", event)
+            self._show("on_event", event)
+
+    def _show(self, *news: object) -> None:
+        try:
+            self._companion.show(*news)
+        except CompanionError:
+            self._missed = True  # the publisher tells it
+            raise
 
     def close(self) -> None:
         """Show the last of it; the page stays."""
@@ -181,7 +188,8 @@ class LiveView:
         """Keep the page until Ctrl-C, or until it is no more."""
         with contextlib.suppress(KeyboardInterrupt):
             self._companion.ended.wait()
-            _log.warning("the viewer stopped: %s", self._companion.why)
+            if not self._missed:
+                _log.warning("the viewer stopped: %s", self._companion.why)
 
     def stop(self) -> None:
         """End the page."""
