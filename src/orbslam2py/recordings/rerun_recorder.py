@@ -246,7 +246,7 @@ class RerunRecorder:
         self._lines("world/map/covisibility", list(scene.covisibility), COVISIBILITY, 0.5)
         self._lines("world/map/loop_edges", list(scene.loop_edges), LOOP, 2.0)
         if self._truth is not None:
-            laid = lay_truth(self._map.trajectory(), self._truth, with_scale=self._with_scale)
+            laid = lay_truth(*self._map.path(), self._truth, with_scale=self._with_scale)
             if laid is not None:
                 self._lines("world/map/ground_truth", [laid.positions], TRUTH, 1.5)
 

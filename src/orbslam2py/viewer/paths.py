@@ -8,10 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
-from orbslam2py.evaluation import align
+from orbslam2py.evaluation import fit_by_time
 from orbslam2py.slam.records import TrackingRecord
 from orbslam2py.trajectory import Trajectory
-from orbslam2py.trajectory.association import associate
 
 #: A path is drawn with at most so many corners.
 MAX_CORNERS = 4000
@@ -19,8 +18,6 @@ MAX_CORNERS = 4000
 _MIN_PAIRS = 5
 #: What the true path must span along one axis [m]: a camera that stands tells no rotation.
 _MIN_SPAN = 1e-3
-#: Poses belong together if their time stamps differ by less [s].
-_SAME_TIME = 0.02
 
 
 @dataclass
@@ -87,13 +84,17 @@ class LaidTruth:
     """Root mean square distance of the poses that were compared [m]."""
 
 
-def lay_truth(path: Trajectory, truth: Trajectory, *, with_scale: bool) -> LaidTruth | None:
-    """Move the true path onto the estimated one (Umeyama, PAMI 1991).
+def lay_truth(
+    timestamps: FloatArray, positions: FloatArray, truth: Trajectory, *, with_scale: bool
+) -> LaidTruth | None:
+    """Move the true path onto the estimated one.
 
     Parameters
     ----------
-    path : Trajectory
-        The estimate, in the world of the map.
+    timestamps : array (n,)
+        Seconds of the estimate.
+    positions : array (n, 3)
+        The estimate, in the world of the map, without lost poses.
     truth : Trajectory
         What it should be, in a world of its own.
     with_scale : bool
@@ -104,14 +105,17 @@ def lay_truth(path: Trajectory, truth: Trajectory, *, with_scale: bool) -> LaidT
     LaidTruth or None
         None while too few poses are known to have a true one.
     """
-    known = path.select(~path.lost)
-    i, j = associate(known.timestamps, truth.timestamps, _SAME_TIME)
-    if len(i) < _MIN_PAIRS:
+    fit = fit_by_time(
+        truth.timestamps,
+        truth.positions,
+        timestamps,
+        positions,
+        with_scale=with_scale,
+        fewest=_MIN_PAIRS,
+    )
+    if fit is None or np.ptp(truth.positions[fit.rows], axis=0).max() < _MIN_SPAN:
         return None
-    estimated, true = known.positions[i], truth.positions[j]
-    if np.ptp(true, axis=0).max() < _MIN_SPAN:
-        return None
-    moved = align(true, estimated, with_scale=with_scale)
-    off = moved.apply(true) - estimated
-    error = float(np.sqrt(np.mean(np.sum(off**2, axis=1)))) / moved.scale
-    return LaidTruth(moved.apply(truth.positions), error)
+    laid = fit.similarity.apply(truth.positions)
+    off = laid[fit.rows] - positions[fit.other_rows]
+    error = float(np.sqrt(np.mean(np.sum(off**2, axis=1)))) / fit.similarity.scale
+    return LaidTruth(laid, error)

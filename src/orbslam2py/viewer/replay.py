@@ -160,7 +160,12 @@ class Replay:
             page.scene.draw_path("online", pieces(run.online.positions))
             truth = None if self._sequence is None else self._sequence.ground_truth()
             if truth is not None:
-                laid = lay_truth(run.path, truth, with_scale=not run.sensor.has_depth)
+                laid = lay_truth(
+                    run.path.timestamps,
+                    run.path.positions,
+                    truth,
+                    with_scale=not run.sensor.has_depth,
+                )
                 if laid is not None:
                     page.scene.draw_path("truth", pieces(laid.positions))
 
