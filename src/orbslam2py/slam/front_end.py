@@ -223,6 +223,7 @@ def _orb_options(settings: Settings, factor: int = 1) -> core.OrbOptions:
         n_levels=settings.orb.n_levels,
         initial_threshold=settings.orb.ini_th_fast,
         minimum_threshold=settings.orb.min_th_fast,
+        original_coordinates=settings.orb.original_coordinates,
     )
 
 
