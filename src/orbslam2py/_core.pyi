@@ -13,7 +13,7 @@ from orbslam2py.errors import SettingsError
 from orbslam2py.errors import StateError
 from orbslam2py.errors import VocabularyError
 import typing
-__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'ChangedIds', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FullBundleCommit', 'FullBundleOptions', 'FullBundleResult', 'GatheredBundle', 'ImageBounds', 'ImageError', 'KeyFrameIndex', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapChanges', 'MapFileError', 'MapFollower', 'MapSnapshot', 'MapStamp', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'anchor_frame', 'apply_loop_correction', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'changed_since', 'check_invariants', 'check_map_contents', 'choose_loop', 'commit_full_bundle', 'corridor_way', 'count_map_points', 'count_sightings', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'describe', 'direct_index_of', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'full_bundle_adjustment', 'fundamental_matrix', 'fuse_points', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'map_contents', 'match_for_initialization', 'match_for_triangulation', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'plan_loop_correction', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'refresh_associations', 'render', 'restore_map', 'room_T_wc', 'sample_colours', 'seed_of', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'snapshot_points', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'stamp_of', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'verify_loop_candidate', 'words_of']
+__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'ChangedIds', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FullBundleCommit', 'FullBundleOptions', 'FullBundleResult', 'GatheredBundle', 'ImageBounds', 'ImageError', 'ImageRotation', 'InlierSpread', 'KeyFrameIndex', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapChanges', 'MapFileError', 'MapFollower', 'MapSnapshot', 'MapStamp', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'align_rotation', 'anchor_frame', 'apply_loop_correction', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'changed_since', 'check_invariants', 'check_map_contents', 'choose_loop', 'commit_full_bundle', 'corridor_way', 'count_map_points', 'count_sightings', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'describe', 'direct_index_of', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'full_bundle_adjustment', 'fundamental_matrix', 'fuse_points', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'keep_small_image', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'map_contents', 'match_for_initialization', 'match_for_triangulation', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'plan_loop_correction', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'refresh_associations', 'render', 'restore_map', 'room_T_wc', 'sample_colours', 'seed_of', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'snapshot_points', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'spread_of_inliers', 'stamp_of', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'verify_loop_candidate', 'words_of']
 class Pose:
     """
     Rigid transform. `T_ab` maps coordinates of frame b into frame a.
@@ -558,6 +558,11 @@ class TrackedFrame:
         """
         The pose was predicted from that of another frame.
         """
+    def take_over(self, other: TrackedFrame) -> None:
+        """
+        Take pose, anchor, associations and outlier flags of another version of this frame.
+        Raises StateError when it is another frame.
+        """
     @property
     def T_cw(self) -> Pose | None:
         """
@@ -627,6 +632,34 @@ class PairExtractor:
     def extract(self, left: numpy.ndarray, right: numpy.ndarray, left_mask: typing.Any = None, right_mask: typing.Any = None) -> tuple[Extraction, Extraction]:
         """
         Extractions (left, right) of two grey images (h, w) uint8 of one size. A mask is None, or uint8 of the same shape with 0 where no keypoint may lie. Raises ImageError for anything else, StateError while another thread uses this object.
+        """
+class ImageRotation:
+    """
+    Result of align_rotation().
+    """
+    @property
+    def correlation(self) -> float:
+        """
+        Of the grey values where both see, -1 to 1.
+        """
+    @property
+    def quaternion_xyzw(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 1]"]:
+        """
+        Rotation of directions of the first camera into the second, (4,) float64.
+        """
+class InlierSpread:
+    """
+    Result of spread_of_inliers().
+    """
+    @property
+    def cells(self) -> int:
+        """
+        Of 48 cells of the image that hold an inlier.
+        """
+    @property
+    def octaves(self) -> int:
+        """
+        Of depth that hold an inlier.
         """
 class Map:
     """
@@ -2622,6 +2655,11 @@ def add_temporary_points(last: TrackedFrame, points: PointBatch, n_minimum: typi
     with `last`; temporary points left there are dropped first. Their ids start at
     FIRST_TEMPORARY_POINT. Returns the number made. Raises StateError without a pose.
     """
+def align_rotation(first: Frame, second: Frame) -> ImageRotation | None:
+    """
+    How the camera turned between two frames, by their small images alone: ImageRotation, or
+    None where the images are missing or say nothing.
+    """
 def anchor_frame(map: Map, frame: TrackedFrame, keyframe: int) -> None:
     """
     Make a frame's pose relative to a keyframe (living or culled) as it is now.
@@ -2804,6 +2842,11 @@ def index_keyframe(index: KeyFrameIndex, map: Map, id: int) -> None:
 def insert_keyframe(map: Map, frame: TrackedFrame, create_points: bool, n_minimum: typing.SupportsInt | typing.SupportsIndex = 100) -> int:
     """
     Make a keyframe of a tracked frame, with points from its depths; its id.
+    """
+def keep_small_image(frame: Frame, grey: numpy.ndarray) -> None:
+    """
+    Keeps a new frame's image (h, w) uint8, shrunk to some 1500 pixels, for align_rotation().
+    Raises ImageError for anything but a grey image.
     """
 def local_bundle_adjustment(map: Map, keyframe: int, abort: StopFlag | None = None, monocular: bool = False, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> LocalBundleResult:
     """
@@ -3038,6 +3081,11 @@ def solve_full_bundle(bundle: GatheredBundle, options: FullBundleOptions = ..., 
 
     `abort`: a StopFlag polled once per iteration, or None; what an aborted run has reached
     is not committed. Results that are worse or not finite are not either.
+    """
+def spread_of_inliers(frame: TrackedFrame) -> InlierSpread:
+    """
+    How a frame's inliers are spread over the image and over depth: InlierSpread.
+    Raises StateError without a pose.
     """
 def stamp_of(map: Map) -> MapStamp:
     """

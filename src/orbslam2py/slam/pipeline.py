@@ -22,6 +22,9 @@ from orbslam2py.maps.map_keeper import MapKeeper, encode_image
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.back_end import RESET_PATIENCE, BackEnd
 from orbslam2py.slam.events import Callbacks, Relocalized, TrackingLost
+from orbslam2py.slam.evidence.belief import Belief
+from orbslam2py.slam.evidence.harder_search import HarderSearch
+from orbslam2py.slam.evidence.judgement import EvidenceJudge
 from orbslam2py.slam.frame_recorder import FrameRecorder
 from orbslam2py.slam.front_end import FrontEnd
 from orbslam2py.slam.initialization import DepthInitializer, Initializer, MonocularInitializer
@@ -218,6 +221,7 @@ class Pipeline:
             visual_odometry=ok and estimate.visual_odometry,
             milliseconds=timer.milliseconds,
             features=frame_features(frame, outcome.inliers) if details else None,
+            evidence=estimate.evidence,
         )
 
     def _announce(self, before: TrackingState, record: TrackingRecord) -> None:
@@ -272,12 +276,14 @@ def _make_tracking(setup: Setup, back_end: BackEnd, seed: int) -> Tracking:
         Relocalizer(slam_map, back_end.keyframe_index, seed),
         TrackingThresholds(),
     )
+    judge = EvidenceJudge(search.motion_model_window, setup.settings.camera.fx)
     return Tracking(
         slam_map,
         vocabulary,
         mapping,
         initializer=initializer,
         search=search,
+        belief=Belief(search, judge, HarderSearch(search, judge)),
         keyframe_decision=KeyframeDecision(slam_map, mapping.worker, sensor, max_keyframe_interval),
         has_depth=sensor.has_depth,
     )

@@ -67,6 +67,50 @@ class TrackingThresholds:
 
 
 @dataclass(frozen=True)
+class EvidenceThresholds:
+    """How much must speak for a pose, and where else it is looked for."""
+
+    gain: float = 0.25
+    """Weight of the newest frame in what is usual."""
+    sudden_share: float = 0.6
+    """Below this share of the usual inliers, or of the usual share of points in view, a pose is
+    not believed before it was searched by other ways ..."""
+    sudden_deviation: float = 2.5
+    """... nor with a position so many times less certain than usual ..."""
+    surprise_windows: float = 1.0
+    """... nor if the camera turned otherwise than before by more than so many windows of the
+    motion model, in pixels of the image."""
+    weak_share: float = 0.5
+    """Below this share of both, evidence is weak."""
+    weak_cells: int = 4
+    """With inliers in so few of the 48 cells of the image or fewer it is weak ..."""
+    weak_deviation: float = 4.0
+    """... and with a position this much less certain than usual."""
+    refused_share: float = 0.3
+    """A pose with less than this share of the usual inliers ..."""
+    refused_inliers: int = 100
+    """... and fewer than this is not believed at all, unless a second method confirms it."""
+    better: float = 1.1
+    """Another way to the pose wins with so many times the inliers."""
+    enough_share: float = 0.75
+    """With this share of the usual inliers no further way is tried."""
+    aligned_correlation: float = 0.6
+    """Least correlation of two small images that tells how the camera turned."""
+    aligned_window: float = 15.0
+    """Half width of the search window around points turned so, pixels at level 0."""
+    wide_window: float = 40.0
+    """The same around points predicted by the motion model, when that is doubted."""
+    keyframes_around: int = 3
+    """So many neighbours of the reference keyframe are matched by words."""
+    same_windows: float = 0.5
+    """Two ways came to the same pose if they differ by fewer windows, in pixels of the image ..."""
+    same_deviations: float = 3.0
+    """... and in position by fewer standard deviations, both added."""
+    weak_frames: int = 2
+    """After so many weak frames in a row a confirmed one may become a keyframe."""
+
+
+@dataclass(frozen=True)
 class KeyframeThresholds:
     """Which frames become keyframes."""
 

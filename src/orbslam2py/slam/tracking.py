@@ -16,6 +16,7 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._timing import StageTimer
+from orbslam2py.slam.evidence.belief import Belief
 from orbslam2py.slam.initialization import Initializer
 from orbslam2py.slam.keyframe_decision import KeyframeClock, KeyframeDecision
 from orbslam2py.slam.local_mapping import LocalMapping
@@ -95,6 +96,8 @@ class Tracking:
         How a map begins.
     search : PoseSearch
         The ways to a pose.
+    belief : Belief
+        Whether enough speaks for a pose.
     keyframe_decision : KeyframeDecision
         Which frames become keyframes.
     has_depth : bool
@@ -109,6 +112,7 @@ class Tracking:
         *,
         initializer: Initializer,
         search: PoseSearch,
+        belief: Belief,
         keyframe_decision: KeyframeDecision,
         has_depth: bool,
     ) -> None:
@@ -117,6 +121,7 @@ class Tracking:
         self._mapping = mapping
         self._initializer = initializer
         self._search = search
+        self._belief = belief
         self._keyframe_decision = keyframe_decision
         self._has_depth = has_depth
         self._in_growing_map = FirstEstimateInGrowingMap(search)
@@ -132,6 +137,7 @@ class Tracking:
         # Whether the map was loaded, or localization mode has been on in it.
         self._map_is_kept = False
         self._search.reset()
+        self._belief.reset()
         self._in_fixed_map.reset()
         self._initializer.reset()
 
@@ -216,7 +222,9 @@ class Tracking:
             core.discard_temporary(frame)
         else:
             with timer("keyframe"):
-                is_keyframe = self._keyframe_wanted(frame, estimate)
+                is_keyframe = self._belief.allows_keyframe(
+                    estimate.evidence
+                ) and self._keyframe_wanted(frame, estimate)
                 if is_keyframe:
                     self._create_keyframe(frame)
         # Outliers went into the keyframe, where bundle adjustment decides about them; the next
@@ -246,14 +254,12 @@ class Tracking:
             strategy = self._in_fixed_map
         with timer("predict"):
             estimate = strategy.estimate(frame, lost=lost)
-        if not estimate.found:
+        if estimate.visual_odometry or (lost and not estimate.found):
             return estimate
         if lost or estimate.relocalized:
             self._search.last_relocalization = frame.id
-        if estimate.visual_odometry:
-            return estimate
         with timer("local_map"):
-            return self._search.in_local_map(frame, estimate)
+            return self._belief.refine(frame, estimate, lost=lost)
 
     def _begin_map(self, frame: core.TrackedFrame, timer: StageTimer) -> TrackingOutcome:
         self.state = TrackingState.NOT_INITIALIZED

@@ -37,6 +37,10 @@ class Frames:
     inliers: FloatArray
     is_keyframe: npt.NDArray[np.bool_]
     visual_odometry: npt.NDArray[np.bool_]
+    is_weak: npt.NDArray[np.bool_]
+    """Whether the pose has weak evidence."""
+    found: FloatArray
+    """Share of the points that should be in view that were found."""
     has_pose: npt.NDArray[np.bool_]
     """Whether there is a pose."""
     milliseconds: dict[str, FloatArray]
@@ -196,6 +200,7 @@ def _frames_of(columns: dict[str, list[str]]) -> Frames:
     def numbers(name: str) -> FloatArray:
         return np.array([text or "nan" for text in columns[name]], dtype=np.float64)
 
+    nothing = [""] * len(columns["index"])
     return Frames(
         index=np.array(columns["index"], dtype=np.int64),
         timestamps=np.array(columns["timestamp"], dtype=np.float64),
@@ -205,6 +210,9 @@ def _frames_of(columns: dict[str, list[str]]) -> Frames:
         inliers=numbers("inliers"),
         is_keyframe=np.array([text == "1" for text in columns["keyframe"]], bool),
         visual_odometry=np.array([text == "1" for text in columns["visual_odometry"]], bool),
+        # Folders of earlier versions do not have the next two.
+        is_weak=np.array([text == "weak" for text in columns.get("evidence", nothing)], bool),
+        found=np.array([text or "nan" for text in columns.get("found", nothing)], np.float64),
         has_pose=np.array([text != "" for text in columns["tx"]], bool),
         milliseconds={
             stage: numbers(f"ms_{stage}") for stage in STAGES if f"ms_{stage}" in columns
