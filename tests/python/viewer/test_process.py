@@ -62,12 +62,12 @@ def view() -> Iterator[LiveView]:
 def shared_memory() -> set[str]:
     """Names of shared memory on this computer."""
     folder = Path("/dev/shm")
-    return set(os.listdir(folder)) if folder.is_dir() else set()
+    return {file.name for file in folder.iterdir()} if folder.is_dir() else set()
 
 
 def test_nothing_is_left_behind(system: System) -> None:
     before, threads = shared_memory(), threading.active_count()
-    descriptors = len(os.listdir("/proc/self/fd"))
+    descriptors = len(list(Path("/proc/self/fd").iterdir()))
     view = LiveView(port=0)
     view.attach(system)
     process = view.process_id
@@ -81,7 +81,7 @@ def test_nothing_is_left_behind(system: System) -> None:
     assert not is_served(view.address)
     assert shared_memory() <= before
     assert threading.active_count() == threads
-    assert len(os.listdir("/proc/self/fd")) == descriptors
+    assert len(list(Path("/proc/self/fd").iterdir())) == descriptors
 
 
 def test_the_page_gives_way_to_tracking_and_ignores_ctrl_c(view: LiveView) -> None:
