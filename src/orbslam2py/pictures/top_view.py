@@ -13,9 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py._arrays import ByteArray, FloatArray
-from orbslam2py.pictures.framing import Framing
-from orbslam2py.pictures.lettering import draw_text, text_width
-from orbslam2py.pictures.palette import (
+from orbslam2py._palette import (
     CAMERA,
     COVISIBILITY,
     FAINT_TEXT,
@@ -31,6 +29,8 @@ from orbslam2py.pictures.palette import (
     TRUTH,
     Colour,
 )
+from orbslam2py.pictures.framing import Framing
+from orbslam2py.pictures.lettering import draw_text, text_width
 
 _SHIFT = 4
 #: The box of what is to be seen is found with at most so many points.

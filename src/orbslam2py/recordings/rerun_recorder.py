@@ -12,9 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py._arrays import ByteArray, FloatArray
-from orbslam2py.errors import OrbSlamError
-from orbslam2py.maps import MapChanges
-from orbslam2py.pictures.palette import (
+from orbslam2py._palette import (
     COVISIBILITY,
     KEYFRAME,
     LOOP,
@@ -27,6 +25,8 @@ from orbslam2py.pictures.palette import (
     VISUAL_ODOMETRY,
     Colour,
 )
+from orbslam2py.errors import OrbSlamError
+from orbslam2py.maps import MapChanges
 from orbslam2py.recordings.growing_map import GrowingMap
 from orbslam2py.recordings.output_file import OutputFile
 from orbslam2py.settings import Settings

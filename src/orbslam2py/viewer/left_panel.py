@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py._arrays import ByteArray
+from orbslam2py._palette import HALO, MAPPED, UNMATCHED, VISUAL_ODOMETRY, Colour
 from orbslam2py.pictures.album import KeyframePicture
 from orbslam2py.pictures.overlay import Marks, Status, draw_marks, fit_size, to_rgb
-from orbslam2py.pictures.palette import HALO, MAPPED, UNMATCHED, VISUAL_ODOMETRY, Colour
 from orbslam2py.viewer.plots import Plots
 from orbslam2py.viewer.watching import FrameView
 

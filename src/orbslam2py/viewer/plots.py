@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
-from orbslam2py.pictures.palette import MAPPED, STAGE_COLOURS, TEXT, Colour
+from orbslam2py._palette import MAPPED, STAGE_COLOURS, TEXT, Colour
 from orbslam2py.slam.records import TrackingRecord, TrackingState
 
 if TYPE_CHECKING:

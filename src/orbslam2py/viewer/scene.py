@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
-from orbslam2py.pictures.palette import (
+from orbslam2py._palette import (
     CAMERA,
     COVISIBILITY,
     KEYFRAME,

@@ -49,6 +49,29 @@ def test_a_run_with_a_viewer_leaves_the_same_bytes(command: CommandLine) -> None
         assert (Path("with") / name).read_bytes() == (Path("without") / name).read_bytes(), name
 
 
+def test_a_run_without_a_viewer_loads_nothing_of_it(tmp_path: Path) -> None:
+    """Neither the page nor what it is made of, nor anything that starts processes in its place."""
+    code = """
+import sys
+from orbslam2py.cli import main
+try:
+    main()
+finally:
+    heavy = {"viser", "websockets", "msgspec", "multiprocessing", "rerun", "plotly"}
+    names = {name for name in sys.modules if name.startswith("orbslam2py.viewer")}
+    print("loaded:", *sorted((heavy & sys.modules.keys()) | names))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code, *DEMO, "--quiet"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1].split() == ["loaded:"]
+
+
 def started(arguments: tuple[str, ...], folder: Path) -> tuple[subprocess.Popen[str], str]:
     """A command of its own, and where its viewer is."""
     environment = {name: value for name, value in os.environ.items() if name != "DISPLAY"}

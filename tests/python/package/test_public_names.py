@@ -165,7 +165,16 @@ def test_names_in_examples_are_public(name: str) -> None:
 
 
 # ---- light doors ---------------------------------------------------------------------------------
-HEAVY = {"numpy", "cv2", "orbslam2py._core", "matplotlib", "typer", "rich"}
+HEAVY = {
+    "numpy",
+    "cv2",
+    "orbslam2py._core",
+    "matplotlib",
+    "typer",
+    "rich",
+    "viser",
+    "multiprocessing",
+}
 
 #: What importing a module may load of these.
 LIGHT: dict[str, set[str]] = {

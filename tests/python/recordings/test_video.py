@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from orbslam2py import OutputFileError, Reason, Sensor, TrackingRecord, TrackingState, VideoWriter
+from orbslam2py._palette import LOST, MAPPED, NOT_TRACKED, STARTING
 from orbslam2py.pictures import compose
-from orbslam2py.pictures.palette import LOST, MAPPED, NOT_TRACKED, STARTING
 from orbslam2py.recordings import output_file, video_file
 from orbslam2py.slam.records import FrameFeatures
 from orbslam2py.viewer import FrameView, Publisher, QueueState

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from orbslam2py import Sensor, System, TrackingState, Viewer
+from orbslam2py._palette import KEYFRAME, LOCAL_POINTS, MAPPED
 from orbslam2py.maps import load_map
-from orbslam2py.pictures.palette import KEYFRAME, LOCAL_POINTS, MAPPED
 from support.browser import Browser, Page
 from support.small_sequences import new_system, play, sequence
 from support.viewer_pages import (

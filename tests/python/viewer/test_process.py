@@ -62,12 +62,17 @@ def view() -> Iterator[LiveView]:
 def shared_memory() -> set[str]:
     """Names of shared memory on this computer."""
     folder = Path("/dev/shm")
-    return {file.name for file in folder.iterdir()} if folder.is_dir() else set()
+    return {path.name for path in folder.iterdir()} if folder.is_dir() else set()
+
+
+def n_open_files() -> int:
+    """File descriptors of this process."""
+    return sum(1 for _ in Path("/proc/self/fd").iterdir())
 
 
 def test_nothing_is_left_behind(system: System) -> None:
     before, threads = shared_memory(), threading.active_count()
-    descriptors = len(list(Path("/proc/self/fd").iterdir()))
+    descriptors = n_open_files()
     view = LiveView(port=0)
     view.attach(system)
     process = view.process_id
@@ -81,7 +86,7 @@ def test_nothing_is_left_behind(system: System) -> None:
     assert not is_served(view.address)
     assert shared_memory() <= before
     assert threading.active_count() == threads
-    assert len(list(Path("/proc/self/fd").iterdir())) == descriptors
+    assert n_open_files() == descriptors
 
 
 def test_the_page_gives_way_to_tracking_and_ignores_ctrl_c(view: LiveView) -> None:

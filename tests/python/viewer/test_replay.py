@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from orbslam2py import DatasetError, MapFileError, Sensor, run_sequence
+from orbslam2py._palette import KEYFRAME
 from orbslam2py.maps import MapArrays
-from orbslam2py.pictures.palette import KEYFRAME
 from orbslam2py.runs import RunOptions, SystemOptions
 from orbslam2py.viewer.replay import Replay
 from orbslam2py.viewer.run_folder import RunFolder
