@@ -96,9 +96,9 @@ class ScalePyramid:
     """
     The scale tables of an image pyramid.
     """
-    def __init__(self, factor: typing.SupportsFloat | typing.SupportsIndex, levels: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def __init__(self, factor: typing.SupportsFloat | typing.SupportsIndex, levels: typing.SupportsInt | typing.SupportsIndex, original_coordinates: bool = False) -> None:
         """
-        `factor`: ratio between levels, above 1 and at most 2. `levels`: 1 to 16. Raises SettingsError otherwise.
+        `factor`: ratio between levels, above 1 and at most 2. `levels`: 1 to 16. Raises SettingsError otherwise. `original_coordinates`: see OrbOptions.
         """
     def features_per_level(self, n_features: typing.SupportsInt | typing.SupportsIndex) -> list[int]:
         """
@@ -138,6 +138,11 @@ class ScalePyramid:
         Its natural logarithm.
         """
     @property
+    def original_coordinates(self) -> bool:
+        """
+        Whether keypoints of coarse levels lie where the original puts them.
+        """
+    @property
     def scale(self) -> numpy.typing.NDArray[numpy.float32]:
         """
         Size of a pixel of each level in level-0 pixels, (levels,) float32.
@@ -171,7 +176,7 @@ class OrbOptions:
     """
     Parameters of the ORB extractor.
     """
-    def __init__(self, n_features: typing.SupportsInt | typing.SupportsIndex = 1000, scale_factor: typing.SupportsFloat | typing.SupportsIndex = 1.2000000476837158, n_levels: typing.SupportsInt | typing.SupportsIndex = 8, initial_threshold: typing.SupportsInt | typing.SupportsIndex = 20, minimum_threshold: typing.SupportsInt | typing.SupportsIndex = 7) -> None:
+    def __init__(self, n_features: typing.SupportsInt | typing.SupportsIndex = 1000, scale_factor: typing.SupportsFloat | typing.SupportsIndex = 1.2000000476837158, n_levels: typing.SupportsInt | typing.SupportsIndex = 8, initial_threshold: typing.SupportsInt | typing.SupportsIndex = 20, minimum_threshold: typing.SupportsInt | typing.SupportsIndex = 7, original_coordinates: bool = False) -> None:
         """
         Raises SettingsError naming the option that is out of range.
         """
@@ -196,6 +201,11 @@ class OrbOptions:
     def n_levels(self) -> int:
         """
         Number of pyramid levels.
+        """
+    @property
+    def original_coordinates(self) -> bool:
+        """
+        Keypoints of coarse levels lie at multiples of the scale, where the original puts them, and not at their true place.
         """
     @property
     def scale_factor(self) -> float:
