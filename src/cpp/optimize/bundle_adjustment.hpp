@@ -47,7 +47,7 @@ struct BundleOptions {
   bool inverse_depth = false;
   /// No iteration is begun that would probably end later; 0: no limit. What was reached is used.
   double max_seconds = 0;
-  BundleSolver solver = BundleSolver::kCeres;
+  BundleSolver solver = BundleSolver::kBlocks;
 };
 
 struct BundleSummary {
