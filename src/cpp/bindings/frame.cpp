@@ -12,6 +12,7 @@
 #include "frame/extract_pair.hpp"
 #include "frame/image_input.hpp"
 #include "frame/keypoint_colours.hpp"
+#include "frame/sharpness.hpp"
 #include "frame/stereo_matching.hpp"
 
 namespace orbslam::bindings {
@@ -378,6 +379,9 @@ void bind_frame(py::module_& module) {
       py::arg("frame"), py::arg("image"), py::arg("is_rgb"),
       "Gives a new frame the colours of its image (h, w, 3) or (h, w, 4) uint8 at the keypoints; "
       "a grey image gives none. Raises ImageError for an image of another size.");
+  module.def("sharpness", &sharpness, py::arg("frame"), py::call_guard<py::gil_scoped_release>(),
+             "Sum of the corners' responses on the two finest levels, grey levels: what blur takes "
+             "away first. To be compared with that of other frames of the same camera.");
   module.def("to_depth_metres", &depth_metres_of, py::arg("raw"), py::arg("factor"),
              "Depth (h, w) float32 in metres: raw / factor. Values <= 0 and NaN mean none.");
 }

@@ -21,7 +21,8 @@ STAGES = ("wait", "extract", "stereo", "predict", "local_map", "keyframe", "trac
 _ALWAYS = ["index", "timestamp", "map", "state", "reason"]
 _TRACKED = [
     *("inliers", "matches", "keyframe", "reference_keyframe"),
-    *("tx", "ty", "tz", "qx", "qy", "qz", "qw", "std_position", "std_angle", "visual_odometry"),
+    *("tx", "ty", "tz", "qx", "qy", "qz", "qw", "std_position", "std_angle"),
+    *("visual_odometry", "unconfirmed"),
     *(f"ms_{stage}" for stage in STAGES),
 ]
 
@@ -86,5 +87,6 @@ def _fields(row: FrameRow) -> list[object]:
         *pose,
         *([""] * 2 if deviation is None else [f"{value:.9f}" for value in deviation]),
         int(record.visual_odometry) if record.T_wc is not None else "",
+        int(record.unconfirmed) if record.T_wc is not None else "",
         *(f"{record.milliseconds.get(stage, 0.0):.3f}" for stage in STAGES),
     ]
