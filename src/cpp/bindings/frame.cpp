@@ -14,6 +14,7 @@
 #include "frame/inlier_spread.hpp"
 #include "frame/keypoint_colours.hpp"
 #include "frame/rotation_alignment.hpp"
+#include "frame/sharpness.hpp"
 #include "frame/stereo_matching.hpp"
 
 namespace orbslam::bindings {
@@ -426,6 +427,9 @@ void bind_frame(py::module_& module) {
              py::call_guard<py::gil_scoped_release>(),
              "How a frame's inliers are spread over the image and over depth: InlierSpread.\n"
              "Raises StateError without a pose.");
+  module.def("sharpness", &sharpness, py::arg("frame"), py::call_guard<py::gil_scoped_release>(),
+             "Sum of the corners' responses on the two finest levels, grey levels: what blur takes "
+             "away first. To be compared with that of other frames of the same camera.");
   module.def("to_depth_metres", &depth_metres_of, py::arg("raw"), py::arg("factor"),
              "Depth (h, w) float32 in metres: raw / factor. Values <= 0 and NaN mean none.");
 }

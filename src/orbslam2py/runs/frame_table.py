@@ -21,8 +21,8 @@ STAGES = ("wait", "extract", "stereo", "predict", "local_map", "keyframe", "trac
 _ALWAYS = ["index", "timestamp", "map", "state", "reason"]
 _TRACKED = [
     *("inliers", "matches", "keyframe", "reference_keyframe"),
-    *("tx", "ty", "tz", "qx", "qy", "qz", "qw", "std_position", "std_angle", "visual_odometry"),
-    *("evidence", "method", "found"),
+    *("tx", "ty", "tz", "qx", "qy", "qz", "qw", "std_position", "std_angle"),
+    *("visual_odometry", "evidence", "method", "found", "unconfirmed"),
     *(f"ms_{stage}" for stage in STAGES),
 ]
 
@@ -88,6 +88,7 @@ def _fields(row: FrameRow) -> list[object]:
         *([""] * 2 if deviation is None else [f"{value:.9f}" for value in deviation]),
         int(record.visual_odometry) if record.T_wc is not None else "",
         *_evidence_fields(record.evidence),
+        int(record.unconfirmed) if record.T_wc is not None else "",
         *(f"{record.milliseconds.get(stage, 0.0):.3f}" for stage in STAGES),
     ]
 

@@ -219,6 +219,7 @@ class Pipeline:
             is_keyframe=outcome.is_keyframe,
             reference_keyframe=self.tracking.reference_keyframe,
             visual_odometry=ok and estimate.visual_odometry,
+            unconfirmed=ok and estimate.unconfirmed,
             milliseconds=timer.milliseconds,
             features=frame_features(frame, outcome.inliers) if details else None,
             evidence=estimate.evidence,

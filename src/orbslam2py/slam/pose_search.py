@@ -16,7 +16,7 @@ from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.records import PoseEstimate, PoseMethod, Reason
-from orbslam2py.slam.relocalization import Relocalizer
+from orbslam2py.slam.relocalization import PlaceOfLoss, Relocalizer
 from orbslam2py.slam.thresholds import TrackingThresholds
 
 
@@ -186,6 +186,38 @@ class PoseSearch:
         self.local_map: core.LocalMap | None = None
         self.last_relocalization = 0
         self.initial_pose: core.Pose | None = None
+        self._place_of_loss: PlaceOfLoss | None = None
+        if self._relocalizer is not None:
+            self._relocalizer.reset()
+
+    def lose(self, *, confirmed: bool) -> None:
+        """Tracking was lost: it is searched from where the last frame was.
+
+        Parameters
+        ----------
+        confirmed : bool
+            False if the last frame had just been found again: then it is searched on from where
+            tracking was lost before.
+        """
+        if confirmed:
+            self._place_of_loss = PlaceOfLoss(
+                self.motion.last, self.motion.velocity, self.reference_keyframe
+            )
+            if self._relocalizer is not None:
+                self._relocalizer.lose(self._place_of_loss)
+        else:
+            self.motion = MotionModel()
+            self.reference_keyframe = -1
+            if self._place_of_loss is not None:
+                self.motion.remember(self._place_of_loss.last)
+                self.reference_keyframe = self._place_of_loss.reference_keyframe
+        self.motion.lose()
+
+    def confirm(self) -> None:
+        """A pose found again is believed: the place of the loss is history."""
+        self._place_of_loss = None
+        if self._relocalizer is not None:
+            self._relocalizer.reset()
 
     @property
     def has_last_frame(self) -> bool:

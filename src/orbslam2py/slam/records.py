@@ -34,6 +34,8 @@ class Reason(str, enum.Enum):
     DEGENERATE_VIEWS = "degenerate views: planar scene, pure rotation or wrong matches"
     INITIAL_MAP_FAILED = "the first map was too small or had no depth"
     NOT_FOUND_IN_MAP = "not found in the map"
+    BLURRED = "blurred image, not searched"
+    NOT_CONFIRMED = "found again, but not confirmed by the next image"
     SEARCHING_LOADED_MAP = "searching the loaded map"
     FEW_MATCHES_LAST_FRAME = "too few matches with the last frame"
     FEW_MATCHES_REFERENCE = "too few matches with the reference keyframe"
@@ -154,6 +156,8 @@ class TrackingRecord:
     """Keyframe that shares most points with the frame, -1 for none."""
     visual_odometry: bool = False
     """In localization mode: outside the map, the pose hangs on the depths of the frame before."""
+    unconfirmed: bool = False
+    """Found again in this image: the next one has to confirm it before the map grows."""
     milliseconds: dict[str, float] = field(default_factory=dict)
     """Time per stage: wait, extract, stereo, predict, local_map, keyframe, track (all of it)."""
     features: FrameFeatures | None = None
@@ -203,6 +207,8 @@ class PoseEstimate:
     """What found it."""
     evidence: Evidence | None = None
     """See `TrackingRecord.evidence`."""
+    unconfirmed: bool = False
+    """Found again, and not yet confirmed by the next frame."""
 
     @property
     def found(self) -> bool:

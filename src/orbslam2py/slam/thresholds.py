@@ -170,6 +170,42 @@ class RelocalizationThresholds:
     """... their points searched in this radius, pixels at level 0 ..."""
     guess_distance: int = 64
     """... with at most so many differing bits."""
+    guessed_frames: int = 60
+    """For so many frames after a loss the camera is looked for near the place of the loss ..."""
+    motion_frames: int = 10
+    """... and for so many where its motion would have led it; at first within `guess_window` ..."""
+    widening: float = 0.25
+    """... which grows by this share of itself at every failure ..."""
+    widest: float = 3.0
+    """... up to this multiple."""
+    word_frames: int = 3
+    """Lost frames, this one included, whose words name candidates."""
+    word_candidates: int = 8
+    """Candidates named by words that are matched with one frame ..."""
+    near_candidates: int = 4
+    """... and those near the place of the loss: half of each likeliest, the others in turns."""
+    covisible_keyframes: int = 10
+    """Near the loss: keyframes that see most of what its reference keyframe sees ..."""
+    last_keyframes: int = 5
+    """... and the last ones made."""
+    verified_poses: int = 20
+    """Poses of RANSAC that are optimised and widened for one frame."""
+    common_points: int = 15
+    """The frame after one found again confirms it with so many points that both see ..."""
+    confirming_cosine: float = 0.87
+    """... if the camera turned by no more than this in between: cosine of the angle, 30 degrees."""
+
+
+@dataclass(frozen=True)
+class BlurThresholds:
+    """When a frame counts as blurred."""
+
+    frames: int = 15
+    """Frames before it that it is compared with: half a second ..."""
+    fewest: int = 5
+    """... and how many there must be at least."""
+    share: float = 0.4
+    """Less than this share of their median sharpness is blur."""
 
 
 @dataclass(frozen=True)

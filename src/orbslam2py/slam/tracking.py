@@ -9,6 +9,7 @@ section V; Mur-Artal and Tardos, "ORB-SLAM2", 2017, section III. Step by step:
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -23,6 +24,7 @@ from orbslam2py.slam.local_mapping import LocalMapping
 from orbslam2py.slam.localization_mode import FirstEstimateInFixedMap
 from orbslam2py.slam.pose_search import MotionModel, PoseSearch
 from orbslam2py.slam.records import PoseEstimate, Reason, TrackingOutcome, TrackingState
+from orbslam2py.slam.relocalization import BlurWatch, Confirmation
 from orbslam2py.slam.watched_frame import accepted_keypoints
 
 _log = logging.getLogger(__name__)
@@ -126,6 +128,8 @@ class Tracking:
         self._has_depth = has_depth
         self._in_growing_map = FirstEstimateInGrowingMap(search)
         self._in_fixed_map = FirstEstimateInFixedMap(search, has_depth=has_depth)
+        self._blur_watch = BlurWatch()
+        self._confirmation = Confirmation()
         #: How often tracking was found again, over all maps.
         self.n_relocalizations = 0
         self.reset()
@@ -140,6 +144,9 @@ class Tracking:
         self._belief.reset()
         self._in_fixed_map.reset()
         self._initializer.reset()
+        self._blur_watch.reset()
+        self._confirmation.reset()
+        self._blurred = False
 
     def begin_in_loaded_map(self, initial_pose: core.Pose | None) -> None:
         """Start lost in the map as it is: every image is searched in it, and it is kept.
@@ -206,13 +213,13 @@ class Tracking:
         """
         if self.initializing:
             return self._begin_map(frame, timer)
+        self._blurred = self._blur_watch.is_blurred(frame.features)
         estimate = self._find_pose(frame, timer, localize)
+        if estimate.found:
+            estimate = self._confirm(frame, estimate)
         if not estimate.found:
             return self._lose(frame, estimate)
 
-        if self.state is TrackingState.LOST:
-            self.n_relocalizations += 1
-            self._search.initial_pose = None
         self.state = TrackingState.OK
         self._search.motion.update_velocity(frame)
         # Before temporary points go, and a keyframe's keypoints become points.
@@ -248,6 +255,8 @@ class Tracking:
         self, frame: core.TrackedFrame, timer: StageTimer, localize: bool
     ) -> PoseEstimate:
         lost = self.state is TrackingState.LOST
+        if lost and self._blurred:
+            return PoseEstimate(Reason.BLURRED)
         strategy: FirstEstimate = self._in_growing_map
         if localize:
             self._map_is_kept = True
@@ -260,6 +269,21 @@ class Tracking:
             self._search.last_relocalization = frame.id
         with timer("local_map"):
             return self._belief.refine(frame, estimate, lost=lost)
+
+    def _confirm(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> PoseEstimate:
+        """A pose found again waits for the next frame; that one confirms it, or both are wrong."""
+        confirmation = self._confirmation
+        if self.state is TrackingState.LOST:
+            self.n_relocalizations += 1
+            self._search.initial_pose = None
+            confirmation.found(frame)
+            return replace(estimate, unconfirmed=True)
+        if confirmation.waiting:
+            if not confirmation.follows(frame):
+                return estimate.failed(Reason.NOT_CONFIRMED)
+            confirmation.reset()
+            self._search.confirm()
+        return estimate
 
     def _begin_map(self, frame: core.TrackedFrame, timer: StageTimer) -> TrackingOutcome:
         self.state = TrackingState.NOT_INITIALIZED
@@ -278,11 +302,14 @@ class Tracking:
         return TrackingOutcome(self.state, estimate, is_keyframe=True)
 
     def _lose(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> TrackingOutcome:
-        if self.state is TrackingState.OK:
+        was_ok = self.state is TrackingState.OK
+        if was_ok:
             _log.info("tracking lost at frame %d: %s", frame.id, estimate.reason)
         self.state = TrackingState.LOST
         # The last pose stays where tracking was lost: the reference keyframe is tried from there.
-        self._search.motion.lose()
+        if was_ok:
+            self._search.lose(confirmed=not self._confirmation.waiting)
+        self._confirmation.reset()
         self._in_fixed_map.reset()
         frame.clear_associations()
         frame.T_cw = None
@@ -292,6 +319,8 @@ class Tracking:
 
     # ---- keyframes -------------------------------------------------------------------------------
     def _keyframe_wanted(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> bool:
+        if self._blurred or estimate.unconfirmed:
+            return False
         since = KeyframeClock(
             last_keyframe=self._last_keyframe_frame_id,
             last_relocalization=self._search.last_relocalization,

@@ -116,6 +116,7 @@ class FakeCore:
     motion: deque[int] = field(default_factory=deque)
     words: deque[int] = field(default_factory=deque)
     inliers: deque[int] = field(default_factory=deque)
+    sharpnesses: deque[float] = field(default_factory=deque)
     n_reference: int = 100
     local_reference: int = 4
     calls: list[str] = field(default_factory=list)
@@ -158,6 +159,9 @@ class FakeCore:
     def anchor_frame(self, world: FakeMap, frame: FakeFrame, keyframe: int) -> None:
         frame.anchor_x = world.keyframe_x
         frame.reference_keyframe = keyframe
+
+    def sharpness(self, features: object) -> float:
+        return self.sharpnesses.popleft() if self.sharpnesses else 1000.0
 
     def add_temporary_points(self, last: FakeFrame, points: str) -> int:
         return 0
