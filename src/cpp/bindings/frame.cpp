@@ -426,6 +426,9 @@ void bind_frame(py::module_& module) {
              py::call_guard<py::gil_scoped_release>(),
              "How a frame's inliers are spread over the image and over depth: InlierSpread.\n"
              "Raises StateError without a pose.");
+  module.def("count_staying", &count_staying, py::arg("frame"), py::arg("T_nw"),
+             py::call_guard<py::gil_scoped_release>(),
+             "How many inliers of a frame a camera at `T_nw` would still have in its image.");
   module.def("to_depth_metres", &depth_metres_of, py::arg("raw"), py::arg("factor"),
              "Depth (h, w) float32 in metres: raw / factor. Values <= 0 and NaN mean none.");
 }
