@@ -430,6 +430,9 @@ void bind_frame(py::module_& module) {
   module.def("sharpness", &sharpness, py::arg("frame"), py::call_guard<py::gil_scoped_release>(),
              "Sum of the corners' responses on the two finest levels, grey levels: what blur takes "
              "away first. To be compared with that of other frames of the same camera.");
+  module.def("count_staying", &count_staying, py::arg("frame"), py::arg("T_nw"),
+             py::call_guard<py::gil_scoped_release>(),
+             "How many inliers of a frame a camera at `T_nw` would still have in its image.");
   module.def("to_depth_metres", &depth_metres_of, py::arg("raw"), py::arg("factor"),
              "Depth (h, w) float32 in metres: raw / factor. Values <= 0 and NaN mean none.");
 }

@@ -38,4 +38,20 @@ InlierSpread spread_of_inliers(const TrackedFrame& tracked) {
   return {static_cast<int>(cells.count()), static_cast<int>(octaves.count())};
 }
 
+int count_staying(const TrackedFrame& tracked, const Pose& T_nw) {
+  const Frame& frame = *tracked.frame;
+  const ImageBounds& bounds = frame.camera->bounds();
+  const Pinhole& pinhole = frame.camera->pinhole();
+  const Eigen::Matrix3d R = T_nw.rotation_matrix();
+  int n = 0;
+  for (std::size_t i = 0; i < frame.size(); ++i) {
+    if (!tracked.map_points[i].valid() || tracked.outlier[i]) continue;
+    const Eigen::Vector3d p = R * tracked.positions[i] + T_nw.translation();
+    if (!(p.z() > 0)) continue;
+    const Eigen::Vector2d pixel = pinhole.project(p);
+    n += bounds.contains(pixel.x(), pixel.y()) ? 1 : 0;
+  }
+  return n;
+}
+
 }  // namespace orbslam

@@ -18,4 +18,8 @@ struct InlierSpread {
 /// frame has no pose. See docs/method/tracking.md#evidence.
 InlierSpread spread_of_inliers(const TrackedFrame& frame);
 
+/// How many of these keypoints show points that a camera at `T_nw` would still have in its image:
+/// what is not about to leave the view. See docs/method/tracking.md#new-keyframes.
+int count_staying(const TrackedFrame& frame, const Pose& T_nw);
+
 }  // namespace orbslam

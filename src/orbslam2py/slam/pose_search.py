@@ -375,7 +375,7 @@ class PoseSearch:
         if local_map.reference_keyframe >= 0:
             self.reference_keyframe = local_map.reference_keyframe
         core.count_sightings(self._map, refined.frame, refined.visible)
-        if self._sensor is Sensor.STEREO:
+        if self._sensor.has_depth:
             refined.frame.discard_outliers()
 
     def _local_map_inliers(self, frame: core.TrackedFrame) -> int:

@@ -86,9 +86,11 @@ class Evidence:
     verdict: Verdict
     method: PoseMethod
     """What found the pose."""
+    doubted: bool
+    """The evidence of the pose that was found first fell so suddenly that it was searched by other
+    ways as well."""
     confirmed: bool
-    """A second method, which does not begin where this one did, came to the same pose. Looked for
-    only when evidence falls."""
+    """Then a second method, which does not begin where this one did, came to the same pose."""
     n_predicted: int
     """Map points that should be in view."""
     found: float

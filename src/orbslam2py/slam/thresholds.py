@@ -132,6 +132,11 @@ class KeyframeThresholds:
     """With fewer close points tracked than this ..."""
     many_untracked_close_points: int = 70
     """... and more close points than this not in the map, a keyframe is needed."""
+    turn_frames: int = 3
+    """Where the camera will be after so many frames of the present speed ..."""
+    staying_share: float = 0.65
+    """... less than this share of the inliers would still be in view: a keyframe is needed before
+    the camera has turned away from them (stereo, RGB-D), if many close points are not tracked."""
     inliers: int = 15
     """A keyframe needs more inliers than this."""
     queue: int = 3

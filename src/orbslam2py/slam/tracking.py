@@ -233,6 +233,10 @@ class Tracking:
                     estimate.evidence
                 ) and self._keyframe_wanted(frame, estimate)
                 if is_keyframe:
+                    if estimate.evidence is not None and estimate.evidence.doubted:
+                        # Bundle adjustment, which tries them again, would have few inliers to
+                        # tell them by.
+                        frame.discard_outliers()
                     self._create_keyframe(frame)
         # Outliers went into the keyframe, where bundle adjustment decides about them; the next
         # frame must not start from them.
@@ -326,7 +330,7 @@ class Tracking:
             last_relocalization=self._search.last_relocalization,
         )
         return self._keyframe_decision.wanted(
-            frame, self.reference_keyframe, estimate.n_inliers, since
+            frame, self.reference_keyframe, estimate.n_inliers, self.motion.velocity, since
         )
 
     def _create_keyframe(self, frame: core.TrackedFrame) -> None:

@@ -51,6 +51,25 @@ TEST(InlierSpread, LeavesOutliersOut) {
   EXPECT_EQ(spread_of_inliers(frame).cells, 0);
 }
 
+TEST(CountStaying, LeavesOutWhatATurnTakesOutOfView) {
+  TrackedFrame frame = frame_at({{10, 30}, {40, 30}, {70, 30}, {40, 50}});
+  frame.T_cw = Pose();
+  // At depth 2, where the keypoints lie: x = (u - 40) / 50 * 2.
+  frame.associate(0, MapPointId(0), {-1.2, 0, 2});
+  frame.associate(1, MapPointId(1), {0, 0, 2});
+  frame.associate(2, MapPointId(2), {1.2, 0, 2});
+  frame.associate(3, MapPointId(3), {0, 0.8, 2});
+  frame.outlier[3] = 1;
+  EXPECT_EQ(count_staying(frame, Pose()), 3);
+  // To the right: the left one leaves.
+  const auto turned = [](double angle) {
+    return Pose(Eigen::Quaterniond(Eigen::AngleAxisd(-angle, Eigen::Vector3d::UnitY())),
+                Eigen::Vector3d::Zero());
+  };
+  EXPECT_EQ(count_staying(frame, turned(0.3)), 2);
+  EXPECT_EQ(count_staying(frame, turned(3.1)), 0);
+}
+
 TEST(InlierSpread, NeedsAPose) {
   const TrackedFrame frame = frame_at({{1, 1}});
   EXPECT_THROW(spread_of_inliers(frame), StateError);

@@ -131,6 +131,9 @@ class FakeCore:
     #: Rotation of the next small images and their correlation; none: they say nothing.
     aligned: deque[SimpleNamespace] = field(default_factory=deque)
     n_cells: int = 30
+    #: Of the inliers, after three more frames of the present speed; how far that was.
+    n_staying: int = 1000
+    looked_ahead: float = 0.0
     #: Points in view that are not held before the local map is matched.
     n_visible: int = 3
 
@@ -145,6 +148,11 @@ class FakeCore:
 
     def spread_of_inliers(self, frame: FakeFrame) -> SimpleNamespace:
         return SimpleNamespace(cells=self.n_cells, octaves=4)
+
+    def count_staying(self, frame: FakeFrame, T_nw: _core.Pose) -> int:
+        assert frame.T_cw is not None
+        self.looked_ahead = float((T_nw.matrix - frame.T_cw.matrix)[0, 3])
+        return self.n_staying
 
     def PointBatch(self) -> str:
         return "no points"

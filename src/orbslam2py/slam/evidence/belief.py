@@ -69,7 +69,8 @@ class Belief:
             if first.found:
                 self._search.settle(refined)
             return estimate
-        return self._take(frame, hypothesis)
+        evidence = replace(hypothesis.evidence, doubted=doubted)
+        return self._take(frame, replace(hypothesis, evidence=evidence))
 
     def _take(self, frame: core.TrackedFrame, hypothesis: Hypothesis) -> PoseEstimate:
         refined, evidence = hypothesis.refined, hypothesis.evidence

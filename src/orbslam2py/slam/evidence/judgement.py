@@ -79,6 +79,7 @@ class EvidenceJudge:
         evidence = Evidence(
             verdict=Verdict.STRONG,
             method=method,
+            doubted=False,
             confirmed=False,
             n_predicted=refined.n_predicted,
             found=figures.found,
