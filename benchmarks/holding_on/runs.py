@@ -27,6 +27,10 @@ def all_rows(cases: list[Case], jobs: int) -> Iterator[Row]:
         yield from map(played_row, cases)
         return
     # Not fork: the extension may have started threads.
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+    pool = ProcessPoolExecutor(jobs, mp_context=get_context("spawn"))
+    try:
         for future in as_completed([pool.submit(played_row, case) for case in cases]):
             yield future.result()
+    finally:
+        # Interrupted, it ends with the runs that have begun.
+        pool.shutdown(cancel_futures=True)

@@ -191,6 +191,8 @@ class Pipeline:
                 _log.info("lost soon after initialization; starting a new map")
             self.reset_requested.set()
         elif outcome.state in (TrackingState.OK, TrackingState.LOST):
+            for earlier in outcome.earlier:
+                self.recorder.record(earlier, lost=False)
             self.recorder.record(frame, lost=outcome.state is TrackingState.LOST)
 
     def _record(
@@ -259,25 +261,28 @@ def _make_tracking(setup: Setup, back_end: BackEnd, seed: int) -> Tracking:
     sensor, vocabulary = setup.sensor, setup.vocabulary
     max_keyframe_interval = setup.settings.max_keyframe_interval
     slam_map, mapping = back_end.map, back_end.mapping
+
+    def search(relocalizer: Relocalizer | None) -> PoseSearch:
+        return PoseSearch(
+            slam_map,
+            vocabulary,
+            sensor,
+            max_keyframe_interval,
+            relocalizer,
+            TrackingThresholds(),
+        )
+
     initializer: Initializer
     if sensor is Sensor.MONOCULAR:
-        initializer = MonocularInitializer(slam_map, vocabulary, mapping, seed)
+        initializer = MonocularInitializer(slam_map, vocabulary, mapping, seed, search(None))
     else:
         initializer = DepthInitializer(slam_map, vocabulary, mapping)
-    search = PoseSearch(
-        slam_map,
-        vocabulary,
-        sensor,
-        max_keyframe_interval,
-        Relocalizer(slam_map, back_end.keyframe_index, seed),
-        TrackingThresholds(),
-    )
     return Tracking(
         slam_map,
         vocabulary,
         mapping,
         initializer=initializer,
-        search=search,
+        search=search(Relocalizer(slam_map, back_end.keyframe_index, seed)),
         keyframe_decision=KeyframeDecision(slam_map, mapping.worker, sensor, max_keyframe_interval),
         has_depth=sensor.has_depth,
     )
