@@ -15,7 +15,8 @@ namespace orbslam {
 namespace {
 
 constexpr double homography_threshold = 0.40;
-constexpr double max_chi2 = 4.0;  // squared reprojection error over sigma^2 of a good pair
+constexpr double max_chi2 = 4.0;           // squared reprojection error over sigma^2 of a good pair
+constexpr double alternative_share = 0.5;  // of the best motion's points, that others must place
 constexpr std::size_t sample_size = std::tuple_size_v<EightPairs>;
 
 void check_options(const TwoViewOptions& options) {
@@ -122,6 +123,22 @@ void report_models(const Models& models, const std::vector<int>& matches, TwoVie
   result.fundamental_inlier = spread<std::uint8_t>(models.fundamental.inliers, matches, 0);
 }
 
+std::vector<TwoViewMotion> alternatives(const std::vector<Motion>& motions,
+                                        const std::vector<MotionSupport>& supports,
+                                        std::size_t best, const TwoViewInput& input) {
+  std::vector<TwoViewMotion> found;
+  const double least = alternative_share * static_cast<double>(supports[best].n_good);
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    const MotionSupport& support = supports[i];
+    if (static_cast<double>(support.n_good) < least) continue;
+    found.push_back(
+        {Pose(motions[i].R, motions[i].t), support.parallax,
+         spread<Eigen::Vector3d>(support.points, input.matches, Eigen::Vector3d::Zero()),
+         spread<std::uint8_t>(support.triangulated, input.matches, 0)});
+  }
+  return found;
+}
+
 /// Chooses among the motions of the chosen model and completes the result.
 void recover_motion(const Models& models, const PointPairs& pairs, const TwoViewInput& input,
                     const TwoViewOptions& options, WorkerThread* helper, TwoViewResult& result) {
@@ -146,6 +163,9 @@ void recover_motion(const Models& models, const PointPairs& pairs, const TwoView
   result.best_hypothesis = choice.index;
   const MotionSupport& best = supports[choice.index];
   result.parallax = best.parallax;
+  if (result.outcome == TwoViewOutcome::ambiguous_motion) {
+    result.alternatives = alternatives(motions, supports, choice.index, input);
+  }
   if (!result.success()) return;
   result.T_21 = Pose(motions[choice.index].R, motions[choice.index].t);
   result.points = spread<Eigen::Vector3d>(best.points, input.matches, Eigen::Vector3d::Zero());

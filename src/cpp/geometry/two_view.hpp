@@ -30,6 +30,15 @@ struct TwoViewInput {
   Pinhole pinhole;                              ///< of both views
 };
 
+/// A motion that explains the matches, and what it places.
+struct TwoViewMotion {
+  Pose T_21;            ///< camera 1 to camera 2 with |translation| = 1
+  double parallax = 0;  ///< degrees
+  // Per initial keypoint.
+  std::vector<Eigen::Vector3d> points;     ///< frame of camera 1
+  std::vector<std::uint8_t> triangulated;  ///< the point is well placed: use it
+};
+
 /// The motion and the points, or why there are none; and in either case what was found on the
 /// way, as far as it went.
 struct TwoViewResult {
@@ -52,6 +61,11 @@ struct TwoViewResult {
   std::vector<std::uint8_t> triangulated;  ///< the point is well placed: use it
   // Per initial keypoint, as soon as the models were estimated.
   std::vector<std::uint8_t> homography_inlier, fundamental_inlier;
+
+  /// Where the motion is ambiguous: all that place at least half as many points as the best, also
+  /// with little parallax, in the order of `hypotheses`. A third view can tell them apart: from two
+  /// views of a plane follow two motions, of which only one agrees with another view.
+  std::vector<TwoViewMotion> alternatives;
 
   bool success() const { return outcome == TwoViewOutcome::reconstructed; }
 };

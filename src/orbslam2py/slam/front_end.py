@@ -15,7 +15,6 @@ from orbslam2py.settings.depth_check import DepthCheck
 from orbslam2py.settings.fit import find_misfit
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
-from orbslam2py.slam.thresholds import InitializationThresholds
 
 #: Pixels per side from which on an image has room for a cell of corners (30 pixels) between its
 #: borders (16 on each side): `features/corner_grid.hpp`.
@@ -52,9 +51,8 @@ class FrontEnd:
         self._size: tuple[int, int] | None = None
         options = _orb_options(settings)
         self._extractor = core.OrbExtractor(options)
-        self._initial_extractor = core.OrbExtractor(
-            _orb_options(settings, factor=InitializationThresholds().feature_factor)
-        )
+        # By the factor on the number of features; more while a single camera starts.
+        self._extractors = {1: self._extractor}
         self._pair_extractor = core.PairExtractor(options) if sensor is Sensor.STEREO else None
         self._check_calibration = check_calibration
         self.depth_check = DepthCheck(settings.depth_factor)
@@ -77,19 +75,25 @@ class FrontEnd:
         timer: StageTimer,
         mask: Mask | None = None,
         *,
-        initializing: bool = False,
+        feature_factor: int = 1,
     ) -> core.Frame:
-        """Frame of a single camera; with twice as many features while the map begins."""
+        """Frame of a single camera; with a multiple of the settings' features."""
         self._check(image, "image")
         _check_mask(mask, image, "mask")
         context = self._context_for(image)
         with timer("extract"):
             grey = core.to_grey(image, self._settings.camera.rgb)
-            extractor = self._initial_extractor if initializing else self._extractor
+            extractor = self._extractor_for(feature_factor)
             frame = core.build_monocular_frame(
                 context, frame_id, timestamp, extractor.extract(grey, mask)
             )
             return self._finished(frame, image, grey)
+
+    def _extractor_for(self, factor: int) -> core.OrbExtractor:
+        if factor not in self._extractors:
+            options = _orb_options(self._settings, factor=factor)
+            self._extractors[factor] = core.OrbExtractor(options)
+        return self._extractors[factor]
 
     def stereo(
         self,

@@ -194,6 +194,8 @@ class Pipeline:
                 _log.info("lost soon after initialization; starting a new map")
             self.reset_requested.set()
         elif outcome.state in (TrackingState.OK, TrackingState.LOST):
+            for earlier in outcome.earlier:
+                self.recorder.record(earlier, lost=False)
             self.recorder.record(frame, lost=outcome.state is TrackingState.LOST)
 
     def _record(
@@ -264,27 +266,31 @@ def _make_tracking(setup: Setup, back_end: BackEnd, seed: int) -> Tracking:
     sensor, vocabulary = setup.sensor, setup.vocabulary
     max_keyframe_interval = setup.settings.max_keyframe_interval
     slam_map, mapping = back_end.map, back_end.mapping
+
+    def search(relocalizer: Relocalizer | None) -> PoseSearch:
+        return PoseSearch(
+            slam_map,
+            vocabulary,
+            sensor,
+            max_keyframe_interval,
+            relocalizer,
+            TrackingThresholds(),
+        )
+
     initializer: Initializer
     if sensor is Sensor.MONOCULAR:
-        initializer = MonocularInitializer(slam_map, vocabulary, mapping, seed)
+        initializer = MonocularInitializer(slam_map, vocabulary, mapping, seed, search(None))
     else:
         initializer = DepthInitializer(slam_map, vocabulary, mapping)
-    search = PoseSearch(
-        slam_map,
-        vocabulary,
-        sensor,
-        max_keyframe_interval,
-        Relocalizer(slam_map, back_end.keyframe_index, seed),
-        TrackingThresholds(),
-    )
-    judge = EvidenceJudge(search.motion_model_window, setup.settings.camera.fx)
+    searching = search(Relocalizer(slam_map, back_end.keyframe_index, seed))
+    judge = EvidenceJudge(searching.motion_model_window, setup.settings.camera.fx)
     return Tracking(
         slam_map,
         vocabulary,
         mapping,
         initializer=initializer,
-        search=search,
-        belief=Belief(search, judge, HarderSearch(search, judge)),
+        search=searching,
+        belief=Belief(searching, judge, HarderSearch(searching, judge)),
         keyframe_decision=KeyframeDecision(slam_map, mapping.worker, sensor, max_keyframe_interval),
         has_depth=sensor.has_depth,
     )

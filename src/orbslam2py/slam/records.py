@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
+from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray, IntArray
 
 
@@ -32,6 +33,7 @@ class Reason(str, enum.Enum):
     LOW_PARALLAX = "low parallax between the two views"
     AMBIGUOUS_MOTION = "ambiguous motion between the two views"
     DEGENERATE_VIEWS = "degenerate views: planar scene, pure rotation or wrong matches"
+    NO_THIRD_VIEW = "no third view agrees with the two that were chosen"
     INITIAL_MAP_FAILED = "the first map was too small or had no depth"
     NOT_FOUND_IN_MAP = "not found in the map"
     BLURRED = "blurred image, not searched"
@@ -231,5 +233,7 @@ class TrackingOutcome:
     is_keyframe: bool = False
     reset_needed: bool = False
     """The map was lost so soon that it is better to begin another one."""
+    earlier: tuple[core.TrackedFrame, ...] = ()
+    """Frames before this one that have found their poses now that there is a map, in order."""
     inliers: npt.NDArray[np.bool_] | None = None
     """(n,) keypoints that the pose was accepted with; None unless details were asked for."""

@@ -266,7 +266,12 @@ class System:
             image,
             details,
             lambda i, timer: self.pipeline.front_end.monocular(
-                image, i, timestamp, timer, mask, initializing=self.pipeline.tracking.initializing
+                image,
+                i,
+                timestamp,
+                timer,
+                mask,
+                feature_factor=self.pipeline.tracking.feature_factor,
             ),
         )
 

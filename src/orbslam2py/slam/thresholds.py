@@ -21,13 +21,37 @@ class InitializationThresholds:
     keypoints: int = 100
     """Each of a single camera's two views must have more keypoints than this."""
     matches: int = 100
-    """Fewest matches between the two views."""
+    """Fewest matches between two views of a single camera."""
+    views: int = 6
+    """So many views are kept ..."""
+    new_view: float = 5.0
+    """... each moved by a median of so many pixels against the one before."""
     window: float = 100.0
-    """Half width of the search window around the position in the first view, pixels."""
-    ratio: float = 0.9
-    """Best by second best descriptor distance between the two views."""
+    """Half width of the search window from frame to frame, pixels ..."""
+    wide_window: float = 200.0
+    """... after that found too little ..."""
+    narrow_window: float = 25.0
+    """... and the least one, around where a view's keypoints should have moved."""
+    displacement: float = 5.0
+    """A view is tried when its keypoints have moved by a median of so many pixels."""
+    parallax: float = 1.0
+    """Degrees of parallax that a motion chosen by third views must have."""
+    third_view_share: float = 0.2
+    """A third view says something if it has moved by this share of the way between the two, from
+    both of them ..."""
+    third_view_fits: float = 0.75
+    """... and agrees when it sees this share of the points where they should be."""
+    clearly_worse: float = 2.0
+    """Of motions that two views cannot tell apart, the others must fit a third view worse than
+    the right one by this factor."""
     feature_factor: int = 2
-    """Extracted features while a single camera starts, in multiples of the settings' number."""
+    """Extracted features while a single camera starts, in multiples of the settings' number ..."""
+    raised_feature_factor: int = 4
+    """... and when it has not started ..."""
+    patience: int = 10
+    """... after so many frames."""
+    remembered_frames: int = 200
+    """So many frames are remembered, to be tracked in the map once it has begun."""
 
 
 @dataclass(frozen=True)

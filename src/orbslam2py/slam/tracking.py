@@ -166,6 +166,11 @@ class Tracking:
         return self.state in (TrackingState.NO_IMAGES_YET, TrackingState.NOT_INITIALIZED)
 
     @property
+    def feature_factor(self) -> int:
+        """Features that a single camera's next image needs, in multiples of the settings'."""
+        return self._initializer.feature_factor if self.initializing else 1
+
+    @property
     def motion(self) -> MotionModel:
         """The last frame that had a pose, and the speed."""
         return self._search.motion
@@ -303,7 +308,8 @@ class Tracking:
         n = frame.n_associated()
         # The first pose is the origin: it is known exactly.
         estimate = PoseEstimate(n_matches=n, n_inliers=n, covariance=np.zeros((6, 6)))
-        return TrackingOutcome(self.state, estimate, is_keyframe=True)
+        earlier = self._initializer.take_earlier()
+        return TrackingOutcome(self.state, estimate, is_keyframe=True, earlier=earlier)
 
     def _lose(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> TrackingOutcome:
         was_ok = self.state is TrackingState.OK
