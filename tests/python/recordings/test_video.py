@@ -100,9 +100,7 @@ def test_ground_truth_lies_beside_the_path_as_far_as_it_has_come(tmp_path: Path)
     assert amounts[1][1] > 3e-4
 
 
-def test_the_rate_is_that_of_the_recording(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_rate_is_that_of_the_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """However busy the computer is on which a video is made."""
     said: list[float | None] = []
 
