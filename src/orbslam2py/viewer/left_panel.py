@@ -113,6 +113,7 @@ class LeftPanel:
             )
         panel.dock_left()
         panel.set_width(_WIDTH)
+        panel.expand()  # on a telephone it is a section of the sheet below, closed by itself
 
     def show_image(self, picture: ByteArray) -> None:
         """Show what the camera sees, red, green, blue."""
