@@ -217,8 +217,9 @@ class LivePage:
                 subject.truth,
                 with_scale=subject.with_scale,
             )
+            until = subject.truth.timestamps <= told.timestamps[-1:].max(initial=-np.inf)
             scene.draw_path(
-                "truth", np.zeros((0, 2, 3)) if laid is None else pieces(laid.positions)
+                "truth", np.zeros((0, 2, 3)) if laid is None else pieces(laid.positions[until])
             )
             self._note = "" if laid is None else f"{laid.error:.3f} m from the ground truth (ATE)"
         self._next["paths"] += _REST * told.seconds
