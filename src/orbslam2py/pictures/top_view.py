@@ -162,7 +162,8 @@ def draw_ground(scene: MapPicture, framing: Framing, *, text: int = 14) -> ByteA
     # Thousands of thin lines: smooth ones take five times as long.
     edges = _edge_pixels(scene.covisibility, framing)
     _lines(picture, edges, COVISIBILITY, thin, smooth=len(edges) < _MANY_EDGES)
-    _draw_path(picture, scene.truth, None, framing, TRUTH, 3 * thin)
+    # Wider than the path above it, which hides it where the estimate is right.
+    _draw_path(picture, scene.truth, None, framing, TRUTH, 6 * thin)
     _draw_keyframes(picture, scene.keyframes, framing, size)
     return picture
 

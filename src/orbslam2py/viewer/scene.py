@@ -267,7 +267,7 @@ class Scene:
         colour, width = {
             "path": (PATH, 2.5),
             "online": (ONLINE_PATH, 1.5),
-            "truth": (TRUTH, 2.0),
+            "truth": (TRUTH, 3.5),
         }[layer]
         self._lines(f"/{layer}/all", lines, colour, width)
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from orbslam2py.cli.demo import own_name
 from support.browser import Browser
 from support.command_line import CommandLine, Results
 from support.viewer_pages import click_on, open_viewer
@@ -27,6 +28,25 @@ def test_the_demo_names_the_viewer_as_the_next_thing(command: CommandLine) -> No
     assert done.code == 0
     assert "orbslam2py demo --viewer" in done.out
     assert (Path("runs/demo") / "map.npz").is_file()
+
+
+@pytest.mark.parametrize(
+    ("called", "on_path", "typed"),
+    [
+        ("{here}/.venv/bin/orbslam2py", False, ".venv/bin/orbslam2py"),
+        ("/opt/tools/bin/orbslam2py", False, "/opt/tools/bin/orbslam2py"),
+        ("/opt/tools/bin/orbslam2py", True, "orbslam2py"),
+        ("{here}/src/orbslam2py/__main__.py", True, f"{sys.executable} -m orbslam2py"),
+    ],
+)
+def test_the_program_is_named_as_it_can_be_called(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, called: str, on_path: bool, typed: str
+) -> None:
+    """After `make demo` it is in a folder that is not on the path."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [called.format(here=tmp_path), "demo"])
+    monkeypatch.setattr("shutil.which", lambda name: f"/usr/bin/{name}" if on_path else None)
+    assert own_name() == typed
 
 
 def test_a_run_with_a_viewer_leaves_the_same_bytes(command: CommandLine) -> None:

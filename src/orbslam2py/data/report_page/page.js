@@ -250,12 +250,13 @@ class Solid {
     pen.font = `${12 * ratio}px system-ui, sans-serif`;
     pen.fillStyle = pen.strokeStyle = this.colour("--soft");
     pen.lineWidth = 1.5 * ratio;
-    pen.textAlign = "center";
     for (const [name, k, sign] of [["right", 0, 1], ["up", 1, -1], ["forward", 2, 1]]) {
       const [x, y] = [sign * a[k] * length, sign * b[k] * length];
       if (Math.hypot(x, y) < 0.3 * length) continue;
       pen.beginPath(); pen.moveTo(u, v); pen.lineTo(u + x, v + y); pen.stroke();
-      pen.fillText(name, u + 1.3 * x, v + 1.3 * y + 4 * ratio);
+      // Beside the end of its line, so that two that point nearly the same way do not overlap.
+      pen.textAlign = Math.abs(x) < 0.2 * length ? "center" : x > 0 ? "left" : "right";
+      pen.fillText(name, u + 1.2 * x, v + 1.3 * y + 4 * ratio);
     }
   }
 

@@ -56,7 +56,7 @@ class LivePage:
         self._system_controls: SystemControls | None = None
         self._view: FrameView | None = None
         self._picture: ByteArray | None = None
-        self._note = ""
+        self._error = self._end = ""
         self._n_dropped = 0
         self._next: dict[str, float] = {}
         self._shown_at: float | None = None
@@ -138,7 +138,7 @@ class LivePage:
     def tell_end(self, text: str) -> None:
         """Say below the image that the run has ended."""
         with self._lock:
-            self._note = text
+            self._end = text
             self._show_status()
 
     def look_from(self, eye: FloatArray, target: FloatArray) -> None:
@@ -186,11 +186,12 @@ class LivePage:
 
     def _show_status(self) -> None:
         view, model = self._view, self.page.model
+        note = "\n".join(text for text in (self._error, self._end) if text)
         if view is None:
-            self.page.left.show_status(None, self._note)
+            self.page.left.show_status(None, note)
             return
         status = status_of(view, len(model.keyframe_ids), model.n_points, self._n_dropped)
-        self.page.left.show_status(status, self._note)
+        self.page.left.show_status(status, note)
 
     def _overlaid(self, view: FrameView) -> ByteArray:
         if self._picture is None:
@@ -217,10 +218,12 @@ class LivePage:
                 subject.truth,
                 with_scale=subject.with_scale,
             )
+            until = subject.truth.timestamps <= told.timestamps[-1:].max(initial=-np.inf)
             scene.draw_path(
-                "truth", np.zeros((0, 2, 3)) if laid is None else pieces(laid.positions)
+                "truth", np.zeros((0, 2, 3)) if laid is None else pieces(laid.positions[until])
             )
-            self._note = "" if laid is None else f"{laid.error:.3f} m from the ground truth (ATE)"
+            self._error = "" if laid is None else f"{laid.error:.3f} m from the ground truth (ATE)"
+            self._show_status()
         self._next["paths"] += _REST * told.seconds
 
     def _in_world(self, positions: FloatArray) -> FloatArray:
