@@ -21,6 +21,8 @@ class KeyframeClock:
 
     last_keyframe: int
     last_relocalization: int
+    in_loaded_map: bool = False
+    """The map was loaded: it may end where the camera was found, and is extended soon."""
 
 
 class KeyframeDecision:
@@ -82,7 +84,8 @@ class KeyframeDecision:
         limits = self.limits
         interval = self._max_keyframe_interval
         n_keyframes = self._map.n_keyframes
-        if frame.id < last.last_relocalization + interval and n_keyframes > interval:
+        wait = min(interval, limits.wait_in_loaded_map) if last.in_loaded_map else interval
+        if frame.id < last.last_relocalization + wait and n_keyframes > wait:
             return False
 
         n_reference = self._points_of(reference_keyframe, n_keyframes)

@@ -140,6 +140,7 @@ class Tracking:
         self._last_keyframe_frame_id = 0
         # Whether the map was loaded, or localization mode has been on in it.
         self._map_is_kept = False
+        self._map_was_loaded = False
         self._search.reset()
         self._belief.reset()
         self._in_fixed_map.reset()
@@ -157,7 +158,7 @@ class Tracking:
             ``T_cw`` where the camera may be; tried before all else.
         """
         self.state = TrackingState.LOST
-        self._map_is_kept = True
+        self._map_is_kept = self._map_was_loaded = True
         self._search.initial_pose = initial_pose
 
     @property
@@ -334,6 +335,7 @@ class Tracking:
         since = KeyframeClock(
             last_keyframe=self._last_keyframe_frame_id,
             last_relocalization=self._search.last_relocalization,
+            in_loaded_map=self._map_was_loaded,
         )
         return self._keyframe_decision.wanted(
             frame, self.reference_keyframe, estimate.n_inliers, self.motion.velocity, since
