@@ -67,6 +67,9 @@ def test_a_covered_lens(world: MappedWorld) -> None:
     assert not any(record.unconfirmed for record in records[1:])
     assert all(record.state is TrackingState.OK for record in records)
     assert world.system.n_keyframes >= n_keyframes
+    lost = world.system.trajectory().lost
+    assert lost[-12:-6].all()
+    assert not lost[-6:].any()
     assert world.system.check_map() == []
 
 
@@ -108,8 +111,18 @@ def test_a_glimpse_is_not_believed(world: MappedWorld) -> None:
     assert glimpse.unconfirmed
     assert tracking.motion.last.id == glimpse.frame_id
     world.lose()
+    assert world.system.trajectory().lost[-3:].all(), "its pose is taken back"
     assert (tracking.motion.last.id, tracking.reference_keyframe) == (believed, reference)
     assert world.show(world.sequence.load(N_MAPPED)).state is TrackingState.OK
+
+
+def test_who_asks_before_the_next_frame_gets_the_pose(world: MappedWorld) -> None:
+    world.lose()
+    found = world.show(world.sequence.load(N_MAPPED))
+    assert found.unconfirmed
+    path = world.system.trajectory()
+    assert not path.lost[-1]
+    assert len(path) == world._n_shown
 
 
 def test_the_same_losses_give_the_same_bytes() -> None:
