@@ -149,6 +149,8 @@ class Pipeline:
             )
         self.statistics.add(timer.milliseconds)
 
+        if outcome.estimate.unconfirmed:
+            self.recorder.doubt(frame)
         self._keep(frame, outcome)
         record = self._record(frame, outcome, timer, details=details)
         self._announce(state_before, record)

@@ -75,6 +75,10 @@ class FirstEstimateInGrowingMap:
             if estimate.found:
                 return estimate
         estimate = search.by_reference_keyframe(frame)
+        if not lost and not estimate.found and search.just_relocalized(frame):
+            # Found again where the map ends, the frame before shows most of what this one does.
+            standing = search.by_motion_model(frame)
+            return standing if standing.found else estimate
         if lost and not estimate.found:
             return estimate.failed(Reason.NOT_FOUND_IN_MAP)
         return estimate

@@ -60,6 +60,17 @@ def test_what_is_not_confirmed_is_searched_on_from_the_old_place(scene: Scene, h
     assert scene.tracking.motion.last is scene.frames[39]
 
 
+def test_the_next_frame_is_also_searched_where_the_one_found_was(scene: Scene) -> None:
+    """At the border of the map a keyframe may show too little of it."""
+    scene.run(40)
+    lose(scene)
+    scene.track()
+    scene.core.calls.clear()
+    scene.core.words.append(0)
+    assert scene.track().state is TrackingState.OK
+    assert scene.core.calls[:2] == ["words", "motion"]
+
+
 def test_fifteen_points_in_common_confirm(scene: Scene) -> None:
     scene.run(40)
     lose(scene)
