@@ -75,8 +75,9 @@ std::vector<EightPairs> draw_samples(std::size_t n_matches, int n_samples, std::
 
 /// Initial structure of a monocular map (Mur-Artal et al. 2015, section IV): a homography and a
 /// fundamental matrix are estimated side by side from the same samples; the score ratio decides
-/// which one gives the motion hypotheses, and the best of these must win clearly. There is no
-/// second attempt with the other model. With a helper thread both models and the hypotheses are
+/// which one gives the motion hypotheses, and the best of these must win clearly. Where a
+/// homography leaves two motions and the fundamental matrix explains a tenth more matches, that is
+/// tried as well. With a helper thread both models and the hypotheses are
 /// worked on in two threads; the result is the same. Throws std::invalid_argument for matches
 /// that do not fit the points and for options out of range. See docs/method/start.md#two-views.
 TwoViewResult reconstruct_two_views(const TwoViewInput& input, const TwoViewOptions& options,

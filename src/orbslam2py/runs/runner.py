@@ -295,10 +295,18 @@ class SequenceRunner:
         for position, row in enumerate(result.rows):
             if row.record is not None:
                 by_frame[row.record.map_index, row.record.frame_id] = position
-                if row.record.map_index == last_map:
+                # Of equal times that of the last map counts.
+                if row.record.map_index == last_map or row.record.timestamp not in by_time:
                     by_time[row.record.timestamp] = position
+        # A map may hold frames from before it, when one before it came to nothing.
         result.trajectories = [
-            _renumber(t, [by_frame.get((number, int(i)), -1) for i in t.indices])
+            _renumber(
+                t,
+                [
+                    by_frame.get((number, int(i)), by_time.get(float(seconds), -1))
+                    for i, seconds in zip(t.indices, t.timestamps, strict=True)
+                ],
+            )
             for number, t in enumerate(trajectories)
         ]
         keyframes = system.keyframe_trajectory()

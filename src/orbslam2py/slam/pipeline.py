@@ -93,6 +93,7 @@ class Pipeline:
         self.frame_watchers: tuple[FrameWatcher, ...] = ()
         self.n_resets = 0
         self._start_failed = False
+        self._keeps_frames = False
         self._next_frame_id = 0
         self._last_timestamp = -math.inf
         if setup.loaded is not None:
@@ -192,6 +193,8 @@ class Pipeline:
     def _keep(self, frame: core.TrackedFrame, outcome: TrackingOutcome) -> None:
         if outcome.reset_needed:
             self._start_failed = outcome.estimate.reason is Reason.INITIAL_MAP_FAILED
+            # Depths begin a map with one frame; one camera's frames from before serve it again.
+            self._keeps_frames = not self._sensor.has_depth
             if not self._start_failed:
                 _log.info("lost soon after initialization; starting a new map")
             self.reset_requested.set()
@@ -250,14 +253,23 @@ class Pipeline:
                 )
             )
 
+    def request_reset(self) -> None:
+        """Begin a new map with the next image, and forget all before it."""
+        self._keeps_frames = False
+        self.reset_requested.set()
+
     # ---- a new map -------------------------------------------------------------------------------
     def _reset(self) -> None:
         _log.info("resetting: map %d ends", self.back_end.map.epoch)
         self.back_end.reset(RESET_PATIENCE, keep=self.recorder.end_map)
-        self.tracking.reset()
-        self.front_end.reset()
-        self._next_frame_id = 0
-        self._last_timestamp = -math.inf
+        if self._keeps_frames:
+            self.tracking.restart()
+        else:
+            self.tracking.reset()
+            self.front_end.reset()
+            self._next_frame_id = 0
+            self._last_timestamp = -math.inf
+        self._keeps_frames = False
         self.reset_requested.clear()
         # A map that never began was not given up.
         self.n_resets += not self._start_failed
@@ -283,7 +295,8 @@ def _make_tracking(setup: Setup, back_end: BackEnd, seed: int) -> Tracking:
     if sensor is Sensor.MONOCULAR:
         initializer = MonocularInitializer(slam_map, vocabulary, mapping, seed, search(None))
     else:
-        initializer = DepthInitializer(slam_map, vocabulary, mapping)
+        n_features = setup.settings.orb.n_features
+        initializer = DepthInitializer(slam_map, vocabulary, mapping, n_features)
     searching = search(Relocalizer(slam_map, back_end.keyframe_index, seed))
     judge = EvidenceJudge(searching.motion_model_window, setup.settings.camera.fx)
     return Tracking(

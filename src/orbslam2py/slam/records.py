@@ -137,7 +137,8 @@ class TrackingRecord:
     """Result of one track call."""
 
     frame_id: int
-    """Number of the image since the last reset, from 0."""
+    """Number of the image since the last reset, from 0. When a single camera's young map comes to
+    nothing, the count goes on: its images serve the next map."""
     timestamp: float
     """Seconds, as given by the caller."""
     map_index: int

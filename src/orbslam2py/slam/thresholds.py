@@ -16,6 +16,8 @@ class InitializationThresholds:
 
     keypoints_with_depth_sensor: int = 500
     """A stereo or RGB-D frame must have more keypoints than this to begin a map ..."""
+    share_with_depth_sensor: float = 0.5
+    """... or than this share of the settings' number of features, if that is less ..."""
     depths: int = 100
     """... and at least this many with depth, or the map would be lost at once."""
     keypoints: int = 100
@@ -51,7 +53,9 @@ class InitializationThresholds:
     patience: int = 10
     """... after so many frames."""
     remembered_frames: int = 200
-    """So many frames are remembered, to be tracked in the map once it has begun."""
+    """So many frames are remembered, to be tracked in the map once it has begun ..."""
+    followed_again: int = 20
+    """... and so many of the last of them serve a new beginning, if the map came to nothing."""
 
 
 @dataclass(frozen=True)

@@ -138,6 +138,12 @@ class Tracking:
         self.n_relocalizations = 0
         self.reset()
 
+    def restart(self) -> None:
+        """Forget a map that came to nothing, but not the frames that a new one may begin from."""
+        frames = self._initializer.remembered()
+        self.reset()
+        self._initializer.restart(frames)
+
     def reset(self) -> None:
         """Forget the map's past; the map itself is cleared by the pipeline."""
         self.state = TrackingState.NO_IMAGES_YET
@@ -224,6 +230,8 @@ class Tracking:
         if self.initializing:
             return self._begin_map(frame, timer)
         self._blurred = self._blur_watch.is_blurred(frame.features)
+        if self._map.n_keyframes <= self._search.limits.small_map:
+            self._initializer.remember(frame)
         estimate = self._find_pose(frame, timer, localize)
         if estimate.found:
             estimate = self._confirm(frame, estimate)

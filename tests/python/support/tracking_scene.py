@@ -238,8 +238,22 @@ class FakeCore:
 class FakeInitializer:
     """Refuses a given number of frames."""
 
+    feature_factor = 1
+
     def __init__(self, refusals: int = 0) -> None:
         self.refusals = refusals
+
+    def remember(self, frame: FakeFrame) -> None:
+        """Frames of a young map are not needed again."""
+
+    def remembered(self) -> list[FakeFrame]:
+        return []
+
+    def restart(self, frames: list[FakeFrame]) -> None:
+        assert not frames
+
+    def take_earlier(self) -> tuple[FakeFrame, ...]:
+        return ()
 
     def reset(self) -> None:
         self.refusals = 0

@@ -8,6 +8,8 @@ from collections.abc import Iterable
 from orbslam2py import _core as core
 from orbslam2py.slam.pose_search import PoseSearch
 
+_PATIENCE = 5  # frames that may be missing between those that are found
+
 
 class EarlierFrames:
     """Tracks frames from the first keyframe on, forwards and backwards.
@@ -47,32 +49,43 @@ class EarlierFrames:
     def _follow(
         self, first: core.TrackedFrame, frames: Iterable[core.TrackedFrame]
     ) -> list[core.TrackedFrame]:
-        """Track one frame after the other until one is not found."""
+        """Track one frame after the other until several are not found."""
         search = self._search
         assert search is not None
         search.reset()
         search.reference_keyframe = first.reference_keyframe
         search.motion.remember(first)
         tracked: list[core.TrackedFrame] = []
+        missed = 0
         for frame in frames:
-            search.follow_map()
-            estimate = search.by_motion_model(frame)
-            if not estimate.found:
-                frame.clear_associations()
-                estimate = search.by_reference_keyframe(frame)
-            if estimate.found:
-                refined = search.in_local_map(frame, estimate)
-                search.settle(refined)
-                estimate = refined.estimate
-            if not estimate.found:
-                frame.clear_associations()
-                frame.T_cw = None
+            if self._found(search, frame):
+                tracked.append(frame)
+                missed = 0
+                continue
+            missed += 1
+            if missed > _PATIENCE:
                 break
-            frame.discard_outliers()
-            last = search.motion.last
-            assert last.T_cw is not None and frame.T_cw is not None
-            # Not update_velocity: the numbers of the frames may fall.
-            search.motion.velocity = frame.T_cw @ last.T_cw.inverse()
-            search.motion.remember(frame)
-            tracked.append(frame)
+            search.motion.lose()
+            frame.clear_associations()
+            frame.T_cw = None
         return tracked
+
+    def _found(self, search: PoseSearch, frame: core.TrackedFrame) -> bool:
+        search.follow_map()
+        estimate = search.by_motion_model(frame)
+        if not estimate.found:
+            frame.clear_associations()
+            estimate = search.by_reference_keyframe(frame)
+        if estimate.found:
+            refined = search.in_local_map(frame, estimate)
+            search.settle(refined)
+            estimate = refined.estimate
+        if not estimate.found:
+            return False
+        frame.discard_outliers()
+        last = search.motion.last
+        assert last.T_cw is not None and frame.T_cw is not None
+        # Not update_velocity: the numbers of the frames may fall.
+        search.motion.velocity = frame.T_cw @ last.T_cw.inverse()
+        search.motion.remember(frame)
+        return True

@@ -33,6 +33,8 @@ class DepthInitializer:
         Describes the first keyframe.
     mapping : LocalMapping
         Takes it.
+    n_features : int, optional
+        How many are extracted: with few of them, fewer keypoints are enough.
     thresholds : InitializationThresholds, optional
         Limits.
     """
@@ -42,12 +44,16 @@ class DepthInitializer:
         slam_map: core.Map,
         vocabulary: core.Vocabulary,
         mapping: LocalMapping,
+        n_features: int | None = None,
         thresholds: InitializationThresholds | None = None,
     ) -> None:
         self._map = slam_map
         self._vocabulary = vocabulary
         self._mapping = mapping
-        self._limits = thresholds or InitializationThresholds()
+        self._limits = limits = thresholds or InitializationThresholds()
+        self._least = limits.keypoints_with_depth_sensor
+        if n_features is not None:
+            self._least = min(self._least, int(limits.share_with_depth_sensor * n_features))
 
     def reset(self) -> None:
         """Nothing is kept from frame to frame."""
@@ -61,13 +67,23 @@ class DepthInitializer:
         """None: the first frame that can begin the map does."""
         return ()
 
+    def remember(self, frame: core.TrackedFrame) -> None:
+        """Nothing: the next frame can begin a map as well."""
+
+    def remembered(self) -> list[core.Frame]:
+        """Nothing."""
+        return []
+
+    def restart(self, frames: list[core.Frame]) -> None:
+        """Nothing is kept."""
+
     def lines(self) -> FloatArray | None:
         """None: one frame is enough."""
         return None
 
     def try_initialize(self, frame: core.TrackedFrame) -> Reason:
         """Make the frame keyframe 0, with a map point for every depth; or say why not."""
-        if frame.features.size <= self._limits.keypoints_with_depth_sensor:
+        if frame.features.size <= self._least:
             return Reason.TOO_FEW_KEYPOINTS
         if int(np.count_nonzero(frame.features.depth > 0)) < self._limits.depths:
             return Reason.TOO_FEW_DEPTHS

@@ -90,6 +90,25 @@ class MonocularInitializer:
         self._last: core.TrackedFrame | None = None
         self._shown: View | None = None
 
+    def remember(self, frame: core.TrackedFrame) -> None:
+        """A frame that was tracked in a young map, which may yet come to nothing."""
+        self._history.append(frame)
+
+    def remembered(self) -> list[core.Frame]:
+        """The frames from before and after a map began."""
+        return [frame.features for frame in self._history]
+
+    def restart(self, frames: list[core.Frame]) -> None:
+        """Begin anew, with the views of the last moments of an earlier attempt."""
+        self.reset()
+        # Their poses were those in the map that is gone.
+        self._history.extend(core.TrackedFrame(frame) for frame in frames)
+        for frame in frames[-self._limits.followed_again :]:
+            if frame.size <= self._limits.keypoints:
+                continue
+            self._kept.follow(frame)
+            self._kept.keep_last()
+
     @property
     def feature_factor(self) -> int:
         """Twice the features of the settings, and more when it takes long to begin."""
@@ -174,5 +193,7 @@ class MonocularInitializer:
         self._mapping.insert_keyframe(begun.first)
         self._mapping.insert_keyframe(begun.second)
         self._earlier.track(list(self._history), first)
-        self.reset()
+        self._kept.clear()
+        self._n_waiting = 0
+        self._last = self._shown = None
         return Reason.NONE

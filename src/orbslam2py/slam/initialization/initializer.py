@@ -44,3 +44,15 @@ class Initializer(Protocol):
     def take_earlier(self) -> tuple[core.TrackedFrame, ...]:
         """Frames before the one that began the map, with their poses in it, in order; once."""
         ...
+
+    def remember(self, frame: core.TrackedFrame) -> None:
+        """A frame that was tracked in a young map, which may yet come to nothing."""
+        ...
+
+    def remembered(self) -> list[core.Frame]:
+        """What a new map may begin from, if the young one came to nothing."""
+        ...
+
+    def restart(self, frames: list[core.Frame]) -> None:
+        """Begin anew, with frames remembered from before."""
+        ...

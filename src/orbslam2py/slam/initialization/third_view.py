@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from orbslam2py.slam.front_end import intrinsics
 from orbslam2py.slam.initialization.kept_views import Indices, View
 from orbslam2py.slam.thresholds import InitializationThresholds
 
-Motion = core.TwoViewResult | core.TwoViewMotion
+Motion: TypeAlias = core.TwoViewResult | core.TwoViewMotion
 
 _FEWEST_COMMON = 30  # points that a third view must see to be asked
 _INLIER_CHI2 = 5.991  # 95 %, two degrees of freedom
