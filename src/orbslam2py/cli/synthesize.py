@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from enum import Enum
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +12,6 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from orbslam2py.datasets import Layout
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import Sensor
 from orbslam2py.synthetic import (
@@ -33,8 +33,21 @@ EXAMPLE = """
 
 World = Annotated[SyntheticWorld, typer.Option(help="Where the camera moves.")]
 Sensors = Annotated[Sensor, typer.Option(help="What delivers the images.")]
+
+
+class _Written(str, Enum):
+    """Layouts that are written."""
+
+    TUM = "tum"
+    KITTI = "kitti"
+    EUROC = "euroc"
+    ROSBAG1 = "rosbag1"
+    ROSBAG2 = "rosbag2"
+    MCAP = "mcap"
+
+
 Layouts = Annotated[
-    Layout | None,
+    _Written | None,
     typer.Option(
         help="File names and formats: tum for mono and rgbd, kitti or euroc for mono and stereo; "
         "rosbag1, rosbag2, mcap: a bag of ROS 1 or 2, for all.  "
@@ -146,7 +159,7 @@ synthesize.__doc__ = f"{synthesize.__doc__}\n{EXAMPLE}"
 def _write(
     sequence: SyntheticSequence,
     folder: Path,
-    layout: Layout | None,
+    layout: _Written | None,
     *,
     force: bool,
     console: Console,
@@ -156,7 +169,7 @@ def _write(
         task = bar.add_task("Rendering", total=len(sequence))
         sequence.write(
             folder,
-            layout,
+            None if layout is None else layout.value,
             force=force,
             progress=lambda done, total: bar.update(task, completed=done, total=total),
         )

@@ -8,6 +8,14 @@ from orbslam2py.datasets.euroc import EurocSequence
 from orbslam2py.datasets.frames import Frame, FramesInOrder
 from orbslam2py.datasets.image_folder import ImageFolder
 from orbslam2py.datasets.kitti import KittiSequence
+from orbslam2py.datasets.layouts import (
+    BonnSequence,
+    IclNuimSequence,
+    Loader,
+    OpenLorisSequence,
+    ReplicaSequence,
+    SevenScenesSequence,
+)
 from orbslam2py.datasets.live import LiveCamera
 from orbslam2py.datasets.masks import MaskedCamera, MaskedSequence
 from orbslam2py.datasets.open_input import open_input
@@ -18,10 +26,12 @@ from orbslam2py.datasets.video import VideoReader, VideoSequence
 
 __all__ = [
     "BagSequence",
+    "BonnSequence",
     "DepthFolders",
     "EurocSequence",
     "Frame",
     "FramesInOrder",
+    "IclNuimSequence",
     "ImageFolder",
     "Images",
     "KittiSequence",
@@ -29,10 +39,14 @@ __all__ = [
     "LiveCamera",
     "LiveFrame",
     "LiveSource",
+    "Loader",
     "MaskedCamera",
     "MaskedSequence",
+    "OpenLorisSequence",
     "RecordedSequence",
+    "ReplicaSequence",
     "Sequence",
+    "SevenScenesSequence",
     "Source",
     "TumSequence",
     "VideoReader",

@@ -29,6 +29,11 @@ class Layout(str, Enum):
     ROSBAG1 = "rosbag1"
     ROSBAG2 = "rosbag2"
     MCAP = "mcap"
+    ICL_NUIM = "icl-nuim"
+    SEVEN_SCENES = "7-scenes"
+    BONN = "bonn"
+    REPLICA = "replica"
+    OPENLORIS = "openloris"
 
     @classmethod
     def _missing_(cls, value: object) -> Layout:

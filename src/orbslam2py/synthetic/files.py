@@ -79,10 +79,10 @@ def choose_layout(layout: Layout | str | None, sensor: Sensor) -> Layout:
     try:
         chosen = Layout(layout)
     except ValueError:
-        names = ", ".join(str(member) for member in Layout)
+        names = ", ".join(map(str, _SENSORS))
         raise SettingsError(f"layout is '{layout}'; there are {names}") from None
-    if sensor not in _SENSORS[chosen]:
-        fitting = " or ".join(str(item) for item in Layout if sensor in _SENSORS[item])
+    if sensor not in _SENSORS.get(chosen, ()):
+        fitting = " or ".join(str(item) for item in _SENSORS if sensor in _SENSORS[item])
         raise SettingsError(f"layout {chosen} has no place for {sensor}; take {fitting}")
     return chosen
 

@@ -61,6 +61,7 @@ NAMES = {
     "export_points",
     "export_trajectory",
     "load_vocabulary",
+    "batch",
     "open_sequence",
     "optimize_map",
     "run_sequence",
