@@ -63,8 +63,8 @@ POSE = {
     "poseopt_stereo": Figure("pose, 350 mixed", 1.15, 0.6),
 }
 BUNDLE = {
-    "lba_stereo": Figure("local BA, stereo", 75.0, 0.6),
-    "lba_mono": Figure("local BA, monocular", 56.0, 0.6),
+    "lba_stereo": Figure("local BA, stereo", 75.0, 0.25),
+    "lba_mono": Figure("local BA, monocular", 56.0, 0.25),
 }
 #: Sum of squared whitened residuals over the observations that the reference keeps, and the most
 #: that ours may be times that.

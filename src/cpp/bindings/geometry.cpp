@@ -85,6 +85,24 @@ void bind_two_view_types(py::module_& module) {
           [](TwoViewOptions& o, double value) { o.limits.min_parallax = value; }, "Degrees.");
 }
 
+void bind_two_view_motion(py::module_& module) {
+  using Motion = TwoViewMotion;
+  py::class_<Motion>(module, "TwoViewMotion", "A motion between two views, and what it places.")
+      .def_readonly("T_21", &Motion::T_21,
+                    "Pose from camera 1 to camera 2, translation of length 1.")
+      .def_readonly("parallax", &Motion::parallax, "Degrees.")
+      .def_property_readonly(
+          "points",
+          [](const Motion& m) {
+            return copy_to_array<double>(m.points.data(),
+                                         {static_cast<py::ssize_t>(m.points.size()), 3});
+          },
+          "Per initial keypoint, (n, 3) float64 in the frame of camera 1; zero where missing.")
+      .def_property_readonly(
+          "triangulated", [](const Motion& m) { return to_array(m.triangulated); },
+          "Per initial keypoint, (n,) uint8: the point is well placed.");
+}
+
 void bind_two_view_result(py::module_& module) {
   using Result = TwoViewResult;
   py::class_<Result>(module, "TwoViewResult", "Result of reconstruct_two_views.")
@@ -101,6 +119,9 @@ void bind_two_view_result(py::module_& module) {
       .def_readonly("n_homography_inliers", &Result::n_homography_inliers, "Matches that fit H.")
       .def_readonly("n_fundamental_inliers", &Result::n_fundamental_inliers, "Matches that fit F.")
       .def_readonly("hypotheses", &Result::hypotheses, "MotionScore of each motion tried.")
+      .def_readonly("alternatives", &Result::alternatives,
+                    "Where the motion is ambiguous: TwoViewMotion of each that a third view may "
+                    "choose.")
       .def_readonly("best_hypothesis", &Result::best_hypothesis, "Index of the best one.")
       .def_readonly("T_21", &Result::T_21,
                     "Pose from camera 1 to camera 2, translation of length 1.")
@@ -125,6 +146,7 @@ void bind_two_view_result(py::module_& module) {
 
 void bind_two_view(py::module_& module) {
   bind_two_view_types(module);
+  bind_two_view_motion(module);
   bind_two_view_result(module);
   module.def(
       "reconstruct_two_views",

@@ -157,6 +157,31 @@ void bind_for_initialization(py::module_& module) {
       "Search the level-0 keypoints of `initial` in `current` around `previous`, (n, 2) pixels.\n\n"
       "Returns (matches, previous): (n,) int32 index in `current` or -1, and the positions to\n"
       "search around next time, (n, 2) float32.");
+
+  module.def(
+      "match_views",
+      [](const std::shared_ptr<Frame>& first, const std::shared_ptr<Frame>& current,
+         const PositionArray& expected, float window, float ratio, int level_difference,
+         int highest_level) {
+        if (expected.ndim() != 2 || expected.shape(1) != 2) {
+          throw py::value_error("expected must be an (n, 2) array of float32 pixels");
+        }
+        std::vector<Eigen::Vector2f> positions(static_cast<std::size_t>(expected.shape(0)));
+        for (std::size_t i = 0; i < positions.size(); ++i) {
+          positions[i] = {expected.data()[2 * i], expected.data()[2 * i + 1]};
+        }
+        const ViewMatchOptions options{window, ratio, level_difference, highest_level};
+        const std::vector<int> matches =
+            released([&] { return match_views(*first, *current, positions, options); });
+        return copy_to_array<std::int32_t>(matches.data(),
+                                           {static_cast<py::ssize_t>(matches.size())});
+      },
+      "first"_a, "current"_a, "expected"_a, "window"_a = ViewMatchOptions{}.window,
+      "ratio"_a = ViewMatchOptions{}.ratio,
+      "level_difference"_a = ViewMatchOptions{}.level_difference,
+      "highest_level"_a = ViewMatchOptions{}.highest_level,
+      "Search the keypoints of `first` up to a level in `current` around `expected`, (n, 2)\n"
+      "pixels.\n\nReturns (n,) int32: index in `current` or -1.");
 }
 
 void bind_for_triangulation(py::module_& module) {

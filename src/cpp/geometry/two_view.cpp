@@ -15,7 +15,9 @@ namespace orbslam {
 namespace {
 
 constexpr double homography_threshold = 0.40;
-constexpr double max_chi2 = 4.0;  // squared reprojection error over sigma^2 of a good pair
+constexpr double general_scene = 1.1;  // matches of F by those of H, from which on it is no plane
+constexpr double max_chi2 = 4.0;       // squared reprojection error over sigma^2 of a good pair
+constexpr double alternative_share = 0.5;  // of the best motion's points, that others must place
 constexpr std::size_t sample_size = std::tuple_size_v<EightPairs>;
 
 void check_options(const TwoViewOptions& options) {
@@ -122,6 +124,22 @@ void report_models(const Models& models, const std::vector<int>& matches, TwoVie
   result.fundamental_inlier = spread<std::uint8_t>(models.fundamental.inliers, matches, 0);
 }
 
+std::vector<TwoViewMotion> alternatives(const std::vector<Motion>& motions,
+                                        const std::vector<MotionSupport>& supports,
+                                        std::size_t best, const TwoViewInput& input) {
+  std::vector<TwoViewMotion> found;
+  const double least = alternative_share * static_cast<double>(supports[best].n_good);
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    const MotionSupport& support = supports[i];
+    if (static_cast<double>(support.n_good) < least) continue;
+    found.push_back(
+        {Pose(motions[i].R, motions[i].t), support.parallax,
+         spread<Eigen::Vector3d>(support.points, input.matches, Eigen::Vector3d::Zero()),
+         spread<std::uint8_t>(support.triangulated, input.matches, 0)});
+  }
+  return found;
+}
+
 /// Chooses among the motions of the chosen model and completes the result.
 void recover_motion(const Models& models, const PointPairs& pairs, const TwoViewInput& input,
                     const TwoViewOptions& options, WorkerThread* helper, TwoViewResult& result) {
@@ -146,6 +164,9 @@ void recover_motion(const Models& models, const PointPairs& pairs, const TwoView
   result.best_hypothesis = choice.index;
   const MotionSupport& best = supports[choice.index];
   result.parallax = best.parallax;
+  if (result.outcome == TwoViewOutcome::ambiguous_motion) {
+    result.alternatives = alternatives(motions, supports, choice.index, input);
+  }
   if (!result.success()) return;
   result.T_21 = Pose(motions[choice.index].R, motions[choice.index].t);
   result.points = spread<Eigen::Vector3d>(best.points, input.matches, Eigen::Vector3d::Zero());
@@ -184,6 +205,19 @@ TwoViewResult reconstruct(const TwoViewInput& input, const TwoViewOptions& optio
   result.model = result.homography_ratio > homography_threshold ? TwoViewModel::homography
                                                                 : TwoViewModel::fundamental;
   recover_motion(models, pairs, input, options, helper, result);
+  // A plane that fills much of the view makes a homography win that knows no way out of its two
+  // motions, although the rest of the matches tells them apart.
+  const auto least = general_scene * static_cast<double>(models.homography.n_inliers);
+  if (result.outcome == TwoViewOutcome::ambiguous_motion &&
+      result.model == TwoViewModel::homography &&
+      static_cast<double>(models.fundamental.n_inliers) >= least) {
+    TwoViewResult second = result;
+    second.model = TwoViewModel::fundamental;
+    second.hypotheses.clear();
+    second.alternatives.clear();
+    recover_motion(models, pairs, input, options, helper, second);
+    if (second.success()) return second;
+  }
   return result;
 }
 

@@ -30,6 +30,15 @@ struct TwoViewInput {
   Pinhole pinhole;                              ///< of both views
 };
 
+/// A motion that explains the matches, and what it places.
+struct TwoViewMotion {
+  Pose T_21;            ///< camera 1 to camera 2 with |translation| = 1
+  double parallax = 0;  ///< degrees
+  // Per initial keypoint.
+  std::vector<Eigen::Vector3d> points;     ///< frame of camera 1
+  std::vector<std::uint8_t> triangulated;  ///< the point is well placed: use it
+};
+
 /// The motion and the points, or why there are none; and in either case what was found on the
 /// way, as far as it went.
 struct TwoViewResult {
@@ -53,6 +62,11 @@ struct TwoViewResult {
   // Per initial keypoint, as soon as the models were estimated.
   std::vector<std::uint8_t> homography_inlier, fundamental_inlier;
 
+  /// Where the motion is ambiguous: all that place at least half as many points as the best, also
+  /// with little parallax, in the order of `hypotheses`. A third view can tell them apart: from two
+  /// views of a plane follow two motions, of which only one agrees with another view.
+  std::vector<TwoViewMotion> alternatives;
+
   bool success() const { return outcome == TwoViewOutcome::reconstructed; }
 };
 
@@ -61,8 +75,9 @@ std::vector<EightPairs> draw_samples(std::size_t n_matches, int n_samples, std::
 
 /// Initial structure of a monocular map (Mur-Artal et al. 2015, section IV): a homography and a
 /// fundamental matrix are estimated side by side from the same samples; the score ratio decides
-/// which one gives the motion hypotheses, and the best of these must win clearly. There is no
-/// second attempt with the other model. With a helper thread both models and the hypotheses are
+/// which one gives the motion hypotheses, and the best of these must win clearly. Where a
+/// homography leaves two motions and the fundamental matrix explains a tenth more matches, that is
+/// tried as well. With a helper thread both models and the hypotheses are
 /// worked on in two threads; the result is the same. Throws std::invalid_argument for matches
 /// that do not fit the points and for options out of range. See docs/method/start.md#two-views.
 TwoViewResult reconstruct_two_views(const TwoViewInput& input, const TwoViewOptions& options,

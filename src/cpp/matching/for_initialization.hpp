@@ -18,4 +18,23 @@ std::vector<int> match_for_initialization(const Frame& initial, const Frame& cur
                                           std::vector<Eigen::Vector2f>& previous, float window,
                                           float ratio);
 
+/// How two views of a scene that is not known yet are compared.
+struct ViewMatchOptions {
+  float window = 100;        ///< half width around each expected position, level-0 pixels
+  float ratio = 0.9F;        ///< best by second best distance; the second at another place
+  int level_difference = 2;  ///< levels by which what comes nearer may rise, or sink
+  int highest_level = 3;     ///< keypoints of coarser levels lie too roughly to say how one moved
+};
+
+/// Searches keypoints of `first` on levels up to `highest_level` among those of `current`, each
+/// within `window` pixels of its expected position (one per keypoint of `first`). One corner may
+/// give keypoints on several levels, so the second best counts only more than 2 pixels of its
+/// level away from the best. Else as match_for_initialization: at most kDescriptorLow bits, one to
+/// one, agreeing with the majority's rotation. Returns per keypoint of `first` the index in
+/// `current` or -1. Throws StateError when `expected` has another length. See
+/// docs/method/start.md#matches-between-views.
+std::vector<int> match_views(const Frame& first, const Frame& current,
+                             const std::vector<Eigen::Vector2f>& expected,
+                             const ViewMatchOptions& options);
+
 }  // namespace orbslam

@@ -4,6 +4,30 @@
 #include <algorithm>
 
 namespace orbslam {
+namespace {
+
+std::uint32_t begin_point(GatheredBundle& bundle, const MapPoint& point) {
+  bundle.points.push_back(point.id);
+  bundle.problem.points.push_back(point.position);
+  return static_cast<std::uint32_t>(bundle.points.size() - 1);
+}
+
+void add_observation(GatheredBundle& bundle, std::uint32_t camera, std::uint32_t point,
+                     const Frame& frame, const Observation& observation) {
+  const Keypoint& keypoint = frame.keypoints[observation.index];
+  BundleProblem::Observation o;
+  o.camera = camera;
+  o.point = point;
+  o.u = keypoint.x;
+  o.v = keypoint.y;
+  o.right_u = frame.right_u[observation.index];
+  o.inverse_sigma2 = frame.scales->inverse_sigma2(keypoint.level);
+  o.has_depth = observation.has_depth;
+  bundle.problem.observations.push_back(o);
+  bundle.keypoints.push_back(observation.index);
+}
+
+}  // namespace
 
 void GatheredBundle::add_camera(const KeyFrame& keyframe, bool fixed) {
   const Camera& camera = *keyframe.frame->camera;
@@ -13,24 +37,37 @@ void GatheredBundle::add_camera(const KeyFrame& keyframe, bool fixed) {
 }
 
 void GatheredBundle::add_point(const MapPoint& point, const Map& map) {
-  const auto slot = static_cast<std::uint32_t>(points.size());
-  points.push_back(point.id);
-  problem.points.push_back(point.position);
+  const std::uint32_t slot = begin_point(*this, point);
   for (const orbslam::Observation& observation : point.observations) {
     const auto camera = camera_of.find(observation.keyframe);
     if (camera == camera_of.end()) continue;
-    const Frame& frame = *map.find(observation.keyframe)->frame;
-    const Keypoint& keypoint = frame.keypoints[observation.index];
-    BundleProblem::Observation o;
-    o.camera = camera->second;
-    o.point = slot;
-    o.u = keypoint.x;
-    o.v = keypoint.y;
-    o.right_u = frame.right_u[observation.index];
-    o.inverse_sigma2 = frame.scales->inverse_sigma2(keypoint.level);
-    o.has_depth = observation.has_depth;
-    problem.observations.push_back(o);
-    keypoints.push_back(observation.index);
+    add_observation(*this, camera->second, slot, *map.find(observation.keyframe)->frame,
+                    observation);
+  }
+}
+
+void GatheredBundle::add_points(const std::vector<const MapPoint*>& added, const Map& map) {
+  // By position in the list of cameras; observations and cameras come in thousands and tens.
+  struct Place {
+    std::uint32_t camera;
+    const Frame* frame;
+  };
+  std::vector<Place> by_id;
+  const auto [first, last] = std::minmax_element(keyframes.begin(), keyframes.end());
+  if (first == keyframes.end()) return;
+  by_id.resize(static_cast<std::size_t>(last->value - first->value) + 1, {0, nullptr});
+  const auto lowest = first->value;
+  for (std::uint32_t i = 0; i < keyframes.size(); ++i) {
+    by_id[static_cast<std::size_t>(keyframes[i].value - lowest)] = {
+        i, map.find(keyframes[i])->frame.get()};
+  }
+  for (const MapPoint* point : added) {
+    const std::uint32_t slot = begin_point(*this, *point);
+    for (const orbslam::Observation& observation : point->observations) {
+      const auto at = static_cast<std::size_t>(observation.keyframe.value - lowest);
+      if (at >= by_id.size() || by_id[at].frame == nullptr) continue;  // lower ones wrap around
+      add_observation(*this, by_id[at].camera, slot, *by_id[at].frame, observation);
+    }
   }
 }
 

@@ -29,6 +29,8 @@ struct GatheredBundle {
   void add_camera(const KeyFrame& keyframe, bool fixed);
   /// The point with its observations by the cameras added so far.
   void add_point(const MapPoint& point, const Map& map);
+  /// Many points, after all cameras.
+  void add_points(const std::vector<const MapPoint*>& added, const Map& map);
   int n_fixed() const;
 };
 

@@ -9,10 +9,25 @@
 namespace orbslam {
 namespace {
 
+/// Every id once, ascending. The ids of a neighbourhood lie close together and come up many times,
+/// so that noting them is cheaper than sorting them.
 template <class IdType>
 void sort_unique(std::vector<IdType>& ids) {
-  std::sort(ids.begin(), ids.end());
-  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  if (ids.empty()) return;
+  const auto [first, last] = std::minmax_element(ids.begin(), ids.end());
+  const auto lowest = first->value;
+  const auto range = static_cast<std::size_t>(last->value - lowest) + 1;
+  if (range > 64 * ids.size()) {
+    std::sort(ids.begin(), ids.end());
+    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+    return;
+  }
+  std::vector<std::uint8_t> present(range, 0);
+  for (const IdType id : ids) present[static_cast<std::size_t>(id.value - lowest)] = 1;
+  ids.clear();
+  for (std::size_t i = 0; i < range; ++i) {
+    if (present[i] != 0) ids.push_back(IdType(lowest + static_cast<decltype(lowest)>(i)));
+  }
 }
 
 /// The keyframe and its neighbours, by id.
@@ -85,7 +100,7 @@ GatheredBundle gather(const Map& map, KeyFrameId current, bool monocular,
   for (const KeyFrameId id : outer_keyframes(points, local)) {
     bundle.add_camera(*map.find(id), true);
   }
-  for (const MapPoint* point : points) bundle.add_point(*point, map);
+  bundle.add_points(points, map);
   fix_gauge(bundle, monocular);
   result.n_local_keyframes = static_cast<int>(local.size());
   result.n_fixed_keyframes = bundle.n_fixed();
@@ -98,7 +113,7 @@ GatheredBundle gather(const Map& map, KeyFrameId current, bool monocular,
 
 LocalBundleResult local_bundle_adjustment(Map& map, KeyFrameId current,
                                           const std::atomic<bool>* abort, bool monocular,
-                                          int n_threads) {
+                                          int n_threads, BundleSolver solver) {
   LocalBundleResult result;
   if (abort != nullptr && abort->load()) {
     result.summary.aborted = true;
@@ -108,6 +123,7 @@ LocalBundleResult local_bundle_adjustment(Map& map, KeyFrameId current,
   if (bundle.problem.observations.empty()) return result;
   BundleOptions options;
   options.n_threads = n_threads;
+  options.solver = solver;
   result.summary = solve_bundle(bundle.problem, options, abort);
   // Every accepted step lowers the cost; without one there is nothing to write.
   const bool moved = result.summary.iterations > 0;

@@ -13,6 +13,7 @@ from rich.console import Console
 from orbslam2py._files import describe_error
 from orbslam2py._version import __version__
 from orbslam2py.cli import (
+    batch,
     calibrate,
     demo,
     evaluate,
@@ -70,6 +71,7 @@ def _options(
 
 
 app.command("run", cls=RunCommand)(run.run)
+app.command("batch")(batch.batch)
 app.command("demo")(demo.demo)
 app.command("synthesize")(synthesize.synthesize)
 app.command("view")(view.view)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from enum import Enum
 from pathlib import Path
 from typing import Annotated
 
@@ -11,10 +12,15 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from orbslam2py.datasets import Layout
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import Sensor
-from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence, SyntheticWorld
+from orbslam2py.synthetic import (
+    Corners,
+    SyntheticMotion,
+    SyntheticOptions,
+    SyntheticSequence,
+    SyntheticWorld,
+)
 
 EXAMPLE = """
 **Example**
@@ -27,10 +33,24 @@ EXAMPLE = """
 
 World = Annotated[SyntheticWorld, typer.Option(help="Where the camera moves.")]
 Sensors = Annotated[Sensor, typer.Option(help="What delivers the images.")]
+
+
+class _Written(str, Enum):
+    """Layouts that are written."""
+
+    TUM = "tum"
+    KITTI = "kitti"
+    EUROC = "euroc"
+    ROSBAG1 = "rosbag1"
+    ROSBAG2 = "rosbag2"
+    MCAP = "mcap"
+
+
 Layouts = Annotated[
-    Layout | None,
+    _Written | None,
     typer.Option(
-        help="File names and formats: tum for mono and rgbd, kitti or euroc for mono and stereo.  "
+        help="File names and formats: tum for mono and rgbd, kitti or euroc for mono and stereo; "
+        "rosbag1, rosbag2, mcap: a bag of ROS 1 or 2, for all.  "
         "[default: kitti for stereo, else tum]"
     ),
 ]
@@ -46,7 +66,27 @@ Fps = Annotated[float | None, typer.Option(help="Frames per second.  [default: 2
 Speed = Annotated[
     float | None,
     typer.Option(
-        help="Metres per second, not for room.  [default: 0.7; two-rooms: 0.4; streets: 10]"
+        help="Metres per second along a way.  [default: 0.7; two-rooms: 0.4; streets: 10]"
+    ),
+]
+Pace = Annotated[float, typer.Option(help="Times the usual speed, in every world.")]
+Motion = Annotated[SyntheticMotion, typer.Option(help="How the camera goes along its way.")]
+Bends = Annotated[
+    Corners,
+    typer.Option(
+        "--corners", help="Whether the camera turns early in bends, or at once with the way."
+    ),
+]
+Blur = Annotated[
+    float, typer.Option(help="How long the shutter is open, in times between two frames: 0 to 1.")
+]
+Cover = Annotated[
+    float, typer.Option(help="Seconds that a hand is over the lens, in the middle of it all.")
+]
+Exposure = Annotated[
+    str,
+    typer.Option(
+        metavar="FACTOR", help="Factor on the grey values; LOW:HIGH jumps about once a second."
     ),
 ]
 Size = Annotated[
@@ -63,13 +103,18 @@ def synthesize(
     laps: Laps = None,
     fps: Fps = None,
     speed: Speed = None,
+    pace: Pace = 1.0,
+    motion: Motion = SyntheticMotion.SMOOTH,
+    corners: Bends = Corners.ROUND,
     size: Size = None,
     seed: Annotated[int, typer.Option(help="Another seed, another world.")] = 0,
     noise: Annotated[float, typer.Option(help="Noise of the images [grey levels].")] = 0.0,
     depth_noise: Annotated[
         float, typer.Option(help="Noise of the depth at 1 m [m]; grows with its square.")
     ] = 0.0,
-    exposure: Annotated[float, typer.Option(help="Factor on the grey values.")] = 1.0,
+    exposure: Exposure = "1",
+    blur: Blur = 0.0,
+    cover: Cover = 0.0,
     lateral: Annotated[float, typer.Option(help="Metres to the right of the usual way.")] = 0.0,
     yaw: Annotated[float, typer.Option(help="Look so many degrees to the right.")] = 0.0,
     force: Annotated[
@@ -85,11 +130,16 @@ def synthesize(
         laps=laps,
         fps=fps,
         speed=speed,
+        pace=pace,
+        motion=motion,
+        corners=corners,
         size=None if size is None else parse_size(size),
         seed=seed,
         noise=noise,
         depth_noise=depth_noise,
-        exposure=exposure,
+        exposure=parse_exposure(exposure),
+        blur=blur,
+        cover=cover,
         lateral=lateral,
         yaw=yaw,
     )
@@ -109,7 +159,7 @@ synthesize.__doc__ = f"{synthesize.__doc__}\n{EXAMPLE}"
 def _write(
     sequence: SyntheticSequence,
     folder: Path,
-    layout: Layout | None,
+    layout: _Written | None,
     *,
     force: bool,
     console: Console,
@@ -119,7 +169,7 @@ def _write(
         task = bar.add_task("Rendering", total=len(sequence))
         sequence.write(
             folder,
-            layout,
+            None if layout is None else layout.value,
             force=force,
             progress=lambda done, total: bar.update(task, completed=done, total=total),
         )
@@ -137,3 +187,22 @@ def parse_size(text: str) -> tuple[int, int]:
     if not (cross and width.isdecimal() and height.isdecimal()):
         raise SettingsError(f"--size is '{text}'; give width x height like 640x480")
     return int(width), int(height)
+
+
+def parse_exposure(text: str) -> float | tuple[float, float]:
+    """Read a factor, or the least and the most of one that jumps: ``0.4:1.5``.
+
+    Raises
+    ------
+    SettingsError
+        If the text is anything else.
+    """
+    try:
+        factors = [float(part) for part in text.split(":")]
+    except ValueError:
+        factors = []
+    if len(factors) == 1:
+        return factors[0]
+    if len(factors) == 2:
+        return factors[0], factors[1]
+    raise SettingsError(f"--exposure is '{text}'; give a factor like 0.8, or two like 0.4:1.5")

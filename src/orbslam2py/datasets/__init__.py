@@ -1,25 +1,37 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Images: TUM RGB-D, KITTI odometry, EuRoC, folders of images, videos, cameras."""
+"""Images: TUM RGB-D, KITTI odometry, EuRoC, bags, folders of images, videos, cameras."""
 
+from orbslam2py.datasets.bags import BagSequence
 from orbslam2py.datasets.base import Images, Layout, LiveFrame, LiveSource, Sequence, Source
 from orbslam2py.datasets.depth_folders import DepthFolders
 from orbslam2py.datasets.euroc import EurocSequence
 from orbslam2py.datasets.frames import Frame, FramesInOrder
 from orbslam2py.datasets.image_folder import ImageFolder
 from orbslam2py.datasets.kitti import KittiSequence
+from orbslam2py.datasets.layouts import (
+    BonnSequence,
+    IclNuimSequence,
+    Loader,
+    OpenLorisSequence,
+    ReplicaSequence,
+    SevenScenesSequence,
+)
 from orbslam2py.datasets.live import LiveCamera
 from orbslam2py.datasets.masks import MaskedCamera, MaskedSequence
 from orbslam2py.datasets.open_input import open_input
-from orbslam2py.datasets.recognise import open_sequence, recognise
+from orbslam2py.datasets.recognise import is_recording, open_sequence, recognise
 from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.datasets.tum import TumSequence
 from orbslam2py.datasets.video import VideoReader, VideoSequence
 
 __all__ = [
+    "BagSequence",
+    "BonnSequence",
     "DepthFolders",
     "EurocSequence",
     "Frame",
     "FramesInOrder",
+    "IclNuimSequence",
     "ImageFolder",
     "Images",
     "KittiSequence",
@@ -27,14 +39,19 @@ __all__ = [
     "LiveCamera",
     "LiveFrame",
     "LiveSource",
+    "Loader",
     "MaskedCamera",
     "MaskedSequence",
+    "OpenLorisSequence",
     "RecordedSequence",
+    "ReplicaSequence",
     "Sequence",
+    "SevenScenesSequence",
     "Source",
     "TumSequence",
     "VideoReader",
     "VideoSequence",
+    "is_recording",
     "open_input",
     "open_sequence",
     "recognise",

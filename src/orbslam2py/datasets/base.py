@@ -26,6 +26,14 @@ class Layout(str, Enum):
     TUM = "tum"
     KITTI = "kitti"
     EUROC = "euroc"
+    ROSBAG1 = "rosbag1"
+    ROSBAG2 = "rosbag2"
+    MCAP = "mcap"
+    ICL_NUIM = "icl-nuim"
+    SEVEN_SCENES = "7-scenes"
+    BONN = "bonn"
+    REPLICA = "replica"
+    OPENLORIS = "openloris"
 
     @classmethod
     def _missing_(cls, value: object) -> Layout:

@@ -16,6 +16,7 @@ from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.image_folder import image_files
 from orbslam2py.datasets.images import read_any, read_depth, read_image
 from orbslam2py.datasets.recorded import RecordedSequence
+from orbslam2py.datasets.time_files import seconds_of_name, stamps_of_names
 from orbslam2py.datasets.unposed import chosen_stamps, with_rate
 from orbslam2py.errors import DatasetError, ImageError, OrbSlamError
 from orbslam2py.settings import Sensor, Settings
@@ -26,8 +27,6 @@ _log = logging.getLogger(__name__)
 #: Names of folders with images of the camera, and with depth: they decide between several.
 _COLOUR_NAME = re.compile(r"colou?r|rgb|images?|img|frames?", re.IGNORECASE)
 _DEPTH_NAME = re.compile(r"depth", re.IGNORECASE)
-#: Whole numbers with so many digits are a time since 1970, in so many parts of a second.
-_PARTS_OF_SECOND = {19: 9, 16: 6, 13: 3}
 #: So much of the smaller folder must be found by name, or names do not tell what is a pair.
 _BY_NAME = 0.5
 
@@ -152,7 +151,7 @@ class DepthFolders(RecordedSequence):
             _require_equal_size(pair)
             images, self._depth_paths, how = _paired(folder, pair, images)
         self._paths, self._list_path = images, pair.colour.path
-        own = _stamps_of_names(images)
+        own = stamps_of_names(images)
         if fps is not None or times is not None:
             otherwise: Stamps | float = 0.0  # not needed, and there may be no settings yet
             told = "are the given ones"
@@ -232,7 +231,7 @@ def _paired(
 ) -> tuple[list[Path], list[Path], str]:
     """Return images, the depth of each, and how they were paired."""
     depths = _files_in_time(pair.depth.path)
-    colour_stamps, depth_stamps = _stamps_of_names(images), _stamps_of_names(depths)
+    colour_stamps, depth_stamps = stamps_of_names(images), stamps_of_names(depths)
     by_name = {path.stem: path for path in depths}
     named = [path for path in images if path.stem in by_name]
     how = "by equal names"
@@ -262,26 +261,6 @@ def _paired(
 def _files_in_time(folder: Path) -> list[Path]:
     """Images by their time if their names are times, where 0.25 is before 0.5, else by name."""
     files = image_files(folder)
-    if any(_seconds_of(path.stem) is None for path in files):
+    if any(seconds_of_name(path.stem) is None for path in files):
         return files
-    return sorted(files, key=lambda path: float(_seconds_of(path.stem) or 0))
-
-
-def _stamps_of_names(files: list[Path]) -> Stamps | None:
-    """Times that all names are: decimal seconds, or whole parts of a second since 1970."""
-    texts = [_seconds_of(path.stem) for path in files]
-    if None in texts:
-        return None
-    seconds = np.array([float(text) for text in texts if text is not None])
-    if (np.diff(seconds) <= 0).any():
-        return None
-    return Stamps(seconds, tuple(text for text in texts if text is not None), ())
-
-
-def _seconds_of(stem: str) -> str | None:
-    if re.fullmatch(r"\d+\.\d+", stem):
-        return stem
-    if not (re.fullmatch(r"[0-9]+", stem) and len(stem) in _PARTS_OF_SECOND):
-        return None
-    digits = _PARTS_OF_SECOND[len(stem)]
-    return f"{stem[:-digits]}.{stem[-digits:]}"
+    return sorted(files, key=lambda path: float(seconds_of_name(path.stem) or 0))

@@ -12,6 +12,7 @@ from orbslam2py.datasets.base import Images
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.frames import FramesInOrder
 from orbslam2py.datasets.images import read_image
+from orbslam2py.datasets.time_files import stamps_of_names
 from orbslam2py.datasets.unposed import UnposedSource, chosen_stamps
 from orbslam2py.errors import DatasetError
 from orbslam2py.settings import Sensor, Settings
@@ -58,7 +59,8 @@ class ImageFolder(FramesInOrder, UnposedSource):
     settings
         Settings, a file, a built-in name, or None for ``settings.yaml`` in the folder.
     fps
-        Images per second; by default that of the settings.
+        Images per second; by default the names if all are times (``1357847239208312.tiff``), else
+        that of the settings.
     times
         File with one time stamp per image, in the order of the images; or a list of images with
         their time stamps, such as ``rgb.txt`` of TUM RGB-D.
@@ -93,7 +95,10 @@ class ImageFolder(FramesInOrder, UnposedSource):
             settings = own
         super().__init__(self.folder, self.folder.resolve().name, sensor, settings, fps)
         names = [path.name for path in self.paths]
-        self._stamps = chosen_stamps(len(names), fps, times, self.settings.camera.fps, names)
+        # Without either, lists of images such as NCLT's: their names are their times.
+        own_times = stamps_of_names(self.paths) if fps is None and times is None else None
+        otherwise = own_times or self.settings.camera.fps
+        self._stamps = chosen_stamps(len(names), fps, times, otherwise, names)
 
     def __len__(self) -> int:
         return len(self.paths)

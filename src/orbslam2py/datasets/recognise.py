@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from orbslam2py._arguments import path_of
-from orbslam2py.datasets.base import Layout
+from orbslam2py.datasets.bags import BagSequence, is_bag
+from orbslam2py.datasets.base import Layout, Sequence
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.depth_folders import (
     DepthFolders,
@@ -15,25 +17,32 @@ from orbslam2py.datasets.depth_folders import (
     no_depth_pair,
 )
 from orbslam2py.datasets.euroc import EurocSequence, find_root
+from orbslam2py.datasets.image_folder import image_files
 from orbslam2py.datasets.kitti import KittiSequence, find_cameras
-from orbslam2py.datasets.recorded import RecordedSequence
+from orbslam2py.datasets.layouts import Loader, find_loaders, loader_of
 from orbslam2py.datasets.tum import TumSequence, find_association
 from orbslam2py.errors import DatasetError
 from orbslam2py.settings import Sensor
 
+_BAGS = (Layout.ROSBAG1, Layout.ROSBAG2, Layout.MCAP)
 _MARKS = (
     "rgb.txt or associations.txt (TUM), times.txt with image_0 or image_2 (KITTI), "
-    "mav0/cam0 or cam0 (EuRoC)"
+    "mav0/cam0 or cam0 (EuRoC), and those of ICL-NUIM, 7-Scenes, Bonn, Replica and OpenLORIS"
 )
 
 
-def recognise(folder: str | Path) -> Layout:
+def recognise(folder: str | Path) -> Layout | str:
     """Tell the layout of a recorded sequence by the files in its folder.
 
     Parameters
     ----------
     folder
         The sequence; for EuRoC also its ``mav0``.
+
+    Returns
+    -------
+    Layout or str
+        The name of the entry point if the loader of another package recognises it.
 
     Raises
     ------
@@ -51,8 +60,7 @@ def recognise(folder: str | Path) -> Layout:
         raise DatasetError(f"{folder} is no folder; give the folder of a sequence")
     found = _layouts(folder)
     if len(found) > 1:
-        names = ", ".join(str(layout) for layout in found)
-        raise DatasetError(f"{folder} looks like several layouts ({names}); name the one you mean")
+        raise _several(folder, list(map(str, found)))
     if found:
         return found[0]
     message = f"{folder} is no sequence we know: looked for {_MARKS}"
@@ -97,14 +105,17 @@ def open_sequence(
     settings: SettingsChoice = None,
     association: str | Path | None = None,
     layout: Layout | str | None = None,
-) -> RecordedSequence:
-    """Open the sequence in a folder, recognised by its files.
+    topics: Mapping[str, str] | str | None = None,
+) -> Sequence:
+    """Open the sequence in a folder or a bag, recognised by its files.
 
     Parameters
     ----------
     folder
-        TUM RGB-D, KITTI odometry or EuRoC (the sequence or its ``mav0``), or a folder with a folder
-        of images and a folder of depth images.
+        TUM RGB-D, KITTI odometry, EuRoC (the sequence or its ``mav0``), ICL-NUIM, 7-Scenes, Bonn,
+        Replica or OpenLORIS, what a loader of another package recognises, a folder with a folder
+        of images and a folder of depth images, or a bag of ROS 1 or ROS 2 (a file, or the folder of
+        a recording).
     sensor
         What to deliver images for; by default the richest the folder has images for.
     settings
@@ -112,12 +123,15 @@ def open_sequence(
     association
         Association file of a TUM sequence; by default one in the folder, else by time stamps.
     layout
-        How to read the folder, if it should not be recognised.
+        How to read the folder, if it should not be recognised; also the name of an entry point.
+    topics
+        Of a bag: which topics are the images, as `datasets.BagSequence` takes them.
 
     Returns
     -------
-    RecordedSequence
-        With the interface of `datasets.base.Sequence`; images are read when asked for.
+    Sequence
+        A `RecordedSequence`, a `BagSequence`, or what a loader of another package makes; images
+        are read when asked for.
 
     Raises
     ------
@@ -129,9 +143,19 @@ def open_sequence(
     folder = path_of(folder, "the folder of the sequence")
     if association is not None:
         association = path_of(association, "association")
+    loader = None if layout is None else loader_of(str(layout))
+    layout = None if layout is None or loader is not None else Layout(layout)
+    if layout in _BAGS or (layout is None and loader is None and is_recording(folder)):
+        return BagSequence(folder, sensor, settings=settings, topics=topics)
+    if topics is not None:
+        raise DatasetError(f"topics belong to a bag; {folder} is none: leave out --topics")
+    if layout is None and association is None:
+        loader = loader or _one_of(folder, find_loaders(folder))
+    if loader is not None:
+        return loader(folder, sensor, settings=settings)
     if layout is None and association is None and is_depth_pair(folder, sensor):
         return DepthFolders(folder, sensor, settings=settings)
-    layout = recognise(folder) if layout is None else Layout(layout)
+    layout = layout or Layout(recognise(folder))
     if layout is Layout.TUM:
         return TumSequence(folder, sensor, settings=settings, association=association)
     if association is not None:
@@ -140,8 +164,30 @@ def open_sequence(
     return kind(folder, sensor, settings=settings)
 
 
-def _layouts(folder: Path) -> list[Layout]:
-    found = []
+def is_recording(path: Path) -> bool:
+    """Tell whether a path is a bag, and no folder of images with a bag beside them."""
+    return is_bag(path) and not (path.is_dir() and (_layouts(path) or image_files(path)))
+
+
+def _one_of(folder: Path, loaders: dict[str, Loader]) -> Loader | None:
+    if len(loaders) > 1:
+        raise _several(folder, sorted(loaders))
+    return next(iter(loaders.values()), None)
+
+
+def _several(folder: Path, names: list[str]) -> DatasetError:
+    return DatasetError(
+        f"{folder} looks like several layouts ({', '.join(names)}); name the one you mean"
+    )
+
+
+def _layouts(folder: Path) -> list[Layout | str]:
+    # What has marks of its own goes before what has only lists as TUM's.
+    special = find_loaders(folder)
+    known = {str(layout) for layout in Layout}
+    found: list[Layout | str] = [Layout(name) if name in known else name for name in special]
+    if found:
+        return found
     if (folder / "rgb.txt").is_file() or find_association(folder) is not None:
         found.append(Layout.TUM)
     if (folder / "times.txt").is_file() and find_cameras(folder):

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -15,6 +16,9 @@ from orbslam2py.errors import DatasetError
 
 #: Whole numbers are nanoseconds if their typical step is longer than this as seconds (a day).
 _LONGEST_STEP = 86400
+
+#: Whole numbers with so many digits are a time since 1970, in so many parts of a second.
+_PARTS_OF_SECOND = {19: 9, 16: 6, 13: 3}
 
 #: Fields of a line: time; time and file; the same of two cameras.
 _FIELDS = {1, 2, 4}
@@ -37,6 +41,39 @@ def stamps_of_rate(n: int, fps: float) -> Stamps:
 def stamps_of_seconds(seconds: FloatArray) -> Stamps:
     """Make time stamps of float64 (n,) seconds, written with nine decimals."""
     return Stamps(seconds, tuple(f"{time:.9f}" for time in seconds.tolist()), ())
+
+
+def stamps_of_names(files: list[Path]) -> Stamps | None:
+    """Take the names of images as their times, if all are and grow.
+
+    Parameters
+    ----------
+    files
+        Images in their order.
+
+    Returns
+    -------
+    Stamps or None
+        None if a name is neither decimal seconds nor a whole number of milli-, micro- or
+        nanoseconds since 1970, or they do not grow.
+    """
+    texts = [seconds_of_name(path.stem) for path in files]
+    if None in texts:
+        return None
+    seconds = np.array([float(text) for text in texts if text is not None])
+    if (np.diff(seconds) <= 0).any():
+        return None
+    return Stamps(seconds, tuple(text for text in texts if text is not None), ())
+
+
+def seconds_of_name(stem: str) -> str | None:
+    """Return the time that a name is, in seconds; None if it is none."""
+    if re.fullmatch(r"\d+\.\d+", stem):
+        return stem
+    if not (re.fullmatch(r"[0-9]+", stem) and len(stem) in _PARTS_OF_SECOND):
+        return None
+    digits = _PARTS_OF_SECOND[len(stem)]
+    return f"{stem[:-digits]}.{stem[-digits:]}"
 
 
 def read_time_file(path: Path, n: int, names: Sequence[str] | None = None) -> Stamps:

@@ -24,6 +24,7 @@ from orbslam2py.runs.calibration_watch import CalibrationWatch, settings_beside
 from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.feeds import FedFrame, LiveFeed, RecordedFeed, is_sequence
 from orbslam2py.runs.options import RunOptions
+from orbslam2py.runs.report_page.kept_images import KeptImages
 from orbslam2py.runs.result import DROPPED, FrameRow, RunResult
 from orbslam2py.settings.depth_check import doubt_of_tum_factor
 from orbslam2py.settings.sensor import Sensor
@@ -87,6 +88,7 @@ class SequenceRunner:
             options=options,
             n_frames=self._feed.n_frames,
             is_live=self._feed.is_live,
+            kept_images=KeptImages(settings) if self._feed.is_live else None,
         )
 
     def run(
@@ -225,6 +227,8 @@ class SequenceRunner:
             self.result.slam_seconds += time.perf_counter() - begin
         if self._watch is not None:
             self._watch.look(frame.item)
+        if self.result.kept_images is not None:
+            self.result.kept_images.look(len(self.result.rows), frame.item.image, record)
         return _row(frame, record, str(record.reason))
 
     def _call(self, system: System, images: Images, timestamp: float) -> TrackingRecord:
@@ -291,10 +295,18 @@ class SequenceRunner:
         for position, row in enumerate(result.rows):
             if row.record is not None:
                 by_frame[row.record.map_index, row.record.frame_id] = position
-                if row.record.map_index == last_map:
+                # Of equal times that of the last map counts.
+                if row.record.map_index == last_map or row.record.timestamp not in by_time:
                     by_time[row.record.timestamp] = position
+        # A map may hold frames from before it, when one before it came to nothing.
         result.trajectories = [
-            _renumber(t, [by_frame.get((number, int(i)), -1) for i in t.indices])
+            _renumber(
+                t,
+                [
+                    by_frame.get((number, int(i)), by_time.get(float(seconds), -1))
+                    for i, seconds in zip(t.indices, t.timestamps, strict=True)
+                ],
+            )
             for number, t in enumerate(trajectories)
         ]
         keyframes = system.keyframe_trajectory()

@@ -15,7 +15,6 @@ from orbslam2py.settings.depth_check import DepthCheck
 from orbslam2py.settings.fit import find_misfit
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
-from orbslam2py.slam.thresholds import InitializationThresholds
 
 #: Pixels per side from which on an image has room for a cell of corners (30 pixels) between its
 #: borders (16 on each side): `features/corner_grid.hpp`.
@@ -52,9 +51,8 @@ class FrontEnd:
         self._size: tuple[int, int] | None = None
         options = _orb_options(settings)
         self._extractor = core.OrbExtractor(options)
-        self._initial_extractor = core.OrbExtractor(
-            _orb_options(settings, factor=InitializationThresholds().feature_factor)
-        )
+        # By the factor on the number of features; more while a single camera starts.
+        self._extractors = {1: self._extractor}
         self._pair_extractor = core.PairExtractor(options) if sensor is Sensor.STEREO else None
         self._check_calibration = check_calibration
         self.depth_check = DepthCheck(settings.depth_factor)
@@ -77,19 +75,25 @@ class FrontEnd:
         timer: StageTimer,
         mask: Mask | None = None,
         *,
-        initializing: bool = False,
+        feature_factor: int = 1,
     ) -> core.Frame:
-        """Frame of a single camera; with twice as many features while the map begins."""
+        """Frame of a single camera; with a multiple of the settings' features."""
         self._check(image, "image")
         _check_mask(mask, image, "mask")
         context = self._context_for(image)
         with timer("extract"):
             grey = core.to_grey(image, self._settings.camera.rgb)
-            extractor = self._initial_extractor if initializing else self._extractor
+            extractor = self._extractor_for(feature_factor)
             frame = core.build_monocular_frame(
                 context, frame_id, timestamp, extractor.extract(grey, mask)
             )
-            return self._coloured(frame, image)
+            return self._finished(frame, image, grey)
+
+    def _extractor_for(self, factor: int) -> core.OrbExtractor:
+        if factor not in self._extractors:
+            options = _orb_options(self._settings, factor=factor)
+            self._extractors[factor] = core.OrbExtractor(options)
+        return self._extractors[factor]
 
     def stereo(
         self,
@@ -122,7 +126,7 @@ class FrontEnd:
             frame = core.build_stereo_frame(
                 context, frame_id, timestamp, features_left, features_right
             )
-            return self._coloured(frame, left)
+            return self._finished(frame, left, left_grey)
 
     def rgbd(
         self,
@@ -155,9 +159,12 @@ class FrontEnd:
         with timer("stereo"):
             metres = core.to_depth_metres(depth, self._settings.depth_factor)
             frame = core.build_rgbd_frame(context, frame_id, timestamp, extraction, metres)
-            return self._coloured(frame, image)
+            return self._finished(frame, image, grey)
 
-    def _coloured(self, frame: core.Frame, image: npt.NDArray[np.uint8]) -> core.Frame:
+    def _finished(
+        self, frame: core.Frame, image: npt.NDArray[np.uint8], grey: npt.NDArray[np.uint8]
+    ) -> core.Frame:
+        core.keep_small_image(frame, grey)
         if image.ndim == 3:
             core.sample_colours(frame, image, self._settings.camera.rgb)
         return frame
@@ -223,6 +230,7 @@ def _orb_options(settings: Settings, factor: int = 1) -> core.OrbOptions:
         n_levels=settings.orb.n_levels,
         initial_threshold=settings.orb.ini_th_fast,
         minimum_threshold=settings.orb.min_th_fast,
+        original_coordinates=settings.orb.original_coordinates,
     )
 
 

@@ -22,6 +22,9 @@ from orbslam2py.maps.map_keeper import MapKeeper, encode_image
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.back_end import RESET_PATIENCE, BackEnd
 from orbslam2py.slam.events import Callbacks, Relocalized, TrackingLost
+from orbslam2py.slam.evidence.belief import Belief
+from orbslam2py.slam.evidence.harder_search import HarderSearch
+from orbslam2py.slam.evidence.judgement import EvidenceJudge
 from orbslam2py.slam.frame_recorder import FrameRecorder
 from orbslam2py.slam.front_end import FrontEnd
 from orbslam2py.slam.initialization import DepthInitializer, Initializer, MonocularInitializer
@@ -90,6 +93,7 @@ class Pipeline:
         self.frame_watchers: tuple[FrameWatcher, ...] = ()
         self.n_resets = 0
         self._start_failed = False
+        self._keeps_frames = False
         self._next_frame_id = 0
         self._last_timestamp = -math.inf
         if setup.loaded is not None:
@@ -146,6 +150,8 @@ class Pipeline:
             )
         self.statistics.add(timer.milliseconds)
 
+        if outcome.estimate.unconfirmed:
+            self.recorder.doubt(frame)
         self._keep(frame, outcome)
         record = self._record(frame, outcome, timer, details=details)
         self._announce(state_before, record)
@@ -187,10 +193,14 @@ class Pipeline:
     def _keep(self, frame: core.TrackedFrame, outcome: TrackingOutcome) -> None:
         if outcome.reset_needed:
             self._start_failed = outcome.estimate.reason is Reason.INITIAL_MAP_FAILED
+            # Depths begin a map with one frame; one camera's frames from before serve it again.
+            self._keeps_frames = not self._sensor.has_depth
             if not self._start_failed:
                 _log.info("lost soon after initialization; starting a new map")
             self.reset_requested.set()
         elif outcome.state in (TrackingState.OK, TrackingState.LOST):
+            for earlier in outcome.earlier:
+                self.recorder.record(earlier, lost=False)
             self.recorder.record(frame, lost=outcome.state is TrackingState.LOST)
 
     def _record(
@@ -216,8 +226,10 @@ class Pipeline:
             is_keyframe=outcome.is_keyframe,
             reference_keyframe=self.tracking.reference_keyframe,
             visual_odometry=ok and estimate.visual_odometry,
+            unconfirmed=ok and estimate.unconfirmed,
             milliseconds=timer.milliseconds,
             features=frame_features(frame, outcome.inliers) if details else None,
+            evidence=estimate.evidence,
         )
 
     def _announce(self, before: TrackingState, record: TrackingRecord) -> None:
@@ -241,14 +253,23 @@ class Pipeline:
                 )
             )
 
+    def request_reset(self) -> None:
+        """Begin a new map with the next image, and forget all before it."""
+        self._keeps_frames = False
+        self.reset_requested.set()
+
     # ---- a new map -------------------------------------------------------------------------------
     def _reset(self) -> None:
         _log.info("resetting: map %d ends", self.back_end.map.epoch)
         self.back_end.reset(RESET_PATIENCE, keep=self.recorder.end_map)
-        self.tracking.reset()
-        self.front_end.reset()
-        self._next_frame_id = 0
-        self._last_timestamp = -math.inf
+        if self._keeps_frames:
+            self.tracking.restart()
+        else:
+            self.tracking.reset()
+            self.front_end.reset()
+            self._next_frame_id = 0
+            self._last_timestamp = -math.inf
+        self._keeps_frames = False
         self.reset_requested.clear()
         # A map that never began was not given up.
         self.n_resets += not self._start_failed
@@ -259,25 +280,32 @@ def _make_tracking(setup: Setup, back_end: BackEnd, seed: int) -> Tracking:
     sensor, vocabulary = setup.sensor, setup.vocabulary
     max_keyframe_interval = setup.settings.max_keyframe_interval
     slam_map, mapping = back_end.map, back_end.mapping
+
+    def search(relocalizer: Relocalizer | None) -> PoseSearch:
+        return PoseSearch(
+            slam_map,
+            vocabulary,
+            sensor,
+            max_keyframe_interval,
+            relocalizer,
+            TrackingThresholds(),
+        )
+
     initializer: Initializer
     if sensor is Sensor.MONOCULAR:
-        initializer = MonocularInitializer(slam_map, vocabulary, mapping, seed)
+        initializer = MonocularInitializer(slam_map, vocabulary, mapping, seed, search(None))
     else:
-        initializer = DepthInitializer(slam_map, vocabulary, mapping)
-    search = PoseSearch(
-        slam_map,
-        vocabulary,
-        sensor,
-        max_keyframe_interval,
-        Relocalizer(slam_map, back_end.keyframe_index, seed),
-        TrackingThresholds(),
-    )
+        n_features = setup.settings.orb.n_features
+        initializer = DepthInitializer(slam_map, vocabulary, mapping, n_features)
+    searching = search(Relocalizer(slam_map, back_end.keyframe_index, seed))
+    judge = EvidenceJudge(searching.motion_model_window, setup.settings.camera.fx)
     return Tracking(
         slam_map,
         vocabulary,
         mapping,
         initializer=initializer,
-        search=search,
+        search=searching,
+        belief=Belief(searching, judge, HarderSearch(searching, judge)),
         keyframe_decision=KeyframeDecision(slam_map, mapping.worker, sensor, max_keyframe_interval),
         has_depth=sensor.has_depth,
     )

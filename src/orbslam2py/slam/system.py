@@ -266,7 +266,12 @@ class System:
             image,
             details,
             lambda i, timer: self.pipeline.front_end.monocular(
-                image, i, timestamp, timer, mask, initializing=self.pipeline.tracking.initializing
+                image,
+                i,
+                timestamp,
+                timer,
+                mask,
+                feature_factor=self.pipeline.tracking.feature_factor,
             ),
         )
 
@@ -342,7 +347,7 @@ class System:
         Settings, vocabulary and mode stay; the images may have another size from then on. The
         trajectory of the present map is kept, see `trajectories`.
         """
-        self.pipeline.reset_requested.set()
+        self.pipeline.request_reset()
 
     def optimize(self, *, stop: threading.Event | None = None) -> FullAdjustmentRecord:
         """Refine all keyframes and points together, now (full bundle adjustment).

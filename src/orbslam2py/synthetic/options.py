@@ -10,7 +10,15 @@ from typing import Any
 from orbslam2py._arguments import is_number, is_whole, seed_of, shown
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import Sensor
-from orbslam2py.synthetic.scenes import LAPS, ROOM_BESIDE, SyntheticWorld
+from orbslam2py.synthetic.motions import SyntheticMotion
+from orbslam2py.synthetic.scenes import (
+    CORNERED,
+    LAPS,
+    ROOM_BESIDE,
+    WITHOUT_WAY,
+    Corners,
+    SyntheticWorld,
+)
 
 
 @dataclass(frozen=True)
@@ -32,7 +40,13 @@ class SyntheticOptions:
         Frames per second (20 indoors, 10 in streets).
     speed
         Metres per second along the way (0.7 in corridors, 0.4 between the rooms, 10 in streets);
-        not for the room, where one turn takes 30 s.
+        not where there is no way to follow (room, table-top, wall, lift-door).
+    pace
+        Factor on the usual speed, in every world.
+    motion
+        How the camera goes along its way.
+    corners
+        How the look direction follows the bends of a way: `Corners`; only where there are bends.
     size
         Width and height in pixels (640 x 480, in streets 1241 x 376).
     seed
@@ -40,12 +54,18 @@ class SyntheticOptions:
     noise
         Standard deviation of the grey values' noise, grey levels.
     exposure
-        Factor on the grey values.
+        Factor on the grey values. Two numbers: the factor jumps between frames, once a second or
+        so, and lies between them.
+    blur
+        How long the shutter is open, in times between two frames (0 to 1): what the camera moves
+        by meanwhile is smeared. The truth is where it is in the middle.
+    cover
+        Seconds that a hand is over the lens, in the middle of the sequence.
     depth_noise
         Standard deviation of the depth [m] at 1 m; it grows with the square of the depth (RGB-D).
     lateral
         Metres to the right of the way: the same places from other viewpoints. Limited by the
-        walls (0.6 m between the rooms, 3.5 m in the street, 3 m around the block).
+        walls (0.6 m between the rooms, 3.5 m in the street, 3 m around the blocks).
     yaw
         Degrees to the right of the direction of travel.
 
@@ -64,14 +84,21 @@ class SyntheticOptions:
     size: tuple[int, int] | None = None
     seed: int = 0
     noise: float = 0.0
-    exposure: float = 1.0
+    exposure: float | tuple[float, float] = 1.0
     depth_noise: float = 0.0
     lateral: float = 0.0
     yaw: float = 0.0
+    pace: float = 1.0
+    motion: SyntheticMotion | str = SyntheticMotion.SMOOTH
+    corners: Corners | str = Corners.ROUND
+    blur: float = 0.0
+    cover: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "world", _member(SyntheticWorld, "world", self.world))
         object.__setattr__(self, "sensor", _member(Sensor, "sensor", self.sensor))
+        object.__setattr__(self, "motion", _member(SyntheticMotion, "motion", self.motion))
+        object.__setattr__(self, "corners", _member(Corners, "corners", self.corners))
         _check_range("frames", self.frames, 1, 1_000_000, whole=True)
         _check_range("laps", self.laps, 0.01, 1000)
         _check_range("fps", self.fps, 0.1, 1000)
@@ -80,15 +107,14 @@ class SyntheticOptions:
             _check_size(self.size)
         seed_of(self.seed, most=2**31 - 1)
         _check_range("noise", self.noise, 0, 100)
-        _check_range("exposure", self.exposure, 0.01, 100)
+        _check_exposure(self.exposure)
+        _check_range("blur", self.blur, 0, 1)
+        _check_range("cover", self.cover, 0, 1000)
         _check_range("depth_noise", self.depth_noise, 0, 1)
         beside = ROOM_BESIDE[SyntheticWorld(self.world)]
         _check_range("lateral", self.lateral, -beside, beside)
         _check_range("yaw", self.yaw, -180, 180)
-        if self.speed is not None and self.world is SyntheticWorld.ROOM:
-            raise SettingsError(
-                "speed does not apply to the room: one turn takes 30 s; leave it out"
-            )
+        self._check_pace()
         if self.laps is not None and self.world not in LAPS:
             names = ", ".join(map(str, LAPS))
             raise SettingsError(
@@ -99,6 +125,19 @@ class SyntheticOptions:
             raise SettingsError(
                 "frames and laps exclude each other: both say how long the way is; give one"
             )
+        if self.corners is Corners.SHARP and self.world not in CORNERED:
+            names = ", ".join(map(str, CORNERED))
+            raise SettingsError(f"corners are sharp on ways with corners: {names}; take one")
+
+    def _check_pace(self) -> None:
+        _check_range("pace", self.pace, 0.01, 100)
+        world = SyntheticWorld(self.world)
+        if self.speed is not None and world in WITHOUT_WAY:
+            raise SettingsError(
+                f"speed does not apply to the {world}: {WITHOUT_WAY[world]}; leave it out"
+            )
+        if self.speed is not None and self.pace != 1:
+            raise SettingsError("speed and pace exclude each other: both say how fast; give one")
 
 
 def _member(kind: type[Enum], name: str, value: object) -> Enum:
@@ -124,3 +163,19 @@ def _check_size(size: Any) -> None:
         raise SettingsError(f"size is {shown(size)}; give width and height, such as (640, 480)")
     for pixels in size:
         _check_range("size", pixels, 64, 8192, whole=True)
+
+
+def _check_exposure(exposure: Any) -> None:
+    if not isinstance(exposure, tuple | list):
+        _check_range("exposure", exposure, 0.01, 100)
+        return
+    if len(exposure) != 2:
+        raise SettingsError(
+            f"exposure has {len(exposure)} factors; give one, or the least and the most"
+        )
+    for factor in exposure:
+        _check_range("exposure", factor, 0.01, 100)
+    if exposure[0] > exposure[1]:
+        raise SettingsError(
+            f"exposure is {exposure[0]:g} to {exposure[1]:g}; give the least factor first"
+        )

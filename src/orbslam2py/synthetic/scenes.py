@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,6 +13,8 @@ import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
+from orbslam2py.synthetic import joinery
+from orbslam2py.synthetic.joinery import MovingPart
 
 
 class SyntheticWorld(str, Enum):
@@ -31,6 +34,26 @@ class SyntheticWorld(str, Enum):
     """A drive around a block of houses; one lap (600 m) and a bit."""
     TWO_ROOMS = "two-rooms"
     """From a room through a door and a passage into a room that looks the same."""
+    STREET_BLOCK = "street-block"
+    """A drive around a smaller block of houses; one lap (320 m) and a bit."""
+    TABLE_TOP = "table-top"
+    """Around above a table with low things on it, looking down."""
+    WALL = "wall"
+    """To and fro along a wall that fills the view."""
+    LIFT_DOOR = "lift-door"
+    """Waiting before a lift whose door slides open and shut."""
+
+    def __str__(self) -> str:
+        return self.value
+
+
+class Corners(str, Enum):
+    """How the look direction follows the bends of a way."""
+
+    ROUND = "round"
+    """It begins to turn before a bend: the turn rate is continuous."""
+    SHARP = "sharp"
+    """It turns with the way: at once, by 4 degrees a frame in streets."""
 
     def __str__(self) -> str:
         return self.value
@@ -45,26 +68,37 @@ class Scene:
     make_world
         Makes the world from a seed.
     way
-        None stands for looking around in the room.
+        Along corridors and streets; None where there is none.
+    looking
+        Without a way: the pose, camera to world (4, 4), at a time [s].
+    period
+        Seconds that this usually takes.
     speed
         Usual speed [m/s].
     outdoors
         Open above; seen from a car.
+    moving
+        What slides in the world.
     """
 
     make_world: Callable[[int], core.World]
     way: core.Way | None
+    looking: Callable[[float], FloatArray] | None = None
+    period: float = 0.0
     speed: float = 0.7
     outdoors: bool = False
+    moving: tuple[MovingPart, ...] = ()
 
     def seconds(self, speed: float, laps: float) -> float:
         """Return the time [s] that `laps` times the way take at a speed [m/s].
 
-        Looking around in the room takes its own time, whatever is asked for.
+        Without a way it takes its own time, whatever is asked for.
         """
-        return _LOOKING_AROUND if self.way is None else laps * self.way.length() / speed
+        return self.period if self.way is None else laps * self.way.length() / speed
 
-    def T_wc(self, seconds: float, speed: float, lateral: float, yaw: float) -> FloatArray:
+    def T_wc(
+        self, seconds: float, speed: float, lateral: float, yaw: float, *, sharp: bool = False
+    ) -> FloatArray:
         """Camera to world (4, 4) at a time.
 
         Parameters
@@ -77,17 +111,34 @@ class Scene:
             Metres to the right of the way.
         yaw
             Radians to the right of the direction of travel.
+        sharp
+            The look direction turns with the way, at once.
         """
         if self.way is not None:
             # A car rolls gently where a walker sways at every step.
             sway, stride = (0.05, 40.0) if self.outdoors else (0.08, 1.7)
-            return np.asarray(self.way.T_wc(speed * seconds, lateral, yaw, sway, stride))
-        T_wc = np.asarray(core.room_T_wc(_ROOM, seconds, 2 * _LOOKING_AROUND))
+            T_wc = np.asarray(self.way.T_wc(speed * seconds, lateral, yaw, sway, stride))
+            return _turned_at_once(self.way, speed * seconds, T_wc) if sharp else T_wc
+        assert self.looking is not None
+        T_wc = self.looking(seconds)
         aside = np.eye(4)
         aside[0, 3] = lateral
         aside[0, [0, 2]] = math.cos(yaw), math.sin(yaw)
         aside[2, [0, 2]] = -math.sin(yaw), math.cos(yaw)
         return np.asarray(T_wc @ aside)
+
+
+def _turned_at_once(way: core.Way, distance: float, T_wc: FloatArray) -> FloatArray:
+    """A pose on a way, turned about its place on it from the smoothed to the way's own heading."""
+    around = 1e-4  # metres
+    before, here, after = (way.T_wc(distance + s, sway=0.0) for s in (-around, 0.0, around))
+    step = after[:3, 3] - before[:3, 3]
+    turn = math.atan2(step[0], step[2]) - math.atan2(here[0, 2], here[2, 2])
+    about = np.eye(4)
+    about[0, [0, 2]] = math.cos(turn), math.sin(turn)
+    about[2, [0, 2]] = -math.sin(turn), math.cos(turn)
+    about[:3, 3] = here[:3, 3] - about[:3, :3] @ here[:3, 3]
+    return np.asarray(about @ T_wc)
 
 
 # Sizes in metres; length goes along z (forward), breadth along x (right).
@@ -99,6 +150,7 @@ _HEIGHT = 2.6  # of corridors
 _REPEAT = 4.0  # after which the pictures of the repeating corridor come again
 _STREET_LENGTH, _STREET_WIDTH = 600.0, 12.0
 _BLOCK = {"length": 208.0, "breadth": 104.0, "width": 14.0}  # between middles of its streets
+_SMALL_BLOCK = {"length": 108.0, "breadth": 64.0, "width": 14.0}
 _PASSAGE = 3.0  # between the two rooms
 
 
@@ -111,6 +163,10 @@ ROOM_BESIDE = {
     SyntheticWorld.STREET: 3.5,
     SyntheticWorld.STREET_LAP: 3.0,
     SyntheticWorld.TWO_ROOMS: 0.6,
+    SyntheticWorld.STREET_BLOCK: 3.0,
+    SyntheticWorld.TABLE_TOP: 0.3,
+    SyntheticWorld.WALL: 1.0,
+    SyntheticWorld.LIFT_DOOR: 0.5,
 }
 
 #: How often the way is usually gone, for those that come back to their start.
@@ -119,13 +175,25 @@ LAPS = {
     SyntheticWorld.REPEATING_CORRIDOR: 1.2,
     SyntheticWorld.FIGURE_EIGHT: 1.1,
     SyntheticWorld.STREET_LAP: 1.2,
+    SyntheticWorld.STREET_BLOCK: 1.2,
+}
+
+#: Ways that turn corners.
+CORNERED = (*LAPS, SyntheticWorld.TWO_ROOMS)
+
+#: Worlds without a way: there is no speed in metres per second.
+WITHOUT_WAY = {
+    SyntheticWorld.ROOM: "one turn takes 30 s",
+    SyntheticWorld.TABLE_TOP: "once around takes 15 s",
+    SyntheticWorld.WALL: "to and fro takes 24 s",
+    SyntheticWorld.LIFT_DOOR: "the camera waits",
 }
 
 
 def make_scene(world: SyntheticWorld) -> Scene:
     """Choose the world and the way; the world itself is made later, when the seed is known."""
-    if world is SyntheticWorld.ROOM:
-        return Scene(lambda seed: core.make_room(_ROOM, seed, n_boxes=10), None)
+    if world in WITHOUT_WAY:
+        return _scene_without_way(world)
     if world in (SyntheticWorld.CORRIDOR, SyntheticWorld.REPEATING_CORRIDOR):
         repeat = _REPEAT if world is SyntheticWorld.REPEATING_CORRIDOR else 0.0
         return Scene(
@@ -143,10 +211,11 @@ def make_scene(world: SyntheticWorld) -> Scene:
             core.two_rooms_way(_ROOM, _PASSAGE),
             speed=0.4,
         )
-    if world is SyntheticWorld.STREET_LAP:
+    if world in (SyntheticWorld.STREET_LAP, SyntheticWorld.STREET_BLOCK):
+        block = _BLOCK if world is SyntheticWorld.STREET_LAP else _SMALL_BLOCK
         return Scene(
-            lambda seed: core.make_street_lap(**_BLOCK, seed=seed),
-            core.street_lap_way(**_BLOCK),
+            lambda seed: core.make_street_lap(**block, seed=seed),
+            core.street_lap_way(**block),
             speed=10.0,
             outdoors=True,
         )
@@ -156,3 +225,19 @@ def make_scene(world: SyntheticWorld) -> Scene:
         speed=10.0,
         outdoors=True,
     )
+
+
+def _scene_without_way(world: SyntheticWorld) -> Scene:
+    if world is SyntheticWorld.TABLE_TOP:
+        return Scene(joinery.make_table_top, None, joinery.over_the_table, period=17.0)
+    if world is SyntheticWorld.WALL:
+        return Scene(joinery.make_wall, None, joinery.along_the_wall, period=24.0)
+    if world is SyntheticWorld.LIFT_DOOR:
+        door = joinery.lift_door()
+        return Scene(joinery.make_lift, None, joinery.before_the_door, period=16.0, moving=door)
+
+    def look_around(seconds: float) -> FloatArray:
+        return np.asarray(core.room_T_wc(_ROOM, seconds, 2 * _LOOKING_AROUND))
+
+    make_room = functools.partial(core.make_room, _ROOM, n_boxes=10)
+    return Scene(lambda seed: make_room(seed=seed), None, look_around, period=_LOOKING_AROUND)

@@ -25,9 +25,11 @@ from orbslam2py._arrays import ByteArray, FloatArray, IntArray
 from orbslam2py.datasets import FramesInOrder, Images, Layout
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import CameraSettings, DepthSettings, OrbSettings, Sensor, Settings
+from orbslam2py.synthetic import lens
 from orbslam2py.synthetic.files import write_sequence
+from orbslam2py.synthetic.motions import Motion, SyntheticMotion
 from orbslam2py.synthetic.options import SyntheticOptions
-from orbslam2py.synthetic.scenes import LAPS, SyntheticWorld, make_scene
+from orbslam2py.synthetic.scenes import LAPS, Corners, SyntheticWorld, make_scene
 from orbslam2py.trajectory import Trajectory
 from orbslam2py.trajectory.rotations import inverse_poses
 
@@ -58,6 +60,7 @@ class SyntheticSequence(FramesInOrder):
         self._scene = make_scene(self._world)
         self._fps = options.fps or (10.0 if self._scene.outdoors else 20.0)
         self._speed = options.speed or self._scene.speed
+        self._motion = Motion(SyntheticMotion(options.motion), self._fps, options.seed)
         self._n_frames = options.frames or self._frames_of_whole_way()
         nanoseconds = np.arange(self._n_frames, dtype=np.float64) * (1e9 / self._fps)
         #: Time stamps, int64 (n,), nanoseconds from the start.
@@ -69,7 +72,8 @@ class SyntheticSequence(FramesInOrder):
 
     def _frames_of_whole_way(self) -> int:
         laps = self.options.laps or LAPS.get(self._world, 1.0)
-        return math.floor(self._scene.seconds(self._speed, laps) * self._fps) + 1
+        seconds = self._scene.seconds(self._speed, laps) / self.options.pace
+        return math.floor(self._motion.duration(seconds) * self._fps) + 1
 
     def __len__(self) -> int:
         return self._n_frames
@@ -160,7 +164,13 @@ class SyntheticSequence(FramesInOrder):
         IndexError
             If there is no such frame.
         """
-        return self.view(self.T_wc(index), index)
+        T_wc = self.T_wc(index)
+        left, depth = self._seen(T_wc, index, right=False)
+        if self.sensor is Sensor.STEREO:
+            return Images(left, right=self._seen(T_wc, index, right=True)[0])
+        if self.sensor is Sensor.RGBD:
+            return Images(left, depth=self._measured(depth, index))
+        return Images(left)
 
     # ---- what only a made-up world knows ---------------------------------------------------------
     @property
@@ -179,12 +189,41 @@ class SyntheticSequence(FramesInOrder):
         """
         if not 0 <= index < len(self):
             raise IndexError(f"frame {index} of {len(self)}")
-        seconds = float(self.timestamps[index])
-        yaw = math.radians(self.options.yaw)
-        return self._scene.T_wc(seconds, self._speed, self.options.lateral, yaw)
+        return self._T_wc_at(float(self.timestamps[index]))
+
+    def _T_wc_at(self, seconds: float) -> FloatArray:
+        options = self.options
+        on_way = self._scene.T_wc(
+            options.pace * self._motion.on_way(seconds),
+            self._speed,
+            options.lateral,
+            math.radians(options.yaw),
+            sharp=options.corners is Corners.SHARP,
+        )
+        return self._motion.applied(on_way, seconds)
+
+    def covered(self, index: int) -> bool:
+        """Whether a hand is over the lens, be it in part.
+
+        Raises
+        ------
+        IndexError
+            If there is no such frame.
+        """
+        if not 0 <= index < len(self):
+            raise IndexError(f"frame {index} of {len(self)}")
+        return self._hand_rows(float(self.timestamps[index])) > 0
+
+    def _hand_rows(self, seconds: float) -> int:
+        if self.options.cover == 0:
+            return 0
+        begin = (self._n_frames / self._fps - self.options.cover) / 2
+        return lens.hand_rows(seconds, begin, begin + self.options.cover, self._size[1])
 
     def view(self, T_wc: FloatArray, number: int = 0, *, exposure: float | None = None) -> Images:
-        """Render the images seen from anywhere.
+        """Render the images seen from anywhere: without smear and without a hand over the lens.
+
+        What moves in the world is where it is at the beginning.
 
         Parameters
         ----------
@@ -193,25 +232,26 @@ class SyntheticSequence(FramesInOrder):
         number
             Seeds the noise together with the sequence's seed: not negative.
         exposure
-            Factor on the grey values; that of the options if None.
+            Factor on the grey values; that of the options if None (of two the first).
 
         Returns
         -------
         Images
             As from `load`.
         """
-        image, depth = self._render(T_wc, 2 * number, exposure)
+        factor = self._exposure(None) if exposure is None else exposure
+        image, depth = self._render(T_wc, 2 * number, factor)
         if self.sensor is Sensor.STEREO:
-            T_wr = T_wc.copy()
-            T_wr[:3, 3] += self.baseline * T_wc[:3, 0]
-            return Images(image, right=self._render(T_wr, 2 * number + 1, exposure)[0])
+            T_wr = self._right_of(T_wc)
+            return Images(image, right=self._render(T_wr, 2 * number + 1, factor)[0])
         if self.sensor is Sensor.RGBD:
             return Images(image, depth=self._measured(depth, number))
         return Images(image)
 
     def exact_depth(self, index: int) -> NDArray[np.float32]:
         """Depth of the (left) image along z, (height, width) [m]; 0 where nothing is hit."""
-        return self._render(self.T_wc(index), 2 * index, None)[1]
+        seconds = float(self.timestamps[index])
+        return self._render(self.T_wc(index), 2 * index, 1.0, seconds=seconds)[1]
 
     def write(
         self,
@@ -228,8 +268,9 @@ class SyntheticSequence(FramesInOrder):
         folder
             Appears when everything is written.
         layout
-            ``tum`` (mono, RGB-D), ``kitti`` or ``euroc`` (mono, stereo); by default TUM for RGB-D
-            and mono, KITTI for stereo.
+            ``tum`` (mono, RGB-D), ``kitti`` or ``euroc`` (mono, stereo); ``rosbag1``, ``rosbag2``
+            or ``mcap`` (all, with the package rosbags); by default TUM for RGB-D and mono, KITTI
+            for stereo.
         force
             Replace a folder that holds a synthetic sequence.
         progress
@@ -250,13 +291,68 @@ class SyntheticSequence(FramesInOrder):
     def _built(self) -> core.World:
         return self._scene.make_world(self.options.seed)
 
+    @cached_property
+    def _built_parts(self) -> list[core.World]:
+        return [part.make_world(self.options.seed) for part in self._scene.moving]
+
+    def _exposure(self, seconds: float | None) -> float:
+        exposure = self.options.exposure
+        if not isinstance(exposure, tuple | list):
+            return exposure
+        if seconds is None:
+            return exposure[0]
+        return lens.exposure_at(seconds, (exposure[0], exposure[1]), self.options.seed)
+
+    def _right_of(self, T_wc: FloatArray) -> FloatArray:
+        T_wr: FloatArray = T_wc.copy()
+        T_wr[:3, 3] += self.baseline * T_wc[:3, 0]
+        return T_wr
+
+    def _seen(
+        self, T_wc: FloatArray, index: int, *, right: bool
+    ) -> tuple[ByteArray, NDArray[np.float32]]:
+        """One image of a frame, with all that is between the world and it, and its depth."""
+        options = self.options
+        seconds = float(self.timestamps[index])
+        number = 2 * index + right
+        exposure = self._exposure(seconds)
+        place = self._right_of if right else np.copy
+        if options.blur > 0:
+            sharp, depth = self._render(place(T_wc), number, 1.0, noise=0.0, seconds=seconds)
+            half = 0.5 * options.blur / self._fps
+            T_open, T_shut = (place(self._T_wc_at(seconds + aside)) for aside in (-half, half))
+            image = lens.smeared(sharp, depth, self.camera, T_open, place(T_wc), T_shut)
+            grey = lens.exposed(image, exposure, options.noise, [options.seed, number])
+        else:
+            grey, depth = self._render(place(T_wc), number, exposure, seconds=seconds)
+        return lens.covered(grey, depth, self._hand_rows(seconds))
+
     def _render(
-        self, T_wc: FloatArray, number: int, exposure: float | None
+        self,
+        T_wc: FloatArray,
+        number: int,
+        exposure: float,
+        *,
+        noise: float | None = None,
+        seconds: float = 0.0,
+    ) -> tuple[ByteArray, NDArray[np.float32]]:
+        grey, depth = self._rendered(self._built, T_wc, number, exposure, noise)
+        for part, world in zip(self._scene.moving, self._built_parts, strict=True):
+            # A part that moves is one that stands still and a camera that moves the other way.
+            T_pc = T_wc.copy()
+            T_pc[:3, 3] -= part.shift(seconds)
+            grey_part, depth_part = self._rendered(world, T_pc, number, exposure, noise)
+            before = (depth_part > 0) & ((depth == 0) | (depth_part < depth))
+            grey, depth = np.where(before, grey_part, grey), np.where(before, depth_part, depth)
+        return grey, depth
+
+    def _rendered(
+        self, world: core.World, T_wc: FloatArray, number: int, exposure: float, noise: float | None
     ) -> tuple[ByteArray, NDArray[np.float32]]:
         camera = self.camera
         width, height = self._size
         grey, depth = core.render(
-            self._built,
+            world,
             inverse_poses(T_wc),
             fx=camera.fx,
             fy=camera.fy,
@@ -264,8 +360,8 @@ class SyntheticSequence(FramesInOrder):
             cy=camera.cy,
             width=width,
             height=height,
-            noise=self.options.noise,
-            exposure=self.options.exposure if exposure is None else exposure,
+            noise=self.options.noise if noise is None else noise,
+            exposure=exposure,
             noise_seed=(self.options.seed << 32) | number,
             threads=self._threads,
         )

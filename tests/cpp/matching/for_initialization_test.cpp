@@ -186,5 +186,54 @@ TEST(MatchForInitializationGolden, WrapAroundKeepsTheSameMatches) {
   EXPECT_EQ(golden_matches(true), golden_output());
 }
 
+std::vector<int> match_all_levels(const std::vector<FeatureSpec>& first,
+                                  const std::vector<FeatureSpec>& current, float moved = 0,
+                                  const ViewMatchOptions& options = {}) {
+  const auto frame_1 = make_synthetic_frame(0, first);
+  const auto frame_2 = make_synthetic_frame(1, current);
+  auto expected = positions_of(*frame_1);
+  for (Eigen::Vector2f& position : expected) position.x() += moved;
+  return match_views(*frame_1, *frame_2, expected, options);
+}
+
+TEST(MatchViews, WhatComesNearerIsFoundOnAHigherLevel) {
+  EXPECT_THAT(match_all_levels({feature(200, 200, 50, 1)}, {feature(205, 200, 50, 3)}),
+              ElementsAre(0));
+  EXPECT_THAT(match_all_levels({feature(200, 200, 50, 1)}, {feature(205, 200, 50, 4)}),
+              ElementsAre(-1));
+}
+
+TEST(MatchViews, CoarseKeypointsAreLeftOut) {
+  EXPECT_THAT(match_all_levels({feature(200, 200, 50, 4)}, {feature(200, 200, 50, 4)}),
+              ElementsAre(-1));
+}
+
+TEST(MatchViews, TheSameCornerOnAnotherLevelDoesNotCompete) {
+  EXPECT_THAT(
+      match_all_levels({feature(200, 200, 50)}, {feature(205, 200, 50), feature(206, 200, 51, 1)}),
+      ElementsAre(0));
+  EXPECT_THAT(
+      match_all_levels({feature(200, 200, 50)}, {feature(205, 200, 55), feature(225, 200, 45)}),
+      ElementsAre(-1));
+}
+
+TEST(MatchViews, SearchesAroundTheExpectedPosition) {
+  ViewMatchOptions narrow;
+  narrow.window = 10;
+  const std::vector<FeatureSpec> current{feature(260, 200, 50)};
+  EXPECT_THAT(match_all_levels({feature(200, 200, 50)}, current, 0, narrow), ElementsAre(-1));
+  EXPECT_THAT(match_all_levels({feature(200, 200, 50)}, current, 55, narrow), ElementsAre(0));
+}
+
+TEST(MatchViews, TheBetterOfTwoWins) {
+  const FeatureSpec good = feature(200, 200, 98), worse = feature(210, 200, 90);
+  EXPECT_THAT(match_all_levels({worse, good}, {feature(205, 205, 100)}), ElementsAre(-1, 0));
+}
+
+TEST(MatchViews, AsksForOnePositionPerKeypoint) {
+  const auto frame = make_synthetic_frame(0, {feature(200, 200, 50)});
+  EXPECT_THROW(match_views(*frame, *frame, {}, {}), StateError);
+}
+
 }  // namespace
 }  // namespace orbslam

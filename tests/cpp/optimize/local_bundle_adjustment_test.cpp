@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <thread>
+#include <tuple>
 
 #include "map/invariants.hpp"
 #include "optimize/bundle_gather.hpp"
@@ -237,6 +238,28 @@ TEST(LocalBundleAdjustment, RepeatsBitByBit) {
   local_bundle_adjustment(a.map, KeyFrameId(5), nullptr);
   local_bundle_adjustment(b.map, KeyFrameId(5), nullptr);
   EXPECT_EQ(a.numbers(), b.numbers());
+}
+
+TEST(GatheredBundle, ManyPointsAreAddedAsEachAlone) {
+  Street street(6);
+  GatheredBundle together(street.map), alone(street.map);
+  for (const int k : {4, 2, 5}) {  // in any order, and with gaps
+    together.add_camera(*street.map.find(KeyFrameId(k)), false);
+    alone.add_camera(*street.map.find(KeyFrameId(k)), false);
+  }
+  std::vector<const MapPoint*> points;
+  for (const MapPointId id : street.points) points.push_back(street.map.find(id));
+  together.add_points(points, street.map);
+  for (const MapPoint* point : points) alone.add_point(*point, street.map);
+  EXPECT_EQ(together.points, alone.points);
+  EXPECT_EQ(together.keypoints, alone.keypoints);
+  ASSERT_EQ(together.problem.observations.size(), alone.problem.observations.size());
+  ASSERT_GT(alone.problem.observations.size(), points.size());
+  for (std::size_t i = 0; i < alone.problem.observations.size(); ++i) {
+    const auto &a = together.problem.observations[i], &b = alone.problem.observations[i];
+    EXPECT_EQ(std::tie(a.camera, a.point, a.u, a.v, a.right_u, a.inverse_sigma2, a.has_depth),
+              std::tie(b.camera, b.point, b.u, b.v, b.right_u, b.inverse_sigma2, b.has_depth));
+  }
 }
 
 TEST(GatheredBundle, CommitSkipsWhatHasDiedMeanwhile) {

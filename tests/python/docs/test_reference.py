@@ -30,7 +30,8 @@ from support.documents import ROOT, cells_of, code_in, headings_of, prose_of, re
 REFERENCE = ROOT / "docs/reference"
 ROOMS = (
     *("settings", "trajectory", "evaluation", "vocabulary", "maps"),
-    *("datasets", "synthetic", "calibration", "runs", "viewer", "recordings", "pictures"),
+    *("datasets", "synthetic", "calibration", "runs", "batches"),
+    *("viewer", "recordings", "pictures"),
 )
 
 

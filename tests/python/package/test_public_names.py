@@ -21,6 +21,7 @@ NAMES = {
     "CameraSettings",
     "DatasetError",
     "DepthSettings",
+    "Evidence",
     "FrameFeatures",
     "FullAdjustmentRecord",
     "ImageError",
@@ -33,6 +34,7 @@ NAMES = {
     "OrbSettings",
     "OrbSlamError",
     "OutputFileError",
+    "PoseMethod",
     "Publisher",
     "Reason",
     "Relocalized",
@@ -46,6 +48,7 @@ NAMES = {
     "TrackingRecord",
     "TrackingState",
     "Trajectory",
+    "Verdict",
     "VideoWriter",
     "Viewer",
     "VocabularyError",
@@ -58,6 +61,7 @@ NAMES = {
     "export_points",
     "export_trajectory",
     "load_vocabulary",
+    "batch",
     "open_sequence",
     "optimize_map",
     "run_sequence",
@@ -162,7 +166,16 @@ def test_names_in_examples_are_public(name: str) -> None:
 
 
 # ---- light doors ---------------------------------------------------------------------------------
-HEAVY = {"numpy", "cv2", "orbslam2py._core", "matplotlib", "typer", "rich"}
+HEAVY = {
+    "numpy",
+    "cv2",
+    "orbslam2py._core",
+    "matplotlib",
+    "typer",
+    "rich",
+    "viser",
+    "multiprocessing",
+}
 
 #: What importing a module may load of these.
 LIGHT: dict[str, set[str]] = {

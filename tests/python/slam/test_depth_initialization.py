@@ -11,6 +11,7 @@ import pytest
 
 from orbslam2py import Reason, _core
 from orbslam2py.slam import initialization
+from orbslam2py.slam.initialization import from_depth
 from support.tracking_scene import (
     FakeCore,
     FakeFrame,
@@ -40,7 +41,7 @@ def test_depth_initializer(
         return 0
 
     fake = SimpleNamespace(Pose=_core.Pose, describe=FakeCore().describe, insert_keyframe=insert)
-    monkeypatch.setattr(initialization, "core", fake)
+    monkeypatch.setattr(from_depth, "core", fake)
     mapping = FakeMapping()
     frame = FakeFrame(0)
     depth = np.full(size, -1, np.float32)

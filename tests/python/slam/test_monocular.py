@@ -31,6 +31,7 @@ UNFIT = {
     Reason.LOW_PARALLAX,
     Reason.AMBIGUOUS_MOTION,
     Reason.DEGENERATE_VIEWS,
+    Reason.NO_THIRD_VIEW,
 }
 
 

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How well tracking holds on: wrong poses believed, starts, losses, honesty of covariances.
+
+Worlds with motions that are hard to follow are played with the three sensors, 400 to 2000
+features and new seeds, small and deterministic, and every pose is compared with the truth.
+`--part block` drives around 320 m of street with sharp corners, at full size. What has been played
+with the present code stands in the CSV file and is not played again.
+
+    python -m benchmarks.holding_on --runs 60
+    python -m benchmarks.holding_on --runs 1000 --sensors stereo rgbd --jobs 2
+    python -m benchmarks.holding_on --part block --runs 10
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+from itertools import islice
+from pathlib import Path
+
+from rich.console import Console
+
+from benchmarks.harness.arguments import (
+    add_counts,
+    add_sensors,
+    add_width,
+    console_of,
+    new_parser,
+)
+from benchmarks.harness.folders import CHECKOUT
+from benchmarks.holding_on.cases import Case, block_cases, motion_cases
+from benchmarks.holding_on.results import (
+    append_row,
+    block_table,
+    motions_table,
+    read_rows,
+    write_rows,
+)
+from benchmarks.holding_on.runs import all_rows
+
+
+def version() -> str:
+    """The present commit, with a ``+`` if files differ from it."""
+    command = ["git", "describe", "--always", "--abbrev=7", "--dirty=+", "--exclude=*"]
+    return subprocess.run(
+        command, cwd=CHECKOUT, capture_output=True, text=True, check=True
+    ).stdout.strip()
+
+
+def main() -> None:
+    parser = new_parser(__doc__)
+    parser.add_argument("--part", choices=("motions", "block"), default="motions", help="[motions]")
+    add_counts(parser, runs=(60, "how many"), jobs=(1, "processes at once"))
+    add_sensors(parser)
+    parser.add_argument("--only", metavar="TEXT", help="situations with this text in their name")
+    parser.add_argument("--csv", type=Path, help="file of all runs [build/holding_on/COMMIT.csv]")
+    parser.add_argument("--again", action="store_true", help="play what is in the file, too")
+    add_width(parser)
+    arguments = parser.parse_args()
+    run(arguments, console_of(arguments))
+
+
+def run(arguments: argparse.Namespace, console: Console) -> None:
+    commit = version()
+    path: Path = arguments.csv or CHECKOUT / "build" / "holding_on" / f"{commit}.csv"
+    cases = chosen_cases(arguments)
+    rows = {} if arguments.again else read_rows(path)
+    write_rows(path, rows.values())
+    missing = [case for case in cases if case.key not in rows]
+    for done, row in enumerate(all_rows(missing, arguments.jobs), 1):
+        rows[row["key"]] = row
+        append_row(path, row)
+        console.print(
+            f"{done} of {len(missing)}: {row['key']}: {row['tracked']} of {row['trackable']} "
+            f"tracked, {row['wrong']} wrong, {row['seconds']:.1f} s",
+            highlight=False,
+        )
+    present = [rows[case.key] for case in cases]
+    table = block_table if arguments.part == "block" else motions_table
+    console.print(table(present, f"Holding on, {len(present)} runs of {commit}"))
+    console.print(f"All runs: {path}", soft_wrap=True)
+
+
+def chosen_cases(arguments: argparse.Namespace) -> list[Case]:
+    if arguments.part == "block":
+        return list(block_cases(arguments.runs))
+    every = motion_cases(arguments.sensors)
+    if arguments.only is None:
+        return list(islice(every, arguments.runs))
+    named = (case for case in islice(every, 100_000) if arguments.only in case.situation.name)
+    return list(islice(named, arguments.runs))
+
+
+if __name__ == "__main__":
+    main()

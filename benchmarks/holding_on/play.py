@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A run, and what is known of every frame of it."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+import orbslam2py as orb
+from benchmarks.holding_on.cases import Case
+from orbslam2py.datasets import Images
+from orbslam2py.settings import Sensor
+from orbslam2py.slam.records import TrackingRecord
+from orbslam2py.synthetic import SyntheticSequence
+from orbslam2py.trajectory.rotations import inverse_poses
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Played:
+    """A run.
+
+    Attributes
+    ----------
+    sequence
+        What was played.
+    truth
+        ``T_cw`` of every frame, (n, 4, 4).
+    posed
+        Frames with a pose, (n,).
+    T_cw
+        Poses as they were told at once, (n, 4, 4); NaN without one.
+    covariance
+        (n, 6, 6) rotation, translation; NaN without one.
+    keyframe
+        Frames that became keyframes, (n,).
+    map_index
+        (n,) which map the pose is in.
+    changed
+        Frames before which a loop had moved the map, (n,).
+    covered
+        Frames with a hand over the lens, (n,).
+    path
+        Final pose ``T_wc`` of every frame of the last map, (n, 4, 4); NaN without one.
+    loops, seconds
+        Loops closed, and wall-clock time of it all.
+    """
+
+    sequence: SyntheticSequence
+    truth: Floats
+    posed: Flags
+    T_cw: Floats
+    covariance: Floats
+    keyframe: Flags
+    map_index: NDArray[np.int64]
+    changed: Flags
+    covered: Flags
+    path: Floats
+    loops: int
+    seconds: float
+
+
+def play(case: Case) -> Played:
+    """Run a case from its first frame to its last; two runs give the same."""
+    began = time.perf_counter()
+    sequence = case.sequence()
+    n = len(sequence)
+    records: list[TrackingRecord] = []
+    changes = np.zeros(n, np.int64)
+    settings = case.settings(sequence)
+    system = orb.System(settings, case.sensor, deterministic=True, seed=case.seed)
+    with system as slam:
+        for i, timestamp in enumerate(sequence.timestamps):
+            records.append(_tracked(slam, sequence.load(i), float(timestamp)))
+            changes[i] = slam.pipeline.back_end.map.big_change_index
+    path = np.full((n, 4, 4), np.nan)
+    last = system.trajectory()
+    path[_indices(sequence, last.timestamps)] = last.T_wc
+    path[_indices(sequence, last.timestamps[last.lost])] = np.nan
+    nowhere, unknown = np.full((4, 4), np.nan), np.full((6, 6), np.nan)
+    return Played(
+        sequence=sequence,
+        truth=inverse_poses(sequence.ground_truth().T_wc),
+        posed=np.array([r.T_cw is not None for r in records]),
+        T_cw=np.stack([nowhere if r.T_cw is None else r.T_cw for r in records]),
+        covariance=np.stack([unknown if r.covariance is None else r.covariance for r in records]),
+        keyframe=np.array([r.is_keyframe for r in records]),
+        map_index=np.array([r.map_index for r in records]),
+        changed=np.diff(changes, prepend=0) != 0,
+        covered=np.array([sequence.covered(i) for i in range(n)]),
+        path=path,
+        loops=system.n_loops_closed,
+        seconds=time.perf_counter() - began,
+    )
+
+
+def _tracked(slam: orb.System, images: Images, timestamp: float) -> TrackingRecord:
+    if slam.sensor is Sensor.STEREO:
+        assert images.right is not None
+        return slam.track_stereo(images.image, images.right, timestamp)
+    if slam.sensor is Sensor.RGBD:
+        assert images.depth is not None
+        return slam.track_rgbd(images.image, images.depth, timestamp)
+    return slam.track_monocular(images.image, timestamp)
+
+
+def _indices(sequence: SyntheticSequence, timestamps: Floats) -> NDArray[np.int64]:
+    found: NDArray[np.int64] = np.searchsorted(sequence.timestamps, timestamps - 1e-6)
+    return found

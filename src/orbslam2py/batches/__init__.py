@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Many sequences, settings and seeds: one command, one table."""
+
+from orbslam2py.batches.batch import BatchResult, batch
+from orbslam2py.batches.jobs import Job, make_jobs, read_jobs
+from orbslam2py.batches.summary import Group, Spread, summarise
+
+__all__ = [
+    "BatchResult",
+    "Group",
+    "Job",
+    "Spread",
+    "batch",
+    "make_jobs",
+    "read_jobs",
+    "summarise",
+]

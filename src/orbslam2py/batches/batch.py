@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Many runs, one table: on all cores of this computer, or on a cluster."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from orbslam2py._arguments import path_of
+from orbslam2py._files import atomic_write, reason_of
+from orbslam2py.batches.engine import open_workers, run_on
+from orbslam2py.batches.jobs import Job, make_jobs, read_jobs
+from orbslam2py.batches.summary import Group, summarise
+from orbslam2py.batches.table import write_table
+from orbslam2py.batches.work import read_row, run_job
+from orbslam2py.errors import DatasetError
+
+Progress = Callable[[dict[str, Any], int, int], None]
+
+#: Marks the folder of a batch.
+BATCH_FILE = "batch.json"
+
+
+@dataclass(frozen=True)
+class BatchResult:
+    """A batch that has ended.
+
+    Attributes
+    ----------
+    folder
+        Where the table is, and a folder with the runs.
+    rows
+        What is in the table, a dictionary a run.
+    n_left
+        Runs that were not made because the batch was stopped.
+    files
+        The files of the table.
+    """
+
+    folder: Path
+    rows: list[dict[str, Any]]
+    n_left: int
+    files: list[Path]
+
+    @property
+    def groups(self) -> list[Group]:
+        """Runs that differ in their seeds alone, with median and range."""
+        return summarise(self.rows)
+
+    @property
+    def n_failed(self) -> int:
+        """How many runs failed."""
+        return sum(row["state"] != "done" for row in self.rows)
+
+
+def batch(
+    jobs: str | Path | Mapping[str, Any],
+    output: str | Path | None = None,
+    *,
+    resume: bool = False,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    memory_limit: str | None = None,
+    report_pages: bool = False,
+    progress: Progress | None = None,
+    stop: threading.Event | None = None,
+) -> BatchResult:
+    """Run many sequences with many settings and seeds, and write one table of all runs.
+
+    Parameters
+    ----------
+    jobs
+        A job file (YAML), or a dictionary with the same keys.
+    output
+        Folder for the results; by default the ``output`` that the jobs name.
+    resume
+        Go on in a folder that has results: what was finished is not run again.
+    scheduler
+        Address of a running Dask scheduler (``tcp://HOST:PORT``); by default workers are started on
+        this computer.
+    workers
+        How many to start; by default one a core. 0: run in this process, one after the other.
+    memory_limit
+        Of each worker that is started, such as ``4GB``.
+    report_pages
+        Write ``report.html`` for every run.
+    progress
+        Called after each run with its row, and how many of how many have ended.
+    stop
+        When it is set no more runs begin, and those that run are waited for.
+
+    Returns
+    -------
+    BatchResult
+        Also if runs failed: their rows say why.
+
+    Raises
+    ------
+    SettingsError
+        If the jobs are wrong, or Dask is not installed.
+    DatasetError
+        If a sequence is not there, the folder cannot take results, or the scheduler cannot be
+        reached.
+    OSError
+        If the table cannot be written.
+
+    Examples
+    --------
+    >>> done = orb.batch({"sequences": ["lap"], "seeds": 5}, "runs/laps")  # doctest: +SKIP
+    >>> done.groups[0].ate_rmse_m.median  # doctest: +SKIP
+    0.0112
+    """
+    if isinstance(jobs, Mapping):
+        wanted = make_jobs(jobs)
+        named = None if jobs.get("output") is None else Path(str(jobs["output"]))
+    else:
+        wanted, named = read_jobs(path_of(jobs, "the job file"))
+    folder = named if output is None else path_of(output, "output")
+    if folder is None:
+        raise DatasetError("there is no folder for the results; give --output")
+    folder = folder.absolute()
+    _prepare(folder, resume=resume)
+    rows = {job.key: row for job in wanted if (row := read_row(folder, job)) is not None}
+    left = [job for job in wanted if job.key not in rows]
+    stop = stop or threading.Event()
+    for job, row in _ended(left, folder, stop, scheduler, workers, memory_limit, page=report_pages):
+        rows[job.key] = row
+        if progress is not None:
+            progress(row, len(rows), len(wanted))
+    table = [rows[job.key] for job in wanted if job.key in rows]
+    files = write_table(folder, table)
+    return BatchResult(folder, table, len(wanted) - len(table), files)
+
+
+def _ended(
+    jobs: list[Job],
+    folder: Path,
+    stop: threading.Event,
+    scheduler: str | None,
+    workers: int | None,
+    memory_limit: str | None,
+    *,
+    page: bool,
+) -> Iterator[tuple[Job, dict[str, Any]]]:
+    if not jobs:
+        return
+    if workers == 0 and scheduler is None:
+        for job in jobs:
+            if stop.is_set():
+                return
+            yield job, run_job(job, str(folder), page=page)
+        return
+    if workers is not None:
+        workers = min(workers, len(jobs))
+    with open_workers(scheduler, workers, memory_limit) as client:
+        yield from run_on(client, jobs, folder, stop, page=page)
+
+
+def _prepare(folder: Path, *, resume: bool) -> None:
+    """Make the folder of a batch, or see that it is one that may be gone on with."""
+    if folder.exists() and not folder.is_dir():
+        raise DatasetError(f"{folder} is a file; give the name of a folder")
+    is_batch = (folder / BATCH_FILE).is_file()
+    if folder.is_dir() and any(folder.iterdir()):
+        if not is_batch:
+            raise DatasetError(f"{folder} is not empty and holds no batch; give another folder")
+        if not resume:
+            raise DatasetError(
+                f"{folder} holds a batch already; go on with --resume, or give another folder"
+            )
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with atomic_write(folder / BATCH_FILE) as stream:
+            json.dump({"what": "runs of orbslam2py batch"}, stream)
+    except OSError as error:
+        raise DatasetError(
+            f"cannot write to {folder}: {reason_of(error)}; give another folder"
+        ) from error

@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a batch is to run: sequences, sensors, settings, options, sweeps and seeds, as a product."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import glob
+import hashlib
+import itertools
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from orbslam2py._arguments import cannot_open, is_whole, seed_of, shown
+from orbslam2py.batches.sweep import Sweep, read_sweep
+from orbslam2py.errors import DatasetError, SettingsError
+from orbslam2py.runs.options import RunOptions
+from orbslam2py.settings import Sensor
+from orbslam2py.slam.options import SystemOptions
+
+_KEYS = ("sequences", "sensors", "settings", "options", "seeds", "sweep", "output")
+_SEQUENCE_KEYS = ("path", "name", "sensor", "settings", "topics")
+#: Options of a run that a batch may have.
+RUN_OPTIONS = ("start", "stride", "max_frames", "realtime", "final_adjustment")
+SYSTEM_OPTIONS = (
+    *("deterministic", "loop_closing", "full_adjustment"),
+    *("full_adjustment_time_limit", "check_calibration"),
+)
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run of a batch.
+
+    Attributes
+    ----------
+    path
+        The sequence.
+    name
+        Its name in the table.
+    sensor
+        ``mono``, ``stereo`` or ``rgbd``; None for the richest there are images for.
+    settings
+        A file or a built-in name; None for what the sequence tells.
+    topics
+        Of a bag.
+    options
+        Options of the run that are not the usual ones.
+    parameters
+        Keys of the settings that are swept, and their values in this run.
+    seed
+        Seed of the run.
+    """
+
+    path: str
+    name: str
+    sensor: str | None = None
+    settings: str | None = None
+    topics: str | None = None
+    options: tuple[tuple[str, Any], ...] = ()
+    parameters: tuple[tuple[str, float], ...] = ()
+    seed: int = 0
+
+    @property
+    def key(self) -> str:
+        """Name of its folder."""
+        parts = [self.name, self.sensor or "", Path(self.settings or "").stem]
+        parts += [f"{name}={_short(value)}" for name, value in (*self.options, *self.parameters)]
+        return "-".join([_plain(part) for part in parts if part] + [f"seed{self.seed}"])
+
+    @property
+    def setting(self) -> str:
+        """What the runs with other seeds have in common."""
+        return self.key.removesuffix(f"-seed{self.seed}")
+
+    @property
+    def fingerprint(self) -> str:
+        """Tells this job from another one in the same folder."""
+        text = json.dumps(dataclasses.asdict(self), sort_keys=True, default=str)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+    def run_options(self, sensor: Sensor) -> RunOptions:
+        """Return the options of the run.
+
+        Raises
+        ------
+        SettingsError, DatasetError
+            If they make no sense.
+        """
+        given = dict(self.options)
+        system = SystemOptions(
+            seed=self.seed, **{name: given[name] for name in SYSTEM_OPTIONS if name in given}
+        )
+        return RunOptions(
+            sensor, system, **{name: given[name] for name in RUN_OPTIONS if name in given}
+        )
+
+
+def read_jobs(path: Path) -> tuple[list[Job], Path | None]:
+    """Read a job file.
+
+    Parameters
+    ----------
+    path
+        A YAML file; paths in it are relative to its folder.
+
+    Returns
+    -------
+    jobs, output
+        The runs in their order, and the folder for the results if the file names one.
+
+    Raises
+    ------
+    SettingsError
+        If the file cannot be read or is wrong.
+    DatasetError
+        If a sequence is not there.
+    """
+    try:
+        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SettingsError(cannot_open(path, error, "job file")) from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise SettingsError(f"{path} is no YAML: {error}; correct it") from error
+    if not isinstance(document, Mapping):
+        raise SettingsError(f"{path} holds no named values; it needs at least 'sequences:'")
+    try:
+        jobs = make_jobs(document, path.parent)
+    except (SettingsError, DatasetError) as error:
+        raise type(error)(f"{path}: {error}") from error
+    output = document.get("output")
+    return jobs, None if output is None else path.parent / str(output)
+
+
+def make_jobs(document: Mapping[str, Any], folder: Path | None = None) -> list[Job]:
+    """Make the runs that a job file, or a dictionary like one, asks for.
+
+    Parameters
+    ----------
+    document
+        ``sequences`` and, if wanted, ``sensors``, ``settings``, ``options``, ``seeds``, ``sweep``.
+    folder
+        What paths are relative to; the present one if None.
+
+    Raises
+    ------
+    SettingsError
+        For unknown keys and values that make no sense, or if two jobs have one folder.
+    DatasetError
+        If a sequence is not there.
+    """
+    folder = folder or Path()
+    _refuse_unknown(document, _KEYS, "key")
+    sequences = _listed(document.get("sequences"))
+    if not sequences:
+        raise SettingsError("there are no sequences; name some with 'sequences: [PATH, ...]'")
+    sensors = _listed(document.get("sensors")) or [None]
+    settings = _listed(document.get("settings")) or [None]
+    seeds = _seeds(document.get("seeds", 1))
+    options = list(_options(document.get("options") or {}))
+    sweep = read_sweep(document["sweep"]) if "sweep" in document else Sweep()
+    jobs = []
+    for one in itertools.chain.from_iterable(_sequences(entry, folder) for entry in sequences):
+        mine = [one["sensor"]] if "sensor" in one else sensors
+        own = [one["settings"]] if "settings" in one else settings
+        for sensor, setting, option, parameters in itertools.product(
+            mine, own, options, sweep.points()
+        ):
+            job = Job(
+                one["path"],
+                one["name"],
+                None if sensor is None else str(Sensor(sensor)),
+                None if setting is None else _settings_name(str(setting), folder),
+                one.get("topics"),
+                option,
+                parameters,
+            )
+            jobs += [dataclasses.replace(job, seed=seed) for seed in seeds]
+    for job in jobs:
+        job.run_options(Sensor.MONOCULAR)  # says now what would fail in every run
+    _require_own_folders(jobs)
+    return jobs
+
+
+def _sequences(entry: Any, folder: Path) -> Iterator[dict[str, Any]]:
+    if isinstance(entry, Mapping):
+        _refuse_unknown(entry, _SEQUENCE_KEYS, "key of a sequence")
+        if "path" not in entry:
+            raise SettingsError(f"a sequence has no path: {dict(entry)}; add 'path: ...'")
+        values = dict(entry)
+    else:
+        values = {"path": entry}
+    pattern = str(folder / str(values["path"]))
+    # Not Path.glob: patterns may be absolute.
+    found = sorted(glob.glob(pattern)) if glob.has_magic(pattern) else [pattern]  # noqa: PTH207
+    if not found:
+        raise DatasetError(f"nothing matches {pattern}; correct the pattern")
+    if "name" in values and len(found) > 1:
+        raise SettingsError(
+            f"{len(found)} sequences match {pattern}, all to be called {values['name']}; leave "
+            "out the name"
+        )
+    for path in found:
+        if not Path(path).exists():
+            raise DatasetError(f"{path} does not exist; correct the path of the sequence")
+        name = values.get("name") or Path(path).resolve().name.partition(".")[0]
+        yield {**values, "path": str(Path(path).absolute()), "name": str(name)}
+
+
+def _options(values: Any) -> Iterator[tuple[tuple[str, Any], ...]]:
+    """Yield all combinations of options; a list stands for several values."""
+    if not isinstance(values, Mapping):
+        raise SettingsError(
+            f"options are {shown(values)}; give 'NAME: VALUE' in lines of their own"
+        )
+    _refuse_unknown(values, (*RUN_OPTIONS, *SYSTEM_OPTIONS), "option")
+    names = sorted(values)
+    for combination in itertools.product(*(_listed(values[name], keep=True) for name in names)):
+        yield tuple(zip(names, combination, strict=True))
+
+
+def _seeds(value: Any) -> list[int]:
+    if is_whole(value):
+        if value < 1:
+            raise SettingsError(f"seeds is {value}; give how many runs, or a list of seeds")
+        return list(range(value))
+    seeds = [seed_of(one, "a seed") for one in _listed(value)]
+    if not seeds or len(set(seeds)) < len(seeds):
+        raise SettingsError("seeds must be a number of runs, or a list of different seeds")
+    return seeds
+
+
+def _settings_name(name: str, folder: Path) -> str:
+    """A file beside the job file, or a built-in name."""
+    path = folder / name
+    return str(path.absolute()) if path.exists() else name
+
+
+def _listed(value: Any, *, keep: bool = False) -> list[Any]:
+    if value is None:
+        return [None] if keep else []
+    return list(value) if isinstance(value, Sequence) and not isinstance(value, str) else [value]
+
+
+def _refuse_unknown(values: Mapping[str, Any], known: Sequence[str], what: str) -> None:
+    for name in values:
+        if name not in known:
+            near = difflib.get_close_matches(str(name), known, 1)
+            hint = f"; did you mean {near[0]}?" if near else f"; there are {', '.join(known)}"
+            raise SettingsError(f"unknown {what} '{name}'{hint}")
+
+
+def _require_own_folders(jobs: list[Job]) -> None:
+    by_key: dict[str, Job] = {}
+    for job in jobs:
+        other = by_key.setdefault(job.key, job)
+        if other is not job:
+            both = f"{other.path} and {job.path}" if other.path != job.path else f"{job.path} twice"
+            raise SettingsError(
+                f"two runs would have the folder {job.key}: {both}; give the sequences names of "
+                "their own ('path: ..., name: ...')"
+            )
+
+
+def _short(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value).lower()
+
+
+def _plain(text: str) -> str:
+    """Leave only what is harmless in names of files."""
+    return re.sub(r"[^A-Za-z0-9_.=+]+", "_", text)

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Keys of the settings that are varied: all combinations of a grid, or random draws."""
+
+from __future__ import annotations
+
+import difflib
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from orbslam2py._arguments import is_number, is_whole, seed_of, shown
+from orbslam2py.errors import SettingsError
+from orbslam2py.settings import Settings
+from orbslam2py.settings.keys import KEYS
+
+_KEYS = {key.name: key for key in KEYS}
+_RANGE_KEYS = ("from", "to", "log")
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Points in the space of some keys of the settings.
+
+    Attributes
+    ----------
+    grid
+        Values by key.
+    ranges
+        Lower and upper end by key, and whether draws are even in the logarithm.
+    n_draws
+        How many random draws; 0: all points of the grid.
+    seed
+        Seed of the draws.
+    """
+
+    grid: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    ranges: tuple[tuple[str, float, float, bool], ...] = ()
+    n_draws: int = 0
+    seed: int = 0
+
+    def points(self) -> Iterator[tuple[tuple[str, float], ...]]:
+        """Yield the values of each point; one without any if nothing is swept."""
+        if not self.n_draws:
+            names = [name for name, _ in self.grid]
+            for values in itertools.product(*(values for _, values in self.grid)):
+                yield tuple(zip(names, values, strict=True))
+            return
+        random = np.random.default_rng(self.seed)
+        for _ in range(self.n_draws):
+            point = [(name, values[random.integers(len(values))]) for name, values in self.grid]
+            for name, low, high, even_in_logarithm in self.ranges:
+                if even_in_logarithm:
+                    value = math.exp(random.uniform(math.log(low), math.log(high)))
+                else:
+                    value = float(random.uniform(low, high))
+                point.append((name, _rounded(name, value)))
+            yield tuple(sorted(point))
+
+
+def read_sweep(values: Any) -> Sweep:
+    """Read the section ``sweep`` of a job file.
+
+    Parameters
+    ----------
+    values
+        Keys of the settings with a list of values, or with ``from`` and ``to`` (and ``log: true``);
+        ``random`` with the number of draws, and ``seed``.
+
+    Raises
+    ------
+    SettingsError
+        If a key is none, or values make no sense.
+    """
+    if not isinstance(values, Mapping) or not values:
+        raise SettingsError("sweep is empty; give 'KEY: [VALUE, ...]' with keys of the settings")
+    n_draws = values.get("random", 0)
+    if not is_whole(n_draws) or n_draws < 0:
+        raise SettingsError(f"sweep: random is {shown(n_draws)}; give how many draws")
+    grid, ranges = [], []
+    for name, value in values.items():
+        if name in ("random", "seed"):
+            continue
+        if name not in _KEYS:
+            near = difflib.get_close_matches(str(name), _KEYS, 1, 0.5)
+            hint = f"did you mean {near[0]}?" if near else "see 'orbslam2py settings show tum1'"
+            raise SettingsError(f"sweep: '{name}' is no key of the settings; {hint}")
+        if isinstance(value, Mapping):
+            ranges.append((name, *_range(name, value)))
+        else:
+            listed = value if isinstance(value, list) else [value]
+            if not listed or not all(is_number(one) for one in listed):
+                raise SettingsError(f"sweep: {name} is {shown(value)}; give a list of numbers")
+            grid.append((name, tuple(listed)))
+    if ranges and not n_draws:
+        raise SettingsError(
+            f"sweep: {ranges[0][0]} has a range; add 'random: N' for N draws, or list its values"
+        )
+    seed = seed_of(values.get("seed", 0), "sweep: seed")
+    return Sweep(tuple(sorted(grid)), tuple(sorted(ranges)), int(n_draws), seed)
+
+
+def with_parameters(settings: Settings, parameters: tuple[tuple[str, float], ...]) -> Settings:
+    """Return settings with other values of some keys.
+
+    Raises
+    ------
+    SettingsError
+        If a value is not allowed, or the settings have no such group.
+    """
+    for name, value in parameters:
+        key = _KEYS[name]
+        group = getattr(settings, key.group)
+        if group is None:
+            raise SettingsError(f"{name} is not used by {settings.sensor}; leave it out of sweep")
+        changed = replace(group, **{key.field: key.kind(value)})
+        settings = replace(settings, **{key.group: changed})
+    return settings
+
+
+def _range(name: str, value: Mapping[str, Any]) -> tuple[float, float, bool]:
+    low, high = value.get("from"), value.get("to")
+    wrong = set(value) - set(_RANGE_KEYS)
+    if wrong or not (is_number(low) and is_number(high)):
+        raise SettingsError(f"sweep: {name} needs numbers 'from' and 'to' (and 'log: true')")
+    assert low is not None
+    assert high is not None
+    logarithm = bool(value.get("log", False))
+    if not low < high or (logarithm and low <= 0):
+        raise SettingsError(
+            f"sweep: {name} goes from {low} to {high}; 'from' must be less than 'to'"
+            + (", and above 0 for log" if logarithm else "")
+        )
+    return float(low), float(high), logarithm
+
+
+def _rounded(name: str, value: float) -> float:
+    """Whole numbers for keys that have such, else four digits: names of folders stay short."""
+    return round(value) if _KEYS[name].kind is int else float(f"{value:.4g}")

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The results of a batch as one table: SQLite, CSV, and Parquet where pyarrow is installed."""
+
+from __future__ import annotations
+
+import csv
+import importlib
+import importlib.util
+import secrets
+import sqlite3
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from orbslam2py._files import atomic_write
+from orbslam2py.batches.work import MEASURED
+
+#: Columns that come first, in this order.
+_FIRST = ("run", "sequence", "sensor", "settings", "seed", "state", "reason", "tracked", "frames")
+
+
+def columns_of(rows: Iterable[dict[str, Any]]) -> list[str]:
+    """Return the columns of all rows: what they are of, the figures, and last what was measured."""
+    names = {name for row in rows for name in row}
+    measured = [name for name in sorted(names) if _is_measured(name)]
+    first = [name for name in _FIRST if name in names]
+    swept = sorted(name for name in names if name.startswith(("option.", "sweep.")))
+    known = {*measured, *first, *swept}
+    return [*first[:5], *swept, *first[5:], *sorted(names - known), *measured]
+
+
+def _is_measured(name: str) -> bool:
+    return name in MEASURED or name.startswith("milliseconds.")
+
+
+def write_table(folder: Path, rows: list[dict[str, Any]]) -> list[Path]:
+    """Write ``results.sqlite``, ``results.csv`` and, with pyarrow, ``results.parquet``.
+
+    Rows are in the order of their names, whatever the order in which the runs ended.
+
+    Returns
+    -------
+    list of Path
+        The files.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be written.
+    """
+    rows = sorted(rows, key=lambda row: str(row["run"]))
+    columns = columns_of(rows)
+    files = [folder / "results.csv", folder / "results.sqlite"]
+    with atomic_write(files[0]) as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows([_text(row.get(name)) for name in columns] for row in rows)
+    _write_database(files[1], columns, rows)
+    if importlib.util.find_spec("pyarrow") is not None:
+        files.append(folder / "results.parquet")
+        _write_parquet(files[-1], columns, rows)
+    return files
+
+
+def _text(value: Any) -> Any:
+    return "" if value is None else str(value).lower() if isinstance(value, bool) else value
+
+
+def _write_database(path: Path, columns: list[str], rows: list[dict[str, Any]]) -> None:
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
+    try:
+        database = sqlite3.connect(temporary)
+        try:
+            names = ", ".join(f'"{name}"' for name in columns)
+            database.execute(f'CREATE TABLE results ({names}, PRIMARY KEY ("run"))')
+            marks = ", ".join("?" * len(columns))
+            values = ([row.get(name) for name in columns] for row in rows)
+            database.executemany(f"INSERT INTO results VALUES ({marks})", values)
+            database.commit()
+        except sqlite3.Error as error:
+            raise OSError(f"cannot write {path}: {error}; make room there") from error
+        finally:
+            database.close()
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _write_parquet(path: Path, columns: list[str], rows: list[dict[str, Any]]) -> None:
+    arrow = importlib.import_module("pyarrow")
+    parquet = importlib.import_module("pyarrow.parquet")
+    arrays = {}
+    for name in columns:
+        values = [row.get(name) for row in rows]
+        kinds = {type(value) for value in values if value is not None}
+        if kinds == {int, float}:
+            values = [None if value is None else float(value) for value in values]
+        elif len(kinds) > 1:
+            values = [None if value is None else str(value) for value in values]
+        arrays[name] = arrow.array(values)
+    with atomic_write(path, binary=True) as stream:
+        parquet.write_table(arrow.table(arrays), stream)

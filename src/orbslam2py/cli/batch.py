@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``orbslam2py batch``: many runs, one table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from orbslam2py.batches import BatchResult, Spread
+from orbslam2py.batches import batch as run_batch
+from orbslam2py.cli.display import log_to
+from orbslam2py.cli.exit_codes import ExitCode
+from orbslam2py.cli.interrupts import StopOnInterrupt
+
+EXAMPLE = """
+**Example**
+
+    orbslam2py batch jobs.yaml --output runs/night
+
+    orbslam2py batch jobs.yaml --output runs/night --resume
+"""
+
+
+def batch(
+    jobs: Annotated[Path, typer.Argument(help="Job file (YAML): sequences, options, seeds.")],
+    output: Annotated[
+        Path | None, typer.Option(help="Folder for the results [that of the job file].")
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on: what was finished is not run again.")
+    ] = False,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            help="A running Dask scheduler [workers on this computer].", metavar="tcp://HOST:PORT"
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            help="Workers to start [one a core]; 0: none, one run after the other.", min=0
+        ),
+    ] = None,
+    memory_limit: Annotated[
+        str | None, typer.Option(help="Of each worker, such as 4GB.", metavar="SIZE")
+    ] = None,
+    report_pages: Annotated[
+        bool, typer.Option("--report-pages", help="Write report.html for every run.")
+    ] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
+) -> None:
+    """Run many sequences, settings and seeds on all cores or a cluster; write one table."""
+    console, errors = Console(quiet=quiet), Console(stderr=True)
+    log_to(errors, quiet=True)  # what single runs say is in their folders
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    with (
+        StopOnInterrupt() as interrupt,
+        Progress(*columns, TimeRemainingColumn(), console=console, transient=True) as bar,
+    ):
+        task = bar.add_task("Runs", total=None)
+
+        def progress(row: dict[str, Any], done: int, total: int) -> None:
+            if row["state"] != "done":
+                console.print(f"[red]failed[/] {escape(row['run'])}: {escape(str(row['reason']))}")
+            ending = "; waiting for those that run" if interrupt.event.is_set() else ""
+            bar.update(task, completed=done, total=total, description=f"Runs{ending}")
+
+        done = run_batch(
+            jobs,
+            output,
+            resume=resume,
+            scheduler=scheduler,
+            workers=workers,
+            memory_limit=memory_limit,
+            report_pages=report_pages,
+            progress=progress,
+            stop=interrupt.event,
+        )
+    console.print(_table(done))
+    console.print(f"Results are in {escape(str(done.files[0]))}", highlight=False, soft_wrap=True)
+    if done.n_left:
+        errors.print(f"{done.n_left} runs are left; go on with --resume", highlight=False)
+        raise typer.Exit(ExitCode.INTERRUPTED)
+    if done.n_failed:
+        raise typer.Exit(ExitCode.FAILED)
+
+
+batch.__doc__ = f"{batch.__doc__}\n{EXAMPLE}"
+
+
+def _table(done: BatchResult) -> Table:
+    table = Table(title=f"{len(done.rows)} runs, {done.n_failed} failed")
+    table.add_column("run")
+    for name in ("runs", "failed", "ATE [m]", "tracked [%]", "frames/s", "memory [MB]"):
+        table.add_column(name, justify="right")
+    for group in done.groups:
+        table.add_row(
+            escape(group.setting),
+            str(group.n_runs),
+            str(group.n_failed) if group.n_failed else "",
+            _spread(group.ate_rmse_m, 4),
+            _spread(group.tracked_fraction, 1, 100),
+            _spread(group.frames_per_second, 1),
+            _spread(group.peak_memory_mb, 0),
+        )
+    return table
+
+
+def _spread(spread: Spread | None, digits: int, factor: float = 1.0) -> str:
+    """Median, and the range behind it if there is one."""
+    if spread is None:
+        return ""
+    median, least, most = (factor * x for x in (spread.median, spread.least, spread.most))
+    text = f"{median:.{digits}f}"
+    return text if least == most else f"{text} ({least:.{digits}f}-{most:.{digits}f})"

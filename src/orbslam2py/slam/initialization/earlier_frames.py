@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The frames before a single camera's map began, tracked in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from orbslam2py import _core as core
+from orbslam2py.slam.pose_search import PoseSearch
+
+_PATIENCE = 5  # frames that may be missing between those that are found
+
+
+class EarlierFrames:
+    """Tracks frames from the first keyframe on, forwards and backwards.
+
+    Parameters
+    ----------
+    search : PoseSearch, optional
+        The ways to a pose; its own, not the tracker's. Without one no frame is tracked.
+    """
+
+    def __init__(self, search: PoseSearch | None) -> None:
+        self._search = search
+        self._tracked: tuple[core.TrackedFrame, ...] = ()
+
+    def take(self) -> tuple[core.TrackedFrame, ...]:
+        """What was tracked, in the order of time; once."""
+        tracked, self._tracked = self._tracked, ()
+        return tracked
+
+    def track(self, history: list[core.TrackedFrame], first: core.TrackedFrame) -> None:
+        """Give poses to the frames of a history before its last, as far as they are found.
+
+        Parameters
+        ----------
+        history : list of TrackedFrame
+            In the order of time; the last one has begun the map.
+        first : TrackedFrame
+            The first view, which is in the history and has its pose.
+        """
+        if self._search is None:
+            return
+        at = next(i for i, frame in enumerate(history) if frame.id == first.id)
+        before = self._follow(first, reversed(history[:at]))
+        between = self._follow(first, history[at + 1 : -1])
+        self._tracked = (*reversed(before), first, *between)
+
+    def _follow(
+        self, first: core.TrackedFrame, frames: Iterable[core.TrackedFrame]
+    ) -> list[core.TrackedFrame]:
+        """Track one frame after the other until several are not found."""
+        search = self._search
+        assert search is not None
+        search.reset()
+        search.reference_keyframe = first.reference_keyframe
+        search.motion.remember(first)
+        tracked: list[core.TrackedFrame] = []
+        missed = 0
+        for frame in frames:
+            if self._found(search, frame):
+                tracked.append(frame)
+                missed = 0
+                continue
+            missed += 1
+            if missed > _PATIENCE:
+                break
+            search.motion.lose()
+            frame.clear_associations()
+            frame.T_cw = None
+        return tracked
+
+    def _found(self, search: PoseSearch, frame: core.TrackedFrame) -> bool:
+        search.follow_map()
+        estimate = search.by_motion_model(frame)
+        if not estimate.found:
+            frame.clear_associations()
+            estimate = search.by_reference_keyframe(frame)
+        if estimate.found:
+            refined = search.in_local_map(frame, estimate)
+            search.settle(refined)
+            estimate = refined.estimate
+        if not estimate.found:
+            return False
+        frame.discard_outliers()
+        last = search.motion.last
+        assert last.T_cw is not None and frame.T_cw is not None
+        # Not update_velocity: the numbers of the frames may fall.
+        search.motion.velocity = frame.T_cw @ last.T_cw.inverse()
+        search.motion.remember(frame)
+        return True

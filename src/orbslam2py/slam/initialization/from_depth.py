@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A map from one frame of a sensor that sees depth.
+
+Mur-Artal and Tardos, 2017, section III-B; ``docs/method/start.md#depth-sensors``.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+
+import numpy as np
+
+from orbslam2py import _core as core
+from orbslam2py._arrays import FloatArray
+from orbslam2py.slam.local_mapping import LocalMapping
+from orbslam2py.slam.records import Reason
+from orbslam2py.slam.thresholds import InitializationThresholds
+
+_log = logging.getLogger(__name__)
+
+
+class DepthInitializer:
+    """Begins a map from one frame of a sensor that sees depth (ORB-SLAM2, section III-B).
+
+    The camera's frame becomes the world's frame.
+
+    Parameters
+    ----------
+    slam_map : orbslam2py._core.Map
+        The map.
+    vocabulary : orbslam2py._core.Vocabulary
+        Describes the first keyframe.
+    mapping : LocalMapping
+        Takes it.
+    n_features : int, optional
+        How many are extracted: with few of them, fewer keypoints are enough.
+    thresholds : InitializationThresholds, optional
+        Limits.
+    """
+
+    def __init__(
+        self,
+        slam_map: core.Map,
+        vocabulary: core.Vocabulary,
+        mapping: LocalMapping,
+        n_features: int | None = None,
+        thresholds: InitializationThresholds | None = None,
+    ) -> None:
+        self._map = slam_map
+        self._vocabulary = vocabulary
+        self._mapping = mapping
+        self._limits = limits = thresholds or InitializationThresholds()
+        self._least = limits.keypoints_with_depth_sensor
+        if n_features is not None:
+            self._least = min(self._least, int(limits.share_with_depth_sensor * n_features))
+
+    def reset(self) -> None:
+        """Nothing is kept from frame to frame."""
+
+    @property
+    def feature_factor(self) -> int:
+        """1: depths do not grow with the number of features."""
+        return 1
+
+    def take_earlier(self) -> tuple[core.TrackedFrame, ...]:
+        """None: the first frame that can begin the map does."""
+        return ()
+
+    def remember(self, frame: core.TrackedFrame) -> None:
+        """Nothing: the next frame can begin a map as well."""
+
+    def remembered(self) -> list[core.Frame]:
+        """Nothing."""
+        return []
+
+    def restart(self, frames: list[core.Frame]) -> None:
+        """Nothing is kept."""
+
+    def lines(self) -> FloatArray | None:
+        """None: one frame is enough."""
+        return None
+
+    def try_initialize(self, frame: core.TrackedFrame) -> Reason:
+        """Make the frame keyframe 0, with a map point for every depth; or say why not."""
+        if frame.features.size <= self._least:
+            return Reason.TOO_FEW_KEYPOINTS
+        if int(np.count_nonzero(frame.features.depth > 0)) < self._limits.depths:
+            return Reason.TOO_FEW_DEPTHS
+        frame.T_cw = core.Pose()
+        core.describe(frame.features, self._vocabulary)
+        keyframe = core.insert_keyframe(self._map, frame, create_points=True, n_minimum=sys.maxsize)
+        self._mapping.insert_keyframe(keyframe)
+        _log.info("new map with %d points", self._map.n_points)
+        return Reason.NONE

@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A map from two views of a single camera that a third agrees with.
+
+Mur-Artal, Montiel and Tardos, 2015, section IV; ``docs/method/start.md#one-camera``.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections import deque
+
+import numpy as np
+
+from orbslam2py import _core as core
+from orbslam2py._arrays import FloatArray
+from orbslam2py.slam.front_end import intrinsics
+from orbslam2py.slam.initialization.earlier_frames import EarlierFrames
+from orbslam2py.slam.initialization.kept_views import KeptViews, View
+from orbslam2py.slam.initialization.third_view import (
+    Candidate,
+    Motion,
+    confirmed_motion,
+    placed_matches,
+)
+from orbslam2py.slam.local_mapping import LocalMapping
+from orbslam2py.slam.pose_search import PoseSearch
+from orbslam2py.slam.records import Reason
+from orbslam2py.slam.thresholds import InitializationThresholds
+from orbslam2py.slam.watched_frame import pixels_as_given
+
+_log = logging.getLogger(__name__)
+
+#: What the two views' reconstruction says, in the words of a record.
+_REASONS = {
+    "too_few_matches": Reason.FEW_MATCHES_FIRST_VIEW,
+    "degenerate_points": Reason.DEGENERATE_VIEWS,
+    "no_model": Reason.DEGENERATE_VIEWS,
+    "degenerate_plane": Reason.DEGENERATE_VIEWS,
+    "too_few_points": Reason.DEGENERATE_VIEWS,
+    "low_parallax": Reason.LOW_PARALLAX,
+    "ambiguous_motion": Reason.AMBIGUOUS_MOTION,
+}
+
+
+class MonocularInitializer:
+    """Keeps views of the last moments and begins a map from the one that fits best to the last.
+
+    The frame of that view becomes the world's frame; its median depth becomes 1. A third view
+    must agree. The frames before and between are then tracked in the map.
+
+    Parameters
+    ----------
+    slam_map : orbslam2py._core.Map
+        The map.
+    vocabulary : orbslam2py._core.Vocabulary
+        Describes the first keyframes.
+    mapping : LocalMapping
+        Takes the two first keyframes.
+    seed : int
+        Seed of the draws.
+    search : PoseSearch, optional
+        Finds the earlier frames in the map; without it they are left out.
+    thresholds : InitializationThresholds, optional
+        Limits.
+    """
+
+    def __init__(
+        self,
+        slam_map: core.Map,
+        vocabulary: core.Vocabulary,
+        mapping: LocalMapping,
+        seed: int,
+        search: PoseSearch | None = None,
+        thresholds: InitializationThresholds | None = None,
+    ) -> None:
+        self._map = slam_map
+        self._vocabulary = vocabulary
+        self._mapping = mapping
+        self._seed = seed
+        self._limits = thresholds or InitializationThresholds()
+        self._kept = KeptViews(self._limits)
+        self._earlier = EarlierFrames(search)
+        self.reset()
+
+    def reset(self) -> None:
+        """Drop all views."""
+        self._kept.clear()
+        self._history: deque[core.TrackedFrame] = deque(maxlen=self._limits.remembered_frames)
+        self._n_waiting = 0
+        self._last: core.TrackedFrame | None = None
+        self._shown: View | None = None
+
+    def remember(self, frame: core.TrackedFrame) -> None:
+        """A frame that was tracked in a young map, which may yet come to nothing."""
+        self._history.append(frame)
+
+    def remembered(self) -> list[core.Frame]:
+        """The frames from before and after a map began."""
+        return [frame.features for frame in self._history]
+
+    def restart(self, frames: list[core.Frame]) -> None:
+        """Begin anew, with the views of the last moments of an earlier attempt."""
+        self.reset()
+        # Their poses were those in the map that is gone.
+        self._history.extend(core.TrackedFrame(frame) for frame in frames)
+        for frame in frames[-self._limits.followed_again :]:
+            if frame.size <= self._limits.keypoints:
+                continue
+            self._kept.follow(frame)
+            self._kept.keep_last()
+
+    @property
+    def feature_factor(self) -> int:
+        """Twice the features of the settings, and more when it takes long to begin."""
+        limits = self._limits
+        waited = self._n_waiting >= limits.patience
+        return limits.raised_feature_factor if waited else limits.feature_factor
+
+    def lines(self) -> FloatArray | None:
+        """From each keypoint of the first view to its match in the last frame, (m, 4) pixels."""
+        if self._shown is None or self._last is None:
+            return np.zeros((0, 4))
+        matched = np.flatnonzero(self._shown.matches >= 0)
+        seen_first = pixels_as_given(self._shown.frame)[matched]
+        seen_last = pixels_as_given(self._last.features)[self._shown.matches[matched]]
+        return np.hstack([seen_first, seen_last]).astype(np.float64)
+
+    def take_earlier(self) -> tuple[core.TrackedFrame, ...]:
+        """Frames before the one that began the map, with their poses in it, in order; once."""
+        return self._earlier.take()
+
+    def try_initialize(self, frame: core.TrackedFrame) -> Reason:
+        """Begin the map with this frame as second view; or say why not."""
+        self._n_waiting += 1
+        if frame.features.size <= self._limits.keypoints:
+            self._kept.clear()
+            self._last = self._shown = None
+            return Reason.TOO_FEW_KEYPOINTS
+        had_views = bool(self._kept.views)
+        self._kept.follow(frame.features)
+        self._history.append(frame)
+        self._last = frame
+        reason = self._from_best_pair(frame)
+        if reason is Reason.NONE:
+            return reason
+        self._shown = self._kept.views[0] if self._kept.views else None
+        self._kept.keep_last()
+        if self._shown is None:
+            return Reason.FEW_MATCHES_FIRST_VIEW if had_views else Reason.FIRST_VIEW
+        return reason
+
+    def _from_best_pair(self, frame: core.TrackedFrame) -> Reason:
+        """Try all views with this frame, the ones that moved furthest first."""
+        reason = Reason.LOW_PARALLAX
+        candidates: list[Candidate] = []
+        for view in sorted(self._kept.views, key=lambda view: -view.displacement):
+            if view.displacement < self._limits.displacement:
+                break
+            result = core.reconstruct_two_views(
+                view.keypoints,
+                frame.features.keypoints,
+                view.matches,
+                intrinsics(frame.features.camera),
+                seed=self._seed,
+                # Each model takes about a millisecond: a busy machine starts a thread no sooner.
+                two_threads=False,
+            )
+            if result.success:
+                candidates.append(Candidate(view, (result,)))
+            elif result.alternatives:
+                candidates.append(Candidate(view, tuple(result.alternatives)))
+            if not result.success and reason is Reason.LOW_PARALLAX:
+                reason = _REASONS[result.outcome.name]
+        for candidate in sorted(candidates, key=lambda candidate: -candidate.worth):
+            motion = confirmed_motion(candidate, self._kept.views, frame.features, self._limits)
+            if motion is not None:
+                return self._build_map(candidate.view, motion, frame)
+            if candidate.is_clear:
+                reason = Reason.NO_THIRD_VIEW
+        return reason
+
+    # ---- the map ---------------------------------------------------------------------------------
+    def _build_map(self, view: View, motion: Motion, second: core.TrackedFrame) -> Reason:
+        first = next(f for f in self._history if f.id == view.frame.id)
+        core.describe(first.features, self._vocabulary)
+        core.describe(second.features, self._vocabulary)
+        begun = core.create_monocular_map(
+            self._map, first, second, motion.T_21, placed_matches(view, motion), motion.points
+        )
+        if not begun.ok:
+            return Reason.INITIAL_MAP_FAILED
+        _log.info("new map with %d points", self._map.n_points)
+        self._mapping.insert_keyframe(begun.first)
+        self._mapping.insert_keyframe(begun.second)
+        self._earlier.track(list(self._history), first)
+        self._kept.clear()
+        self._n_waiting = 0
+        self._last = self._shown = None
+        return Reason.NONE

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The views of the last moments, each matched with every frame that comes."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from orbslam2py import _core as core
+from orbslam2py.slam.initialization.image_motion import ImageMotion, Pixels
+from orbslam2py.slam.thresholds import InitializationThresholds
+
+Indices = npt.NDArray[np.int32]
+
+
+class View:
+    """A frame that a map may begin from, and where its keypoints have moved to.
+
+    Parameters
+    ----------
+    frame
+        The frame.
+
+    Attributes
+    ----------
+    frame
+        The frame.
+    positions
+        Where its keypoints are, or would be, in the last frame, (n, 2) pixels.
+    matches
+        Per keypoint the index in the last frame or -1, (n,).
+    displacement
+        Median distance that matched keypoints have moved since [pixels].
+    """
+
+    def __init__(self, frame: core.Frame) -> None:
+        self.frame = frame
+        self.keypoints: Pixels = frame.keypoints
+        self.positions: Pixels = self.keypoints
+        self.matches: Indices = np.arange(frame.size, dtype=np.int32)
+        self.displacement = 0.0
+
+    @property
+    def n_matches(self) -> int:
+        """Keypoints matched with the last frame."""
+        return int(np.count_nonzero(self.matches >= 0))
+
+    def follow(self, frame: core.Frame, seen: Pixels, motion: ImageMotion, window: float) -> None:
+        """Match with the next frame, whose keypoints are `seen`, around where things move to."""
+        expected = self.positions + motion.at(self.positions)
+        matches = core.match_views(self.frame, frame, expected, window=window)
+        found = _one_per_place(self.keypoints, matches)
+        self.matches = np.full(len(matches), -1, np.int32)
+        self.matches[found] = matches[found]
+        expected[found] = seen[matches[found]]
+        self.positions = expected
+        moved = expected[found] - self.keypoints[found]
+        self.displacement = float(np.median(np.linalg.norm(moved, axis=1))) if len(found) else 0.0
+
+    def partners(self, other: View) -> Indices:
+        """Per keypoint of this view the index in another view that the last frame links it to."""
+        n_last = int(max(self.matches.max(initial=-1), other.matches.max(initial=-1))) + 1
+        back = np.full(n_last + 1, -1, np.int32)  # the last entry: not matched
+        matched = np.flatnonzero(other.matches >= 0)
+        back[other.matches[matched]] = matched
+        return back[self.matches]
+
+
+def _one_per_place(keypoints: Pixels, matches: Indices) -> npt.NDArray[np.int64]:
+    """Matched keypoints of which no two lie within the same two pixels.
+
+    A corner gives keypoints on several levels, of which the first, finest one is kept: counted
+    twice it would weigh twice.
+    """
+    found = np.flatnonzero(matches >= 0)
+    cells = np.floor(keypoints[found] / 2).astype(np.int64)
+    _, first = np.unique(cells[:, 1] * 100_000 + cells[:, 0], return_index=True)
+    return np.asarray(found[np.sort(first)])
+
+
+class KeptViews:
+    """Follows the image from frame to frame and keeps a few views, thinned by parallax.
+
+    Parameters
+    ----------
+    limits
+        Windows, counts and how many are kept.
+    """
+
+    def __init__(self, limits: InitializationThresholds) -> None:
+        self._limits = limits
+        self.clear()
+
+    def clear(self) -> None:
+        """Keep nothing."""
+        self.views: list[View] = []
+        self._last: View | None = None
+        self._motion: ImageMotion | None = None
+
+    def follow(self, frame: core.Frame) -> None:
+        """Match all views with the next frame; those that have lost too much are let go."""
+        limits, last = self._limits, self._last
+        seen: Pixels = frame.keypoints
+        if last is not None:
+            motion = self._follow_image(last, frame, seen)
+            narrow = limits.window
+            if motion.spread is not None:
+                narrow = min(limits.window, max(limits.narrow_window, 4 * motion.spread))
+            for view in self.views:
+                view.follow(frame, seen, motion, narrow)
+            self.views = [view for view in self.views if view.n_matches >= limits.matches]
+        self._last = View(frame)
+
+    def _follow_image(self, last: View, frame: core.Frame, seen: Pixels) -> ImageMotion:
+        """The motion from the last frame, searched in wide windows around where it would lead."""
+        if self._motion is None:
+            pinhole = frame.camera.pinhole
+            centre = np.array([pinhole.cx, pinhole.cy])
+            self._motion = ImageMotion(centre, centre)
+        last.follow(frame, seen, self._motion, self._limits.window)
+        if last.n_matches < self._limits.matches:
+            # It turned otherwise than before, or further than the window.
+            still = ImageMotion(*self._motion.frame)
+            last.positions = last.keypoints
+            last.follow(frame, seen, still, self._limits.wide_window)
+        found = last.matches >= 0
+        self._motion.fit(last.keypoints[found], (last.positions - last.keypoints)[found])
+        return self._motion
+
+    def keep_last(self) -> None:
+        """Keep the last frame as a view, if it shows enough that is new."""
+        last, views = self._last, self.views
+        if last is None or (views and views[-1].displacement < self._limits.new_view):
+            return
+        views.append(View(last.frame))
+        if len(views) > self._limits.views:
+            # The one that differs least from its neighbours; the first and the last stay.
+            moved = np.array([view.displacement for view in views])
+            gaps = np.abs(moved[:-2] - moved[2:])
+            del views[1 + int(np.argmin(gaps))]

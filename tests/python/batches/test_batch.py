@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Batches: one table of all runs, whatever happens on the way."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+import sqlite3
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import orbslam2py as orb
+from orbslam2py.batches.work import MEASURED
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+
+
+@pytest.fixture(scope="module")
+def sequences(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("sequences")
+    for name, seed in (("one", 0), ("two", 1)):
+        options = SyntheticOptions(
+            world="corridor", sensor="rgbd", frames=8, size=(320, 240), seed=seed
+        )
+        SyntheticSequence(options).write(folder / name)
+    return folder
+
+
+def jobs_of(sequences: Path, **more: Any) -> dict[str, Any]:
+    options = {"deterministic": True, "max_frames": 6}
+    return {"sequences": [str(sequences / "*")], "options": options, "seeds": 2, **more}
+
+
+def table(folder: Path) -> list[dict[str, str]]:
+    with (folder / "results.csv").open(newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def reproducible(folder: Path) -> bytes:
+    """The table without what was measured, as bytes."""
+    rows = [
+        ",".join(
+            f"{name}={value}"
+            for name, value in row.items()
+            if name not in MEASURED and not name.startswith("milliseconds.")
+        )
+        for row in table(folder)
+    ]
+    return "\n".join(rows).encode()
+
+
+def test_table(sequences: Path, tmp_path: Path) -> None:
+    seen: list[tuple[int, int]] = []
+    done = orb.batch(
+        jobs_of(sequences),
+        tmp_path / "out",
+        workers=0,
+        progress=lambda row, n, total: seen.append((n, total)),
+    )
+    assert seen == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    assert (len(done.rows), done.n_failed, done.n_left) == (4, 0, 0)
+    rows = table(tmp_path / "out")
+    assert [row["run"] for row in rows] == sorted(row["run"] for row in rows)
+    first = rows[0]
+    assert first["sequence"] == "one"
+    assert (first["state"], first["tracked"], first["option.max_frames"]) == ("done", "6", "6")
+    report = json.loads((tmp_path / "out/runs" / first["run"] / "report.json").read_text())
+    assert float(first["ate_rmse_m"]) == report["ate_rmse_m"]
+    assert first["version"] == orb.__version__
+    assert float(first["peak_memory_mb"]) > 10
+    with sqlite3.connect(tmp_path / "out/results.sqlite") as database:
+        found = database.execute("SELECT run, tracked, ate_rmse_m FROM results ORDER BY run")
+        assert [list(map(str, row)) for row in found] == [
+            [row["run"], row["tracked"], row["ate_rmse_m"]] for row in rows
+        ]
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is an extra")
+    assert parquet.read_table(tmp_path / "out/results.parquet").num_rows == 4
+    group = done.groups[0]
+    assert (group.n_runs, group.n_failed) == (2, 0)
+    assert group.ate_rmse_m is not None
+    assert group.ate_rmse_m.least <= group.ate_rmse_m.median <= group.ate_rmse_m.most
+
+
+def test_resume(sequences: Path, tmp_path: Path) -> None:
+    """Stopped after two runs, with a half one: the same table as without a stop."""
+    whole = tmp_path / "whole"
+    orb.batch(jobs_of(sequences), whole, workers=0)
+    folder, stop = tmp_path / "stopped", threading.Event()
+    done = orb.batch(
+        jobs_of(sequences),
+        folder,
+        workers=0,
+        stop=stop,
+        progress=lambda row, n, total: stop.set() if n == 2 else None,
+    )
+    assert (len(done.rows), done.n_left) == (2, 2)
+    finished, half = done.rows[0]["run"], done.rows[1]["run"]
+    (folder / "runs" / half / "row.json").unlink()
+    (folder / "runs" / half / "trajectory.txt").write_text("half a line")
+    before = (folder / "runs" / finished / "row.json").stat().st_mtime_ns
+    with pytest.raises(orb.DatasetError, match="holds a batch already; go on with --resume"):
+        orb.batch(jobs_of(sequences), folder, workers=0)
+    ran: list[str] = []
+    resumed = orb.batch(
+        jobs_of(sequences),
+        folder,
+        workers=0,
+        resume=True,
+        progress=lambda row, n, total: ran.append(row["run"]),
+    )
+    assert len(ran) == 3
+    assert finished not in ran
+    assert (folder / "runs" / finished / "row.json").stat().st_mtime_ns == before
+    assert resumed.n_left == 0
+    assert reproducible(folder) == reproducible(whole)
+    for row in resumed.rows:
+        name = f"runs/{row['run']}/trajectory.txt"
+        assert (folder / name).read_bytes() == (whole / name).read_bytes()
+
+
+def test_a_changed_job_is_run_again(sequences: Path, tmp_path: Path) -> None:
+    document = {"sequences": [{"path": str(sequences / "one"), "name": "x"}]}
+    document |= {"options": {"max_frames": 3, "deterministic": True}}
+    orb.batch(document, tmp_path / "out", workers=0)
+    document["sequences"] = [{"path": str(sequences / "two"), "name": "x"}]
+    ran: list[str] = []
+    done = orb.batch(
+        document,
+        tmp_path / "out",
+        workers=0,
+        resume=True,
+        progress=lambda row, n, total: ran.append(row["run"]),
+    )
+    assert ran == [done.rows[0]["run"]]
+    assert done.rows[0]["path"].endswith("two")
+
+
+def test_failures_are_rows(sequences: Path, tmp_path: Path) -> None:
+    """A run that fails says why, and the others go on; it is tried again by --resume."""
+    broken = tmp_path / "broken"
+    shutil.copytree(sequences / "one", broken)
+    (broken / "rgb.txt").write_text("nonsense\n")
+    (broken / "associations.txt").unlink()
+    document = jobs_of(sequences, seeds=1)
+    document["sequences"] = [str(broken), *document["sequences"]]
+    done = orb.batch(document, tmp_path / "out", workers=0)
+    rows = {row["sequence"]: row for row in done.rows}
+    assert rows["broken"]["state"] == "failed"
+    assert "rgb.txt:1: expected 'timestamp path'" in rows["broken"]["reason"]
+    assert "\n" not in rows["broken"]["reason"]
+    assert rows["one"]["state"] == rows["two"]["state"] == "done"
+    shutil.rmtree(broken)
+    shutil.copytree(sequences / "two", broken)
+    again = orb.batch(document, tmp_path / "out", workers=0, resume=True)
+    assert again.n_failed == 0
+
+
+def test_sweep(sequences: Path, tmp_path: Path) -> None:
+    document = jobs_of(sequences, seeds=1, sweep={"ORBextractor.nFeatures": [300, 900]})
+    document["sequences"] = [str(sequences / "one")]
+    done = orb.batch(document, tmp_path / "out", workers=0)
+    assert [row["sweep.ORBextractor.nFeatures"] for row in done.rows] == [300, 900]
+    few, many = (row["map_points"] for row in done.rows)
+    assert few < many
+
+
+def test_two_workers(sequences: Path, tmp_path: Path) -> None:
+    """In processes of their own: the same bytes as in this one."""
+    pytest.importorskip("distributed", reason="dask is an extra")
+    orb.batch(jobs_of(sequences), tmp_path / "here", workers=0)
+    done = orb.batch(jobs_of(sequences), tmp_path / "there", workers=2)
+    assert (len(done.rows), done.n_failed) == (4, 0)
+    assert reproducible(tmp_path / "here") == reproducible(tmp_path / "there")
+    for row in done.rows:
+        for name in ("trajectory.txt", "points.ply"):
+            file = Path("runs") / row["run"] / name
+            here, there = (tmp_path / where / file for where in ("here", "there"))
+            assert here.read_bytes() == there.read_bytes()

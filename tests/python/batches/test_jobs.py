@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Job files: what they ask for, and what is wrong with them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import orbslam2py as orb
+from orbslam2py.batches import make_jobs, read_jobs
+from orbslam2py.batches.sweep import read_sweep, with_parameters
+from orbslam2py.settings import Settings, builtin_settings
+
+
+@pytest.fixture
+def places(tmp_path: Path) -> Path:
+    for name in ("a/01", "a/02", "b/02"):
+        (tmp_path / name).mkdir(parents=True)
+    return tmp_path
+
+
+def test_product(places: Path) -> None:
+    document = {
+        "sequences": ["a/*"],
+        "sensors": ["mono", "stereo"],
+        "options": {"deterministic": [True, False], "max_frames": 30},
+        "seeds": [3, 5],
+    }
+    jobs = make_jobs(document, places)
+    assert len(jobs) == 2 * 2 * 2 * 2
+    assert jobs[0].key == "01-mono-deterministic=true-max_frames=30-seed3"
+    assert jobs[0].setting == jobs[1].setting
+    assert len({job.key for job in jobs}) == len({job.fingerprint for job in jobs}) == 16
+    options = jobs[0].run_options(orb.Sensor.MONOCULAR)
+    assert (options.system.deterministic, options.system.seed, options.max_frames) == (True, 3, 30)
+
+
+def test_file(places: Path) -> None:
+    path = places / "jobs.yaml"
+    path.write_text(
+        "sequences: [a/01, {path: b/02, name: other, sensor: mono}]\nseeds: 2\noutput: out\n"
+    )
+    jobs, output = read_jobs(path)
+    assert [job.key for job in jobs] == [
+        *("01-seed0", "01-seed1"),
+        *("other-mono-seed0", "other-mono-seed1"),
+    ]
+    assert jobs[0].path == str(places / "a/01")
+    assert output == places / "out"
+
+
+@pytest.mark.parametrize(
+    ("document", "message"),
+    [
+        ({}, "there are no sequences"),
+        ({"sequence": ["a/01"]}, "unknown key 'sequence'; did you mean sequences?"),
+        ({"sequences": ["c/*"]}, r"nothing matches .*c/\*; correct the pattern"),
+        ({"sequences": ["c/01"]}, "c/01 does not exist"),
+        ({"sequences": ["*/02"]}, "two runs would have the folder 02-seed0: .*names of their own"),
+        ({"sequences": ["a/01", "a/01"]}, "a/01 twice"),
+        ({"sequences": [{"name": "x"}]}, "a sequence has no path"),
+        ({"sequences": [{"path": "a/*", "name": "x"}]}, "2 sequences match .* all to be called x"),
+        ({"sequences": [{"path": "a/01", "cam": 1}]}, "unknown key of a sequence 'cam'"),
+        ({"sequences": ["a/01"], "sensors": ["lidar"]}, "lidar"),
+        ({"sequences": ["a/01"], "seeds": 0}, "seeds is 0; give how many"),
+        ({"sequences": ["a/01"], "seeds": [1, 1]}, "list of different seeds"),
+        ({"sequences": ["a/01"], "seeds": ["x"]}, "a seed is 'x'"),
+        ({"sequences": ["a/01"], "options": {"strid": 2}}, "unknown option 'strid'.* stride?"),
+        ({"sequences": ["a/01"], "options": [1]}, "options are a list"),
+        ({"sequences": ["a/01"], "options": {"deterministic": "no"}}, "deterministic is 'no'"),
+        ({"sequences": ["a/01"], "sweep": {}}, "sweep is empty"),
+        ({"sequences": ["a/01"], "sweep": {"nFeatures": [1]}}, "is no key of the settings; did"),
+        ({"sequences": ["a/01"], "sweep": {"ThDepth": ["x"]}}, "ThDepth is .* give a list of num"),
+        ({"sequences": ["a/01"], "sweep": {"ThDepth": {"from": 1, "to": 9}}}, "add 'random: N'"),
+        (
+            {"sequences": ["a/01"], "sweep": {"random": 3, "ThDepth": {"from": 9, "to": 1}}},
+            "'from' must be less than 'to'",
+        ),
+    ],
+)
+def test_wrong_jobs(places: Path, document: dict[str, Any], message: str) -> None:
+    with pytest.raises((orb.SettingsError, orb.DatasetError), match=message):
+        make_jobs(document, places)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [("a: [", "is no YAML"), ("3\n", "holds no named values"), ("seqs: 1\n", "jobs.yaml: unknown")],
+)
+def test_wrong_files(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "jobs.yaml"
+    with pytest.raises(orb.SettingsError, match="cannot open job file"):
+        read_jobs(path)
+    path.write_text(text)
+    with pytest.raises(orb.SettingsError, match=message):
+        read_jobs(path)
+
+
+def test_grid() -> None:
+    sweep = read_sweep({"ORBextractor.nFeatures": [500, 1000], "ThDepth": [30, 40]})
+    points = list(sweep.points())
+    assert len(points) == 4
+    assert points[0] == (("ORBextractor.nFeatures", 500), ("ThDepth", 30))
+
+
+def test_random_draws() -> None:
+    """The same in every run; whole numbers where the key has such; within the range."""
+    values = {
+        "random": 50,
+        "seed": 4,
+        "ORBextractor.nFeatures": {"from": 200, "to": 4000, "log": True},
+        "ThDepth": [30, 40],
+    }
+    points = list(read_sweep(values).points())
+    assert points == list(read_sweep(values).points())
+    features = [dict(point)["ORBextractor.nFeatures"] for point in points]
+    assert all(isinstance(value, int) and 200 <= value <= 4000 for value in features)
+    assert sum(value < 900 for value in features) > 12  # even in the logarithm
+    assert {dict(point)["ThDepth"] for point in points} == {30, 40}
+
+
+def test_parameters_go_into_the_settings() -> None:
+    settings: Settings = builtin_settings("tum1", orb.Sensor.RGBD)
+    changed = with_parameters(settings, (("ORBextractor.nFeatures", 700), ("ThDepth", 25.0)))
+    assert changed.orb.n_features == 700
+    assert changed.depth is not None
+    assert changed.depth.close_factor == 25
+    assert changed.camera == settings.camera
+    mono = builtin_settings("tum1", orb.Sensor.MONOCULAR)
+    with pytest.raises(orb.SettingsError, match="ThDepth is not used by mono"):
+        with_parameters(mono, (("ThDepth", 25.0),))

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``orbslam2py batch``: what it prints, and inputs that it refuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+from support.command_line import CommandLine
+
+
+@pytest.fixture(scope="module")
+def sequences(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("sequences")
+    options = SyntheticOptions(world="corridor", sensor="rgbd", frames=6, size=(320, 240))
+    for name in ("one", "two"):
+        SyntheticSequence(options).write(folder / name)
+    return folder
+
+
+def jobs_of(sequences: Path) -> dict[str, Any]:
+    options = {"deterministic": True, "max_frames": 4}
+    return {"sequences": [str(sequences / "*")], "options": options, "seeds": 2}
+
+
+def test_command(command: CommandLine, sequences: Path, tmp_path: Path) -> None:
+    Path("jobs.yaml").write_text(json.dumps(jobs_of(sequences)))
+    done = command("batch", "jobs.yaml", "--output", "out", "--workers", "0")
+    assert done.code == 0, done.err
+    assert "4 runs, 0 failed" in done.out
+    assert Path("out/results.csv").is_file()
+    again = command("batch", "jobs.yaml", "--output", "out")
+    assert again.code == 2
+    assert "--resume" in again.err
+    resumed = command("batch", "jobs.yaml", "--output", "out", "--resume")
+    assert resumed.code == 0, resumed.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("none.yaml", "--output", "out"), "cannot open job file none.yaml"),
+        (("jobs.yaml",), "there is no folder for the results; give --output"),
+        (("jobs.yaml", "--output", "jobs.yaml"), "jobs.yaml is a file; give the name of a folder"),
+        (("jobs.yaml", "--output", "full"), "full is not empty and holds no batch"),
+        (
+            ("jobs.yaml", "--output", "out", "--scheduler", "tcp://127.0.0.1:9"),
+            "the scheduler tcp://127.0.0.1:9 cannot be reached; start one with 'dask scheduler'",
+        ),
+    ],
+)
+def test_bad_input(
+    command: CommandLine,
+    sequences: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: tuple[str, ...],
+    message: str,
+) -> None:
+    monkeypatch.setattr("orbslam2py.batches.engine._PATIENCE", 0.5)
+    Path("jobs.yaml").write_text(json.dumps(jobs_of(sequences)))
+    Path("full").mkdir()
+    Path("full/notes.txt").write_text("mine\n")
+    done = command("batch", *arguments)
+    assert done.code == 2
+    assert message in " ".join(done.err.split())
+    for noise in ("Traceback", "Errno", "Error(", "SettingsError"):
+        assert noise not in done.err
