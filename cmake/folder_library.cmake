@@ -28,14 +28,17 @@ endif()
 # Parsing Eigen is most of what a small file costs the compiler.
 set(ORBSLAM2PY_EIGEN_HEADERS <Eigen/Core> <Eigen/Geometry> <Eigen/LU>)
 
-# orbslam_folder(NAME [DEPENDS folder...] [PUBLIC lib...] [PRIVATE lib...] [AVX2 source...])
+# orbslam_folder(NAME [SEPARATE] [DEPENDS folder...] [PUBLIC lib...] [PRIVATE lib...] [AVX2 source...])
+# SEPARATE: each source is compiled by itself, also in a unity build.
 function(orbslam_folder NAME)
-  cmake_parse_arguments(ARG "" "" "DEPENDS;PUBLIC;PRIVATE;AVX2" ${ARGN})
+  cmake_parse_arguments(ARG "SEPARATE" "" "DEPENDS;PUBLIC;PRIVATE;AVX2" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${NAME}/*.cpp)
   list(TRANSFORM ARG_DEPENDS PREPEND orbslam_ OUTPUT_VARIABLE depends)
   if(sources)
     add_library(orbslam_${NAME} STATIC ${sources})
-    set(scope PUBLIC)
+    if(ARG_SEPARATE)
+      set_target_properties(orbslam_${NAME} PROPERTIES UNITY_BUILD OFF)
+    endif()
     target_link_libraries(orbslam_${NAME} PUBLIC ${depends} ${ARG_PUBLIC}
       PRIVATE orbslam_options ${ARG_PRIVATE})
     target_include_directories(orbslam_${NAME} PUBLIC ${CMAKE_CURRENT_SOURCE_DIR})
@@ -54,6 +57,6 @@ function(orbslam_folder NAME)
   endif()
   foreach(source ${ARG_AVX2})
     set_source_files_properties(${CMAKE_CURRENT_SOURCE_DIR}/${NAME}/${source}
-      PROPERTIES COMPILE_OPTIONS "-mavx2" SKIP_PRECOMPILE_HEADERS ON)
+      PROPERTIES COMPILE_OPTIONS "-mavx2" SKIP_PRECOMPILE_HEADERS ON SKIP_UNITY_BUILD_INCLUSION ON)
   endforeach()
 endfunction()

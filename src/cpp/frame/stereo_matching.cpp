@@ -20,7 +20,7 @@ using stereo::kShifts;
 using stereo::kStripWidth;
 using stereo::kWindow;
 
-constexpr float kUnknown = -1.0F;
+constexpr float kUnmatched = -1.0F;
 constexpr int kDescriptorLimit = 75;
 constexpr int kLevelTolerance = 1;
 constexpr float kRowBand = 2.0F;  // pixels of a keypoint's level by which its row may be off
@@ -148,8 +148,8 @@ void remove_outliers(std::vector<std::pair<int, std::uint32_t>>& sads, StereoMat
   for (auto pair = sads.rbegin(); pair != sads.rend(); ++pair) {
     // Equal windows are never an outlier, also where half of all windows are equal.
     if (pair->first == 0 || static_cast<float>(pair->first) < limit) break;
-    matches.right_u[pair->second] = kUnknown;
-    matches.depth[pair->second] = kUnknown;
+    matches.right_u[pair->second] = kUnmatched;
+    matches.depth[pair->second] = kUnmatched;
   }
 }
 
@@ -190,8 +190,8 @@ StereoMatches match_stereo(const Extraction& left, const Extraction& right,
   const stereo::ShiftedSad shifted_sad = stereo::best_shifted_sad();
 
   StereoMatches matches;
-  matches.right_u.assign(keypoints.size(), kUnknown);
-  matches.depth.assign(keypoints.size(), kUnknown);
+  matches.right_u.assign(keypoints.size(), kUnmatched);
+  matches.depth.assign(keypoints.size(), kUnmatched);
   std::vector<std::pair<int, std::uint32_t>> sads;
   sads.reserve(keypoints.size());
   stereo::WindowPair windows{};

@@ -11,7 +11,7 @@
 namespace orbslam {
 namespace {
 
-constexpr int kAllBits = 256;
+constexpr int kFarthest = 256;
 
 // What a search needs of a keyframe, copied so that it can run without the lock.
 struct KeyFrameFeatures {
@@ -49,7 +49,7 @@ void match_nodes(const KeyFrameFeatures& a, const Frame& frame_b, float ratio, U
   for_each_common_node(frame_a, frame_b, [&](NodeFeatures node_a, NodeFeatures node_b) {
     for (const std::uint32_t i : node_a) {
       if (!a.points[i].valid()) continue;
-      int best = kAllBits, second = kAllBits;
+      int best = kFarthest, second = kFarthest;
       std::uint32_t match = 0;
       for (const std::uint32_t j : node_b) {
         if (used_b[j] || !usable_b(j)) continue;

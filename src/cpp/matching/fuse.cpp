@@ -12,8 +12,8 @@
 namespace orbslam {
 namespace {
 
-constexpr double kMonoGate = 5.99;             // chi-square, 95 %, 2 degrees of freedom
-constexpr double kStereoGate = 7.8;            // 3 degrees of freedom, rounded as in the original
+constexpr double kFuseMonoGate = 5.99;             // chi-square, 95 %, 2 degrees of freedom
+constexpr double kFuseStereoGate = 7.8;            // 3 degrees of freedom, rounded as in the original
 constexpr std::size_t kSecondDegree = 5;       // neighbours of a neighbour that take part
 constexpr std::size_t kRefreshedAtOnce = 200;  // points per write section, to keep it short
 constexpr float kNeighbourRadius = 3.0F;
@@ -34,11 +34,11 @@ bool reprojection_agrees(const Frame& frame, std::size_t keypoint, const ImagePo
   const Keypoint& feature = frame.keypoints[keypoint];
   const double error_u = image.u - feature.x, error_v = image.v - feature.y;
   double error = error_u * error_u + error_v * error_v;
-  double gate = kMonoGate;
+  double gate = kFuseMonoGate;
   if (frame.has_depth(keypoint)) {
     const double error_right = image.right_u - frame.right_u[keypoint];
     error += error_right * error_right;
-    gate = kStereoGate;
+    gate = kFuseStereoGate;
   }
   return error * frame.scales->inverse_sigma2(feature.level) <= gate;
 }

@@ -5,11 +5,10 @@
 #include <cmath>
 
 #include "base/errors.hpp"
+#include "synthetic/pi.hpp"
 
 namespace orbslam::synthetic {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 Eigen::Vector2d direction(double heading) { return {std::sin(heading), std::cos(heading)}; }
 

@@ -5,6 +5,7 @@
 #include <array>
 
 #include "synthetic/hash.hpp"
+#include "synthetic/pi.hpp"
 
 namespace orbslam::synthetic {
 namespace {
@@ -53,7 +54,6 @@ Polygon random_panel(HashStream& random, double cx, double cy, double radius) {
 
 /// A convex polygon inscribed in an ellipse, hence never degenerate or self-crossing.
 Polygon random_polygon(HashStream& random, double cx, double cy, double radius) {
-  constexpr double kPi = 3.14159265358979323846;
   Polygon polygon;
   polygon.corners = 3 + random.below(Polygon::kMaxCorners - 2);
   const double flatness = random.uniform(0.45, 1.0);

@@ -6,12 +6,12 @@
 #include "base/errors.hpp"
 #include "synthetic/carpentry.hpp"
 #include "synthetic/hash.hpp"
+#include "synthetic/pi.hpp"
 #include "synthetic/world.hpp"
 
 namespace orbslam::synthetic {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kRoomTexel = 0.004;
 constexpr double kCorridorTexel = 0.005;
 constexpr double kStreetTexel = 0.02;

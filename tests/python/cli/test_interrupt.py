@@ -22,7 +22,8 @@ pytestmark = pytest.mark.watchdog(60)
 
 N = 30
 
-# Runs the command; sends Ctrl-C to itself when a function is called for the n-th time.
+# Runs the command; sends Ctrl-C to itself when a function is called for the n-th time, or, if it is
+# to be sent no times, tells that it came so far.
 _DRIVER = """
 import importlib, os, signal, sys
 
@@ -40,6 +41,8 @@ def interrupting(*arguments, **named):
     if left == 0:
         for _ in range(int(times)):
             os.kill(os.getpid(), signal.SIGINT)
+        if times == "0":
+            print("so far", flush=True)
     return original(*arguments, **named)
 
 setattr(owner, name, interrupting)
@@ -152,10 +155,11 @@ def test_while_an_image_does_not_come(lap: Path) -> None:
     path = sorted((lap / "rgb").iterdir())[12]
     path.unlink()
     os.mkfifo(path)
-    process = start(lap.parent, "time", "ctime", 1, 1)
+    process = start(lap.parent, "orbslam2py.cli.display", "Display.show", 12, 0)
     pipe = open_for_a_reader(path)
     try:
-        time.sleep(2)  # the images before it are tracked meanwhile
+        assert process.stdout is not None
+        assert [process.stdout.readline() for _ in range(2)] == ["ready\n", "so far\n"]
         process.send_signal(signal.SIGINT)
         code, err = finish(process)
     finally:

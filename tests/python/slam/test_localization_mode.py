@@ -211,21 +211,25 @@ def test_waiting_keyframes_are_processed_afterwards(
 ) -> None:
     """The original deletes them when the mode ends (OD-126)."""
     with new_system(sensor) as system:
+        worker = system.pipeline.back_end.mapping.worker
         play(system, 1)
-        assert system.pipeline.back_end.mapping.worker.wait_until(
-            lambda: system.pipeline.back_end.mapping.worker._busy, 10
-        )
+        assert worker.wait_until(lambda: worker._busy, 10)
         n = 1
-        while system.pipeline.back_end.mapping.worker.n_waiting == 0:
+        while worker.n_waiting == 0:
             track(system, n)
             n += 1
             assert n < 80
-        n_waiting = system.pipeline.back_end.mapping.worker.n_waiting
+        n_waiting = worker.n_waiting
+
+        def go_on_when_held() -> None:
+            worker.wait_until(lambda: worker.held, 20)
+            slow_mapping.set()
+
         system.localization_mode = True
-        threading.Timer(0.1, slow_mapping.set).start()  # the switch waits for the step
+        threading.Thread(target=go_on_when_held).start()  # the switch waits for the step
         fixed = play(system, 5, first=n)
         before = system.map_hash()
-        assert system.pipeline.back_end.mapping.worker.n_waiting == n_waiting
+        assert worker.n_waiting == n_waiting
         assert not system.wait_until_idle(10), "they wait for the end of the mode"
         fixed += play(system, 5, first=n + 5)
         assert system.map_hash() == before
@@ -233,7 +237,7 @@ def test_waiting_keyframes_are_processed_afterwards(
         system.localization_mode = False
         track(system, n + 10)
         assert system.wait_until_idle(20)
-        assert system.pipeline.back_end.mapping.worker.n_waiting == 0
+        assert worker.n_waiting == 0
         assert system.pipeline.back_end.loop_closing.last_keyframe >= n_waiting
         assert system.check_map() == []
 

@@ -3,15 +3,13 @@
 
 from __future__ import annotations
 
-import threading
-
 import pytest
 
 from orbslam2py import Sensor, StateError, WorkerError
 from orbslam2py._worker import Worker, WorkerState
 from support.interleaving import LIMIT
 from support.small_sequences import new_system, play
-from support.worker_steps import NAME, Gate, eventually
+from support.worker_steps import NAME, Gate, eventually, once
 
 pytestmark = pytest.mark.watchdog(10)
 
@@ -31,7 +29,7 @@ def test_reset_while_busy_waits_for_the_job_and_drops_the_others(
     for job in range(3):
         worker.submit(job)
     gate.wait_begun()
-    threading.Timer(0.05, gate.open).start()
+    once(worker.cancel_flag.is_set, gate.open)
     worker.reset(10)
     assert gate.done == [0]
     assert worker.idle

@@ -10,7 +10,7 @@ import pytest
 from orbslam2py import OrbSlamError, StateError, WorkerError
 from orbslam2py._call_guard import CallGuard
 from orbslam2py._worker import Worker, WorkerState
-from support.worker_steps import NAME, Gate, eventually
+from support.worker_steps import NAME, Gate, eventually, once
 
 pytestmark = pytest.mark.watchdog(10)
 
@@ -39,7 +39,7 @@ def test_finish_drops_waiting_jobs_and_interrupts(worker: Worker[int], gate: Gat
     worker.submit(0)
     gate.wait_begun()
     worker.submit(1)
-    threading.Timer(0.05, gate.open).start()
+    once(worker.cancel_flag.is_set, gate.open)
     worker.finish(timeout=10)
     assert gate.done == [0]
     assert worker.interrupt_flag.is_set()

@@ -40,6 +40,16 @@ def eventually(condition: Callable[[], bool]) -> None:
         time.sleep(0.001)
 
 
+def once(condition: Callable[[], bool], act: Callable[[], object]) -> None:
+    """Do something in a thread of its own as soon as a condition holds."""
+
+    def wait_and_act() -> None:
+        eventually(condition)
+        act()
+
+    threading.Thread(target=wait_and_act).start()
+
+
 def failing(job: int) -> None:
     if job == 1:
         raise ValueError("bad job")
