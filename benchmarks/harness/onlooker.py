@@ -26,6 +26,8 @@ with connect(address, subprotocols=[protocol], max_size=None) as page:
     n_bytes = 0
     try:
         for message in page:
+            if not n_bytes:
+                print("looks", flush=True)
             n_bytes += len(message)
     finally:
         print(n_bytes, flush=True)
@@ -39,6 +41,11 @@ class Onlooker:
     ----------
     address : str
         Of the page.
+
+    Raises
+    ------
+    RuntimeError
+        With its words, if it cannot look.
     """
 
     def __init__(self, address: str) -> None:
@@ -48,6 +55,9 @@ class Onlooker:
             stderr=subprocess.PIPE,
             text=True,
         )
+        assert self._process.stdout is not None
+        if self._process.stdout.readline().strip() != "looks":
+            raise RuntimeError(f"nobody looked: {self._process.communicate()[1]}")
 
     def n_bytes(self) -> int:
         """Bytes that it was sent, once the page has ended.

@@ -57,6 +57,8 @@ class Share:
     tracking_process: float
     """Of the process that tracks, for the viewer alone."""
     page_process: float
+    looks: float
+    """Changes of the map that were handed over, a second."""
 
 
 # ---- a large map ---------------------------------------------------------------------------------
@@ -156,7 +158,8 @@ def _watched(system: orb.System, truth: orb.Trajectory | None = None) -> Iterato
     """Let somebody look; yields what does something at a rate, and measures the viewer alone."""
     view = LiveView(port=0)
     view.attach(system, truth=truth)
-    clock = _Clock()
+    clock, looks = _Clock(), _Clock()
+    view.on_map = looks.timed(view.on_map)  # type: ignore[method-assign]
     try:
         with Onlooker(view.address), Publisher(system, [view], frame_rate=FRAME_RATE):
             # What the viewer does in threads that do other things as well.
@@ -166,13 +169,18 @@ def _watched(system: orb.System, truth: orb.Trajectory | None = None) -> Iterato
 
             def measured(work: Callable[[], None], period: float, times: int) -> Share:
                 begin = time.perf_counter()
+                n_before = looks.n_calls
                 before = clock.seconds + _viewer_threads(), _seconds_of(view.process_id)
                 for n in range(times):
                     work()
                     time.sleep(max(0.0, begin + (n + 1) * period - time.perf_counter()))
                 after = clock.seconds + _viewer_threads(), _seconds_of(view.process_id)
                 elapsed = time.perf_counter() - begin
-                return Share((after[0] - before[0]) / elapsed, (after[1] - before[1]) / elapsed)
+                return Share(
+                    (after[0] - before[0]) / elapsed,
+                    (after[1] - before[1]) / elapsed,
+                    (looks.n_calls - n_before) / elapsed,
+                )
 
             yield measured
             system.pipeline.frame_watchers = (watch,)
@@ -181,14 +189,16 @@ def _watched(system: orb.System, truth: orb.Trajectory | None = None) -> Iterato
 
 
 class _Clock:
-    """Adds up the processor time of functions."""
+    """Adds up the processor time of functions, and counts their calls."""
 
     def __init__(self) -> None:
         self.seconds = 0.0
+        self.n_calls = 0
 
     def timed(self, function: Callable[..., Any]) -> Callable[..., Any]:
         def call(*arguments: Any) -> Any:
             begin = time.thread_time()
+            self.n_calls += 1
             try:
                 return function(*arguments)
             finally:
@@ -253,7 +263,13 @@ def share_tables(seconds: float) -> Iterator[object]:
     table = new_table(
         "Watching: processor time in the process that tracks, and in that of the page",
         ["what"],
-        ["of a core\ntracking process", "page's process", "target", "met"],
+        [
+            "of a core\ntracking process",
+            "page's process",
+            "looks at the\nmap a second",
+            "target",
+            "met",
+        ],
         "Who looks takes all that a browser takes, at this computer, and draws nothing.",
     )
     share = follow_large_map(seconds)
@@ -271,6 +287,7 @@ def share_tables(seconds: float) -> Iterator[object]:
             f"{name}, {rate:g} images a second in real time",
             f"{100 * share.tracking_process:.1f} %",
             f"{100 * share.page_process:.0f} %",
+            f"{share.looks:.1f}",
             "",
             "",
         )

@@ -121,7 +121,7 @@ class Status:
         if self.n_visual_odometry:
             parts.append(f"{_thousands(self.n_visual_odometry)} visual odometry")
         if self.frames_per_second is not None:
-            parts.append(f"{self.frames_per_second:.0f} frames/s")
+            parts.append(_counted(round(self.frames_per_second), "frame", "frames") + "/s")
         if self.n_dropped is not None:
             parts.append(f"{_thousands(self.n_dropped)} dropped")
         return "  ·  ".join(parts)
