@@ -26,8 +26,8 @@ from typing import NoReturn
 from benchmarks.map_files.mapping import corridor, mapped
 from orbslam2py import System
 from orbslam2py import _core as core
-from orbslam2py.maps import SavedMap, load_map, restore_contents, save_map
 from orbslam2py.datasets import Frame
+from orbslam2py.maps import SavedMap, load_map, restore_contents, save_map
 
 #: So many keyframes may have been culled since the last save that was told of.
 CULLED = 3
@@ -56,9 +56,7 @@ def forked(work: Callable[[int], object]) -> tuple[int, int]:
     return process, heard
 
 
-def victim(
-    path: Path, start: SavedMap, frames: list[Frame], how: str, tells: int
-) -> NoReturn:
+def victim(path: Path, start: SavedMap, frames: list[Frame], how: str, tells: int) -> NoReturn:
     """Map and save until somebody kills us; tells how many keyframes were saved."""
     with System(load_map=start, wait_for_mapping=True) as slam:
         if how == "autosave":
