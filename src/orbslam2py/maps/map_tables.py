@@ -89,6 +89,7 @@ class BlobTable:
     def __init__(self, connection: sqlite3.Connection, table: Table) -> None:
         self._connection = connection
         self._table = table
+        self._sizes = [_size_of(blob) for blob in table.blobs]
         keys = ", ".join(table.keys)
         lengths = ", ".join(f"length({blob.column})" for blob in table.blobs)
         query = f"SELECT {keys}, count, {lengths} FROM {table.name} ORDER BY {keys}"
@@ -162,11 +163,12 @@ class BlobTable:
         count = row[first]
         if number >= len(self.counts) or count != self.counts[number]:
             raise MapFileError(f"the table {self._table.name} changed while it was read")
-        for blob, value in zip(self._table.blobs, row[first + 1 :], strict=True):
-            array = arrays[blob.field]
+        blobs = zip(self._table.blobs, self._sizes, row[first + 1 :], strict=True)
+        for blob, size, value in blobs:
             if value is None:
                 continue
-            if not isinstance(value, bytes) or len(value) != count * _size_of(blob):
+            array = arrays[blob.field]
+            if not isinstance(value, bytes) or len(value) != count * size:
                 raise MapFileError(f"{blob.column} of {self._table.name} has the wrong length")
             items = np.frombuffer(value, blob.dtype)
             array[place : place + count] = items.reshape(-1, blob.width) if blob.width else items

@@ -180,7 +180,7 @@ TEST(Vocabulary, KnownWordsOfUnevenAndStoppedBranches) {
 TEST(Vocabulary, DescribingNothingOrOnlyStoppedWordsGivesEmptyVectors) {
   const auto vocabulary = build(uneven_tree());
   WordVector words{{7}, {1.0}};
-  DirectIndex index{{1}, {0, 1}, {0}};
+  DirectIndex index{{1}, {0, 1}, {0}, {7}};
   for (const auto& descriptors : {std::vector<Descriptor>{}, std::vector<Descriptor>{ones(256)}}) {
     vocabulary->transform(descriptors, words, index);
     EXPECT_TRUE(words.words.empty() && words.weights.empty());
