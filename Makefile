@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= $(shell nproc)
 
-.PHONY: demo test bench lint types stubs docs format sanitize stress tidy wheel install clean \
+.PHONY: demo test bench lint types stubs docs format sanitize stress fuzz-maps tidy wheel install clean \
   test-cpp test-python help
 
 help:
@@ -15,6 +15,7 @@ help:
 	@echo "make bench     measure, and compare with the reference's figures where they are known"
 	@echo "make sanitize  C++ tests under the address, undefined-behaviour and thread sanitizers"
 	@echo "make stress    ten minutes of all threads at random under the thread sanitizer"
+	@echo "make fuzz-maps 20 000 spoilt map files under the address and undefined-behaviour sanitizers"
 	@echo "make wheel     build dist/*.whl"
 	@echo "make format    apply clang-format and ruff"
 
@@ -95,6 +96,23 @@ STRESS_SECONDS ?= 600
 stress: build/.system-packages
 	@cmake --preset tsan >/dev/null && cmake --build build/tsan -j $(JOBS) --target thread_driver
 	@build/tsan/tests/cpp/thread_driver --seconds $(STRESS_SECONDS)
+
+# Spoilt map files, read by Python with an extension that was built with sanitizers. `make sanitize`
+# spoils what the extension gets; this spoils the files. FUZZ_FIRST goes on where a run has ended.
+FUZZ_RUNS ?= 20000
+FUZZ_FIRST ?= 0
+SANITIZED := build/asan-ext
+fuzz-maps: install
+	@cmake --preset asan -B $(SANITIZED) -DORBSLAM2PY_TESTS=OFF -DORBSLAM2PY_PYTHON=ON \
+	  -DPython_EXECUTABLE=$(CURDIR)/$(BIN)/python \
+	  -Dpybind11_DIR=$$($(BIN)/python -m pybind11 --cmakedir) >$(SANITIZED).log || { cat $(SANITIZED).log; exit 1; }
+	@cmake --build $(SANITIZED) -j $(JOBS) --target orbslam2py_python
+	@$(BIN)/python scripts/package_with_extensions.py $(SANITIZED) $(SANITIZED)/package
+	@LD_PRELOAD="$$($${CXX:-c++} -print-file-name=libasan.so) $$($${CXX:-c++} -print-file-name=libstdc++.so)" \
+	  ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1 \
+	  PYTHONPATH=$(SANITIZED)/package:.:$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))') \
+	  $(BIN)/python -S -m benchmarks.map_files.mutations \
+	  --runs $(FUZZ_RUNS) --first $(FUZZ_FIRST)
 
 # ---- the rest ------------------------------------------------------------------------------------
 bench: install

@@ -7,7 +7,7 @@ import dataclasses
 
 import numpy as np
 
-from orbslam2py import System
+from orbslam2py import System, load_vocabulary
 from orbslam2py.maps import (
     Covisibility,
     Keyframes,
@@ -62,6 +62,7 @@ def made_up(like: SavedMap, n_keyframes: int, n_keypoints: int, n_points: int) -
         depth=rng.uniform(1, 5, k * n).astype(np.float32),
         right_u=keypoints[:, 0] - 10,
         colours=np.zeros((0, 3), np.uint8),
+        words=rng.integers(0, load_vocabulary().n_words, k * n).astype(np.uint32),
     )
     first = np.sort(rng.integers(0, k - seen_by, p))
     order = np.arange(p)

@@ -4,8 +4,8 @@
     python -m benchmarks.map_files.mutations --runs 20000
 
 Bits, bytes and blocks of the file are changed, swapped, cut or repeated, and its numbers and blobs
-edited by SQL with checksums that fit again. The same command finds more in an extension that was
-built with sanitizers (CONTRIBUTING.md).
+edited by SQL with checksums that fit again. Each file is read as a copy in memory and as a system
+reads it. `make fuzz-maps` does it with an extension that was built with sanitizers.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from contextlib import closing
 from pathlib import Path
 
 from benchmarks.map_files.mapping import mapped
-from orbslam2py import MapFileError
+from orbslam2py import MapFileError, load_vocabulary
 from orbslam2py import _core as core
-from orbslam2py.maps import load_map, restore_contents, save_map
+from orbslam2py.maps import MapFile, load_map, save_map, take_contents
 from orbslam2py.maps.map_rows import checksum
 from orbslam2py.maps.schema import TABLES
 
@@ -140,16 +140,18 @@ BYTEWISE: tuple[Callable[[bytearray, random.Random], None], ...] = (
 )
 
 
-def check(path: Path) -> str:
+def check(path: Path, vocabulary: core.Vocabulary) -> str:
     """Load a spoilt file as a system would: what came of it."""
     try:
         contents = load_map(path, images=True).contents
+        restored = core.Map()
+        MapFile(path).restore(restored, vocabulary, core.KeyFrameIndex())
     except MapFileError as error:
         assert path.name in str(error), error
         assert "\n" not in str(error), error
         return "refused"
-    restored = restore_contents(contents)
-    violations = core.check_invariants(restored, require_words=False)
+    assert contents.first_difference(take_contents(restored)) is None
+    violations = core.check_invariants(restored, require_words=True)
     assert not violations, violations[0]
     return "loaded"
 
@@ -158,7 +160,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--only", type=int, help="one run, by its number")
+    parser.add_argument("--first", type=int, default=0, help="number of the first run")
     arguments = parser.parse_args()
     bad = 0
     counts: Counter[str] = Counter()
@@ -166,9 +168,10 @@ def main() -> int:
         path, original = Path(name) / "spoilt.orbmap", Path(name) / "map.orbmap"
         save_map(mapped(20), original)
         content = original.read_bytes()
-        check(original)
+        vocabulary = load_vocabulary()
+        check(original, vocabulary)
         before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        runs = range(arguments.runs) if arguments.only is None else [arguments.only]
+        runs = range(arguments.first, arguments.first + arguments.runs)
         for run in runs:
             draws = random.Random(arguments.seed * 1_000_003 + run)
             spoilt = bytearray(content)
@@ -180,7 +183,7 @@ def main() -> int:
                 edited(path, draws)
             begin = time.perf_counter()
             try:
-                what = check(path)
+                what = check(path, vocabulary)
                 seconds = time.perf_counter() - begin
                 if seconds > LONGEST:
                     raise TimeoutError(f"it took {seconds:.0f} s")

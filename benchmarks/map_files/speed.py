@@ -2,10 +2,9 @@
 """Map files of large maps: size, time and memory of saving and loading.
 
     python -m benchmarks.map_files.speed
-    python -m benchmarks.map_files.speed --keyframes 10000 --points 600000
 
-A made-up map: keyframes of 1000 random features, points that six keyframes in a row see. Times are
-medians of five, the first load apart.
+Made-up maps: keyframes of 1000 random features, points that six keyframes in a row see. Times are
+medians of five, the first load apart. Of the largest map only the load is measured.
 """
 
 from __future__ import annotations
@@ -29,9 +28,9 @@ from benchmarks.harness.process_memory import peak_mb, resident_mb
 from benchmarks.map_files.mapping import corridor, made_up, mapped
 from orbslam2py import System, load_vocabulary
 from orbslam2py import _core as core
-from orbslam2py.maps import SavedMap, load_map, restore_contents, save_map, take_contents
-from orbslam2py.maps.contents import take_changes
-from orbslam2py.maps.map_rows import Row, all_rows, keypoint_rows, map_rows
+from orbslam2py.maps import MapFile, SavedMap, load_map, restore_contents, save_map, take_contents
+from orbslam2py.maps.map_copies import take_changes
+from orbslam2py.maps.map_rows import all_rows, keypoint_rows, map_rows
 from orbslam2py.maps.map_writer import MapWriter
 
 
@@ -80,14 +79,14 @@ def increment(path: Path, slam_map: core.Map, saved: SavedMap) -> float:
             known = np.delete(ids, newest)
             begin = time.perf_counter()
             before = take_changes(slam_map, known, before)
-            pages = set(before.pages.tolist())
+            pages = set(zip(before.pages.tolist(), strict=True))
             new = [*map_rows(before.contents, before.changed_keyframes)]
-            new.append(list(keypoint_rows(before.contents))[newest])
-
-            def unchanged(table: str, key: Row, looked_at: set[int] = pages) -> bool:
-                return table not in ("map_points", "observations") or key[0] not in looked_at
-
-            writer.commit(new, unchanged)
+            new += keypoint_rows(before.contents, [newest])
+            kept = {
+                table: writer.keys(table) - (pages if "keyframe" not in table else set())
+                for table in ("keyframes", "covisibility", "map_points", "observations")
+            }
+            writer.commit(new, kept)
             times.append(time.perf_counter() - begin)
     return statistics.median(times)
 
@@ -116,13 +115,14 @@ def memory_of_load(path: Path) -> None:
     before = resident_mb(trimmed=True)
     slam_map, index = core.Map(), core.KeyFrameIndex()
     begin = time.perf_counter()
-    restore_contents(load_map(path).contents, slam_map, vocabulary, index)
+    MapFile(path).restore(slam_map, vocabulary, index)
     seconds = time.perf_counter() - begin
     peak = peak_mb() - before
     gc.collect()
     size = resident_mb(trimmed=True) - before
     print(
-        f"load until usable: {seconds:.2f} s; map {size:.0f} MB, at most {peak:.0f} MB on the way"
+        f"{len(index)} keyframes: load until usable {seconds:.2f} s; map {size:.0f} MB, on the "
+        f"way at most {peak:.0f} MB, {peak / size:.2f} times"
     )
 
 
@@ -133,6 +133,7 @@ def main() -> None:
         keyframes=(1000, "keyframes"),
         features=(1000, "features of each"),
         points=(60_000, "points"),
+        largest=(10_000, "keyframes of the largest map; 0: none"),
         frames=(150, "frames of the run with autosave; 0: none"),
     )
     parser.add_argument("--load", type=Path, help="measure the load of this file alone")
@@ -146,6 +147,10 @@ def main() -> None:
         print_size_and_times(arguments, path)
         command = [sys.executable, "-m", "benchmarks.map_files.speed", "--load", str(path)]
         subprocess.run(command, check=True)
+        if arguments.largest:
+            points = arguments.points * arguments.largest // arguments.keyframes
+            save_map(made_up(mapped(20), arguments.largest, arguments.features, points), path)
+            subprocess.run(command, check=True)
         if arguments.frames:
             without, with_it = frames_with_autosave(folder, arguments.frames)
             print(f"track calls, p99: {without:.2f} ms, with autosave {with_it:.2f} ms")

@@ -13,7 +13,7 @@ from orbslam2py.errors import SettingsError
 from orbslam2py.errors import StateError
 from orbslam2py.errors import VocabularyError
 import typing
-__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'ChangedIds', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FullBundleCommit', 'FullBundleOptions', 'FullBundleResult', 'GatheredBundle', 'ImageBounds', 'ImageError', 'ImageRotation', 'InlierSpread', 'KeyFrameIndex', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapChanges', 'MapFileError', 'MapFollower', 'MapSnapshot', 'MapStamp', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewMotion', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'align_rotation', 'anchor_frame', 'apply_loop_correction', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'changed_since', 'check_invariants', 'check_map_contents', 'choose_loop', 'commit_full_bundle', 'corridor_way', 'count_map_points', 'count_sightings', 'count_staying', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'describe', 'direct_index_of', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'full_bundle_adjustment', 'fundamental_matrix', 'fuse_points', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'keep_small_image', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'map_contents', 'match_for_initialization', 'match_for_triangulation', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'match_views', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'plan_loop_correction', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'refresh_associations', 'render', 'restore_map', 'room_T_wc', 'sample_colours', 'seed_of', 'select_local_map', 'sharpness', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'snapshot_points', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'spread_of_inliers', 'stamp_of', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'verify_loop_candidate', 'words_of']
+__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'ChangedIds', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FullBundleCommit', 'FullBundleOptions', 'FullBundleResult', 'GatheredBundle', 'ImageBounds', 'ImageError', 'ImageRotation', 'InlierSpread', 'KeyFrameIndex', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapChanges', 'MapFileError', 'MapFollower', 'MapRestorer', 'MapSnapshot', 'MapStamp', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewMotion', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'align_rotation', 'anchor_frame', 'apply_loop_correction', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'changed_since', 'check_invariants', 'check_map_contents', 'choose_loop', 'commit_full_bundle', 'corridor_way', 'count_map_points', 'count_sightings', 'count_staying', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'describe', 'direct_index_of', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'full_bundle_adjustment', 'fundamental_matrix', 'fuse_points', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'keep_small_image', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'map_contents', 'match_for_initialization', 'match_for_triangulation', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'match_views', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'plan_loop_correction', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'refresh_associations', 'render', 'restore_map', 'room_T_wc', 'sample_colours', 'seed_of', 'select_local_map', 'sharpness', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'snapshot_points', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'spread_of_inliers', 'stamp_of', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'verify_loop_candidate', 'words_of']
 class Pose:
     """
     Rigid transform. `T_ab` maps coordinates of frame b into frame a.
@@ -1453,6 +1453,10 @@ class Vocabulary:
         """
         Writes the binary format under a temporary name, then renames. Comment and source are kept unless given. Raises VocabularyError.
         """
+    def sha256(self) -> str:
+        """
+        SHA-256 of the content, 64 hexadecimal digits: parameters and tree, not the comment.
+        """
     def table(self) -> tuple:
         """
         The columns (parents, is_word, centres, weights) of from_table.
@@ -1529,6 +1533,23 @@ class KeyFrameIndex:
     def erase(self, id: int) -> None:
         """
         Forgets a keyframe; call it after its death in the map.
+        """
+class MapRestorer:
+    """
+    Makes a map of contents as of map_contents(), of which the keypoints may come in parts. Raises MapFileError, naming the thing, before anything was changed.
+    """
+    def __init__(self, contents: dict, n_keypoints: typing.SupportsInt | typing.SupportsIndex, vocabulary: Vocabulary | None = None, words_fit: bool = False) -> None:
+        """
+        Contents without the keypoints, which are so many. With a vocabulary keyframes are
+        described by words: by those given with the keypoints if they are of this one.
+        """
+    def add(self, keypoints: dict, n_keyframes: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        The arrays of the keypoints of so many more keyframes; they are copied.
+        """
+    def finish(self, map: Map, index: KeyFrameIndex | None = None) -> None:
+        """
+        Fill an empty map; keyframes are added to the index if there is one.
         """
 class TwoViewOutcome:
     """
@@ -3083,12 +3104,6 @@ def refresh_associations(map: Map, frame: TrackedFrame) -> None:
 def render(world: World, T_cw: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"], fx: typing.SupportsFloat | typing.SupportsIndex, fy: typing.SupportsFloat | typing.SupportsIndex, cx: typing.SupportsFloat | typing.SupportsIndex, cy: typing.SupportsFloat | typing.SupportsIndex, width: typing.SupportsInt | typing.SupportsIndex, height: typing.SupportsInt | typing.SupportsIndex, noise: typing.SupportsFloat | typing.SupportsIndex = 0.0, exposure: typing.SupportsFloat | typing.SupportsIndex = 1.0, noise_seed: typing.SupportsInt | typing.SupportsIndex = 0, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> tuple[numpy.typing.NDArray[numpy.uint8], numpy.typing.NDArray[numpy.float32]]:
     """
     Grey image (height, width) uint8 and depth along z (height, width) float32 [m], 0 where nothing is hit. The same bytes for any number of threads.
-    """
-def restore_map(map: Map, contents: dict, vocabulary: Vocabulary | None = None, index: KeyFrameIndex | None = None) -> None:
-    """
-    Fill an empty map with contents as of map_contents(). With a vocabulary keyframes
-    are described by words, and added to the index if there is one. Raises MapFileError,
-    naming the thing, before anything was changed.
     """
 def room_T_wc(size: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], seconds: typing.SupportsFloat | typing.SupportsIndex, period: typing.SupportsFloat | typing.SupportsIndex = 30.0) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
     """

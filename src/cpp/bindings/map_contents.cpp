@@ -71,13 +71,14 @@ void put_keypoints(py::dict& arrays, const std::vector<std::shared_ptr<const Fra
                    const std::vector<bool>& is_known) {
   std::vector<std::int64_t> offsets{0};
   std::vector<std::uint8_t> has_colours;
-  bool distorts = false, has_any_colours = false;
+  bool distorts = false, has_any_colours = false, all_described = true;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const std::size_t n = is_known[i] ? 0 : frames[i]->size();
     offsets.push_back(offsets.back() + static_cast<std::int64_t>(n));
     distorts |= !frames[i]->camera->lens().is_identity();
     has_colours.push_back(frames[i]->colours.empty() ? 0 : 1);
     has_any_colours |= !frames[i]->colours.empty();
+    all_described &= frames[i]->described;
   }
   const auto n = static_cast<py::ssize_t>(offsets.back());
   using Shape = std::vector<py::ssize_t>;
@@ -85,16 +86,17 @@ void put_keypoints(py::dict& arrays, const std::vector<std::shared_ptr<const Fra
       depth(n), right_u(n);
   py::array_t<std::uint8_t> octave(n), descriptors(Shape{n, 32}),
       colours(Shape{has_any_colours ? n : 0, 3});
-  const KeypointColumns<float, std::uint8_t> columns{
-      keypoints.mutable_data(),
-      distorts ? raw.mutable_data() : nullptr,
-      octave.mutable_data(),
-      angle.mutable_data(),
-      response.mutable_data(),
-      descriptors.mutable_data(),
-      depth.mutable_data(),
-      right_u.mutable_data(),
-      has_any_colours ? colours.mutable_data() : nullptr};
+  py::array_t<std::uint32_t> words(all_described ? n : 0);
+  const WritableKeypoints columns{keypoints.mutable_data(),
+                                  distorts ? raw.mutable_data() : nullptr,
+                                  octave.mutable_data(),
+                                  angle.mutable_data(),
+                                  response.mutable_data(),
+                                  descriptors.mutable_data(),
+                                  depth.mutable_data(),
+                                  right_u.mutable_data(),
+                                  has_any_colours ? colours.mutable_data() : nullptr,
+                                  all_described ? words.mutable_data() : nullptr};
   {
     const py::gil_scoped_release release;
     for (std::size_t i = 0; i < frames.size(); ++i) {
@@ -113,6 +115,7 @@ void put_keypoints(py::dict& arrays, const std::vector<std::shared_ptr<const Fra
   arrays["keyframes.depth"] = depth;
   arrays["keyframes.right_u"] = right_u;
   arrays["keyframes.colours"] = colours;
+  arrays["keyframes.words"] = words;
 }
 
 void put_the_rest(py::dict& arrays, MapContents&& contents) {
@@ -181,7 +184,7 @@ py::dict map_contents(const Map& map, const IdArray& known, std::uint64_t keyfra
 /// Takes arrays out of a dictionary, checks type and shape, and keeps them alive.
 class Arrays {
  public:
-  explicit Arrays(const py::dict& arrays) : arrays_(arrays) {}
+  explicit Arrays(py::dict arrays) : arrays_(std::move(arrays)) {}
 
   /// (n, Width) items, or (n,) when Width is 0; n is any number if `count` is negative.
   template <class Item, py::ssize_t Width = 0>
@@ -207,7 +210,7 @@ class Arrays {
   std::int64_t number(const char* name) const { return arrays_[name].cast<std::int64_t>(); }
 
  private:
-  const py::dict& arrays_;
+  py::dict arrays_;
   std::vector<py::array> kept_;
 };
 
@@ -254,11 +257,13 @@ void read_keyframes(Arrays& arrays, StoredMap& stored) {
   rows.has_colours = arrays.flags("keyframes.has_colours", k);
   py::ssize_t ends = k + 1;
   rows.offsets = arrays.column<std::int64_t>("keyframes.offsets", ends);
+}
 
-  py::ssize_t n = -1, n_raw = -1, n_colours = -1;
-  auto& columns = stored.keypoints;
+/// The keypoints of some keyframes; n in number, or any if n is negative, and then told.
+ReadableKeypoints read_keypoints(Arrays& arrays, py::ssize_t& n) {
+  py::ssize_t n_raw = -1, n_colours = -1, n_words = -1;
+  ReadableKeypoints columns;
   columns.keypoints = arrays.items<float, 2>("keyframes.keypoints", n);
-  stored.n_keypoints = static_cast<std::size_t>(n);
   columns.octave = arrays.items<std::uint8_t>("keyframes.octave", n);
   columns.angle = arrays.items<float>("keyframes.angle", n);
   columns.response = arrays.items<float>("keyframes.response", n);
@@ -267,11 +272,16 @@ void read_keyframes(Arrays& arrays, StoredMap& stored) {
   columns.right_u = arrays.items<float>("keyframes.right_u", n);
   const float* const raw = arrays.items<float, 2>("keyframes.raw_keypoints", n_raw);
   const std::uint8_t* const colours = arrays.items<std::uint8_t, 3>("keyframes.colours", n_colours);
-  if ((n_raw != 0 && n_raw != n) || (n_colours != 0 && n_colours != n)) {
-    throw MapFileError("raw keypoints or colours are not as many as keypoints");
+  const auto* const words = arrays.items<std::uint32_t>("keyframes.words", n_words);
+  for (const py::ssize_t optional : {n_raw, n_colours, n_words}) {
+    if (optional != 0 && optional != n) {
+      throw MapFileError("raw keypoints, colours or words are not as many as keypoints");
+    }
   }
   if (n_raw == n && n > 0) columns.raw_keypoints = raw;
   if (n_colours == n && n > 0) columns.colours = colours;
+  if (n_words == n && n > 0) columns.words = words;
+  return columns;
 }
 
 void read_the_rest(Arrays& arrays, StoredMap& stored) {
@@ -304,6 +314,7 @@ void read_the_rest(Arrays& arrays, StoredMap& stored) {
   stored.loop_edges = arrays.column<std::array<std::int64_t, 2>, std::int64_t, 2>("loop_edges", l);
 }
 
+/// All but the keypoints.
 StoredMap read_stored(Arrays& arrays) {
   StoredMap stored;
   stored.next_keyframe = arrays.number("next_keyframe");
@@ -314,26 +325,92 @@ StoredMap read_stored(Arrays& arrays) {
   return stored;
 }
 
-void restore(Map& map, const py::dict& contents, const Vocabulary* vocabulary,
-             KeyFrameIndex* index) {
+void check(const py::dict& contents) {
   Arrays arrays(contents);
-  const StoredMap stored = read_stored(arrays);
+  StoredMap stored = read_stored(arrays);
+  py::ssize_t n = -1;
+  const StoredKeypoints keypoints{0, stored.keyframes.ids.size, read_keypoints(arrays, n)};
+  stored.n_keypoints = static_cast<std::size_t>(n);
   const py::gil_scoped_release release;
   check_stored_map(stored);
-  const auto cameras = restore_cameras(stored);
-  const auto scales = restore_scales(stored);
-  std::vector<std::shared_ptr<const Frame>> frames(stored.keyframes.ids.size);
-  for_each_in_parallel(frames.size(), [&](std::size_t i) {
-    const std::shared_ptr<Frame> frame = restore_frame(stored, i, cameras, scales);
-    if (vocabulary) describe(*frame, *vocabulary);
-    frames[i] = frame;
-  });
-  restore_map(map, stored, frames);
-  if (!index) return;
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    index->add(KeyFrameId(stored.keyframes.ids[i]), frames[i]);
-  }
+  check_stored_keypoints(stored, keypoints);
 }
+
+/// Makes a map of its contents, of which the keypoints come in parts.
+class MapRestorer {
+ public:
+  MapRestorer(const py::dict& contents, std::int64_t n_keypoints,
+              std::shared_ptr<const Vocabulary> vocabulary, bool words_fit)
+      : arrays_(contents),
+        stored_(read_stored(arrays_)),
+        vocabulary_(std::move(vocabulary)),
+        words_fit_(words_fit) {
+    stored_.n_keypoints = static_cast<std::size_t>(n_keypoints);
+    const py::gil_scoped_release release;
+    check_stored_map(stored_);
+    cameras_ = restore_cameras(stored_);
+    scales_ = restore_scales(stored_);
+    frames_.reserve(stored_.keyframes.ids.size);
+  }
+
+  void add(const py::dict& part, std::size_t n_keyframes) {
+    if (n_keyframes > stored_.keyframes.ids.size - frames_.size()) {
+      throw MapFileError("there are keypoints of more keyframes than there are");
+    }
+    const std::size_t first = frames_.size(), end = first + n_keyframes;
+    const auto& offsets = stored_.keyframes.offsets;
+    Arrays arrays(part);
+    auto n = static_cast<py::ssize_t>(offsets[end] - offsets[first]);
+    const StoredKeypoints keypoints{first, end, read_keypoints(arrays, n)};
+    const py::gil_scoped_release release;
+    check_stored_keypoints(stored_, keypoints);
+    frames_.resize(end);
+    try {
+      for_each_in_parallel(n_keyframes, [&](std::size_t i) { make_frame(keypoints, first + i); });
+    } catch (...) {
+      frames_.resize(first);
+      throw;
+    }
+  }
+
+  void finish(Map& map, KeyFrameIndex* index) {
+    const py::gil_scoped_release release;
+    if (frames_.size() != stored_.keyframes.ids.size) {
+      throw MapFileError("the keypoints of some keyframes are missing");
+    }
+    restore_map(map, stored_, frames_);
+    if (!index) return;
+    for (std::size_t i = 0; i < frames_.size(); ++i) {
+      index->add(KeyFrameId(stored_.keyframes.ids[i]), frames_[i]);
+    }
+  }
+
+ private:
+  void make_frame(const StoredKeypoints& keypoints, std::size_t row) {
+    const std::shared_ptr<Frame> frame = restore_frame(stored_, keypoints, row, cameras_, scales_);
+    if (vocabulary_ && words_fit_ && keypoints.columns.words) {
+      const auto& offsets = stored_.keyframes.offsets;
+      const auto begin = offsets[row] - offsets[keypoints.first_row];
+      try {
+        describe(*frame, *vocabulary_, keypoints.columns.words + begin);
+      } catch (const VocabularyError&) {
+        throw MapFileError("keyframe " + std::to_string(stored_.keyframes.ids[row]) +
+                           " has a word that the vocabulary does not have");
+      }
+    } else if (vocabulary_) {
+      describe(*frame, *vocabulary_);
+    }
+    frames_[row] = frame;
+  }
+
+  Arrays arrays_;
+  StoredMap stored_;
+  std::shared_ptr<const Vocabulary> vocabulary_;
+  bool words_fit_;
+  std::vector<std::shared_ptr<const Camera>> cameras_;
+  std::vector<std::shared_ptr<const ScalePyramid>> scales_;
+  std::vector<std::shared_ptr<const Frame>> frames_;
+};
 
 }  // namespace
 
@@ -345,20 +422,25 @@ void bind_map_contents(py::module_& module) {
              "orbslam2py.maps.MapContents. The keypoints of the keyframes `known` ((m,) int64\n"
              "ascending), which never change, are left out. With the stamps and incomplete pages\n"
              "of an earlier call, points come only of pages that may have changed since.");
-  module.def(
-      "check_map_contents",
-      [](const py::dict& contents) {
-        Arrays arrays(contents);
-        const StoredMap stored = read_stored(arrays);
-        const py::gil_scoped_release release;
-        check_stored_map(stored);
-      },
-      "contents"_a, "Raises MapFileError, naming the thing, unless a map can be made of them.");
-  module.def(
-      "restore_map", &restore, "map"_a, "contents"_a, "vocabulary"_a = nullptr, "index"_a = nullptr,
-      "Fill an empty map with contents as of map_contents(). With a vocabulary keyframes\n"
-      "are described by words, and added to the index if there is one. Raises MapFileError,\n"
-      "naming the thing, before anything was changed.");
+  module.def("check_map_contents", &check, "contents"_a,
+             "Raises MapFileError, naming the thing, unless a map can be made of them.");
+  py::class_<MapRestorer>(
+      module, "MapRestorer",
+      "Makes a map of contents as of map_contents(), of which the keypoints may "
+      "come in parts. Raises MapFileError, naming the thing, before anything "
+      "was changed.")
+      .def(py::init([](const py::dict& contents, std::int64_t n_keypoints,
+                       std::shared_ptr<Vocabulary> vocabulary, bool words_fit) {
+             return std::make_unique<MapRestorer>(contents, n_keypoints, std::move(vocabulary),
+                                                  words_fit);
+           }),
+           "contents"_a, "n_keypoints"_a, "vocabulary"_a = nullptr, "words_fit"_a = false,
+           "Contents without the keypoints, which are so many. With a vocabulary keyframes are\n"
+           "described by words: by those given with the keypoints if they are of this one.")
+      .def("add", &MapRestorer::add, "keypoints"_a, "n_keyframes"_a,
+           "The arrays of the keypoints of so many more keyframes; they are copied.")
+      .def("finish", &MapRestorer::finish, "map"_a, "index"_a = nullptr,
+           "Fill an empty map; keyframes are added to the index if there is one.");
 }
 
 }  // namespace orbslam::bindings

@@ -227,6 +227,17 @@ void bind_vocabulary_class(py::module_& module) {
       .def_property_readonly("depth", &Vocabulary::depth)
       .def_property_readonly("scoring", &Vocabulary::scoring)
       .def_property_readonly("weighting", &Vocabulary::weighting)
+      .def(
+          "sha256",
+          [](const Vocabulary& v) {
+            const py::object digest = py::module_::import("hashlib").attr("sha256")();
+            for (const std::string_view piece : v.content()) {
+              digest.attr("update")(py::memoryview::from_memory(
+                  piece.data(), static_cast<py::ssize_t>(piece.size())));
+            }
+            return digest.attr("hexdigest")().cast<std::string>();
+          },
+          "SHA-256 of the content, 64 hexadecimal digits: parameters and tree, not the comment.")
       .def_property_readonly("n_nodes", &Vocabulary::n_nodes, "The root included.")
       .def_property_readonly("n_words", &Vocabulary::n_words)
       .def_property_readonly("hash", &Vocabulary::hash, "Of the content; maps remember it.")

@@ -13,6 +13,9 @@ struct WordVector {
   std::vector<double> weights;
 };
 
+/// Stands for the word of a feature whose word is stopped, which is ignored everywhere.
+inline constexpr std::uint32_t kNoWord = 0xFFFFFFFFU;
+
 /// Direct index: which features fall under which vocabulary node. Nodes ascend; the features of
 /// nodes[i] are indices[offsets[i]] .. indices[offsets[i + 1] - 1], ascending. See
 /// docs/method/words.md#groups-of-words.
@@ -20,6 +23,7 @@ struct DirectIndex {
   std::vector<std::uint32_t> nodes;
   std::vector<std::uint32_t> offsets;  ///< nodes.size() + 1 entries, or empty
   std::vector<std::uint32_t> indices;
+  std::vector<std::uint32_t> words;  ///< of the features, as `indices`: the word of each
 };
 
 }  // namespace orbslam

@@ -223,8 +223,7 @@ MapContents take_contents(const Map& map, const ContentsKnown& known) {
   return contents;
 }
 
-void copy_keypoints(const Frame& frame, const KeypointColumns<float, std::uint8_t>& into,
-                    std::size_t first) {
+void copy_keypoints(const Frame& frame, const WritableKeypoints& into, std::size_t first) {
   const std::size_t n = frame.size();
   const auto& raw = frame.raw_keypoints.empty() ? frame.keypoints : frame.raw_keypoints;
   for (std::size_t i = 0; i < n; ++i) {
@@ -246,6 +245,12 @@ void copy_keypoints(const Frame& frame, const KeypointColumns<float, std::uint8_
     } else if (n > 0) {
       std::memcpy(colours, frame.colours.data(), 3 * n);
     }
+  }
+  if (into.words && frame.described) {
+    std::uint32_t* const words = into.words + first;
+    std::fill_n(words, n, kNoWord);
+    const DirectIndex& index = frame.direct_index;
+    for (std::size_t i = 0; i < index.indices.size(); ++i) words[index.indices[i]] = index.words[i];
   }
   if (n == 0) return;
   static_assert(sizeof(Descriptor) == 32);

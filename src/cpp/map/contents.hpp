@@ -92,9 +92,9 @@ struct ContentsKnown {
 /// then. Takes the read lock; the frames' keypoints are not copied under it.
 MapContents take_contents(const Map& map, const ContentsKnown& known = {});
 
-/// The keypoints of many frames, one after the other, borrowed for reading or writing. Colours
-/// and raw positions may be null.
-template <class Float, class Byte>
+/// The keypoints of many frames, one after the other, borrowed for reading or writing. Colours,
+/// raw positions and words may be null.
+template <class Float, class Byte, class Word>
 struct KeypointColumns {
   Float* keypoints = nullptr;      ///< (n, 2)
   Float* raw_keypoints = nullptr;  ///< (n, 2)
@@ -105,10 +105,13 @@ struct KeypointColumns {
   Float* depth = nullptr;
   Float* right_u = nullptr;
   Byte* colours = nullptr;  ///< (n, 3)
+  Word* words = nullptr;    ///< kNoWord where the word is stopped
 };
+using WritableKeypoints = KeypointColumns<float, std::uint8_t, std::uint32_t>;
+using ReadableKeypoints = KeypointColumns<const float, const std::uint8_t, const std::uint32_t>;
 
-/// Writes the keypoints of a frame into the columns, from row `first` on.
-void copy_keypoints(const Frame& frame, const KeypointColumns<float, std::uint8_t>& into,
-                    std::size_t first);
+/// Writes the keypoints of a frame into the columns, from row `first` on. Words are written of a
+/// frame that is described only.
+void copy_keypoints(const Frame& frame, const WritableKeypoints& into, std::size_t first);
 
 }  // namespace orbslam

@@ -138,13 +138,14 @@ std::vector<std::shared_ptr<const ScalePyramid>> restore_scales(const StoredMap&
 }
 
 std::shared_ptr<Frame> restore_frame(
-    const StoredMap& stored, std::size_t row,
+    const StoredMap& stored, const StoredKeypoints& keypoints, std::size_t row,
     const std::vector<std::shared_ptr<const Camera>>& cameras,
     const std::vector<std::shared_ptr<const ScalePyramid>>& scales) {
-  const auto& columns = stored.keypoints;
+  const ReadableKeypoints& columns = keypoints.columns;
+  const auto& offsets = stored.keyframes.offsets;
   const auto camera = static_cast<std::size_t>(stored.keyframes.camera[row]);
-  const auto first = static_cast<std::size_t>(stored.keyframes.offsets[row]);
-  const std::size_t n = static_cast<std::size_t>(stored.keyframes.offsets[row + 1]) - first;
+  const auto first = static_cast<std::size_t>(offsets[row] - offsets[keypoints.first_row]);
+  const auto n = static_cast<std::size_t>(offsets[row + 1] - offsets[row]);
   auto frame = std::make_shared<Frame>();
   frame->id = stored.keyframes.frame_ids[row];
   frame->timestamp = stored.keyframes.timestamps[row];

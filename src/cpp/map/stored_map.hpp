@@ -19,7 +19,8 @@ struct Column {
 };
 
 /// The arrays of a map that was written down (MapContents as columns), of which nothing is known
-/// but their lengths: columns of one group are equally long, `offsets` has one entry more.
+/// but their lengths: columns of one group are equally long, `offsets` has one entry more. The
+/// keypoints, which are most of it, may come in parts.
 struct StoredMap {
   std::int64_t next_keyframe = 0, next_point = 0;
   std::vector<CameraContents> cameras;
@@ -31,7 +32,6 @@ struct StoredMap {
     Column<std::uint8_t> provisional_parent, processed, has_colours;
   } keyframes;
   std::size_t n_keypoints = 0;
-  KeypointColumns<const float, const std::uint8_t> keypoints;
   struct {
     Column<std::int64_t> ids, parent;
     Column<Quaternion> rotations;
@@ -56,14 +56,23 @@ struct StoredMap {
   Column<std::array<std::int64_t, 2>> loop_edges;
 };
 
-/// Checks everything that restore_map() relies on before anything is allocated for it: ids ascend
-/// and refer to what is there, counts and sizes agree, poses are rigid, numbers are finite and in
-/// range, the spanning tree is a tree. Throws MapFileError with one clause that names the thing.
-void check_stored_map(const StoredMap& stored);
+/// The keypoints of the keyframes in the rows first_row .. end_row - 1.
+struct StoredKeypoints {
+  std::size_t first_row = 0, end_row = 0;
+  ReadableKeypoints columns;  ///< as many as these keyframes' offsets say
+};
 
-/// The frame of keyframe `row`, not described yet.
+/// Checks everything that restore_map() relies on before anything is allocated for it, but for the
+/// keypoints: ids ascend and refer to what is there, counts and sizes agree, poses are rigid,
+/// numbers are finite and in range, the spanning tree is a tree. Throws MapFileError with one
+/// clause that names the thing.
+void check_stored_map(const StoredMap& stored);
+/// The same for keypoints, of a map that was found good.
+void check_stored_keypoints(const StoredMap& stored, const StoredKeypoints& keypoints);
+
+/// The frame of keyframe `row`, one of those whose keypoints are given; not described yet.
 std::shared_ptr<Frame> restore_frame(
-    const StoredMap& stored, std::size_t row,
+    const StoredMap& stored, const StoredKeypoints& keypoints, std::size_t row,
     const std::vector<std::shared_ptr<const Camera>>& cameras,
     const std::vector<std::shared_ptr<const ScalePyramid>>& scales);
 

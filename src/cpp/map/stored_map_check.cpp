@@ -68,12 +68,7 @@ void check_cameras(const StoredMap& stored) {
              std::to_string(size.height) + " pixels");
     }
   }
-  for (const auto& camera : restore_cameras(stored)) {
-    if (!camera->lens().is_identity() && !stored.keypoints.raw_keypoints &&
-        stored.n_keypoints > 0) {
-      refuse("the raw keypoints of a camera with a distorting lens are missing");
-    }
-  }
+  restore_cameras(stored);
   restore_scales(stored);
 }
 
@@ -87,10 +82,7 @@ class KeyFrameCheck {
     if (rows_.ids.size == 0) refuse("there is no keyframe");
     if (rows_.ids[0] != 0) refuse("keyframe 0, the root of the spanning tree, is missing");
     check_offsets();
-    for (std::size_t i = 0; i < rows_.ids.size; ++i) {
-      check_row(i);
-      check_keypoints(i);
-    }
+    for (std::size_t i = 0; i < rows_.ids.size; ++i) check_row(i);
     check_tree();
   }
 
@@ -117,26 +109,6 @@ class KeyFrameCheck {
     if (rows_.camera[i] < 0 ||
         rows_.camera[i] >= static_cast<std::int64_t>(stored_.cameras.size())) {
       refuse(name + " has the camera " + std::to_string(rows_.camera[i]) + ", which is not there");
-    }
-  }
-
-  void check_keypoints(std::size_t i) {
-    const auto& columns = stored_.keypoints;
-    const int n_levels = stored_.cameras[static_cast<std::size_t>(rows_.camera[i])].n_levels;
-    for (auto k = static_cast<std::size_t>(rows_.offsets[i]);
-         k < static_cast<std::size_t>(rows_.offsets[i + 1]); ++k) {
-      const auto in_range = [](const float* xy) {
-        return std::abs(xy[0]) <= kMaxCoordinate && std::abs(xy[1]) <= kMaxCoordinate;
-      };
-      const float depth = columns.depth[k], angle = columns.angle[k];
-      const bool good = in_range(columns.keypoints + 2 * k) &&
-                        (!columns.raw_keypoints || in_range(columns.raw_keypoints + 2 * k)) &&
-                        columns.octave[k] < n_levels && angle >= 0 && angle < 360 &&
-                        std::isfinite(columns.response[k]) && std::isfinite(depth) &&
-                        (depth > 0 || depth == -1) && std::isfinite(columns.right_u[k]);
-      if (good) continue;
-      refuse("keypoint " + std::to_string(k - static_cast<std::size_t>(rows_.offsets[i])) + " of " +
-             keyframe(rows_.ids[i]) + " has a number out of range");
     }
   }
 
@@ -167,6 +139,30 @@ class KeyFrameCheck {
   const StoredMap& stored_;
   const decltype(StoredMap::keyframes)& rows_;
 };
+
+void check_keypoints_of(const StoredMap& stored, const StoredKeypoints& keypoints,
+                        std::size_t row) {
+  const auto& rows = stored.keyframes;
+  const ReadableKeypoints& columns = keypoints.columns;
+  const int n_levels = stored.cameras[static_cast<std::size_t>(rows.camera[row])].n_levels;
+  const auto first = static_cast<std::size_t>(rows.offsets[row]);
+  const auto before = static_cast<std::size_t>(rows.offsets[keypoints.first_row]);
+  const auto end = static_cast<std::size_t>(rows.offsets[row + 1]);
+  const auto in_range = [](const float* xy) {
+    return std::abs(xy[0]) <= kMaxCoordinate && std::abs(xy[1]) <= kMaxCoordinate;
+  };
+  for (std::size_t k = first - before; k < end - before; ++k) {
+    const float depth = columns.depth[k], angle = columns.angle[k];
+    const bool good = in_range(columns.keypoints + 2 * k) &&
+                      (!columns.raw_keypoints || in_range(columns.raw_keypoints + 2 * k)) &&
+                      columns.octave[k] < n_levels && angle >= 0 && angle < 360 &&
+                      std::isfinite(columns.response[k]) && std::isfinite(depth) &&
+                      (depth > 0 || depth == -1) && std::isfinite(columns.right_u[k]);
+    if (good) continue;
+    refuse("keypoint " + std::to_string(k - (first - before)) + " of " + keyframe(rows.ids[row]) +
+           " has a number out of range");
+  }
+}
 
 void check_removed(const StoredMap& stored) {
   const auto& rows = stored.removed_keyframes;
@@ -276,6 +272,19 @@ void check_stored_map(const StoredMap& stored) {
   check_removed(stored);
   check_points(stored);
   check_edges(stored);
+}
+
+void check_stored_keypoints(const StoredMap& stored, const StoredKeypoints& keypoints) {
+  const auto& offsets = stored.keyframes.offsets;
+  const bool any = offsets[keypoints.end_row] > offsets[keypoints.first_row];
+  for (const auto& camera : restore_cameras(stored)) {
+    if (!camera->lens().is_identity() && !keypoints.columns.raw_keypoints && any) {
+      refuse("the raw keypoints of a camera with a distorting lens are missing");
+    }
+  }
+  for (std::size_t row = keypoints.first_row; row < keypoints.end_row; ++row) {
+    check_keypoints_of(stored, keypoints, row);
+  }
 }
 
 }  // namespace orbslam

@@ -2,6 +2,8 @@
 #include "places/vocabulary.hpp"
 
 #include <algorithm>
+#include <mutex>
+#include <utility>
 
 #include "base/errors.hpp"
 #include "places/vocabulary_builder.hpp"
@@ -96,6 +98,30 @@ struct Vocabulary::Impl {
     }
     return {link[node], groups.rank[group]};
   }
+  /// The group of every word; found when it is first asked for.
+  const std::vector<std::uint32_t>& group_of_words() const {
+    std::call_once(words_grouped, [this] {
+      const std::uint64_t n_nodes = image.header().n_nodes;
+      std::vector<std::uint32_t> group_of_nodes(n_nodes, 0);
+      group_of_word.resize(image.header().n_words);
+      // Breadth first: the nodes that groups are made of come first, parents before children.
+      for (std::uint32_t node = 0; node < n_nodes; ++node) {
+        if (node < groups.end) group_of_nodes[node] = groups.rank[node];
+        if (child_count[node] == 0) {
+          group_of_word[link[node]] = group_of_nodes[node];
+          continue;
+        }
+        for (std::uint32_t child = link[node]; child < link[node] + child_count[node]; ++child) {
+          group_of_nodes[child] = group_of_nodes[node];
+        }
+      }
+    });
+    return group_of_word;
+  }
+  /// Words and direct index of features of which `leaf_of(i)` tells word and group.
+  template <class LeafOf>
+  void collect(std::size_t n_features, LeafOf&& leaf_of, WordVector& words,
+               DirectIndex& direct_index) const;
   /// Ties go to the first child.
   std::uint32_t nearest(const Descriptor& descriptor, std::uint32_t first,
                         std::uint32_t count) const {
@@ -118,6 +144,8 @@ struct Vocabulary::Impl {
   const std::uint32_t* link = nullptr;
   const double* weight = nullptr;
   Groups groups;
+  mutable std::once_flag words_grouped;
+  mutable std::vector<std::uint32_t> group_of_word;
 };
 
 Vocabulary::Vocabulary(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -164,6 +192,19 @@ Weighting Vocabulary::weighting() const {
 std::size_t Vocabulary::n_nodes() const { return impl_->image.header().n_nodes; }
 std::size_t Vocabulary::n_words() const { return impl_->image.header().n_words; }
 std::uint64_t Vocabulary::hash() const { return impl_->image.header().content_hash; }
+std::vector<std::string_view> Vocabulary::content() const {
+  const VocabularyHeader& h = impl_->image.header();
+  const auto piece = [](const void* data, std::size_t size) {
+    return std::string_view(static_cast<const char*>(data), size);
+  };
+  return {piece(&h.branching, 4 * sizeof(std::uint32_t)),
+          piece(&h.n_nodes, 2 * sizeof(std::uint64_t)),
+          piece(impl_->centres, h.n_nodes * sizeof(Descriptor)),
+          piece(impl_->child_count, h.n_nodes),
+          piece(impl_->link, h.n_nodes * sizeof(std::uint32_t)),
+          piece(impl_->image.original_id(), h.n_nodes * sizeof(std::uint32_t)),
+          piece(impl_->weight, h.n_words * sizeof(double))};
+}
 std::string Vocabulary::comment() const { return impl_->image.comment(); }
 VocabularySource Vocabulary::source() const { return impl_->image.header().source; }
 void Vocabulary::check_content() const { impl_->image.check_content(impl_->name); }
@@ -185,41 +226,66 @@ Quantised Vocabulary::quantise(const Descriptor& descriptor) const {
   return {leaf.word, impl_->groups.ids[leaf.group], impl_->weight[leaf.word]};
 }
 
-void Vocabulary::transform(const std::vector<Descriptor>& descriptors, WordVector& words,
-                           DirectIndex& direct_index) const {
-  const Impl& tree = *impl_;
-  constexpr auto kStopped = static_cast<std::uint32_t>(-1);
-  std::vector<std::uint32_t> group_of(descriptors.size(), kStopped);
-  std::vector<std::uint32_t> ends(tree.groups.ids.size(), 0);  // counts at first
+template <class LeafOf>
+void Vocabulary::Impl::collect(std::size_t n_features, LeafOf&& leaf_of, WordVector& words,
+                               DirectIndex& direct_index) const {
+  std::vector<Leaf> leaves(n_features);
+  std::vector<std::uint32_t> ends(groups.ids.size(), 0);  // counts at first
   words.words.clear();
   words.weights.clear();
-  for (std::size_t i = 0; i < descriptors.size(); ++i) {
-    const Impl::Leaf leaf = tree.descend(descriptors[i]);
-    if (!(tree.weight[leaf.word] > 0)) continue;
-    words.words.push_back(leaf.word);
-    group_of[i] = leaf.group;
-    ++ends[leaf.group];
+  for (std::size_t i = 0; i < n_features; ++i) {
+    leaves[i] = leaf_of(i);
+    if (leaves[i].word == kNoWord) continue;
+    if (!(weight[leaves[i].word] > 0)) {
+      leaves[i].word = kNoWord;
+      continue;
+    }
+    words.words.push_back(leaves[i].word);
+    ++ends[leaves[i].group];
   }
   const std::size_t n_described = words.words.size();
-  count_words(tree.weight, weighting(), words);
+  count_words(weight, static_cast<Weighting>(image.header().weighting), words);
 
   direct_index.nodes.clear();
   direct_index.offsets.assign(1, 0);
   direct_index.indices.resize(n_described);
+  direct_index.words.resize(n_described);
   std::uint32_t begin = 0;
   for (std::size_t group = 0; group < ends.size(); ++group) {
     const std::uint32_t count = ends[group];
     ends[group] = begin;
     begin += count;
     if (count == 0) continue;
-    direct_index.nodes.push_back(tree.groups.ids[group]);
+    direct_index.nodes.push_back(groups.ids[group]);
     direct_index.offsets.push_back(begin);
   }
-  for (std::size_t i = 0; i < descriptors.size(); ++i) {
-    if (group_of[i] != kStopped) {
-      direct_index.indices[ends[group_of[i]]++] = static_cast<std::uint32_t>(i);
-    }
+  for (std::size_t i = 0; i < n_features; ++i) {
+    if (leaves[i].word == kNoWord) continue;
+    const std::uint32_t place = ends[leaves[i].group]++;
+    direct_index.indices[place] = static_cast<std::uint32_t>(i);
+    direct_index.words[place] = leaves[i].word;
   }
+}
+
+void Vocabulary::transform(const std::vector<Descriptor>& descriptors, WordVector& words,
+                           DirectIndex& direct_index) const {
+  impl_->collect(
+      descriptors.size(), [&](std::size_t i) { return impl_->descend(descriptors[i]); }, words,
+      direct_index);
+}
+
+void Vocabulary::transform(const std::uint32_t* words_of_features, std::size_t n_features,
+                           WordVector& words, DirectIndex& direct_index) const {
+  const std::vector<std::uint32_t>& groups = impl_->group_of_words();
+  const auto leaf_of = [&](std::size_t i) -> Impl::Leaf {
+    const std::uint32_t word = words_of_features[i];
+    if (word == kNoWord) return {word, 0};
+    if (word >= groups.size()) {
+      throw VocabularyError("the vocabulary has no word " + std::to_string(word));
+    }
+    return {word, groups[word]};
+  };
+  impl_->collect(n_features, leaf_of, words, direct_index);
 }
 
 double similarity(const WordVector& a, const WordVector& b) {
@@ -240,6 +306,12 @@ double similarity(const WordVector& a, const WordVector& b) {
 void describe(Frame& frame, const Vocabulary& vocabulary) {
   if (frame.described) return;
   vocabulary.transform(frame.descriptors, frame.words, frame.direct_index);
+  frame.described = true;
+}
+
+void describe(Frame& frame, const Vocabulary& vocabulary, const std::uint32_t* words_of_features) {
+  if (frame.described) return;
+  vocabulary.transform(words_of_features, frame.size(), frame.words, frame.direct_index);
   frame.described = true;
 }
 

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/descriptor.hpp"
@@ -93,7 +94,10 @@ class Vocabulary {
   Weighting weighting() const;
   std::size_t n_nodes() const;  ///< the root included
   std::size_t n_words() const;
-  std::uint64_t hash() const;       ///< of the content; saved maps remember it
+  std::uint64_t hash() const;  ///< of the content, quick
+  /// What the content is, for a hash that cannot be forged: the tree's parameters and its sections,
+  /// as pieces of memory that live as long as the vocabulary.
+  std::vector<std::string_view> content() const;
   std::string comment() const;      ///< where it comes from, its licence
   VocabularySource source() const;  ///< the text file it was made from, if any
   std::vector<VocabularyNode> nodes() const;
@@ -108,6 +112,10 @@ class Vocabulary {
   /// of weight 0 are left out of both. See docs/method/words.md#word-vectors.
   void transform(const std::vector<Descriptor>& descriptors, WordVector& words,
                  DirectIndex& direct_index) const;
+  /// The same of features whose words are known, kNoWord for stopped ones. Throws VocabularyError
+  /// when there is no such word.
+  void transform(const std::uint32_t* words_of_features, std::size_t n_features, WordVector& words,
+                 DirectIndex& direct_index) const;
 
  private:
   struct Impl;
@@ -121,5 +129,7 @@ double similarity(const WordVector& a, const WordVector& b);
 
 /// Fills words and direct index of a frame that is not shared yet (idempotent).
 void describe(Frame& frame, const Vocabulary& vocabulary);
+/// The same with the words of its features, kNoWord for stopped ones: nothing has to be searched.
+void describe(Frame& frame, const Vocabulary& vocabulary, const std::uint32_t* words_of_features);
 
 }  // namespace orbslam

@@ -43,7 +43,7 @@ from orbslam2py.cli.run_options import (
 from orbslam2py.cli.viewing import ViewerExit, ViewerFlag, ViewerHost, ViewerOptions, ViewerPort
 from orbslam2py.cli.watching import RecordOption, VideoOption
 from orbslam2py.datasets import open_input
-from orbslam2py.maps import load_map
+from orbslam2py.maps import MapFile
 from orbslam2py.maps.setup_check import check_sensor
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.settings import Settings
@@ -110,7 +110,7 @@ def run(
     """Track a recorded sequence, a video or a camera; write trajectory, map and report."""
     look = ViewerOptions(viewer, viewer_port, viewer_host, viewer_exit)
     log_to(Console(stderr=True), quiet=quiet)  # opening warns already
-    loaded = None if load is None else load_map(load, images=True)
+    loaded = None if load is None else MapFile(load)
     chosen: Settings | str | None = settings
     if loaded is not None and settings is None:
         if sensor is not None:

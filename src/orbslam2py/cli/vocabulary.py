@@ -135,7 +135,7 @@ def info(
         ("scoring, weighting", f"{facts.scoring}, {facts.weighting}"),
         ("nodes", f"{facts.n_nodes} (with the root)"),
         ("words", f"{facts.n_words} ({facts.n_stopped} of weight 0)"),
-        ("hash", f"{facts.hash:016x}"),
+        ("sha256", facts.sha256),
         ("comment", facts.comment),
     ):
         console.print(f"{name:20}{value}", markup=False)

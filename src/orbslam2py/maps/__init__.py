@@ -3,17 +3,15 @@
 
 from orbslam2py.maps.changes import KeyframesSet, MapChanges, MapFollower, PointsSet
 from orbslam2py.maps.compare import map_differences
-from orbslam2py.maps.contents import (
+from orbslam2py.maps.content_groups import (
     Cameras,
     Covisibility,
     Keyframes,
-    MapContents,
     Observations,
     Points,
     RemovedKeyframes,
-    restore_contents,
-    take_contents,
 )
+from orbslam2py.maps.contents import MapContents
 from orbslam2py.maps.edits.crop import crop_to_box, crop_to_times, keep_keyframes
 from orbslam2py.maps.edits.placement import (
     Placement,
@@ -31,7 +29,8 @@ from orbslam2py.maps.exports.nerfstudio import export_nerfstudio
 from orbslam2py.maps.exports.points import export_points
 from orbslam2py.maps.exports.trajectories import export_trajectory, keyframe_path
 from orbslam2py.maps.map_arrays import MapArrays
-from orbslam2py.maps.map_file import save_map
+from orbslam2py.maps.map_copies import restore_contents, take_contents
+from orbslam2py.maps.map_file import MapFile, save_map
 from orbslam2py.maps.map_reader import load_map
 from orbslam2py.maps.pcd import write_pcd
 from orbslam2py.maps.ply import write_ply
@@ -50,6 +49,7 @@ __all__ = [
     "MapArrays",
     "MapChanges",
     "MapContents",
+    "MapFile",
     "MapFollower",
     "MapSnapshot",
     "Observations",

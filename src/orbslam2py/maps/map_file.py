@@ -3,12 +3,116 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+from collections.abc import Iterator
 
+from orbslam2py import _core as core
 from orbslam2py.errors import MapFileError
+from orbslam2py.maps.map_reader import check_frames, opened, read_head
 from orbslam2py.maps.map_rows import all_rows
+from orbslam2py.maps.map_tables import MapTables
 from orbslam2py.maps.map_writer import MapWriter
 from orbslam2py.maps.saved_map import SavedMap
+from orbslam2py.settings.sensor import Sensor
+
+
+class MapFile:
+    """A map file that a system can begin in, without the copy of it that `load_map` makes.
+
+    What must be known to use the map is read at once, the map itself when a system is made.
+
+    Parameters
+    ----------
+    path
+        The file. It is not changed; another program may be writing it.
+
+    Attributes
+    ----------
+    settings, vocabulary, runs, images, source
+        As in `SavedMap`.
+    n_keyframes, n_points : int
+        Of the map.
+
+    Raises
+    ------
+    MapFileError
+        Naming the file, what is wrong and what can be done about it.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.source = str(path)
+        with opened(path) as (connection, tables):
+            self.settings, self.vocabulary, self.runs, self.images = read_head(
+                connection, tables, images=True
+            )
+            totals = connection.execute("SELECT name, rows, checksum FROM totals").fetchall()
+            (n_points,) = connection.execute("SELECT sum(count) FROM map_points").fetchone()
+            (n_keyframes,) = connection.execute("SELECT count(*) FROM keyframes").fetchone()
+        self._totals = totals
+        self.n_keyframes = int(n_keyframes)
+        self.n_points = int(n_points or 0)
+
+    @property
+    def sensor(self) -> Sensor:
+        """What the map was made from."""
+        return self.settings.sensor
+
+    def check(self) -> None:
+        """Read the file once without making anything of it: whether it is whole.
+
+        Raises
+        ------
+        MapFileError
+            If the file is damaged.
+        """
+        with self._opened() as stored:
+            rest = stored.without_keypoints()
+            core.MapRestorer(rest, stored.n_keypoints)
+            check_frames(self.runs, rest["keyframes.ids"], rest["removed_keyframes.ids"])
+            for _ in stored.keypoint_parts():
+                pass  # their checksums and sizes are looked at
+
+    def restore(
+        self,
+        slam_map: core.Map,
+        vocabulary: core.Vocabulary | None = None,
+        index: core.KeyFrameIndex | None = None,
+    ) -> None:
+        """Make the map.
+
+        Parameters
+        ----------
+        slam_map
+            An empty map to fill.
+        vocabulary
+            Describes the keyframes by words: those in the file, if it is the one that the map was
+            made with.
+        index
+            Gets the keyframes, once they are described.
+
+        Raises
+        ------
+        MapFileError
+            If the file is damaged, or another one than when it was opened; nothing was changed
+            then.
+        """
+        with self._opened() as stored:
+            fits = vocabulary is not None and self.vocabulary.is_of(vocabulary)
+            rest = stored.without_keypoints()
+            restorer = core.MapRestorer(rest, stored.n_keypoints, vocabulary, fits)
+            check_frames(self.runs, rest["keyframes.ids"], rest["removed_keyframes.ids"])
+            for part, n_keyframes in stored.keypoint_parts():
+                restorer.add(part, n_keyframes)
+            restorer.finish(slam_map, index)
+
+    @contextlib.contextmanager
+    def _opened(self) -> Iterator[MapTables]:
+        with opened(self.source) as (connection, tables):
+            totals = connection.execute("SELECT name, rows, checksum FROM totals").fetchall()
+            if totals != self._totals:
+                raise MapFileError("another program has changed it since it was opened")
+            yield MapTables(connection, tables)
 
 
 def save_map(saved: SavedMap, path: str | os.PathLike[str]) -> None:

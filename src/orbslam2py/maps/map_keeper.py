@@ -10,7 +10,8 @@ import math
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -21,14 +22,18 @@ from orbslam2py import _core as core
 from orbslam2py._arrays import IntArray
 from orbslam2py._version import __version__
 from orbslam2py.errors import MapFileError, StateError
-from orbslam2py.maps.contents import ChangedContents, MapContents, take_changes, take_contents
-from orbslam2py.maps.map_file import save_map
+from orbslam2py.maps.contents import MapContents
+from orbslam2py.maps.map_copies import ChangedContents, take_changes, take_contents
+from orbslam2py.maps.map_file import MapFile, save_map
 from orbslam2py.maps.map_rows import Row, keypoint_rows, map_rows, run_rows, settings_rows
 from orbslam2py.maps.map_writer import MapWriter
 from orbslam2py.maps.saved_map import RecordedFrames, Run, SavedMap, VocabularyIdentity
 from orbslam2py.settings.settings import Settings
 
 _log = logging.getLogger(__name__)
+
+#: Seconds that saving keeps the interpreter's lock, and that it leaves to others after them.
+_LONGEST_STRETCH, _BREAK = 0.0005, 0.0005
 
 #: Gives the frames of a map that hang on known keyframes: ``recorded(map_index, keyframe_ids)``.
 Recorded = Callable[[int, IntArray], RecordedFrames]
@@ -47,13 +52,13 @@ class MapKeeper:
         Gives the frames that a file is to hold.
     settings : Settings
         Of the camera.
-    vocabulary : VocabularyIdentity
-        The visual words.
+    vocabulary : callable
+        Tells which visual words there are: only who saves needs to know.
     seed : int
         Of the present run.
     options : mapping
         Those of the system, by their names.
-    earlier : SavedMap, optional
+    earlier : SavedMap or MapFile, optional
         What the map was loaded from.
 
     Attributes
@@ -67,11 +72,11 @@ class MapKeeper:
         slam_map: core.Map,
         recorded: Recorded,
         settings: Settings,
-        vocabulary: VocabularyIdentity,
+        vocabulary: Callable[[], VocabularyIdentity],
         *,
         seed: int,
         options: Mapping[str, Any],
-        earlier: SavedMap | None,
+        earlier: SavedMap | MapFile | None,
     ) -> None:
         self._map = slam_map
         self._recorded = recorded
@@ -100,7 +105,7 @@ class MapKeeper:
         if contents.map_index != self._images_of:
             images = {}
         runs = (*self._runs_before(contents), self._present_run(contents))
-        return SavedMap(contents, self._settings, self._vocabulary, runs, images)
+        return SavedMap(contents, self._settings, self._vocabulary(), runs, images)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a map file; see `orbslam2py.System.save_map`."""
@@ -133,7 +138,9 @@ class MapKeeper:
         if autosave is not None:
             autosave.finish()
 
-    def update(self, writer: MapWriter, before: ChangedContents | None) -> ChangedContents | None:
+    def update(
+        self, writer: MapWriter, before: ChangedContents | None, *, gently: bool = False
+    ) -> ChangedContents | None:
         """Bring a file up to date; returns what it holds then, or None as long as there is no map.
 
         Parameters
@@ -142,39 +149,48 @@ class MapKeeper:
             Of the file.
         before : ChangedContents, optional
             What the file holds: only what has changed since is looked at. None: everything.
+        gently : bool
+            Leave time to other threads all the while.
         """
-        known = np.array([key[0] for key in writer.keys("keypoints")], np.int64)
+        known = np.array(sorted(key[0] for key in writer.keys("keypoints")), np.int64)
         changes = take_changes(self._map, known, before)
         contents = changes.contents
+        if gently:
+            time.sleep(_BREAK)
         if not len(contents.keyframes):
             return None
-        looked_at = set(changes.pages.tolist())
-        kept = set(contents.keyframes.ids[~changes.changed_keyframes].tolist())
-
-        def unchanged(table: str, key: Row) -> bool:
-            if table in ("map_points", "observations"):
-                return key[0] not in looked_at
-            return table in ("keyframes", "covisibility") and key[0] in kept
-
-        n = writer.commit(self._rows(changes, writer), unchanged)
+        looked_at = set(zip(changes.pages.tolist(), strict=True))
+        same = set(zip(contents.keyframes.ids[~changes.changed_keyframes].tolist(), strict=True))
+        kept = {
+            "keyframes": same,
+            "covisibility": same,
+            "map_points": writer.keys("map_points") - looked_at,
+            "observations": writer.keys("observations") - looked_at,
+        }
+        rows = self._rows(changes, writer)
+        n = writer.commit(_leaving_time(rows) if gently else rows, kept)
         _log.debug("%d rows written to %s", n, writer.path)
         return changes
 
     def _rows(self, changes: ChangedContents, writer: MapWriter) -> Iterator[tuple[str, Row]]:
         contents = changes.contents
-        yield from settings_rows(self._settings, self._vocabulary)
+        yield from self._head
         runs = (*self._runs_before(contents), self._present_run(contents))
         for number, run in enumerate(runs):
             # Parts that are full do not change; the last one is looked at again.
             parts = sum(key[0] == number for key in writer.keys("frames"))
             yield from run_rows(number, run, first_part=max(0, parts - 1))
         yield from map_rows(contents, changes.changed_keyframes)
-        for name, row in keypoint_rows(contents):
-            if not writer.has(name, row[0]):
-                yield name, row
+        keys = zip(contents.keyframes.ids.tolist(), strict=True)
+        written = writer.keys("keypoints")
+        yield from keypoint_rows(contents, [i for i, key in enumerate(keys) if key not in written])
         for keyframe, jpeg in list(self._images.items()):
             if self._images_of == contents.map_index and not writer.has("images", keyframe):
                 yield from self._image_rows(contents, keyframe, jpeg)
+
+    @cached_property
+    def _head(self) -> list[tuple[str, Row]]:
+        return list(settings_rows(self._settings, self._vocabulary()))
 
     @staticmethod
     def _image_rows(contents: MapContents, keyframe: int, jpeg: bytes) -> Iterator[tuple[str, Row]]:
@@ -207,7 +223,7 @@ class _Autosave:
         with self._lock:
             self._follow_reset()
             before = None if everything else self._held
-            self._held = self._keeper.update(self._writer, before)
+            self._held = self._keeper.update(self._writer, before, gently=not everything)
 
     def finish(self) -> None:
         """Commit a last time and end the thread."""
@@ -237,6 +253,19 @@ class _Autosave:
         path = self.path.with_stem(f"{self.path.stem}-{epoch - self._first_map}")
         self._writer = MapWriter(path)
         _log.warning("the map was given up; the new one is saved as %s, the old one stays", path)
+
+
+def _leaving_time(rows: Iterable[tuple[str, Row]]) -> Iterator[tuple[str, Row]]:
+    """Give the interpreter's lock to whoever waits for it, every fraction of a millisecond.
+
+    A thread that only asks for the lock gets it after five milliseconds, which a frame would feel.
+    """
+    since = time.perf_counter()
+    for row in rows:
+        yield row
+        if time.perf_counter() - since > _LONGEST_STRETCH:
+            time.sleep(_BREAK)
+            since = time.perf_counter()
 
 
 def encode_image(image: npt.NDArray[np.uint8], width: int = 320, quality: int = 75) -> bytes:

@@ -10,23 +10,21 @@ import sqlite3
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
 from orbslam2py import _core as core
+from orbslam2py._arrays import IntArray
 from orbslam2py._files import reason_of
 from orbslam2py.errors import MapFileError, SettingsError
-from orbslam2py.maps.map_rows import Row
-from orbslam2py.maps.map_tables import join_blobs, read_contents, read_one, read_rows
+from orbslam2py.maps.map_tables import BlobTable, MapTables, read_one, read_rows
 from orbslam2py.maps.map_writer import connect
 from orbslam2py.maps.saved_map import RecordedFrames, Run, SavedMap, VocabularyIdentity
-from orbslam2py.maps.schema import APPLICATION_ID, CREATE, FORMAT_VERSION, TABLES, Table
+from orbslam2py.maps.schema import APPLICATION_ID, FORMAT_VERSION, Table, create_script, tables_of
 from orbslam2py.settings.keys import ORIGINAL_COORDINATES
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
-
-_Group = TypeVar("_Group")
 
 _WRITTEN_BY = "give a file that 'orbslam2py run --save' or save_map has written"
 _COPY = "use a copy of the file"
@@ -53,23 +51,47 @@ def load_map(path: str | os.PathLike[str], *, images: bool = False) -> SavedMap:
     MapFileError
         Naming the file, what is wrong and what can be done about it.
     """
+    named = str(path)
+    with opened(path) as (connection, tables):
+        head = read_head(connection, tables, images=images)
+        contents = MapTables(connection, tables).contents()
+        core.check_map_contents(contents.as_dict())
+        check_frames(head.runs, contents.keyframes.ids, contents.removed_keyframes.ids)
+    return SavedMap(contents, *head, source=named)
+
+
+@contextlib.contextmanager
+def opened(
+    path: str | os.PathLike[str],
+) -> Iterator[tuple[sqlite3.Connection, dict[str, Table]]]:
+    """Open a map file for reading, all of it as of one commit.
+
+    Yields
+    ------
+    connection, tables
+        To the database, and the tables that it has.
+
+    Raises
+    ------
+    MapFileError
+        Naming the file; also for what is found to be wrong with it while it is open.
+    """
     named, file = str(path), Path(path)
-    _check_header(file, named)
+    version = _check_header(file, named)
     with _refusing(named):
         # A writer that was killed may have left a journal: SQLite takes back what it says first.
         interrupted = file.with_name(f"{file.name}-journal").exists()
         with contextlib.closing(connect(file, "rw" if interrupted else "ro")) as connection:
             connection.execute("PRAGMA cell_size_check = ON")
             connection.execute("BEGIN")  # all tables as of one commit
-            _check_schema(connection)
-            saved = _read(connection, images=images)
-        core.check_map_contents(saved.contents.as_dict())
-        _check_frames(saved)
-    return replace(saved, source=named)
+            # Of a file that is being written the header may be older than what the log says.
+            version = max(version, connection.execute("PRAGMA user_version").fetchone()[0])
+            _check_schema(connection, version)
+            yield connection, tables_of(version)
 
 
-def _check_header(path: Path, named: str) -> None:
-    """Tell what a file is by its first bytes, before SQLite looks at it."""
+def _check_header(path: Path, named: str) -> int:
+    """Tell what a file is by its first bytes, before SQLite looks at it; returns its version."""
     try:
         if path.is_dir():
             raise MapFileError(f"{named} is a folder; give the map file itself")
@@ -98,6 +120,7 @@ def _check_header(path: Path, named: str) -> None:
         raise MapFileError(
             f"{named} is cut short: {size} of {expected} bytes; {_COPY}, or save the map again"
         )
+    return version
 
 
 @contextlib.contextmanager
@@ -123,29 +146,32 @@ def _one_line(error: Exception) -> str:
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
 
 
-def _check_schema(connection: sqlite3.Connection) -> None:
+def _check_schema(connection: sqlite3.Connection, version: int) -> None:
     with contextlib.closing(sqlite3.connect(":memory:")) as model:
-        model.executescript(CREATE)
+        model.executescript(create_script(version))
         query = "SELECT type, name, sql FROM sqlite_schema WHERE sql IS NOT NULL ORDER BY name"
         if connection.execute(query).fetchall() != model.execute(query).fetchall():
             raise MapFileError("its tables are not those of a map file")
 
 
-def _read(connection: sqlite3.Connection, *, images: bool) -> SavedMap:
-    sensor, yaml = read_one(connection, "settings")[1:]
+class Head(NamedTuple):
+    """What must be known to use a map, as in `SavedMap`."""
+
+    settings: Settings
+    vocabulary: VocabularyIdentity
+    runs: tuple[Run, ...]
+    images: dict[int, bytes]
+
+
+def read_head(connection: sqlite3.Connection, tables: dict[str, Table], *, images: bool) -> Head:
+    """Everything but the map itself."""
+    sensor, yaml = read_one(connection, tables["settings"])[1:]
     if sensor not in {member.value for member in Sensor}:
         raise MapFileError(f"it names a sensor that is not known, '{sensor}'")
-    name, content_hash, comment = read_one(connection, "vocabulary")[1:]
-    runs = tuple(_read_runs(connection))
-    contents = read_contents(connection)
-    pictures = read_rows(connection, TABLES["images"]) if images else []
-    return SavedMap(
-        contents,
-        _settings_of(yaml, Sensor(sensor)),
-        VocabularyIdentity(name, content_hash, comment),
-        runs,
-        dict(pictures),
-    )
+    identity = VocabularyIdentity(*read_one(connection, tables["vocabulary"])[1:])
+    runs = tuple(_read_runs(connection, tables))
+    pictures = read_rows(connection, tables["images"]) if images else []
+    return Head(_settings_of(yaml, Sensor(sensor)), identity, runs, dict(pictures))
 
 
 def _settings_of(yaml: str, sensor: Sensor) -> Settings:
@@ -156,28 +182,30 @@ def _settings_of(yaml: str, sensor: Sensor) -> Settings:
     return replace(settings, orb=replace(settings.orb, original_coordinates=True))
 
 
-def _read_runs(connection: sqlite3.Connection) -> Iterator[Run]:
-    frames: dict[int, list[Row]] = {}
-    for run, _part, *rest in read_rows(connection, TABLES["frames"]):
-        frames.setdefault(run, []).append((run, *rest))
-    table = Table("frames", ("run",), (), TABLES["frames"].blobs)
-    for number, program, started, seed, options in read_rows(connection, TABLES["runs"]):
-        arrays = join_blobs(table, frames.pop(number, []))
+def _read_runs(connection: sqlite3.Connection, tables: dict[str, Table]) -> Iterator[Run]:
+    frames = BlobTable(connection, tables["frames"])
+    arrays = frames.whole()
+    ends = np.cumsum(frames.counts)
+    rows = read_rows(connection, tables["runs"])
+    if not np.isin(frames.keys[:, 0], [row[0] for row in rows]).all():
+        raise MapFileError("there are frames of a run that is not there")
+    for number, program, started, seed, options in rows:
+        begin, end = np.searchsorted(frames.keys[:, 0], [number, number + 1])
+        first, last = (int(ends[row - 1]) if row else 0 for row in (begin, end))
         try:
             chosen = json.loads(options)
         except ValueError:
             chosen = None
         if not isinstance(chosen, dict):
             raise MapFileError(f"the options of run {number} are not readable")
-        yield Run(program, started, seed, chosen, RecordedFrames(**arrays))
-    if frames:
-        raise MapFileError("there are frames of a run that is not there")
+        recorded = {name: array[first:last].copy() for name, array in arrays.items()}
+        yield Run(program, started, seed, chosen, RecordedFrames(**recorded))
 
 
-def _check_frames(saved: SavedMap) -> None:
-    contents = saved.contents
-    known = np.concatenate([contents.keyframes.ids, contents.removed_keyframes.ids, [-1]])
-    for number, run in enumerate(saved.runs):
+def check_frames(runs: tuple[Run, ...], keyframes: IntArray, removed: IntArray) -> None:
+    """Raise `MapFileError` unless the frames of all runs are poses relative to these keyframes."""
+    known = np.concatenate([keyframes, removed, [-1]])
+    for number, run in enumerate(runs):
         frames = run.frames
         good = (
             np.isin(frames.keyframes, known).all()

@@ -6,13 +6,14 @@ from __future__ import annotations
 import json
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orbslam2py._arrays import IntArray
+from orbslam2py.maps.content_groups import Covisibility, Keyframes
 from orbslam2py.maps.contents import MapContents
 from orbslam2py.maps.saved_map import Run, SavedMap, VocabularyIdentity
 from orbslam2py.maps.schema import FRAMES_PER_ROW, IDS_PER_PAGE, TABLES, Blob, Table
@@ -80,24 +81,37 @@ def map_rows(
     yield from _page_rows("map_points", points, points.ids)
     yield from _page_rows("observations", seen, seen.point)
     edges = contents.covisibility
-    wanted = set(contents.keyframes.ids[changed_keyframes].tolist())
+    wanted = np.isin(edges.a, contents.keyframes.ids[changed_keyframes])
+    edges = Covisibility(edges.a[wanted], edges.b[wanted], edges.weight[wanted])
     for keyframe, which in _groups(edges.a):
-        if keyframe not in wanted:
-            continue
         yield "covisibility", (keyframe, *_blobs(TABLES["covisibility"], edges, which))
     for a, b in contents.loop_edges.tolist():
         yield "loop_edges", (a, b)
 
 
-def keypoint_rows(contents: MapContents) -> Iterator[tuple[str, Row]]:
-    """Row by row the keypoints of all keyframes, as (table, row)."""
+def keypoint_rows(
+    contents: MapContents, wanted: Iterable[int] | None = None
+) -> Iterator[tuple[str, Row]]:
+    """Row by row the keypoints of keyframes, as (table, row).
+
+    Parameters
+    ----------
+    contents
+        The map.
+    wanted
+        Which rows of the keyframes; all by default.
+    """
     keyframes = contents.keyframes
-    for row, keyframe in enumerate(keyframes.ids.tolist()):
-        which = keyframes.keypoints_of(row)
-        blobs = list(_blobs(TABLES["keypoints"], keyframes, which))
-        if not keyframes.has_colours[row]:
-            blobs[-1] = None
-        yield "keypoints", (keyframe, *blobs)
+    for row in range(len(keyframes)) if wanted is None else wanted:
+        yield "keypoints", (int(keyframes.ids[row]), *_keypoint_blobs(keyframes, row))
+
+
+def _keypoint_blobs(keyframes: Keyframes, row: int) -> Iterator[Any]:
+    which = keyframes.keypoints_of(row)
+    blobs = _blobs(TABLES["keypoints"], keyframes, which)
+    yield next(blobs)
+    for blob, value in zip(TABLES["keypoints"].blobs, blobs, strict=True):
+        yield None if blob.sparse and not keyframes.has_colours[row] else value
 
 
 def all_rows(saved: SavedMap) -> Iterator[tuple[str, Row]]:

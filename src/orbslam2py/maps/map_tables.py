@@ -1,104 +1,272 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tables of a map file to arrays; rows are checked against their checksums."""
+"""Tables of a map file to arrays; rows are checked against their checksums.
+
+Sizes are known and checked before anything is made for them, and rows are read one by one, so that
+reading needs no more memory than what is read.
+"""
 
 from __future__ import annotations
 
 import sqlite3
+from collections.abc import Iterator, Mapping
+from itertools import islice
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from orbslam2py._arrays import IntArray
 from orbslam2py.errors import MapFileError
-from orbslam2py.maps.contents import (
+from orbslam2py.maps.content_groups import (
     Cameras,
     Covisibility,
     Keyframes,
-    MapContents,
     Observations,
     Points,
     RemovedKeyframes,
 )
+from orbslam2py.maps.contents import MapContents
 from orbslam2py.maps.map_rows import Row, checksum
-from orbslam2py.maps.schema import TABLES, Table
+from orbslam2py.maps.schema import Blob, Table
+
+#: Keyframes whose keypoints are read at once: a few megabytes.
+_PART = 64
 
 
-def read_rows(connection: sqlite3.Connection, table: Table) -> list[Row]:
-    """All rows of a table by ascending key, without their checksums, which are checked.
+def each_row(connection: sqlite3.Connection, table: Table) -> Iterator[Row]:
+    """Rows of a table by ascending key, one by one, without their checksums, which are checked.
 
     Raises
     ------
     MapFileError
-        If a row is not what was written, or one is missing.
+        If a row is not what was written; after the last one, if any is missing.
     """
     query = f"SELECT {', '.join(table.columns)} FROM {table.name} ORDER BY {', '.join(table.keys)}"
-    rows, sums = [], 0
+    n, sums = 0, 0
     for *values, expected in connection.execute(query):
         row = tuple(values)
         if checksum(row) != expected:
             raise MapFileError(f"the checksum of a row of {table.name}, {row[0]}, is wrong")
         sums += expected
-        _check_types(table, row)
-        rows.append(row)
+        n += 1
+        yield row
     totals = connection.execute("SELECT rows, checksum FROM totals WHERE name = ?", [table.name])
-    if totals.fetchone() != (len(rows), sums):
+    if totals.fetchone() != (n, sums):
         raise MapFileError(f"the table {table.name} has lost rows or has others")
-    return rows
 
 
-def _check_types(table: Table, row: Row) -> None:
-    """Sizes of the blobs against the row's count, before anything is made of them."""
-    if not table.blobs:
-        return
-    count = row[len(table.keys)]
-    for blob, value in zip(table.blobs, row[len(table.keys) + 1 :], strict=True):
-        if value is None and blob.optional:
-            continue
-        if len(value) != count * max(1, blob.width) * np.dtype(blob.dtype).itemsize:
-            raise MapFileError(f"{blob.column} of {table.name} {row[0]} has the wrong length")
+def read_rows(connection: sqlite3.Connection, table: Table) -> list[Row]:
+    """All rows of a table, as `each_row` gives them."""
+    return list(each_row(connection, table))
 
 
-def read_one(connection: sqlite3.Connection, name: str) -> Row:
+def read_one(connection: sqlite3.Connection, table: Table) -> Row:
     """The row of a table that has one."""
-    rows = read_rows(connection, TABLES[name])
+    rows = read_rows(connection, table)
     if len(rows) != 1:
-        raise MapFileError(f"the table {name} is empty")
+        raise MapFileError(f"the table {table.name} is empty")
     return rows[0]
 
 
-def read_contents(connection: sqlite3.Connection) -> MapContents:
-    """The map, of which nothing but sizes has been checked yet."""
-    _, next_keyframe, next_point = read_one(connection, "map")
-    cameras = _read_cameras(read_rows(connection, TABLES["cameras"]))
-    keyframes = _read_keyframes(
-        read_rows(connection, TABLES["keyframes"]), read_rows(connection, TABLES["keypoints"])
-    )
-    removed = read_rows(connection, TABLES["removed_keyframes"])
-    poses = _poses([row[2] for row in removed])
-    edges = read_rows(connection, TABLES["covisibility"])
-    first = np.repeat(
-        np.array([row[0] for row in edges], np.int64), np.array([row[1] for row in edges], np.int64)
-    )
-    loops = read_rows(connection, TABLES["loop_edges"])
-    return MapContents(
-        map_index=0,
-        next_keyframe=next_keyframe,
-        next_point=next_point,
-        cameras=cameras,
-        keyframes=keyframes,
-        removed_keyframes=RemovedKeyframes(
-            ids=_column(removed, 0, np.int64),
-            parent=_column(removed, 1, np.int64),
+class BlobTable:
+    """A table of arrays, cut into rows; sizes are read and checked at once.
+
+    Parameters
+    ----------
+    connection
+        To the file.
+    table
+        One that has blobs.
+
+    Attributes
+    ----------
+    keys : array of int64 (n, m)
+        Of all rows, ascending.
+    counts : array of int64 (n,)
+        Items of the arrays in each row.
+    """
+
+    def __init__(self, connection: sqlite3.Connection, table: Table) -> None:
+        self._connection = connection
+        self._table = table
+        self._sizes = [_size_of(blob) for blob in table.blobs]
+        keys = ", ".join(table.keys)
+        lengths = ", ".join(f"length({blob.column})" for blob in table.blobs)
+        query = f"SELECT {keys}, count, {lengths} FROM {table.name} ORDER BY {keys}"
+        rows = connection.execute(query).fetchall()
+        n_keys = len(table.keys)
+        if not all(isinstance(number, int) for row in rows for number in row[: n_keys + 1]):
+            raise MapFileError(f"a row of {table.name} has a key or a count that is no number")
+        self.keys: IntArray = np.array([row[:n_keys] for row in rows], np.int64)
+        self.keys = self.keys.reshape(-1, n_keys)
+        self.counts: IntArray = np.array([row[n_keys] for row in rows], np.int64)
+        self._present: dict[str, NDArray[np.bool_]] = {}
+        for blob, *sizes in zip(table.blobs, *(row[n_keys + 1 :] for row in rows), strict=True):
+            self._check_sizes(blob, sizes)
+            self._present[blob.field] = np.array([size is not None for size in sizes], bool)
+
+    def has(self, field: str) -> NDArray[np.bool_]:
+        """(n,) which rows hold something of an optional array."""
+        return self._present[field]
+
+    def whole(self) -> dict[str, NDArray[Any]]:
+        """All rows, one after the other, as arrays by field."""
+        ((arrays, _),) = self.parts(max(1, len(self.counts)))
+        return arrays
+
+    def parts(self, rows_each: int = _PART) -> Iterator[tuple[dict[str, NDArray[Any]], int]]:
+        """Arrays by field of so many rows at a time, and of how many; at least one part."""
+        rows = each_row(self._connection, self._table)
+        begin = 0
+        while True:
+            end = min(begin + rows_each, len(self.counts))
+            last = end == len(self.counts)
+            arrays = self._arrays(self.counts[begin:end].sum())
+            place = 0
+            # To the very end, where the totals are compared.
+            for number, row in enumerate(rows if last else islice(rows, end - begin), begin):
+                place += self._put(row, number, arrays, place)
+            if number_of_missing := int(self.counts[begin:end].sum()) - place:
+                raise MapFileError(f"{number_of_missing} rows of {self._table.name} are missing")
+            yield arrays, end - begin
+            if last:
+                return
+            begin = end
+
+    def _check_sizes(self, blob: Blob, sizes: list[int | None]) -> None:
+        item = _size_of(blob)
+        for key, count, size in zip(self.keys, self.counts, sizes, strict=True):
+            if size is None and blob.optional:
+                continue
+            if size is None or size != int(count) * item:
+                raise MapFileError(
+                    f"{blob.column} of {self._table.name} {key[0]} has the wrong length"
+                )
+        missing = sizes.count(None)
+        if missing and missing != len(sizes) and not blob.sparse:
+            raise MapFileError(f"{blob.column} is missing in some rows of {self._table.name}")
+
+    def _arrays(self, n: int) -> dict[str, NDArray[Any]]:
+        arrays = {}
+        for blob in self._table.blobs:
+            present = self._present[blob.field]
+            rows = n if present.any() or not blob.optional else 0
+            native = np.dtype(blob.dtype).newbyteorder("=")
+            shape = (rows, blob.width) if blob.width else (rows,)
+            # Who leaves out a sparse one means zeros.
+            arrays[blob.field] = np.zeros(shape, native) if blob.sparse else np.empty(shape, native)
+        return arrays
+
+    def _put(self, row: Row, number: int, arrays: Mapping[str, NDArray[Any]], place: int) -> int:
+        """Copy a row's blobs into the arrays; returns its count."""
+        first = len(self._table.keys)
+        count = row[first]
+        if number >= len(self.counts) or count != self.counts[number]:
+            raise MapFileError(f"the table {self._table.name} changed while it was read")
+        blobs = zip(self._table.blobs, self._sizes, row[first + 1 :], strict=True)
+        for blob, size, value in blobs:
+            if value is None:
+                continue
+            array = arrays[blob.field]
+            if not isinstance(value, bytes) or len(value) != count * size:
+                raise MapFileError(f"{blob.column} of {self._table.name} has the wrong length")
+            items = np.frombuffer(value, blob.dtype)
+            array[place : place + count] = items.reshape(-1, blob.width) if blob.width else items
+        return int(count)
+
+
+def _size_of(blob: Blob) -> int:
+    """Bytes of an item."""
+    return max(1, blob.width) * np.dtype(blob.dtype).itemsize
+
+
+class MapTables:
+    """The map in an open file, of which nothing but checksums and sizes has been checked yet.
+
+    Parameters
+    ----------
+    connection
+        To the file, in a transaction.
+    tables
+        Those of the file's version.
+    """
+
+    def __init__(self, connection: sqlite3.Connection, tables: Mapping[str, Table]) -> None:
+        self._connection = connection
+        self._tables = tables
+        self._keypoints = BlobTable(connection, tables["keypoints"])
+
+    @property
+    def n_keypoints(self) -> int:
+        """Of all keyframes."""
+        return int(self._keypoints.counts.sum())
+
+    def contents(self) -> MapContents:
+        """Everything."""
+        return self._contents(self._keypoints.whole())
+
+    def without_keypoints(self) -> dict[str, Any]:
+        """All but the keypoints, which `keypoint_parts` gives: as the C++ core takes it."""
+        none = {
+            blob.field: np.zeros((0, blob.width) if blob.width else 0, blob.dtype)
+            for blob in self._tables["keypoints"].blobs
+        }
+        return self._contents(none).as_dict()
+
+    def keypoint_parts(self) -> Iterator[tuple[dict[str, NDArray[Any]], int]]:
+        """Keypoints of some keyframes at a time, as the C++ core takes them, and of how many."""
+        for arrays, n in self._keypoints.parts():
+            arrays.setdefault("words", np.zeros(0, np.uint32))
+            yield {f"keyframes.{name}": array for name, array in arrays.items()}, n
+
+    def _contents(self, keypoints: dict[str, NDArray[Any]]) -> MapContents:
+        connection, tables = self._connection, self._tables
+        removed = read_rows(connection, tables["removed_keyframes"])
+        poses = _poses([row[2] for row in removed])
+        edges = BlobTable(connection, tables["covisibility"])
+        loops = read_rows(connection, tables["loop_edges"])
+        next_keyframe, next_point = read_one(connection, tables["map"])[1:]
+        return MapContents(
+            map_index=0,
+            next_keyframe=next_keyframe,
+            next_point=next_point,
+            cameras=_read_cameras(read_rows(connection, tables["cameras"])),
+            keyframes=self._keyframes(keypoints),
+            removed_keyframes=RemovedKeyframes(
+                ids=_column(removed, 0, np.int64),
+                parent=_column(removed, 1, np.int64),
+                rotations=poses[:, :4].copy(),
+                translations=poses[:, 4:].copy(),
+                scale=_column(removed, 3, np.float64),
+                parent_scale=_column(removed, 4, np.float64),
+            ),
+            points=Points(**BlobTable(connection, tables["map_points"]).whole()),
+            observations=Observations(**BlobTable(connection, tables["observations"]).whole()),
+            covisibility=Covisibility(a=np.repeat(edges.keys[:, 0], edges.counts), **edges.whole()),
+            loop_edges=np.array(loops, np.int64).reshape(-1, 2),
+        )
+
+    def _keyframes(self, keypoints: dict[str, NDArray[Any]]) -> Keyframes:
+        rows = read_rows(self._connection, self._tables["keyframes"])
+        ids = _column(rows, 0, np.int64)
+        if not np.array_equal(ids, self._keypoints.keys[:, 0]):
+            raise MapFileError("keyframes and their keypoints do not belong together")
+        poses = _poses([row[4] for row in rows])
+        return Keyframes(
+            ids=ids,
+            frame_ids=_column(rows, 1, np.int64),
+            timestamps=_column(rows, 2, np.float64),
+            camera=_column(rows, 3, np.int64),
             rotations=poses[:, :4].copy(),
             translations=poses[:, 4:].copy(),
-            scale=_column(removed, 3, np.float64),
-            parent_scale=_column(removed, 4, np.float64),
-        ),
-        points=Points(**_join_table(connection, "map_points")),
-        observations=Observations(**_join_table(connection, "observations")),
-        covisibility=Covisibility(a=first, **join_blobs(TABLES["covisibility"], edges)),
-        loop_edges=np.array(loops, np.int64).reshape(-1, 2),
-    )
+            scale=_column(rows, 5, np.float64),
+            parent=np.array([-1 if row[6] is None else row[6] for row in rows], np.int64),
+            provisional_parent=_column(rows, 7, np.int64) != 0,
+            processed=_column(rows, 8, np.int64) != 0,
+            has_colours=self._keypoints.has("colours"),
+            offsets=np.concatenate([[0], np.cumsum(self._keypoints.counts)]).astype(np.int64),
+            **keypoints,
+        )
 
 
 def _read_cameras(rows: list[Row]) -> Cameras:
@@ -117,35 +285,6 @@ def _read_cameras(rows: list[Row]) -> Cameras:
     )
 
 
-def _read_keyframes(rows: list[Row], keypoints: list[Row]) -> Keyframes:
-    ids = _column(rows, 0, np.int64)
-    if not np.array_equal(ids, _column(keypoints, 0, np.int64)):
-        raise MapFileError("keyframes and their keypoints do not belong together")
-    table = TABLES["keypoints"]
-    counts = _column(keypoints, 1, np.int64)
-    has_colours = np.array([row[-1] is not None for row in keypoints], bool)
-    if has_colours.any():
-        keypoints = [
-            row if row[-1] is not None else (*row[:-1], bytes(3 * row[1])) for row in keypoints
-        ]
-    poses = _poses([row[4] for row in rows])
-    return Keyframes(
-        ids=ids,
-        frame_ids=_column(rows, 1, np.int64),
-        timestamps=_column(rows, 2, np.float64),
-        camera=_column(rows, 3, np.int64),
-        rotations=poses[:, :4].copy(),
-        translations=poses[:, 4:].copy(),
-        scale=_column(rows, 5, np.float64),
-        parent=np.array([-1 if row[6] is None else row[6] for row in rows], np.int64),
-        provisional_parent=_column(rows, 7, np.int64) != 0,
-        processed=_column(rows, 8, np.int64) != 0,
-        has_colours=has_colours,
-        offsets=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
-        **join_blobs(table, keypoints),
-    )
-
-
 def _column(rows: list[Row], place: int, dtype: Any) -> NDArray[Any]:
     return np.array([row[place] for row in rows], dtype)
 
@@ -154,22 +293,3 @@ def _poses(blobs: list[bytes]) -> NDArray[np.float64]:
     if any(len(blob) != 7 * 8 for blob in blobs):
         raise MapFileError("a pose has the wrong length")
     return np.frombuffer(b"".join(blobs), "<f8").astype(np.float64).reshape(-1, 7)
-
-
-def _join_table(connection: sqlite3.Connection, name: str) -> dict[str, NDArray[Any]]:
-    return join_blobs(TABLES[name], read_rows(connection, TABLES[name]))
-
-
-def join_blobs(table: Table, rows: list[Row]) -> dict[str, NDArray[Any]]:
-    """The blobs of all rows, one after the other, as arrays by field."""
-    arrays = {}
-    for place, blob in enumerate(table.blobs, start=len(table.keys) + 1):
-        parts = [row[place] for row in rows]
-        if blob.optional and any(part is None for part in parts):
-            if not all(part is None for part in parts):
-                raise MapFileError(f"{blob.column} is missing in some rows of {table.name}")
-            parts = []
-        native = np.dtype(blob.dtype).newbyteorder("=")
-        array = np.frombuffer(b"".join(parts), blob.dtype).astype(native, copy=True)
-        arrays[blob.field] = array.reshape(-1, blob.width) if blob.width else array
-    return arrays

@@ -7,13 +7,14 @@ import contextlib
 import os
 import secrets
 import sqlite3
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Set
 from pathlib import Path
+from types import MappingProxyType
 
 from orbslam2py._files import reason_of
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.map_rows import Row, checksum
-from orbslam2py.maps.schema import CREATE, TABLES, Table
+from orbslam2py.maps.schema import TABLES, Table, create_script
 
 #: Tables whose rows never change and are written once.
 WRITTEN_ONCE = frozenset({"keypoints", "images", "frames", "runs", "settings", "vocabulary"})
@@ -67,14 +68,14 @@ class MapWriter:
         """Whether the file holds a row."""
         return key in self._written[table]
 
-    def keys(self, table: str) -> list[Row]:
-        """Keys of the rows that the file holds, ascending."""
-        return sorted(self._written[table])
+    def keys(self, table: str) -> Set[Row]:
+        """Keys of the rows that the file holds."""
+        return self._written[table].keys()
 
     def commit(
         self,
         rows: Iterable[tuple[str, Row]],
-        unchanged: Callable[[str, Row], bool] = lambda table, key: False,
+        kept: Mapping[str, Set[Row]] = MappingProxyType({}),
     ) -> int:
         """Make the file hold these rows, in one transaction; returns how many were written.
 
@@ -85,8 +86,8 @@ class MapWriter:
         ----------
         rows
             (table, row) pairs.
-        unchanged
-            ``unchanged(table, key)`` tells of a row of the file that is not given whether it stays.
+        kept
+            Keys of rows that stay though they are not given, by table.
 
         Raises
         ------
@@ -96,7 +97,7 @@ class MapWriter:
         with _naming(self._named):
             if self._connection is None:
                 return self._commit_first(rows)
-            return self._change(self._connection, rows, unchanged)
+            return self._change(self._connection, rows, kept)
 
     def close(self) -> None:
         """End with a single file, without a log beside it; idempotent."""
@@ -114,8 +115,8 @@ class MapWriter:
                 # Nobody sees the temporary file, so it needs no journal.
                 connection.execute("PRAGMA journal_mode = OFF")
                 connection.execute("PRAGMA synchronous = OFF")
-                connection.executescript(CREATE)
-                n = self._change(connection, rows, lambda table, key: False)
+                connection.executescript(create_script())
+                n = self._change(connection, rows, {})
                 if not self._once:
                     # Readers see the last commit while the next is written, and so does whoever
                     # comes after a crash. Switched on here, where a kill does no harm.
@@ -138,7 +139,7 @@ class MapWriter:
         self,
         connection: sqlite3.Connection,
         rows: Iterable[tuple[str, Row]],
-        unchanged: Callable[[str, Row], bool],
+        kept: Mapping[str, Set[Row]],
     ) -> int:
         written = {name: dict(known) for name, known in self._written.items()}
         seen: dict[str, set[Row]] = {name: set() for name in TABLES}
@@ -154,7 +155,7 @@ class MapWriter:
                 written[name][key] = total
                 connection.execute(_UPSERT[name], (*row, total))
                 n += 1
-            for name, key in _others(written, seen, unchanged):
+            for name, key in _others(written, seen, kept):
                 _delete(connection, name, key)
                 del written[name][key]
                 n += 1
@@ -197,15 +198,14 @@ def connect(path: Path, mode: str) -> sqlite3.Connection:
 def _others(
     written: dict[str, dict[Row, int]],
     seen: dict[str, set[Row]],
-    unchanged: Callable[[str, Row], bool],
+    kept: Mapping[str, Set[Row]],
 ) -> list[tuple[str, Row]]:
     """What the file holds and the map no longer has; keypoints before their keyframes."""
     gone = [
         (name, key)
         for name, known in written.items()
         if name not in WRITTEN_ONCE
-        for key in known
-        if key not in seen[name] and not unchanged(name, key)
+        for key in known.keys() - seen[name] - kept.get(name, frozenset())
     ]
     dead = {key for name, key in gone if name == "keyframes"}
     hanging = [(name, key) for name in ("keypoints", "images") for key in dead & set(written[name])]

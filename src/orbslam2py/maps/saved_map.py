@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
 from orbslam2py.maps.contents import MapContents
+from orbslam2py.maps.map_copies import restore_contents
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
 from orbslam2py.trajectory.rotations import (
@@ -21,6 +23,15 @@ from orbslam2py.trajectory.rotations import (
 )
 from orbslam2py.trajectory.trajectory import Trajectory
 
+#: It takes a tenth of a second for a vocabulary of a million words.
+_known_sha256: weakref.WeakKeyDictionary[core.Vocabulary, str] = weakref.WeakKeyDictionary()
+
+
+def _sha256_of(vocabulary: core.Vocabulary) -> str:
+    if vocabulary not in _known_sha256:
+        _known_sha256[vocabulary] = vocabulary.sha256()
+    return _known_sha256[vocabulary]
+
 
 @dataclass(frozen=True)
 class VocabularyIdentity:
@@ -29,14 +40,20 @@ class VocabularyIdentity:
     name: str
     """Of the file; empty when it was made in memory."""
     hash: str
-    """Of the content, 16 hexadecimal digits, as ``orbslam2py vocabulary info`` shows it."""
+    """SHA-256 of the content, 64 hexadecimal digits, as ``orbslam2py vocabulary info`` shows it. In
+    map files of version 1 a shorter hash of 16 digits."""
     comment: str = ""
     """Where it comes from, its licence."""
 
     @classmethod
     def of(cls, vocabulary: core.Vocabulary, name: str = "") -> VocabularyIdentity:
         """Identify a vocabulary by its content."""
-        return cls(name, f"{vocabulary.hash:016x}", vocabulary.comment)
+        return cls(name, _sha256_of(vocabulary), vocabulary.comment)
+
+    def is_of(self, vocabulary: core.Vocabulary) -> bool:
+        """Whether it is this vocabulary, by its content."""
+        short = f"{vocabulary.hash:016x}"
+        return self.hash == (short if len(self.hash) == len(short) else _sha256_of(vocabulary))
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +124,37 @@ class SavedMap:
     def sensor(self) -> Sensor:
         """What the map was made from."""
         return self.settings.sensor
+
+    @property
+    def n_keyframes(self) -> int:
+        """Of the map."""
+        return len(self.contents.keyframes)
+
+    @property
+    def n_points(self) -> int:
+        """Of the map."""
+        return len(self.contents.points)
+
+    def restore(
+        self,
+        slam_map: core.Map,
+        vocabulary: core.Vocabulary | None = None,
+        index: core.KeyFrameIndex | None = None,
+    ) -> None:
+        """Make the map.
+
+        Parameters
+        ----------
+        slam_map
+            An empty map to fill.
+        vocabulary
+            Describes the keyframes by words: those that are known, if it is the one that the map
+            was made with.
+        index
+            Gets the keyframes, once they are described.
+        """
+        fits = vocabulary is not None and self.vocabulary.is_of(vocabulary)
+        restore_contents(self.contents, slam_map, vocabulary, index, words_fit=fits)
 
     def trajectory(self, run: int = -1) -> Trajectory:
         """Where the images of a run were, in the map as it is now.

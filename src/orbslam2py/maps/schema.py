@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 #: Tells map files from other SQLite files: "ORBm" in ASCII.
 APPLICATION_ID = 0x4F52426D
-#: Version of the format; files of later versions are refused.
-FORMAT_VERSION = 1
+#: Version of the format that is written; later ones are refused. Version 1 had no words.
+FORMAT_VERSION = 2
 #: A row of `map_points` and of `observations` holds the points of so many ids.
 IDS_PER_PAGE = 256
 #: Frames in a row of `frames`.
@@ -26,6 +26,8 @@ class Blob(NamedTuple):
     """Items a row, for arrays (n, width); 0 for arrays (n,)."""
     optional: bool = False
     """NULL when the array is empty."""
+    sparse: bool = False
+    """NULL in single rows too, which are zeros in the array."""
 
 
 KEYPOINTS = (
@@ -37,7 +39,8 @@ KEYPOINTS = (
     Blob("descriptors", "descriptors", "|u1", 32),
     Blob("depths", "depth", "<f4"),
     Blob("right_columns", "right_u", "<f4"),
-    Blob("colours", "colours", "|u1", 3, optional=True),
+    Blob("colours", "colours", "|u1", 3, optional=True, sparse=True),
+    Blob("words", "words", "<u4", optional=True),
 )
 MAP_POINTS = (
     Blob("ids", "ids", "<i8"),
@@ -129,16 +132,31 @@ TABLES = {
 }
 
 
+def tables_of(version: int) -> dict[str, Table]:
+    """The tables of a version of the format."""
+    if version > 1:
+        return TABLES
+    return {**TABLES, "keypoints": Table("keypoints", ("keyframe",), (), KEYPOINTS[:-1])}
+
+
 def _blob_columns(blobs: tuple[Blob, ...]) -> str:
     columns = ["count INTEGER NOT NULL CHECK (count >= 0),"]
     columns += [f"{blob.column} BLOB{'' if blob.optional else ' NOT NULL'}," for blob in blobs]
     return "\n  ".join(columns)
 
 
-#: Makes the tables. Rows carry their checksums; `totals` counts the rows and adds them up.
-CREATE = f"""
+def create_script(version: int = FORMAT_VERSION) -> str:
+    """SQL that makes the tables of a version of the format.
+
+    Rows carry their checksums; `totals` counts the rows and adds them up.
+    """
+    keypoints = _blob_columns(tables_of(version)["keypoints"].blobs)
+    return _CREATE.format(version=version, keypoints=keypoints)
+
+
+_CREATE = f"""
 PRAGMA application_id = {APPLICATION_ID};
-PRAGMA user_version = {FORMAT_VERSION};
+PRAGMA user_version = {{version}};
 
 CREATE TABLE map (
   id INTEGER PRIMARY KEY CHECK (id = 1),
@@ -210,7 +228,7 @@ CREATE VIEW spanning_tree AS
 CREATE TABLE keypoints (
   keyframe INTEGER PRIMARY KEY
     REFERENCES keyframes ON DELETE CASCADE DEFERRABLE INITIALLY DEFERRED,
-  {_blob_columns(KEYPOINTS)}
+  {{keypoints}}
   checksum INTEGER NOT NULL
 ) STRICT;
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from orbslam2py import _core as core
 from orbslam2py.errors import MapFileError, SettingsError
+from orbslam2py.maps.map_file import MapFile
 from orbslam2py.maps.saved_map import SavedMap, VocabularyIdentity
 from orbslam2py.settings.keys import KEYS
 from orbslam2py.settings.sensor import Sensor
@@ -21,7 +23,7 @@ _FREE = {"Camera.fps", "Camera.RGB", "ORBextractor.nFeatures"} | {
 }
 
 
-def check_sensor(saved: SavedMap, sensor: Sensor) -> None:
+def check_sensor(saved: SavedMap | MapFile, sensor: Sensor) -> None:
     """Raise `SettingsError` unless the map was made with this kind of sensor."""
     if saved.sensor is not sensor:
         raise SettingsError(
@@ -30,7 +32,7 @@ def check_sensor(saved: SavedMap, sensor: Sensor) -> None:
         )
 
 
-def check_camera(saved: SavedMap, settings: Settings) -> None:
+def check_camera(saved: SavedMap | MapFile, settings: Settings) -> None:
     """Raise `SettingsError`, saying what differs, unless the map was made with this camera."""
     differences = list(_differences(saved.settings, settings))
     if differences:
@@ -41,10 +43,11 @@ def check_camera(saved: SavedMap, settings: Settings) -> None:
         )
 
 
-def check_vocabulary(saved: SavedMap, present: VocabularyIdentity) -> None:
+def check_vocabulary(saved: SavedMap | MapFile, vocabulary: core.Vocabulary, name: str) -> None:
     """Raise `MapFileError` unless the map was made with these visual words."""
     made_with = saved.vocabulary
-    if made_with.hash != present.hash:
+    if not made_with.is_of(vocabulary):
+        present = VocabularyIdentity.of(vocabulary, name)
         raise MapFileError(
             f"the map {saved.source} was made with the vocabulary {made_with.name or 'in memory'} "
             f"({made_with.hash}), not with {present.name or 'the one given'} ({present.hash}); "

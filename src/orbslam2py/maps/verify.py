@@ -13,7 +13,7 @@ import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py.errors import MapFileError
-from orbslam2py.maps.contents import restore_contents
+from orbslam2py.maps.map_copies import restore_contents
 from orbslam2py.maps.map_reader import load_map
 from orbslam2py.maps.map_writer import connect
 from orbslam2py.maps.saved_map import SavedMap

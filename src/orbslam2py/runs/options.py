@@ -11,6 +11,7 @@ from orbslam2py._arguments import choice_of, is_whole, shown
 from orbslam2py._arrays import FloatArray
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.errors import DatasetError, SettingsError
+from orbslam2py.maps.map_file import MapFile
 from orbslam2py.maps.saved_map import SavedMap
 from orbslam2py.runs.feeds import is_sequence
 from orbslam2py.settings.sensor import Sensor
@@ -41,7 +42,7 @@ class RunOptions:
     """Switch to localization mode after so many frames; 0, in a loaded map: from the first on."""
     final_adjustment: bool = False
     """Refine the finished map as a whole (`System.optimize`) before the results are written."""
-    load_map: SavedMap | None = None
+    load_map: SavedMap | MapFile | None = None
     """Begin in this map."""
     initial_pose: FloatArray | None = None
     """Where in the loaded map the camera may be, (4, 4) camera to world."""

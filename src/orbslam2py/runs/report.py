@@ -15,6 +15,7 @@ from orbslam2py._files import describe_error
 from orbslam2py._version import __version__
 from orbslam2py.errors import OrbSlamError
 from orbslam2py.evaluation import Alignment, Evaluation, evaluate_trajectory
+from orbslam2py.maps.map_file import MapFile
 from orbslam2py.maps.saved_map import SavedMap
 from orbslam2py.runs.gravity import Height, height_of
 from orbslam2py.runs.losses import losses_report
@@ -142,14 +143,14 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
     return report
 
 
-def loaded_map_entry(loaded: SavedMap | None) -> dict[str, Any] | None:
+def loaded_map_entry(loaded: SavedMap | MapFile | None) -> dict[str, Any] | None:
     """What report.json says about the map that the run began in."""
     if loaded is None:
         return None
     return {
         "file": loaded.source,
-        "keyframes": len(loaded.contents.keyframes),
-        "map_points": len(loaded.contents.points),
+        "keyframes": loaded.n_keyframes,
+        "map_points": loaded.n_points,
         "runs": len(loaded.runs),
     }
 

@@ -14,6 +14,7 @@ from orbslam2py._arguments import path_of, shown
 from orbslam2py.datasets import RecordedSequence
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.errors import DatasetError, SettingsError
+from orbslam2py.maps.map_file import MapFile
 from orbslam2py.maps.map_writer import check_map_target
 from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.losses import find_losses, last_loss_warning
@@ -140,6 +141,8 @@ def run_sequence(
             options.initial_pose,
             options.allow_other_setup,
         )
+        if isinstance(options.load_map, MapFile):
+            options.load_map.check()
     if options.save_map is not None:
         check_map_target(options.save_map)
     runner = SequenceRunner(sequence, sequence.settings, vocabulary, options)

@@ -18,7 +18,8 @@ from dataclasses import dataclass, field, replace
 from orbslam2py import _core as core
 from orbslam2py._timing import StageStatistics, StageTimer
 from orbslam2py._worker import Worker, WorkerState
-from orbslam2py.maps.contents import MapContents, restore_contents, take_contents
+from orbslam2py.maps.contents import MapContents
+from orbslam2py.maps.map_copies import restore_contents, take_contents
 from orbslam2py.maps.units import unit_of
 
 _log = logging.getLogger(__name__)
@@ -253,4 +254,7 @@ def optimize_map(
         on_done=lambda _: None,
     )
     record = adjustment.run()
-    return replace(take_contents(slam_map), map_index=contents.map_index), record
+    refined = take_contents(slam_map)
+    # No keyframe comes or goes, and nothing here knows the vocabulary.
+    keyframes = replace(refined.keyframes, words=contents.keyframes.words)
+    return replace(refined, map_index=contents.map_index, keyframes=keyframes), record

@@ -13,8 +13,8 @@ import numpy.typing as npt
 from orbslam2py import _core as core
 from orbslam2py._arguments import choice_of, is_number, seed_of, shown
 from orbslam2py.errors import SettingsError
-from orbslam2py.maps.map_reader import load_map
-from orbslam2py.maps.saved_map import SavedMap, VocabularyIdentity
+from orbslam2py.maps.map_file import MapFile
+from orbslam2py.maps.saved_map import SavedMap
 from orbslam2py.maps.setup_check import check_camera, check_sensor, check_vocabulary
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings, resolve_settings
@@ -67,8 +67,8 @@ class Setup:
     sensor: Sensor
     settings: Settings
     vocabulary: core.Vocabulary
-    identity: VocabularyIdentity
-    loaded: SavedMap | None
+    vocabulary_name: str
+    loaded: SavedMap | MapFile | None
     initial_pose: core.Pose | None
     """``T_cw`` where the camera may be in the loaded map."""
 
@@ -78,15 +78,15 @@ class Setup:
         settings: Settings | str | Path | None,
         sensor: Sensor | str | None,
         vocabulary: core.Vocabulary | str | Path | None,
-        map_to_load: SavedMap | str | Path | None,
+        map_to_load: SavedMap | MapFile | str | Path | None,
         initial_T_wc: npt.ArrayLike | None,
         allow_other: bool,
     ) -> Setup:
         """Put together what was given and what the map brings; `System` describes the arguments."""
-        if map_to_load is None or isinstance(map_to_load, SavedMap):
+        if map_to_load is None or isinstance(map_to_load, (SavedMap, MapFile)):
             loaded = map_to_load
         else:
-            loaded = load_map(map_to_load, images=True)
+            loaded = MapFile(map_to_load)
         if sensor is None:
             sensor = settings.sensor if isinstance(settings, Settings) else None
             sensor = loaded.sensor if loaded is not None else sensor
@@ -103,13 +103,13 @@ class Setup:
         words = (
             vocabulary if isinstance(vocabulary, core.Vocabulary) else load_vocabulary(vocabulary)
         )
-        identity = VocabularyIdentity.of(words, vocabulary_name(vocabulary))
+        name = vocabulary_name(vocabulary)
         if loaded is not None and not allow_other:
             check_camera(loaded, settings)
-            check_vocabulary(loaded, identity)
+            check_vocabulary(loaded, words, name)
         if loaded is None and initial_T_wc is not None:
             raise SettingsError("initial_pose says where in a loaded map the camera is; load one")
-        return cls(sensor, settings, words, identity, loaded, _pose_given(initial_T_wc))
+        return cls(sensor, settings, words, name, loaded, _pose_given(initial_T_wc))
 
 
 def _pose_given(T_wc: npt.ArrayLike | None) -> core.Pose | None:

@@ -6,6 +6,7 @@ Mur-Artal and Tardos, "ORB-SLAM2", 2017, figure 2; ``docs/method/index.md``.
 
 from __future__ import annotations
 
+import functools
 import logging
 import math
 import threading
@@ -17,8 +18,8 @@ from orbslam2py._arguments import is_number, shown
 from orbslam2py._arrays import ByteArray
 from orbslam2py._timing import StageStatistics, StageTimer
 from orbslam2py.errors import ImageError
-from orbslam2py.maps.contents import restore_contents
 from orbslam2py.maps.map_keeper import MapKeeper, encode_image
+from orbslam2py.maps.saved_map import VocabularyIdentity
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.back_end import RESET_PATIENCE, BackEnd
 from orbslam2py.slam.events import Callbacks, Relocalized, TrackingLost
@@ -97,14 +98,13 @@ class Pipeline:
         self._next_frame_id = 0
         self._last_timestamp = -math.inf
         if setup.loaded is not None:
-            contents = setup.loaded.contents
-            restore_contents(contents, back_end.map, setup.vocabulary, back_end.keyframe_index)
+            setup.loaded.restore(back_end.map, setup.vocabulary, back_end.keyframe_index)
             self.tracking.begin_in_loaded_map(setup.initial_pose)
         self.keeper = MapKeeper(
             back_end.map,
             self.recorder.recorded,
             setup.settings,
-            setup.identity,
+            functools.partial(VocabularyIdentity.of, setup.vocabulary, setup.vocabulary_name),
             seed=options.seed,
             options=asdict(options),
             earlier=setup.loaded,

@@ -16,7 +16,9 @@ from orbslam2py import _core as core
 from orbslam2py._arguments import patience_of
 from orbslam2py._call_guard import CallGuard
 from orbslam2py.errors import MapFileError, StateError, WorkerError
-from orbslam2py.maps.contents import MapContents, take_contents
+from orbslam2py.maps.contents import MapContents
+from orbslam2py.maps.map_copies import take_contents
+from orbslam2py.maps.map_file import MapFile
 from orbslam2py.maps.saved_map import SavedMap
 from orbslam2py.maps.snapshot import MapSnapshot, keyframe_trajectory, take_snapshot
 from orbslam2py.settings.sensor import Sensor
@@ -47,7 +49,7 @@ class System:
         ``"mono"``, ``"stereo"`` or ``"rgbd"``. May be left out with `load_map`.
     vocabulary : Vocabulary or path, optional
         Visual words; the one shipped with the package if None.
-    load_map : SavedMap or path, optional
+    load_map : SavedMap, MapFile or path, optional
         Begin in a map that was saved before: lost at first, every image is searched in it. It is
         never given up for a new one, unless you `reset`.
     initial_pose : array (4, 4), optional
@@ -106,7 +108,7 @@ class System:
         sensor: Sensor | str | None = None,
         vocabulary: core.Vocabulary | str | Path | None = None,
         *,
-        load_map: SavedMap | str | Path | None = None,
+        load_map: SavedMap | MapFile | str | Path | None = None,
         initial_pose: npt.ArrayLike | None = None,
         allow_other_setup: bool = False,
         deterministic: bool = False,

@@ -266,7 +266,7 @@ class VocabularyInfo:
     n_words: int
     n_stopped: int
     """Words of weight 0, which are ignored."""
-    hash: int
+    sha256: str
     comment: str
 
 
@@ -300,6 +300,6 @@ def vocabulary_info(path: str | os.PathLike[str] | None = None) -> VocabularyInf
         n_nodes=vocabulary.n_nodes,
         n_words=vocabulary.n_words,
         n_stopped=int(np.count_nonzero((is_word != 0) & (weights == 0))),
-        hash=vocabulary.hash,
+        sha256=vocabulary.sha256(),
         comment=vocabulary.comment,
     )

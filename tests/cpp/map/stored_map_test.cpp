@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <random>
 
@@ -47,10 +48,29 @@ class WrittenMap {
     const auto cameras = restore_cameras(stored);
     const auto scales = restore_scales(stored);
     std::vector<std::shared_ptr<const Frame>> frames;
-    for (std::size_t i = 0; i < stored.keyframes.ids.size; ++i) {
-      frames.push_back(restore_frame(stored, i, cameras, scales));
+    const std::size_t n = stored.keyframes.ids.size;
+    for (std::size_t first = 0; first < n; first += kPart) {
+      const StoredKeypoints part = keypoints(first, std::min(n, first + kPart));
+      check_stored_keypoints(stored, part);
+      for (std::size_t i = part.first_row; i < part.end_row; ++i) {
+        frames.push_back(restore_frame(stored, part, i, cameras, scales));
+      }
     }
     restore_map(map, stored, frames);
+  }
+
+  /// Those of some keyframes of a map whose offsets were found good.
+  StoredKeypoints keypoints(std::size_t first_row, std::size_t end_row) const {
+    const auto k = static_cast<std::size_t>(stored.keyframes.offsets[first_row]);
+    ReadableKeypoints columns = keypoints_;
+    columns.keypoints += 2 * k;
+    columns.octave += k;
+    columns.angle += k;
+    columns.response += k;
+    columns.descriptors += 32 * k;
+    columns.depth += k;
+    columns.right_u += k;
+    return {first_row, end_row, columns};
   }
 
   std::size_t n_arrays() const { return arrays_.size(); }
@@ -97,23 +117,24 @@ class WrittenMap {
     const std::size_t n = stored.n_keypoints;
     std::vector<float> keypoints(2 * n), angle(n), response(n), depth(n), right_u(n);
     std::vector<std::uint8_t> octave(n), descriptors(32 * n);
-    const KeypointColumns<float, std::uint8_t> columns{
+    const WritableKeypoints columns{
         keypoints.data(),   nullptr,      octave.data(),  angle.data(), response.data(),
-        descriptors.data(), depth.data(), right_u.data(), nullptr};
+        descriptors.data(), depth.data(), right_u.data(), nullptr,      nullptr};
     std::size_t first = 0;
     for (const auto& frame : frames) {
       copy_keypoints(*frame, columns, first);
       first += frame->size();
     }
-    stored.keypoints = {keep<float>(keypoints),
-                        nullptr,
-                        keep<std::uint8_t>(octave),
-                        keep<float>(angle),
-                        keep<float>(response),
-                        keep<std::uint8_t>(descriptors),
-                        keep<float>(depth),
-                        keep<float>(right_u),
-                        nullptr};
+    keypoints_ = {keep<float>(keypoints),
+                  nullptr,
+                  keep<std::uint8_t>(octave),
+                  keep<float>(angle),
+                  keep<float>(response),
+                  keep<std::uint8_t>(descriptors),
+                  keep<float>(depth),
+                  keep<float>(right_u),
+                  nullptr,
+                  nullptr};
   }
 
   void write_points(const PointRows& rows) {
@@ -131,6 +152,9 @@ class WrittenMap {
     put(columns.first_frame, rows.first_frame);
   }
 
+  static constexpr std::size_t kPart = 2;  ///< keyframes whose keypoints come at once
+
+  ReadableKeypoints keypoints_;
   std::vector<std::unique_ptr<std::vector<std::uint8_t>>> arrays_;
 };
 

@@ -85,6 +85,27 @@ TEST_P(GoldenImages, WordVectorAndDirectIndexAreTheReferences) {
   EXPECT_EQ(index.indices, read_npy<std::uint32_t>(bow_file(name("fv_up1_index"))).values);
 }
 
+/// What a feature's word says is all that vectors and index need.
+TEST_P(GoldenImages, KnownWordsGiveTheSameAsDescriptors) {
+  const auto vocabulary = golden_vocabulary();
+  const auto descriptors = read_descriptors("desc" + std::to_string(GetParam()));
+  WordVector words, again;
+  DirectIndex index, index_again;
+  vocabulary->transform(descriptors, words, index);
+  std::vector<std::uint32_t> words_of_features(descriptors.size(), kNoWord);
+  for (std::size_t i = 0; i < index.indices.size(); ++i) {
+    words_of_features[index.indices[i]] = index.words[i];
+    EXPECT_EQ(index.words[i], vocabulary->quantise(descriptors[index.indices[i]]).word);
+  }
+  vocabulary->transform(words_of_features.data(), words_of_features.size(), again, index_again);
+  EXPECT_EQ(again.words, words.words);
+  EXPECT_EQ(again.weights, words.weights) << "bit by bit";
+  EXPECT_EQ(index_again.nodes, index.nodes);
+  EXPECT_EQ(index_again.offsets, index.offsets);
+  EXPECT_EQ(index_again.indices, index.indices);
+  EXPECT_EQ(index_again.words, index.words);
+}
+
 TEST(Similarity, MatchesTheReference) {
   const auto vocabulary = golden_vocabulary();
   WordVector words[2];
@@ -141,10 +162,25 @@ TEST(Vocabulary, StoppedWordsAreLeftOut) {
   EXPECT_THAT(index.indices, ElementsAre(2U, 1U, 3U));
 }
 
+TEST(Vocabulary, KnownWordsOfUnevenAndStoppedBranches) {
+  const auto vocabulary = build(uneven_tree());
+  const std::vector<std::uint32_t> known{3, 2, 0, kNoWord, 2};  // word 3 is stopped
+  WordVector words;
+  DirectIndex index;
+  vocabulary->transform(known.data(), known.size(), words, index);
+  EXPECT_THAT(words.words, ElementsAre(0U, 2U));
+  EXPECT_DOUBLE_EQ(words.weights[1], 6.0 / 7);
+  EXPECT_THAT(index.nodes, ElementsAre(1U, 4U));
+  EXPECT_THAT(index.indices, ElementsAre(2U, 1U, 4U));
+  EXPECT_THAT(index.words, ElementsAre(0U, 2U, 2U));
+  const std::uint32_t unknown = 4;
+  EXPECT_THROW(vocabulary->transform(&unknown, 1, words, index), VocabularyError);
+}
+
 TEST(Vocabulary, DescribingNothingOrOnlyStoppedWordsGivesEmptyVectors) {
   const auto vocabulary = build(uneven_tree());
   WordVector words{{7}, {1.0}};
-  DirectIndex index{{1}, {0, 1}, {0}};
+  DirectIndex index{{1}, {0, 1}, {0}, {7}};
   for (const auto& descriptors : {std::vector<Descriptor>{}, std::vector<Descriptor>{ones(256)}}) {
     vocabulary->transform(descriptors, words, index);
     EXPECT_TRUE(words.words.empty() && words.weights.empty());

@@ -11,7 +11,7 @@ import pytest
 from orbslam2py import MapFileError, Sensor
 from orbslam2py import _core as core
 from orbslam2py.maps import MapContents, restore_contents, take_contents
-from orbslam2py.maps.contents import take_changes
+from orbslam2py.maps.map_copies import take_changes
 from orbslam2py.maps.schema import IDS_PER_PAGE
 from support import small_sequences
 from support.saved_maps import small_map

@@ -56,3 +56,42 @@ def test_a_disk_that_becomes_full_costs_nothing_that_was_there(tmp_path: Path) -
     assert small_map().contents.first_difference(load_map(path).contents) is None
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
     save_map(small_map(), path)
+
+
+_TEN_TURNS = """
+import sys
+from benchmarks.harness.process_memory import resident_mb
+from orbslam2py import System
+from orbslam2py.maps import load_map
+from benchmarks.map_files.mapping import corridor
+
+path = sys.argv[1]
+frames = [corridor(12).load(i) for i in range(12)]
+
+def turn():
+    with System(load_map=path, deterministic=True) as slam:
+        for number, frame in enumerate(frames):
+            slam.track_rgbd(frame.image, frame.depth, 0.1 * number)
+        slam.save_map(path + ".again")
+        slam.reset()
+        slam.track_rgbd(frames[0].image, frames[0].depth, 10.0)
+        slam.save_map(path + ".new")
+    load_map(path + ".again")
+
+for _ in range(5):
+    turn()
+before = resident_mb(trimmed=True)
+for _ in range(10):
+    turn()
+print(before, resident_mb(trimmed=True))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is read from /proc")
+def test_saving_resetting_and_loading_again_and_again_keeps_memory(tmp_path: Path) -> None:
+    path = written(tmp_path)
+    command = [sys.executable, "-c", _TEN_TURNS, str(path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    before, after = map(float, done.stdout.split())
+    assert after < 1.01 * before, f"{before:.1f} MB became {after:.1f} MB"

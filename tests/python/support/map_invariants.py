@@ -52,7 +52,9 @@ def _check_keyframes(contents: MapContents) -> None:
         if name == "offsets":
             assert len(array) == len(keyframes) + 1
         elif len(array) != len(keyframes):
-            assert len(array) == n or (name in ("raw_keypoints", "colours") and not len(array))
+            assert len(array) == n or (
+                name in ("raw_keypoints", "colours", "words") and not len(array)
+            )
     # The tree spans them all: everybody reaches keyframe 0, which has no parent.
     assert keyframes.ids[0] == 0
     assert keyframes.parent[0] == -1

@@ -8,10 +8,10 @@ from contextlib import closing
 from functools import lru_cache
 from pathlib import Path
 
-from orbslam2py import Sensor
+from orbslam2py import Sensor, load_vocabulary
 from orbslam2py.maps import SavedMap, load_map, save_map
-from orbslam2py.maps.map_rows import checksum
-from orbslam2py.maps.schema import TABLES
+from orbslam2py.maps.map_rows import all_rows, checksum
+from orbslam2py.maps.schema import TABLES, create_script
 from support import small_sequences
 
 #: Frames of the mapping run: enough for several keyframes and a culled one.
@@ -30,6 +30,24 @@ def written(folder: Path, sensor: Sensor = Sensor.RGBD) -> Path:
     """A file of the small map."""
     path = folder / "small.orbmap"
     save_map(small_map(sensor), path)
+    return path
+
+
+def written_as_version_1(folder: Path) -> Path:
+    """The small map as the first version of the format had it: no words, a short hash of them."""
+    path = folder / "old.orbmap"
+    sums: dict[str, list[int]] = {name: [] for name in TABLES}
+    with closing(sqlite3.connect(path)) as connection, connection:
+        connection.executescript(create_script(1))
+        for name, present in all_rows(small_map()):
+            row = present[:-1] if name == "keypoints" else present
+            if name == "vocabulary":
+                row = (1, "", f"{load_vocabulary().hash:016x}", "")
+            sums[name].append(checksum(row))
+            marks = ", ".join("?" * (len(row) + 1))
+            connection.execute(f"INSERT INTO {name} VALUES ({marks})", (*row, sums[name][-1]))
+        totals = [(name, len(crcs), sum(crcs)) for name, crcs in sums.items()]
+        connection.executemany("INSERT INTO totals VALUES (?, ?, ?)", totals)
     return path
 
 

@@ -11,13 +11,8 @@ from numpy.typing import NDArray
 
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.errors import MapFileError
-from orbslam2py.maps.contents import (
-    Covisibility,
-    Keyframes,
-    MapContents,
-    Observations,
-    RemovedKeyframes,
-)
+from orbslam2py.maps.content_groups import Covisibility, Keyframes, Observations, RemovedKeyframes
+from orbslam2py.maps.contents import MapContents
 from orbslam2py.maps.edits.spanning_tree import count_covisibility, spanning_parents
 
 BoolArray = NDArray[np.bool_]
@@ -185,7 +180,7 @@ def _select(keyframes: Keyframes, kept: BoolArray) -> Keyframes:
 
 _OF_KEYPOINTS = {
     *("keypoints", "raw_keypoints", "octave", "angle", "response", "descriptors", "depth"),
-    *("right_u", "colours"),
+    *("right_u", "colours", "words"),
 }
 
 

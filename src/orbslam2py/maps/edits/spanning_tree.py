@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbslam2py._arrays import IntArray
-from orbslam2py.maps.contents import Covisibility, Keyframes, Observations
+from orbslam2py.maps.content_groups import Covisibility, Keyframes, Observations
 
 _NONE = -1
 

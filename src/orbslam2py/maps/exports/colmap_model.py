@@ -17,7 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
-from orbslam2py.maps.contents import Cameras, MapContents
+from orbslam2py.maps.content_groups import Cameras
+from orbslam2py.maps.contents import MapContents
 from orbslam2py.maps.exports.images import View, pixel_scale
 from orbslam2py.maps.reprojection import project_points
 

@@ -12,7 +12,8 @@ import numpy as np
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py._files import atomic_write
-from orbslam2py.maps.contents import Cameras, MapContents
+from orbslam2py.maps.content_groups import Cameras
+from orbslam2py.maps.contents import MapContents
 from orbslam2py.maps.exports.folder import export_folder, write_images
 from orbslam2py.maps.exports.images import (
     ImageOfKeyframe,

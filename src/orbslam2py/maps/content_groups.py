@@ -1,0 +1,250 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The parts of a map as groups of arrays: keyframes, points, and who sees what.
+
+Ids ascend and are never reused in one map. ``T_ab`` maps coordinates of frame b into frame a; the
+world is the camera frame of keyframe 0 when it was made. Lengths are metres, with a single camera
+the map's own unit. Pixels: the centre of the top-left pixel is (0, 0).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbslam2py._arrays import ByteArray, FloatArray, IntArray
+from orbslam2py.trajectory.rotations import (
+    inverse_poses,
+    poses_from,
+    quaternions_from_rotations,
+    rotations_from_quaternions,
+)
+
+Float32Array = NDArray[np.float32]
+Int32Array = NDArray[np.int32]
+BoolArray = NDArray[np.bool_]
+WordArray = NDArray[np.uint32]
+
+
+class ArrayGroup:
+    """Arrays that belong together; compared by content."""
+
+    def arrays(self) -> Iterator[tuple[str, NDArray[Any]]]:
+        """Names and arrays, in the order in which they are declared."""
+        for field in dataclasses.fields(self):  # type: ignore[arg-type]
+            yield field.name, getattr(self, field.name)
+
+
+@dataclass(frozen=True, eq=False)
+class Cameras(ArrayGroup):
+    """The cameras that keyframes were seen with: (c,) entries each, one as a rule."""
+
+    fx: FloatArray
+    """Focal length [px]."""
+    fy: FloatArray
+    cx: FloatArray
+    """Principal point [px]."""
+    cy: FloatArray
+    distortion: FloatArray
+    """(c, 5): k1, k2, p1, p2, k3; zeros when the images are rectified."""
+    bf: FloatArray
+    """Baseline times fx [px m]; 0 with a single camera."""
+    depth_ratio: FloatArray
+    """Depths up to so many baselines are close; 0 with a single camera."""
+    width: IntArray
+    """Of the images [px]."""
+    height: IntArray
+    scale_factor: Float32Array
+    """Between the levels of the image pyramid."""
+    n_levels: IntArray
+
+    def __len__(self) -> int:
+        return len(self.fx)
+
+
+@dataclass(frozen=True, eq=False)
+class Keyframes(ArrayGroup):
+    """Keyframes by ascending id: (k,) entries each, then (n,) keypoints of all of them.
+
+    The keypoints of keyframe i are entries ``offsets[i]:offsets[i + 1]`` (`keypoints_of`).
+    """
+
+    ids: IntArray
+    """(k,) ascending; keyframe 0 is always there and is the root of the spanning tree."""
+    frame_ids: IntArray
+    """(k,) number of the image that became the keyframe, in the run that made it."""
+    timestamps: FloatArray
+    """(k,) seconds."""
+    camera: IntArray
+    """(k,) rows of `Cameras`."""
+    rotations: FloatArray
+    """(k, 4) unit quaternions x, y, z, w of `T_cw`."""
+    translations: FloatArray
+    """(k, 3) of `T_cw`: the world's origin in the camera."""
+    scale: FloatArray
+    """(k,) by how much lengths around the keyframe have been multiplied since it was made."""
+    parent: IntArray
+    """(k,) ids in the spanning tree, -1 for keyframe 0."""
+    provisional_parent: BoolArray
+    """(k,) the parent is the keyframe before, for want of a neighbour."""
+    processed: BoolArray
+    """(k,) local mapping has taken it in."""
+    has_colours: BoolArray
+    """(k,) `colours` are known."""
+    offsets: IntArray
+    """(k + 1,) into the arrays below."""
+    keypoints: Float32Array
+    """(n, 2) undistorted pixels x, y."""
+    raw_keypoints: Float32Array
+    """(n, 2) pixels of the images as given; (0, 2) when no camera's lens distorts."""
+    octave: ByteArray
+    """(n,) level of the image pyramid."""
+    angle: Float32Array
+    """(n,) degrees in [0, 360), clockwise."""
+    response: Float32Array
+    """(n,) FAST score."""
+    descriptors: ByteArray
+    """(n, 32) ORB."""
+    depth: Float32Array
+    """(n,) along the optical axis [m]; -1 unknown."""
+    right_u: Float32Array
+    """(n,) column in the (virtual) right image [px]; -1 where the depth is unknown."""
+    colours: ByteArray
+    """(n, 3) RGB of the image there, 0 where unknown; (0, 3) when no keyframe has any."""
+    words: WordArray = dataclasses.field(default_factory=lambda: np.zeros(0, np.uint32))
+    """(n,) visual word of the descriptor, 2^32 - 1 where it is stopped; (0,) when not known. It
+    follows from the descriptor and the vocabulary."""
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @cached_property
+    def T_cw(self) -> FloatArray:
+        """(k, 4, 4) world to camera."""
+        return poses_from(rotations_from_quaternions(self.rotations), self.translations)
+
+    @cached_property
+    def T_wc(self) -> FloatArray:
+        """(k, 4, 4) camera to world."""
+        return inverse_poses(self.T_cw)
+
+    def with_poses(self, T_cw: FloatArray) -> Keyframes:
+        """Return the same keyframes at other poses.
+
+        Parameters
+        ----------
+        T_cw
+            (k, 4, 4) world to camera.
+        """
+        return dataclasses.replace(
+            self,
+            rotations=quaternions_from_rotations(T_cw[:, :3, :3]),
+            translations=T_cw[:, :3, 3].copy(),
+        )
+
+    def row_of(self, keyframe_id: int) -> int:
+        """Return the row of a keyframe in the arrays.
+
+        Raises
+        ------
+        KeyError
+            If the map has no such keyframe.
+        """
+        return _row_of(self.ids, keyframe_id, "keyframe")
+
+    def keypoints_of(self, row: int) -> slice:
+        """Return where the keypoints of the keyframe in this row are."""
+        return slice(int(self.offsets[row]), int(self.offsets[row + 1]))
+
+
+@dataclass(frozen=True, eq=False)
+class Points(ArrayGroup):
+    """Map points by ascending id: (p,) entries each."""
+
+    ids: IntArray
+    positions: FloatArray
+    """(p, 3) world."""
+    mean_directions: FloatArray
+    """(p, 3) mean of the unit vectors from the observing cameras to the point; length <= 1."""
+    min_distance: FloatArray
+    """(p,) from which the point would appear on the coarsest level of the pyramid."""
+    max_distance: FloatArray
+    """(p,) from which it would appear on the finest."""
+    descriptors: ByteArray
+    """(p, 32) the representative one of those observed."""
+    n_visible: Int32Array
+    """(p,) frames in whose view the point lay."""
+    n_found: Int32Array
+    """(p,) of these, frames that matched it."""
+    reference_keyframe: IntArray
+    """(p,) id of the observer that gives the distances."""
+    first_keyframe: IntArray
+    """(p,) id of the keyframe that made it, which may have been removed since."""
+    first_frame: IntArray
+    """(p,) number of that image in the run that made it."""
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+
+@dataclass(frozen=True, eq=False)
+class Observations(ArrayGroup):
+    """Who sees what: (o,) entries each, by ascending (point, keyframe)."""
+
+    point: IntArray
+    """(o,) ids."""
+    keyframe: IntArray
+    """(o,) ids."""
+    keypoint: Int32Array
+    """(o,) number of the keypoint in its keyframe, from 0."""
+
+    def __len__(self) -> int:
+        return len(self.point)
+
+
+@dataclass(frozen=True, eq=False)
+class Covisibility(ArrayGroup):
+    """Pairs of keyframes that share points: (e,) entries each, by ascending (a, b), a < b."""
+
+    a: IntArray
+    """(e,) ids."""
+    b: IntArray
+    """(e,) ids."""
+    weight: Int32Array
+    """(e,) shared points, as last counted; at least 1."""
+
+    def __len__(self) -> int:
+        return len(self.a)
+
+
+@dataclass(frozen=True, eq=False)
+class RemovedKeyframes(ArrayGroup):
+    """Where culled keyframes were, relative to others: frames tracked in them hang on that."""
+
+    ids: IntArray
+    """(r,) ascending."""
+    parent: IntArray
+    """(r,) ids of keyframes that live or were removed later."""
+    rotations: FloatArray
+    """(r, 4) unit quaternions x, y, z, w of the parent's camera to the keyframe's."""
+    translations: FloatArray
+    """(r, 3) of the same transform."""
+    scale: FloatArray
+    """(r,) `Keyframes.scale` at that time."""
+    parent_scale: FloatArray
+    """(r,) the same of the parent."""
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+
+def _row_of(ids: IntArray, wanted: int, what: str) -> int:
+    row = int(np.searchsorted(ids, wanted))
+    if row == len(ids) or ids[row] != wanted:
+        raise KeyError(f"the map has no {what} {wanted}")
+    return row

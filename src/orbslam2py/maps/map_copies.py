@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Copies of a map of the core, whole or of what has changed, and maps made of copies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from orbslam2py import _core as core
+from orbslam2py._arrays import IntArray
+from orbslam2py.maps.content_groups import (
+    BoolArray,
+    Cameras,
+    Covisibility,
+    Keyframes,
+    Observations,
+    Points,
+    RemovedKeyframes,
+)
+from orbslam2py.maps.contents import MapContents
+
+
+@dataclass(frozen=True, eq=False)
+class ChangedContents:
+    """What may have changed in a map since an earlier copy of it, for who keeps a file of it."""
+
+    contents: MapContents
+    """All but the keypoints that were known, and the points on pages without a change."""
+    keyframe_stamp: int
+    """Of the last change of a keyframe ..."""
+    point_stamp: int
+    """... and of a point."""
+    changed_keyframes: BoolArray
+    """(k,) pose, parent, weights or something else has changed."""
+    pages: IntArray
+    """(m,) of `IDS_PER_PAGE` ids each: points on other pages have not changed."""
+    incomplete_pages: IntArray
+    """(i,) of these, those with points whose keyframes mapping has not taken in yet."""
+
+
+def take_contents(slam_map: core.Map) -> MapContents:
+    """Copy everything of a map, as of one moment, while the system may be running.
+
+    Keyframes that local mapping has not taken in yet, and what only they see, are not part of it.
+
+    Parameters
+    ----------
+    slam_map
+        The map.
+    """
+    return take_changes(slam_map, np.zeros(0, np.int64), None).contents
+
+
+def take_changes(
+    slam_map: core.Map, known_keyframes: IntArray, before: ChangedContents | None
+) -> ChangedContents:
+    """Copy what may have changed in a map since an earlier copy, but for the tracker's counters.
+
+    Parameters
+    ----------
+    slam_map
+        The map.
+    known_keyframes
+        Ids (m,), ascending, of keyframes whose keypoints, which never change, are left out.
+    before
+        The earlier copy, of the same map (`MapContents.map_index`); None: there is none.
+    """
+    since: dict[str, Any] = {}
+    if before is not None:
+        since = {
+            "keyframe_stamp": before.keyframe_stamp,
+            "point_stamp": before.point_stamp,
+            "incomplete_pages": before.incomplete_pages,
+        }
+    arrays = core.map_contents(slam_map, known_keyframes, **since)
+    groups: dict[str, dict[str, Any]] = {}
+    for name, array in arrays.items():
+        group, _, field = name.rpartition(".")
+        groups.setdefault(group, {})[field] = array
+    contents = MapContents(
+        **groups[""],
+        cameras=Cameras(**groups["cameras"]),
+        keyframes=Keyframes(**groups["keyframes"]),
+        removed_keyframes=RemovedKeyframes(**groups["removed_keyframes"]),
+        points=Points(**groups["points"]),
+        observations=Observations(**groups["observations"]),
+        covisibility=Covisibility(**groups["covisibility"]),
+    )
+    return ChangedContents(contents, **groups["known"])
+
+
+def restore_contents(
+    contents: MapContents,
+    slam_map: core.Map | None = None,
+    vocabulary: core.Vocabulary | None = None,
+    index: core.KeyFrameIndex | None = None,
+    *,
+    words_fit: bool = False,
+) -> core.Map:
+    """Make a map of its contents.
+
+    Parameters
+    ----------
+    contents
+        Everything that the map is.
+    slam_map
+        An empty map to fill; a new one by default.
+    vocabulary
+        Describes the keyframes by words, which recognising places needs.
+    index
+        Gets the keyframes, once they are described.
+    words_fit
+        The words that the contents know are of this vocabulary and need not be searched again.
+
+    Raises
+    ------
+    MapFileError
+        If the contents are impossible; names the thing. Nothing was changed then.
+    """
+    if slam_map is None:
+        slam_map = core.Map()
+    arrays = contents.as_dict()
+    keyframes = contents.keyframes
+    restorer = core.MapRestorer(arrays, len(keyframes.keypoints), vocabulary, words_fit)
+    restorer.add(arrays, len(keyframes))
+    restorer.finish(slam_map, index)
+    return slam_map
