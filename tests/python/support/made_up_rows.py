@@ -27,7 +27,8 @@ _STATES = {
 def rows_of(letters: str) -> list[FrameRow]:
     """One row for every letter.
 
-    k: tracked; w: tracked with weak evidence; r, i: just lost; l: lost; n, f, m: no map yet; d: dropped; s: skipped.
+    k: tracked; w: tracked with weak evidence; r, i: just lost; l: lost; n, f, m: no map yet;
+    d: dropped; s: skipped.
     """
     return [_row(index, letter) for index, letter in enumerate(letters)]
 
