@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from orbslam2py.runs.frame_table import pose_deviation, write_frames
+from orbslam2py.runs.report_page.run_folder import read_frames
 from support.made_up_rows import rows_of
 
 pytestmark = pytest.mark.watchdog(20)
@@ -52,3 +53,30 @@ def test_turning_the_world_does_not_change_it() -> None:
     deviation = pose_deviation(replace(row.record, covariance=A @ A.T))
     assert deviation is not None
     assert deviation[0] == pytest.approx(measured, rel=0.02)
+
+
+def test_what_speaks_for_a_pose(tmp_path: Path) -> None:
+    weak, untold = rows_of("wk")
+    write_frames(tmp_path / "f.csv", [weak, untold])
+    with (tmp_path / "f.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    names = ("evidence", "method", "found")
+    assert [rows[0][name] for name in names] == ["weak", "aligned images", "0.125"]
+    assert [rows[1][name] for name in names] == ["", "", ""]
+    frames = read_frames(tmp_path / "f.csv")
+    assert frames.is_weak.tolist() == [True, False]
+    np.testing.assert_array_equal(frames.found, [0.125, np.nan])
+
+
+def test_a_table_of_an_earlier_version_says_nothing_of_it(tmp_path: Path) -> None:
+    write_frames(tmp_path / "f.csv", rows_of("wk"))
+    with (tmp_path / "f.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    kept = [name for name in rows[0] if name not in ("evidence", "method", "found")]
+    with (tmp_path / "f.csv").open("w", newline="") as stream:
+        writer = csv.DictWriter(stream, kept, extrasaction="ignore")
+        writer.writeheader()
+        writer.writerows(rows)
+    frames = read_frames(tmp_path / "f.csv")
+    assert not frames.is_weak.any()
+    assert np.isnan(frames.found).all()

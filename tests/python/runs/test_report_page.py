@@ -130,6 +130,18 @@ def test_any_run_has_a_page(tmp_path: Path, states: str, how: dict[str, object])
         assert [f"map-{number}" in page.ids for number in range(5)] == [True] * 4 + [False]
 
 
+def test_weak_evidence_is_shown(tmp_path: Path) -> None:
+    run = made_up_run(tmp_path / "weak", "kkkwwkkkwkkk")
+    assert json.loads((run / "report.json").read_text())["weak_frames"] == 3
+    page = page_of(run)
+    assert "tracked with weak evidence: 3" in page.text
+    assert "tracked: 9" in page.text
+    assert "plot-found" in page.ids
+    plain = page_of(made_up_run(tmp_path / "plain", "k" * 12))
+    assert "weak evidence" not in plain.text
+    assert "plot-found" not in plain.ids
+
+
 @pytest.mark.parametrize(
     "text", ["<script>alert(1)</script>", '"><img src=x onerror=alert(1)>', "a&b"]
 )

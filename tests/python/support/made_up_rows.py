@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from orbslam2py import Reason, TrackingRecord, TrackingState
+from orbslam2py import Evidence, PoseMethod, Reason, TrackingRecord, TrackingState, Verdict
 from orbslam2py.runs import FrameRow
 from orbslam2py.runs.result import DROPPED
 
@@ -14,6 +14,7 @@ FPS = 10
 
 _STATES = {
     "k": (TrackingState.OK, Reason.NONE),
+    "w": (TrackingState.OK, Reason.NONE),
     "n": (TrackingState.NOT_INITIALIZED, Reason.TOO_FEW_KEYPOINTS),
     "f": (TrackingState.NOT_INITIALIZED, Reason.FIRST_VIEW),
     "m": (TrackingState.NOT_INITIALIZED, Reason.FEW_MATCHES_FIRST_VIEW),
@@ -26,7 +27,8 @@ _STATES = {
 def rows_of(letters: str) -> list[FrameRow]:
     """One row for every letter.
 
-    k: tracked; r, i: just lost; l: lost; n, f, m: no map yet; d: dropped; s: skipped.
+    k: tracked; w: tracked with weak evidence; r, i: just lost; l: lost; n, f, m: no map yet;
+    d: dropped; s: skipped.
     """
     return [_row(index, letter) for index, letter in enumerate(letters)]
 
@@ -48,5 +50,25 @@ def _row(index: int, letter: str) -> FrameRow:
         n_inliers=0,
         is_keyframe=False,
         reference_keyframe=-1,
+        evidence=evidence(Verdict.WEAK, 0.125) if letter == "w" else None,
     )
     return FrameRow(index, text, record, str(reason))
+
+
+def evidence(verdict: Verdict, found: float) -> Evidence:
+    """What speaks for a pose that was looked at twice."""
+    return Evidence(
+        verdict=verdict,
+        method=PoseMethod.ALIGNED_IMAGES,
+        doubted=True,
+        confirmed=False,
+        n_predicted=800,
+        found=found,
+        found_to_usual=found / 0.5,
+        inliers_to_usual=0.25,
+        n_cells=20,
+        n_octaves=3,
+        deviation_to_usual=2.0,
+        turn_change=4.0,
+        move_change=0.1,
+    )

@@ -104,7 +104,7 @@ def result_of(sequence: MadeUpSequence, states: str, maps: str, noise: float) ->
     for k, row in enumerate(rows_of(states)):
         record = row.record
         if record is not None:
-            is_ok = states[k] == "k"
+            is_ok = states[k] in "kw"
             record = replace(
                 record,
                 map_index=int(maps[k]),
@@ -115,7 +115,7 @@ def result_of(sequence: MadeUpSequence, states: str, maps: str, noise: float) ->
             )
         result.rows.append(replace(row, record=record))
     for number in range(max(map(int, maps), default=0) + 1):
-        chosen = np.array([states[k] == "k" and int(maps[k]) == number for k in range(len(maps))])
+        chosen = np.array([states[k] in "kw" and int(maps[k]) == number for k in range(len(maps))])
         which = np.flatnonzero(chosen)
         result.trajectories.append(
             Trajectory(path.timestamps[which], T_wc[which], indices=which.astype(np.int64))
