@@ -4,6 +4,7 @@
     python -m benchmarks.accuracy.relocalization PART
 
     kidnap          to another place, black images between
+    gaps            the camera goes on behind a covered lens, or while images are blurred
     recall          viewpoints beside the path, other exposure
     foreign         worlds and photographs never mapped
     localization    out of the map and back, ten times
@@ -45,7 +46,7 @@ ATTEMPTED = {Reason.LOW_PARALLAX, Reason.AMBIGUOUS_MOTION, Reason.DEGENERATE_VIE
 
 
 def sequence_of(arguments: argparse.Namespace, sensor: str, **options: object) -> SyntheticSequence:
-    merged = {"world": arguments.world, "noise": 2.0} | options
+    merged = {"world": arguments.world, "noise": 2.0, "size": arguments.size} | options
     return SyntheticSequence(SyntheticOptions(sensor=sensor, **merged), threads=2)
 
 
@@ -99,6 +100,44 @@ def kidnap(arguments: argparse.Namespace, sensor: str) -> None:
     print(f"  frames until found: {dict(sorted(waits.items(), key=str))}")
     print(f"  first pose  {summary(first_errors)}")
     print(f"  all poses   {summary(all_errors)}", flush=True)
+
+
+# ---- gaps ----------------------------------------------------------------------------------------
+def gaps(arguments: argparse.Namespace, sensor: str) -> None:
+    """Behind the mapped part of the path, which goes on while nothing can be seen."""
+    n_gaps, second = arguments.count, 20
+    for kind in ("covered", "blurred"):
+        for length in (5, 10, 20):
+            sequence = sequence_of(arguments, sensor)
+            n_mapped = arguments.frames or 120
+            world = MappedWorld(sequence, range(n_mapped), arguments.seed)
+            index, waits, errors, keyframes = n_mapped, Counter(), [], 0
+            for _ in range(n_gaps):
+                for _ in range(length):
+                    unseen = blurred(sequence.load(index)) if kind == "blurred" else world.black()
+                    keyframes += world.show(unseen).is_keyframe
+                    index += 1
+                found = None
+                for k in range(second):
+                    T_wc = sequence.T_wc(index)
+                    record = world.show(sequence.load(index))
+                    index += 1
+                    if record.state is TrackingState.OK:
+                        found = k if found is None else found
+                        errors.append(world.error(record, T_wc))
+                waits[found] += 1
+            print(
+                f"  {kind} for {length} images: frames until found "
+                f"{dict(sorted(waits.items(), key=str))}, {keyframes} keyframes of images "
+                f"{kind}\n    {summary(errors)}",
+                flush=True,
+            )
+
+
+def blurred(images: Images, length: int = 61) -> Images:
+    """As by a fast turn while the shutter was open, in both images of a pair."""
+    right = None if images.right is None else cv2.blur(images.right, (length, 1))
+    return Images(cv2.blur(images.image, (length, 1)), right, images.depth)
 
 
 # ---- recall --------------------------------------------------------------------------------------
@@ -239,9 +278,9 @@ def speed(arguments: argparse.Namespace, sensor: str) -> None:
 
 
 def _relocalization_speed(arguments: argparse.Namespace, sensor: str) -> None:
-    """Twenty candidates around the place, none of which is ever good enough: the worst case."""
+    """Twelve candidates around the place, none of which is ever good enough: the worst case."""
     world = mapped(argparse.Namespace(**{**vars(arguments), "frames": 260}), sensor)
-    pipeline, n_candidates = world.system.pipeline, 20
+    pipeline, n_candidates = world.system.pipeline, 12
     image, T_wc = world.sequence.load(150).image, world.sequence.T_wc(150)
     frame = pipeline.front_end.monocular(image, 9999, 0.0, StageTimer())
     core.describe(frame, world.system.vocabulary)
@@ -249,17 +288,19 @@ def _relocalization_speed(arguments: argparse.Namespace, sensor: str) -> None:
     ids = core.snapshot_keyframes(slam_map).ids
     distances = np.linalg.norm(world.true_T_wk[:, :3, 3] - T_wc[:3, 3], axis=1)
     first = min(max(int(distances.argmin()) - n_candidates // 2, 0), len(ids) - n_candidates)
-    chosen = [SimpleNamespace(keyframe=int(i)) for i in ids[first : first + n_candidates]]
+    ids = ids[first : first + n_candidates]
+    chosen = [SimpleNamespace(keyframe=int(i), group_score=1.0) for i in ids]
     query = core.find_relocalization_candidates
     limits = {"never good enough": 10**6, "as it is": 50}
     try:
         core.find_relocalization_candidates = lambda *_: chosen
         for name, enough in limits.items():
-            thresholds = RelocalizationThresholds(enough=enough)
+            thresholds = RelocalizationThresholds(enough=enough, word_candidates=n_candidates)
             relocalizer = Relocalizer(slam_map, index, 0, thresholds)
             candidates = relocalizer._candidates(core.TrackedFrame(frame))
             times_of(
-                f"relocalization, 20 keyframes, {len(candidates)} with enough matches, {name}",
+                f"relocalization, {n_candidates} keyframes, {len(candidates)} of them with enough "
+                f"matches, {name}",
                 lambda r=relocalizer: r.relocalize(core.TrackedFrame(frame)),  # type: ignore[misc]
                 30,
                 30,
@@ -293,20 +334,28 @@ def _query_speed(sequence: SyntheticSequence) -> None:
     )
 
 
+def _size(text: str) -> tuple[int, int]:
+    width, height = map(int, text.split("x"))
+    return width, height
+
+
 def main() -> None:
-    parts = {f.__name__: f for f in (kidnap, recall, foreign, localization, speed)}
+    parts = {f.__name__: f for f in (kidnap, gaps, recall, foreign, localization, speed)}
     parser = new_parser(__doc__)
     parser.add_argument("part", choices=parts, help="see above")
     add_sensors(parser)
     worlds = [str(world) for world in SyntheticWorld]
     parser.add_argument("--world", choices=worlds, default="corridor", help="[corridor]")
-    parser.add_argument("--frames", type=int, help="mapped frames [all, localization: 200]")
+    parser.add_argument("--size", type=_size, metavar="WxH", help="of the images [the world's]")
+    parser.add_argument(
+        "--frames", type=int, help="mapped frames [all, gaps: 120, localization: 200]"
+    )
     parser.add_argument("--count", type=int, help="tries, or foreign images")
     add_counts(
         parser, beyond=(60, "frames past the end of the map"), seed=(0, "of all random draws")
     )
     arguments = parser.parse_args()
-    counts = {"kidnap": 20, "recall": 300, "foreign": 1000}
+    counts = {"kidnap": 20, "gaps": 4, "recall": 300, "foreign": 1000}
     arguments.count = arguments.count or counts.get(arguments.part, 0)
     if arguments.part == "localization":
         arguments.frames = arguments.frames or 200

@@ -23,16 +23,25 @@ void BM_OptimizePose(benchmark::State& state, const char* set) {
 BENCHMARK_CAPTURE(BM_OptimizePose, mono_200, "poseopt_mono")->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(BM_OptimizePose, mixed_350, "poseopt_stereo")->Unit(benchmark::kMillisecond);
 
-void BM_SolveBundle(benchmark::State& state, const char* set) {
+void BM_SolveBundle(benchmark::State& state, const char* set, BundleSolver solver) {
   const BundleProblem start = testing::golden_bundle(set).problem;
   BundleProblem problem;
+  BundleOptions options;
+  options.solver = solver;
   measure(state, [&] {
     problem = start;
-    benchmark::DoNotOptimize(solve_bundle(problem, BundleOptions(), nullptr));
+    benchmark::DoNotOptimize(solve_bundle(problem, options, nullptr));
   });
 }
-BENCHMARK_CAPTURE(BM_SolveBundle, mono, "lba_mono")->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(BM_SolveBundle, stereo, "lba_stereo")->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(BM_SolveBundle, small, "lba_small")->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(BM_SolveBundle, mono, "lba_mono", BundleSolver::kBlocks)
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(BM_SolveBundle, stereo, "lba_stereo", BundleSolver::kBlocks)
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(BM_SolveBundle, small, "lba_small", BundleSolver::kBlocks)
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(BM_SolveBundle, mono_ceres, "lba_mono", BundleSolver::kCeres)
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(BM_SolveBundle, stereo_ceres, "lba_stereo", BundleSolver::kCeres)
+    ->Unit(benchmark::kMillisecond);
 
 }  // namespace

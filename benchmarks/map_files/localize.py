@@ -84,9 +84,13 @@ def extended(sequence: Sequence, n: int, folder: Path, whole: float) -> str:
     second = run(sequence, half, n, load_map=path)
     rest = second.trajectory()
     found = int(np.argmin(rest.lost)) if not rest.lost.all() else len(rest)
+    tracked = 1 - float(np.mean(rest.lost[found:])) if found < len(rest) else 0.0
     saved = second.saved_map()
     ate = ate_of(joined([saved.trajectory(0), saved.trajectory(1)]), sequence)
-    return f"found after {found} frames; ate {ate:.4f} m, one run over everything {whole:.4f} m"
+    return (
+        f"found after {found} frames, then tracked {tracked:.1%}; ate {ate:.4f} m, one run over "
+        f"everything {whole:.4f} m, {ate / whole:.2f} times"
+    )
 
 
 def main() -> None:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 from benchmarks.harness.arguments import add_build, add_counts, add_width, console_of, new_parser
@@ -26,6 +27,7 @@ from benchmarks.speed.locks import lock_tables
 from benchmarks.speed.python_share import python_tables
 from benchmarks.speed.sequences import sequence_tables
 from benchmarks.speed.viewer_cost import viewer_tables
+from benchmarks.speed.viewer_share import share_tables
 from orbslam2py import _core as core
 
 PARTS = ("steps", "vocabularies", "sequences", "python", "viewer", "locks", "loops")
@@ -76,7 +78,7 @@ def main() -> None:
         "vocabularies": lambda: vocabulary_tables(yardstick, large),
         "sequences": lambda: sequence_tables(yardstick, arguments.runs),
         "python": python_tables,
-        "viewer": lambda: viewer_tables(arguments.runs),
+        "viewer": lambda: chain(viewer_tables(arguments.runs), share_tables(10.0)),
         "locks": lambda: lock_tables(build),
         "loops": lambda: loop_tables(yardstick, build, arguments.pictures),
     }

@@ -3,8 +3,8 @@
 
     python -m benchmarks.speed.viewer_cost [--pairs 5]
 
-Who looks is a program that takes all that a browser would take and draws nothing: a browser is at
-another computer, or draws with hardware of its own.
+Who looks is a program at this computer that takes all that a browser would take and draws nothing,
+since a browser is at another computer or draws with hardware of its own.
 """
 
 from __future__ import annotations
@@ -22,35 +22,12 @@ from pathlib import Path
 
 from benchmarks.harness.arguments import add_width, console_of, new_parser
 from benchmarks.harness.folders import MISSING, sequence_folder, shared_folder
+from benchmarks.harness.onlooker import Onlooker
 from benchmarks.harness.tables import new_table, verdict
 
 #: p99 of tracking with a page connected, at most so many times that without.
 TARGET = 1.1
 SEQUENCES = (("7scenes_redkitchen_head250", "rgbd"), ("kitti_06_head51_stereo", "stereo"))
-
-# Takes what a browser takes; says where it looks from, as every page does when it has loaded.
-_ONLOOKER = """
-import sys
-import msgspec
-import viser
-from websockets.sync.client import connect
-
-camera = {
-    "type": "ViewerCameraMessage", "wxyz": (1.0, 0.0, 0.0, 0.0), "position": (0.0, 0.0, -3.0),
-    "fov": 0.9, "near": 0.01, "far": 1000.0, "image_height": 900, "image_width": 1600,
-    "look_at": (0.0, 0.0, 0.0), "up_direction": (0.0, -1.0, 0.0),
-}
-protocol = f"viser-v{viser.__version__}"
-address = sys.argv[1].replace("http", "ws")
-with connect(address, subprotocols=[protocol], max_size=None) as page:
-    page.send(msgspec.msgpack.encode(camera))
-    n_bytes = 0
-    try:
-        for message in page:
-            n_bytes += len(message)
-    finally:
-        print(n_bytes, flush=True)
-"""
 
 
 @dataclass(frozen=True)
@@ -85,10 +62,7 @@ def run_once(folder: Path, sensor: str, *, watched: bool) -> Watched:
         _, errors = process.communicate()
         sent = 0
         if onlooker is not None:
-            printed, complaints = onlooker.communicate(timeout=60)
-            if not printed.strip().isdigit():
-                raise RuntimeError(f"nobody looked: {complaints}")
-            sent = int(printed)
+            sent = onlooker.n_bytes()
         if process.returncode != 0:
             raise RuntimeError(errors)
         report = json.loads((Path(output) / "report.json").read_text())
@@ -96,7 +70,7 @@ def run_once(folder: Path, sensor: str, *, watched: bool) -> Watched:
     return Watched(track["median"], track["p99"], report["dropped_frames"], sent / 1e6)
 
 
-def _look(process: subprocess.Popen[str]) -> subprocess.Popen[str]:
+def _look(process: subprocess.Popen[str]) -> Onlooker:
     """Wait until the viewer says where it is, and look."""
     assert process.stdout is not None
     said: queue.Queue[str] = queue.Queue()
@@ -106,12 +80,7 @@ def _look(process: subprocess.Popen[str]) -> subprocess.Popen[str]:
     address = next((word.rstrip(":") for word in words if word.startswith("http://")), None)
     if address is None:
         raise RuntimeError(f"the viewer did not say where it is: {' '.join(words)}")
-    return subprocess.Popen(
-        [sys.executable, "-c", _ONLOOKER, address],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    return Onlooker(address)
 
 
 def viewer_tables(n_pairs: int) -> Iterator[object]:
@@ -133,6 +102,8 @@ def viewer_tables(n_pairs: int) -> Iterator[object]:
             "dropped\nwithout / with",
             "MB sent",
         ],
+        "Page and onlooker ran on this machine's cores as well; the onlooker takes all that a "
+        "browser takes, and draws nothing.",
     )
     for name, sensor in SEQUENCES:
         folder = sequence_folder(name)

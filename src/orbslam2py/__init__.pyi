@@ -36,10 +36,13 @@ from .slam.events import Relocalized as Relocalized
 from .slam.events import TrackingLost as TrackingLost
 from .slam.full_bundle_adjustment import FullAdjustmentRecord as FullAdjustmentRecord
 from .slam.full_bundle_adjustment import optimize_map as optimize_map
+from .slam.records import Evidence as Evidence
 from .slam.records import FrameFeatures as FrameFeatures
+from .slam.records import PoseMethod as PoseMethod
 from .slam.records import Reason as Reason
 from .slam.records import TrackingRecord as TrackingRecord
 from .slam.records import TrackingState as TrackingState
+from .slam.records import Verdict as Verdict
 from .slam.system import System as System
 from .trajectory import Trajectory as Trajectory
 from .viewer import Publisher as Publisher

@@ -13,7 +13,7 @@ from orbslam2py.errors import SettingsError
 from orbslam2py.errors import StateError
 from orbslam2py.errors import VocabularyError
 import typing
-__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'ChangedIds', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FullBundleCommit', 'FullBundleOptions', 'FullBundleResult', 'GatheredBundle', 'ImageBounds', 'ImageError', 'KeyFrameIndex', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapChanges', 'MapFileError', 'MapFollower', 'MapSnapshot', 'MapStamp', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewMotion', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'anchor_frame', 'apply_loop_correction', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'changed_since', 'check_invariants', 'check_map_contents', 'choose_loop', 'commit_full_bundle', 'corridor_way', 'count_map_points', 'count_sightings', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'describe', 'direct_index_of', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'full_bundle_adjustment', 'fundamental_matrix', 'fuse_points', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'map_contents', 'match_for_initialization', 'match_for_triangulation', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'match_views', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'plan_loop_correction', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'refresh_associations', 'render', 'restore_map', 'room_T_wc', 'sample_colours', 'seed_of', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'snapshot_points', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'stamp_of', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'verify_loop_candidate', 'words_of']
+__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'ChangedIds', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FullBundleCommit', 'FullBundleOptions', 'FullBundleResult', 'GatheredBundle', 'ImageBounds', 'ImageError', 'ImageRotation', 'InlierSpread', 'KeyFrameIndex', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapChanges', 'MapFileError', 'MapFollower', 'MapSnapshot', 'MapStamp', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewMotion', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'align_rotation', 'anchor_frame', 'apply_loop_correction', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'changed_since', 'check_invariants', 'check_map_contents', 'choose_loop', 'commit_full_bundle', 'corridor_way', 'count_map_points', 'count_sightings', 'count_staying', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'describe', 'direct_index_of', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'full_bundle_adjustment', 'fundamental_matrix', 'fuse_points', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'keep_small_image', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'map_contents', 'match_for_initialization', 'match_for_triangulation', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'match_views', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'plan_loop_correction', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'refresh_associations', 'render', 'restore_map', 'room_T_wc', 'sample_colours', 'seed_of', 'select_local_map', 'sharpness', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'snapshot_points', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'spread_of_inliers', 'stamp_of', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'verify_loop_candidate', 'words_of']
 class Pose:
     """
     Rigid transform. `T_ab` maps coordinates of frame b into frame a.
@@ -96,9 +96,9 @@ class ScalePyramid:
     """
     The scale tables of an image pyramid.
     """
-    def __init__(self, factor: typing.SupportsFloat | typing.SupportsIndex, levels: typing.SupportsInt | typing.SupportsIndex) -> None:
+    def __init__(self, factor: typing.SupportsFloat | typing.SupportsIndex, levels: typing.SupportsInt | typing.SupportsIndex, original_coordinates: bool = False) -> None:
         """
-        `factor`: ratio between levels, above 1 and at most 2. `levels`: 1 to 16. Raises SettingsError otherwise.
+        `factor`: ratio between levels, above 1 and at most 2. `levels`: 1 to 16. Raises SettingsError otherwise. `original_coordinates`: see OrbOptions.
         """
     def features_per_level(self, n_features: typing.SupportsInt | typing.SupportsIndex) -> list[int]:
         """
@@ -138,6 +138,11 @@ class ScalePyramid:
         Its natural logarithm.
         """
     @property
+    def original_coordinates(self) -> bool:
+        """
+        Whether keypoints of coarse levels lie where the original puts them.
+        """
+    @property
     def scale(self) -> numpy.typing.NDArray[numpy.float32]:
         """
         Size of a pixel of each level in level-0 pixels, (levels,) float32.
@@ -171,7 +176,7 @@ class OrbOptions:
     """
     Parameters of the ORB extractor.
     """
-    def __init__(self, n_features: typing.SupportsInt | typing.SupportsIndex = 1000, scale_factor: typing.SupportsFloat | typing.SupportsIndex = 1.2000000476837158, n_levels: typing.SupportsInt | typing.SupportsIndex = 8, initial_threshold: typing.SupportsInt | typing.SupportsIndex = 20, minimum_threshold: typing.SupportsInt | typing.SupportsIndex = 7) -> None:
+    def __init__(self, n_features: typing.SupportsInt | typing.SupportsIndex = 1000, scale_factor: typing.SupportsFloat | typing.SupportsIndex = 1.2000000476837158, n_levels: typing.SupportsInt | typing.SupportsIndex = 8, initial_threshold: typing.SupportsInt | typing.SupportsIndex = 20, minimum_threshold: typing.SupportsInt | typing.SupportsIndex = 7, original_coordinates: bool = False) -> None:
         """
         Raises SettingsError naming the option that is out of range.
         """
@@ -196,6 +201,11 @@ class OrbOptions:
     def n_levels(self) -> int:
         """
         Number of pyramid levels.
+        """
+    @property
+    def original_coordinates(self) -> bool:
+        """
+        Keypoints of coarse levels lie at multiples of the scale, where the original puts them, and not at their true place.
         """
     @property
     def scale_factor(self) -> float:
@@ -548,6 +558,11 @@ class TrackedFrame:
         """
         The pose was predicted from that of another frame.
         """
+    def take_over(self, other: TrackedFrame) -> None:
+        """
+        Take pose, anchor, associations and outlier flags of another version of this frame.
+        Raises StateError when it is another frame.
+        """
     @property
     def T_cw(self) -> Pose | None:
         """
@@ -617,6 +632,34 @@ class PairExtractor:
     def extract(self, left: numpy.ndarray, right: numpy.ndarray, left_mask: typing.Any = None, right_mask: typing.Any = None) -> tuple[Extraction, Extraction]:
         """
         Extractions (left, right) of two grey images (h, w) uint8 of one size. A mask is None, or uint8 of the same shape with 0 where no keypoint may lie. Raises ImageError for anything else, StateError while another thread uses this object.
+        """
+class ImageRotation:
+    """
+    Result of align_rotation().
+    """
+    @property
+    def correlation(self) -> float:
+        """
+        Of the grey values where both see, -1 to 1.
+        """
+    @property
+    def quaternion_xyzw(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 1]"]:
+        """
+        Rotation of directions of the first camera into the second, (4,) float64.
+        """
+class InlierSpread:
+    """
+    Result of spread_of_inliers().
+    """
+    @property
+    def cells(self) -> int:
+        """
+        Of 48 cells of the image that hold an inlier.
+        """
+    @property
+    def octaves(self) -> int:
+        """
+        Of depth that hold an inlier.
         """
 class Map:
     """
@@ -1616,30 +1659,6 @@ class MotionScore:
         """
         Degrees; of the 51st best pair.
         """
-class TwoViewMotion:
-    """
-    A motion between two views, and what it places.
-    """
-    @property
-    def T_21(self) -> Pose:
-        """
-        Pose from camera 1 to camera 2, translation of length 1.
-        """
-    @property
-    def parallax(self) -> float:
-        """
-        Degrees.
-        """
-    @property
-    def points(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Per initial keypoint, (n, 3) float64 in the frame of camera 1; zero where missing.
-        """
-    @property
-    def triangulated(self) -> numpy.typing.NDArray[numpy.uint8]:
-        """
-        Per initial keypoint, (n,) uint8: the point is well placed.
-        """
 class TwoViewOptions:
     """
     Limits of reconstruct_two_views.
@@ -1686,6 +1705,30 @@ class TwoViewOptions:
     @sigma.setter
     def sigma(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
+class TwoViewMotion:
+    """
+    A motion between two views, and what it places.
+    """
+    @property
+    def T_21(self) -> Pose:
+        """
+        Pose from camera 1 to camera 2, translation of length 1.
+        """
+    @property
+    def parallax(self) -> float:
+        """
+        Degrees.
+        """
+    @property
+    def points(self) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Per initial keypoint, (n, 3) float64 in the frame of camera 1; zero where missing.
+        """
+    @property
+    def triangulated(self) -> numpy.typing.NDArray[numpy.uint8]:
+        """
+        Per initial keypoint, (n,) uint8: the point is well placed.
+        """
 class TwoViewResult:
     """
     Result of reconstruct_two_views.
@@ -1944,7 +1987,7 @@ class BundleOptions:
     """
     How solve_bundle works.
     """
-    def __init__(self, robust_iterations: typing.SupportsInt | typing.SupportsIndex = 5, final_iterations: typing.SupportsInt | typing.SupportsIndex = 10, robust: bool = True, n_threads: typing.SupportsInt | typing.SupportsIndex = 1, inverse_depth: bool = False, max_seconds: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+    def __init__(self, robust_iterations: typing.SupportsInt | typing.SupportsIndex = 5, final_iterations: typing.SupportsInt | typing.SupportsIndex = 10, robust: bool = True, n_threads: typing.SupportsInt | typing.SupportsIndex = 1, inverse_depth: bool = False, max_seconds: typing.SupportsFloat | typing.SupportsIndex = 0.0, solver: str = 'blocks') -> None:
         ...
     @property
     def final_iterations(self) -> int:
@@ -1957,7 +2000,8 @@ class BundleOptions:
     @property
     def inverse_depth(self) -> bool:
         """
-        Step along inverse depths of points: for large maps, with one stage.
+        Step along inverse depths of points: for large maps, with one stage; Ceres
+        only.
         """
     @inverse_depth.setter
     def inverse_depth(self, arg0: bool) -> None:
@@ -1973,7 +2017,7 @@ class BundleOptions:
     @property
     def n_threads(self) -> int:
         """
-        1 gives the same bytes in every run.
+        With Ceres only 1 gives the same bytes in every run.
         """
     @n_threads.setter
     def n_threads(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
@@ -1993,6 +2037,14 @@ class BundleOptions:
         """
     @robust_iterations.setter
     def robust_iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
+        ...
+    @property
+    def solver(self) -> str:
+        """
+        `blocks`: our own, the same bytes with any number of threads; `ceres`.
+        """
+    @solver.setter
+    def solver(self, arg1: str) -> None:
         ...
 class BundleSummary:
     """
@@ -2641,6 +2693,11 @@ def add_temporary_points(last: TrackedFrame, points: PointBatch, n_minimum: typi
     with `last`; temporary points left there are dropped first. Their ids start at
     FIRST_TEMPORARY_POINT. Returns the number made. Raises StateError without a pose.
     """
+def align_rotation(first: Frame, second: Frame) -> ImageRotation | None:
+    """
+    How the camera turned between two frames, by their small images alone: ImageRotation, or
+    None where the images are missing or say nothing.
+    """
 def anchor_frame(map: Map, frame: TrackedFrame, keyframe: int) -> None:
     """
     Make a frame's pose relative to a keyframe (living or culled) as it is now.
@@ -2707,6 +2764,10 @@ def count_map_points(frame: TrackedFrame) -> int:
 def count_sightings(map: Map, frame: TrackedFrame, in_view: typing.Annotated[numpy.typing.ArrayLike, numpy.int64]) -> None:
     """
     Count which points were visible ((n,) int64 and the associated) and which were found.
+    """
+def count_staying(frame: TrackedFrame, T_nw: Pose) -> int:
+    """
+    How many inliers of a frame a camera at `T_nw` would still have in its image.
     """
 def count_tracked_points(map: Map, id: int, min_observations: typing.SupportsInt | typing.SupportsIndex) -> int:
     """
@@ -2824,13 +2885,18 @@ def insert_keyframe(map: Map, frame: TrackedFrame, create_points: bool, n_minimu
     """
     Make a keyframe of a tracked frame, with points from its depths; its id.
     """
-def local_bundle_adjustment(map: Map, keyframe: int, abort: StopFlag | None = None, monocular: bool = False, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> LocalBundleResult:
+def keep_small_image(frame: Frame, grey: numpy.ndarray) -> None:
+    """
+    Keeps a new frame's image (h, w) uint8, shrunk to some 1500 pixels, for align_rotation().
+    Raises ImageError for anything but a grey image.
+    """
+def local_bundle_adjustment(map: Map, keyframe: int, abort: StopFlag | None = None, monocular: bool = False, n_threads: typing.SupportsInt | typing.SupportsIndex = 1, solver: str = 'blocks') -> LocalBundleResult:
     """
     Refine a keyframe, its neighbours and all their points; other observers are fixed.
 
     `abort`: a StopFlag polled once per iteration, or None. `monocular`: fix two poses, for
-    the scale. Takes the map's locks for short sections only. A dead or unknown keyframe
-    gives an empty result, a reset meanwhile drops it.
+    the scale. `solver`: of BundleOptions. Takes the map's locks for short sections only. A
+    dead or unknown keyframe gives an empty result, a reset meanwhile drops it.
     """
 def lowest_neighbour_score(map: Map, id: int) -> float:
     """
@@ -3017,6 +3083,10 @@ def select_local_map(map: Map, frame: TrackedFrame) -> LocalMap:
     """
     Keyframes voted for by the frame's points, extended, and all their points.
     """
+def sharpness(frame: Frame) -> float:
+    """
+    Sum of the corners' responses on the two finest levels, grey levels: what blur takes away first. To be compared with that of other frames of the same camera.
+    """
 def similarity(a: WordVector, b: WordVector) -> float:
     """
     L1 score of two word vectors, 0 (disjoint) to 1 (identical).
@@ -3064,6 +3134,11 @@ def solve_full_bundle(bundle: GatheredBundle, options: FullBundleOptions = ..., 
 
     `abort`: a StopFlag polled once per iteration, or None; what an aborted run has reached
     is not committed. Results that are worse or not finite are not either.
+    """
+def spread_of_inliers(frame: TrackedFrame) -> InlierSpread:
+    """
+    How a frame's inliers are spread over the image and over depth: InlierSpread.
+    Raises StateError without a pose.
     """
 def stamp_of(map: Map) -> MapStamp:
     """

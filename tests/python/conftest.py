@@ -23,7 +23,8 @@ def _no_hang_and_no_thread_left(request: pytest.FixtureRequest) -> Iterator[None
     before = worker_threads()
     with watchdog(*mark.args):
         yield
-        gc.collect()
+        if worker_threads() != before:
+            gc.collect()  # ends those of a system that nobody holds; slow, hence not every time
         assert worker_threads() == before
 
 

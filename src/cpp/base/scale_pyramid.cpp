@@ -12,7 +12,8 @@ namespace {
 int round_half_even(float value) { return static_cast<int>(std::nearbyintf(value)); }
 }  // namespace
 
-ScalePyramid::ScalePyramid(float factor, int levels) : factor_(factor) {
+ScalePyramid::ScalePyramid(float factor, int levels, bool original_coordinates)
+    : factor_(factor), original_coordinates_(original_coordinates) {
   if (!(factor > 1.0F && factor <= 2.0F)) {
     throw SettingsError("scale factor between pyramid levels must be above 1 and at most 2, got " +
                         std::to_string(factor));

@@ -14,12 +14,15 @@ struct ImageSize {
 /// coordinates and must round the same way everywhere.
 class ScalePyramid {
  public:
-  /// Throws SettingsError unless 1 < factor <= 2 and 1 <= levels <= 16.
-  ScalePyramid(float factor, int levels);
+  /// `original_coordinates`: keypoints lie where the original puts them, at multiples of the scale,
+  /// and not at their true place. Throws SettingsError unless 1 < factor <= 2, 1 <= levels <= 16.
+  ScalePyramid(float factor, int levels, bool original_coordinates = false);
 
   int levels() const { return static_cast<int>(scale_factor_.size()); }
   float factor() const { return factor_; }
   float log_factor() const { return log_factor_; }
+  /// The convention of keypoints on coarse levels (features/level_placement.hpp).
+  bool original_coordinates() const { return original_coordinates_; }
 
   /// Size of one level-`level` pixel in level-0 pixels.
   float scale(int level) const { return scale_factor_[static_cast<std::size_t>(level)]; }
@@ -40,6 +43,7 @@ class ScalePyramid {
  private:
   float factor_;
   float log_factor_;
+  bool original_coordinates_;
   std::vector<float> scale_factor_, inverse_scale_, sigma2_, inverse_sigma2_;
 };
 

@@ -143,12 +143,15 @@ void check_level(const ScalePyramid& scales, int level) {
 
 void bind_scale_pyramid(py::module_& module) {
   py::class_<ScalePyramid>(module, "ScalePyramid", "The scale tables of an image pyramid.")
-      .def(py::init<float, int>(), py::arg("factor"), py::arg("levels"),
+      .def(py::init<float, int, bool>(), py::arg("factor"), py::arg("levels"),
+           py::arg("original_coordinates") = false,
            "`factor`: ratio between levels, above 1 and at most 2. `levels`: 1 to 16. Raises "
-           "SettingsError otherwise.")
+           "SettingsError otherwise. `original_coordinates`: see OrbOptions.")
       .def_property_readonly("levels", &ScalePyramid::levels, "Number of levels.")
       .def_property_readonly("factor", &ScalePyramid::factor, "Ratio between levels.")
       .def_property_readonly("log_factor", &ScalePyramid::log_factor, "Its natural logarithm.")
+      .def_property_readonly("original_coordinates", &ScalePyramid::original_coordinates,
+                             "Whether keypoints of coarse levels lie where the original puts them.")
       .def_property_readonly(
           "scale", [](const ScalePyramid& s) { return table(s, &ScalePyramid::scale); },
           "Size of a pixel of each level in level-0 pixels, (levels,) float32.")

@@ -85,14 +85,15 @@ struct SharedExtractor {
 void bind_options(py::module_& module) {
   py::class_<OrbOptions>(module, "OrbOptions", "Parameters of the ORB extractor.")
       .def(py::init([](int n_features, float scale_factor, int n_levels, int initial_threshold,
-                       int minimum_threshold) {
-             const OrbOptions options{n_features, scale_factor, n_levels, initial_threshold,
-                                      minimum_threshold};
+                       int minimum_threshold, bool original_coordinates) {
+             const OrbOptions options{n_features,        scale_factor,      n_levels,
+                                      initial_threshold, minimum_threshold, original_coordinates};
              options.check();
              return options;
            }),
            py::arg("n_features") = 1000, py::arg("scale_factor") = 1.2F, py::arg("n_levels") = 8,
            py::arg("initial_threshold") = 20, py::arg("minimum_threshold") = 7,
+           py::arg("original_coordinates") = false,
            "Raises SettingsError naming the option that is out of range.")
       .def_readonly("n_features", &OrbOptions::n_features, "Keypoints wanted, all levels together.")
       .def_readonly("scale_factor", &OrbOptions::scale_factor, "Ratio between levels.")
@@ -101,12 +102,16 @@ void bind_options(py::module_& module) {
                     "FAST threshold, grey levels.")
       .def_readonly("minimum_threshold", &OrbOptions::minimum_threshold,
                     "FAST threshold of cells where the first finds nothing.")
+      .def_readonly("original_coordinates", &OrbOptions::original_coordinates,
+                    "Keypoints of coarse levels lie at multiples of the scale, where the original "
+                    "puts them, and not at their true place.")
       .def("__repr__", [](const OrbOptions& options) {
         return "OrbOptions(n_features=" + std::to_string(options.n_features) +
                ", scale_factor=" + std::to_string(options.scale_factor) +
                ", n_levels=" + std::to_string(options.n_levels) +
                ", initial_threshold=" + std::to_string(options.initial_threshold) +
-               ", minimum_threshold=" + std::to_string(options.minimum_threshold) + ")";
+               ", minimum_threshold=" + std::to_string(options.minimum_threshold) +
+               ", original_coordinates=" + (options.original_coordinates ? "True" : "False") + ")";
       });
 }
 

@@ -11,7 +11,10 @@
 #include "frame/build_frame.hpp"
 #include "frame/extract_pair.hpp"
 #include "frame/image_input.hpp"
+#include "frame/inlier_spread.hpp"
 #include "frame/keypoint_colours.hpp"
+#include "frame/rotation_alignment.hpp"
+#include "frame/sharpness.hpp"
 #include "frame/stereo_matching.hpp"
 
 namespace orbslam::bindings {
@@ -253,6 +256,17 @@ void bind_tracked_frame(py::module_& module) {
       .def("clear_associations", &TrackedFrame::clear_associations,
            "Removes all map points, positions and outlier flags; keeps the pose.")
       .def(
+          "take_over",
+          [](TrackedFrame& t, const TrackedFrame& other) {
+            if (other.frame != t.frame) {
+              throw StateError("a pose can be taken over only from another version of the frame");
+            }
+            t = other;
+          },
+          py::arg("other"),
+          "Take pose, anchor, associations and outlier flags of another version of this frame.\n"
+          "Raises StateError when it is another frame.")
+      .def(
           "copy_associations",
           [](TrackedFrame& t, const TrackedFrame& from, const py::array_t<bool>& keep) {
             if (keep.ndim() != 1) throw py::value_error("keep must be a 1-D array of bool");
@@ -378,6 +392,47 @@ void bind_frame(py::module_& module) {
       py::arg("frame"), py::arg("image"), py::arg("is_rgb"),
       "Gives a new frame the colours of its image (h, w, 3) or (h, w, 4) uint8 at the keypoints; "
       "a grey image gives none. Raises ImageError for an image of another size.");
+  module.def(
+      "keep_small_image",
+      [](Frame& frame, const py::array& grey) {
+        if (!holds<std::uint8_t>(grey)) throw ImageError("image must be uint8");
+        const py::array pixels = normal_form(grey);
+        const cv::Mat source = view_image(pixels, CV_8U);
+        const py::gil_scoped_release release;
+        frame.small_image = shrink_image(source);
+      },
+      py::arg("frame"), py::arg("grey"),
+      "Keeps a new frame's image (h, w) uint8, shrunk to some 1500 pixels, for align_rotation().\n"
+      "Raises ImageError for anything but a grey image.");
+  py::class_<ImageRotation>(module, "ImageRotation", "Result of align_rotation().")
+      .def_property_readonly(
+          "quaternion_xyzw",
+          [](const ImageRotation& r) { return Eigen::Vector4d(r.R_21.coeffs()); },
+          "Rotation of directions of the first camera into the second, (4,) float64.")
+      .def_readonly("correlation", &ImageRotation::correlation,
+                    "Of the grey values where both see, -1 to 1.");
+  module.def(
+      "align_rotation",
+      [](const Frame& first, const Frame& second) {
+        const py::gil_scoped_release release;
+        return align_rotation(first.small_image, second.small_image, second.camera->pinhole());
+      },
+      py::arg("first"), py::arg("second"),
+      "How the camera turned between two frames, by their small images alone: ImageRotation, or\n"
+      "None where the images are missing or say nothing.");
+  py::class_<InlierSpread>(module, "InlierSpread", "Result of spread_of_inliers().")
+      .def_readonly("cells", &InlierSpread::cells, "Of 48 cells of the image that hold an inlier.")
+      .def_readonly("octaves", &InlierSpread::octaves, "Of depth that hold an inlier.");
+  module.def("spread_of_inliers", &spread_of_inliers, py::arg("frame"),
+             py::call_guard<py::gil_scoped_release>(),
+             "How a frame's inliers are spread over the image and over depth: InlierSpread.\n"
+             "Raises StateError without a pose.");
+  module.def("sharpness", &sharpness, py::arg("frame"), py::call_guard<py::gil_scoped_release>(),
+             "Sum of the corners' responses on the two finest levels, grey levels: what blur takes "
+             "away first. To be compared with that of other frames of the same camera.");
+  module.def("count_staying", &count_staying, py::arg("frame"), py::arg("T_nw"),
+             py::call_guard<py::gil_scoped_release>(),
+             "How many inliers of a frame a camera at `T_nw` would still have in its image.");
   module.def("to_depth_metres", &depth_metres_of, py::arg("raw"), py::arg("factor"),
              "Depth (h, w) float32 in metres: raw / factor. Values <= 0 and NaN mean none.");
 }

@@ -165,25 +165,45 @@ py::tuple solve_bundle_arrays(const std::vector<Pose>& T_cw, const std::vector<b
   return py::make_tuple(poses, copy_to_array<double>(problem.points.data(), {n, 3}), summary);
 }
 
+BundleSolver solver_named(const std::string& name) {
+  if (name == "blocks") return BundleSolver::kBlocks;
+  if (name == "ceres") return BundleSolver::kCeres;
+  throw py::value_error("solver must be 'blocks' or 'ceres', not '" + name + "'");
+}
+
+std::string name_of(BundleSolver solver) {
+  return solver == BundleSolver::kCeres ? "ceres" : "blocks";
+}
+
 void bind_bundle(py::module_& module) {
   py::class_<BundleOptions>(module, "BundleOptions", "How solve_bundle works.")
       .def(py::init([](int robust_iterations, int final_iterations, bool robust, int n_threads,
-                       bool inverse_depth, double max_seconds) {
-             return BundleOptions{robust_iterations, final_iterations, robust,
-                                  n_threads,         inverse_depth,    max_seconds};
+                       bool inverse_depth, double max_seconds, const std::string& solver) {
+             return BundleOptions{robust_iterations,   final_iterations, robust,
+                                  n_threads,           inverse_depth,    max_seconds,
+                                  solver_named(solver)};
            }),
            "robust_iterations"_a = 5, "final_iterations"_a = 10, "robust"_a = true,
-           "n_threads"_a = 1, "inverse_depth"_a = false, "max_seconds"_a = 0.0)
+           "n_threads"_a = 1, "inverse_depth"_a = false, "max_seconds"_a = 0.0,
+           "solver"_a = name_of(BundleOptions().solver))
       .def_readwrite("robust_iterations", &BundleOptions::robust_iterations,
                      "Steps of the first stage, with Huber kernel if `robust`.")
       .def_readwrite("final_iterations", &BundleOptions::final_iterations,
                      "Steps of the second stage, on the inliers, without kernel. 0: none.")
       .def_readwrite("robust", &BundleOptions::robust, "Kernel in the first stage.")
-      .def_readwrite("n_threads", &BundleOptions::n_threads, "1 gives the same bytes in every run.")
+      .def_readwrite("n_threads", &BundleOptions::n_threads,
+                     "With Ceres only 1 gives the same bytes in every run.")
       .def_readwrite("inverse_depth", &BundleOptions::inverse_depth,
-                     "Step along inverse depths of points: for large maps, with one stage.")
+                     "Step along inverse depths of points: for large maps, with one stage; Ceres\n"
+                     "only.")
       .def_readwrite("max_seconds", &BundleOptions::max_seconds,
-                     "No step is begun that would probably end later; 0: no limit.");
+                     "No step is begun that would probably end later; 0: no limit.")
+      .def_property(
+          "solver", [](const BundleOptions& options) { return name_of(options.solver); },
+          [](BundleOptions& options, const std::string& name) {
+            options.solver = solver_named(name);
+          },
+          "`blocks`: our own, the same bytes with any number of threads; `ceres`.");
   py::class_<BundleSummary>(module, "BundleSummary", "What solve_bundle did.")
       .def_readonly("initial_cost", &BundleSummary::initial_cost,
                     "Sum of (robustified) squared whitened residuals at the start.")
@@ -223,15 +243,17 @@ void bind_local_bundle(py::module_& module) {
   module.def(
       "local_bundle_adjustment",
       [](Map& map, KeyFrameId keyframe, const std::shared_ptr<StopFlag>& abort, bool monocular,
-         int n_threads) {
-        return local_bundle_adjustment(map, keyframe, flag_of(abort), monocular, n_threads);
+         int n_threads, const std::string& solver) {
+        const BundleSolver chosen = solver_named(solver);
+        const py::gil_scoped_release release;
+        return local_bundle_adjustment(map, keyframe, flag_of(abort), monocular, n_threads, chosen);
       },
       "map"_a, "keyframe"_a, "abort"_a = py::none(), "monocular"_a = false, "n_threads"_a = 1,
-      py::call_guard<py::gil_scoped_release>(),
+      "solver"_a = name_of(BundleOptions().solver),
       "Refine a keyframe, its neighbours and all their points; other observers are fixed.\n\n"
       "`abort`: a StopFlag polled once per iteration, or None. `monocular`: fix two poses, for\n"
-      "the scale. Takes the map's locks for short sections only. A dead or unknown keyframe\n"
-      "gives an empty result, a reset meanwhile drops it.");
+      "the scale. `solver`: of BundleOptions. Takes the map's locks for short sections only. A\n"
+      "dead or unknown keyframe gives an empty result, a reset meanwhile drops it.");
 }
 
 void bind_full_bundle_steps(py::module_& module) {

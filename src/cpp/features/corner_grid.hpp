@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "features/kernels.hpp"
+#include "features/level_placement.hpp"
 
 namespace orbslam {
 
@@ -15,7 +16,7 @@ inline constexpr int corner_origin = 16;
 /// Which pixels of a level may hold a keypoint.
 struct LevelMask {
   const cv::Mat* mask = nullptr;  ///< CV_8UC1 of the size of level 0, 0 = forbidden; null = all
-  float scale = 1.0F;             ///< size of a level pixel in level-0 pixels
+  LevelPlacement placement;       ///< of the level
 
   /// Position in pixels of the level. None of the level-0 pixels around it may be forbidden.
   bool allows(int x, int y) const;

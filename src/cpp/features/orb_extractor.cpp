@@ -8,6 +8,7 @@
 #include "base/errors.hpp"
 #include "features/corner_grid.hpp"
 #include "features/gaussian_blur.hpp"
+#include "features/level_placement.hpp"
 #include "features/orientation.hpp"
 #include "features/pyramid_builder.hpp"
 #include "features/quadtree.hpp"
@@ -66,7 +67,7 @@ void OrbOptions::check() const {
 struct OrbExtractor::Impl {
   Impl(const OrbOptions& wanted, const Kernels& chosen)
       : options(wanted),
-        scales(wanted.scale_factor, wanted.n_levels),
+        scales(wanted.scale_factor, wanted.n_levels, wanted.original_coordinates),
         quota(scales.features_per_level(wanted.n_features)),
         kernels(&chosen) {}
 
@@ -86,7 +87,7 @@ struct OrbExtractor::Impl {
 
 void OrbExtractor::Impl::extract_level(const cv::Mat& image, const cv::Mat& mask, int level,
                                        Features& features) {
-  const LevelMask allowed{mask.empty() ? nullptr : &mask, scales.scale(level)};
+  const LevelMask allowed{mask.empty() ? nullptr : &mask, LevelPlacement(scales, level)};
   const auto& corners =
       grid.detect(image, options.initial_threshold, options.minimum_threshold, allowed, *kernels);
   const auto& kept =
@@ -106,11 +107,11 @@ Keypoint OrbExtractor::Impl::keypoint_at(const cv::Mat& image, const Corner& cor
   std::int32_t m10 = 0, m01 = 0;
   kernels->moments(image.ptr<std::uint8_t>(y) + x, static_cast<std::ptrdiff_t>(image.step[0]), &m10,
                    &m01);
-  const float scale = scales.scale(level);
+  const LevelPlacement placement(scales, level);
   Keypoint keypoint;
-  keypoint.x = static_cast<float>(x) * scale;
-  keypoint.y = static_cast<float>(y) * scale;
-  keypoint.size = std::trunc(static_cast<float>(patch_size) * scale);
+  keypoint.x = placement.to_image(static_cast<float>(x));
+  keypoint.y = placement.to_image(static_cast<float>(y));
+  keypoint.size = std::trunc(static_cast<float>(patch_size) * scales.scale(level));
   keypoint.angle = fast_atan2_degrees(static_cast<float>(m01), static_cast<float>(m10));
   keypoint.response = static_cast<float>(corner.response);
   keypoint.level = level;

@@ -15,8 +15,9 @@ struct OrbOptions {
   int n_features = 1000;      ///< keypoints wanted per image, all levels together
   float scale_factor = 1.2F;  ///< ratio between levels
   int n_levels = 8;
-  int initial_threshold = 20;  ///< FAST threshold, grey levels
-  int minimum_threshold = 7;   ///< used in cells where the first finds nothing
+  int initial_threshold = 20;         ///< FAST threshold, grey levels
+  int minimum_threshold = 7;          ///< used in cells where the first finds nothing
+  bool original_coordinates = false;  ///< ScalePyramid::original_coordinates()
 
   /// Throws SettingsError naming the option that is out of range.
   void check() const;

@@ -99,9 +99,12 @@ std::shared_ptr<Frame> build_rgbd_frame(const FrameContext& context, FrameId id,
 
   const auto& raw = frame->raw_keypoints.empty() ? frame->keypoints : frame->raw_keypoints;
   const float bf = static_cast<float>(camera.bf());
+  // The pixel in which the keypoint lies; the original truncates, which the multiples of its
+  // coordinates make half a pixel too little.
+  const float rounding = context.scales->original_coordinates() ? 0.0F : 0.5F;
   for (std::size_t i = 0; i < raw.size(); ++i) {
-    const int column = static_cast<int>(raw[i].x);
-    const int row = static_cast<int>(raw[i].y);
+    const int column = static_cast<int>(raw[i].x + rounding);
+    const int row = static_cast<int>(raw[i].y + rounding);
     if (column < 0 || column >= depth.cols || row < 0 || row >= depth.rows) continue;
     const float z = depth.at<float>(row, column);
     // Some drivers write infinity for "too far", which is as good as no measurement.

@@ -12,6 +12,7 @@
 #include "camera/camera.hpp"
 #include "features/keypoint.hpp"
 #include "frame/keypoint_grid.hpp"
+#include "frame/small_image.hpp"
 #include "frame/words.hpp"
 
 namespace orbslam {
@@ -32,6 +33,7 @@ struct Frame {
   /// Red, green, blue of the image at each keypoint; empty when the image was grey.
   std::vector<std::array<std::uint8_t, 3>> colours;
   KeypointGrid grid;
+  SmallImage small_image;  ///< of the image, the left one of a pair; empty when nobody kept it
 
   WordVector words;          ///< filled by describe() (places/), before the frame is shared
   DirectIndex direct_index;  ///< same

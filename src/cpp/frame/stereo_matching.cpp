@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/errors.hpp"
+#include "features/level_placement.hpp"
 #include "frame/stereo_kernels.hpp"
 
 namespace orbslam {
@@ -116,10 +117,10 @@ bool refine(const Keypoint& keypoint, float coarse_u, const ImagePyramid& left,
             const ImagePyramid& right, const ScalePyramid& scales, stereo::ShiftedSad shifted_sad,
             stereo::WindowPair& windows, Refined& refined) {
   const auto level = static_cast<std::size_t>(keypoint.level);
-  const float inverse = scales.inverse_scale(keypoint.level);
-  const int x_left = static_cast<int>(std::round(keypoint.x * inverse));
-  const int y = static_cast<int>(std::round(keypoint.y * inverse));
-  const int x_right = static_cast<int>(std::round(coarse_u * inverse));
+  const LevelPlacement placement(scales, keypoint.level);
+  const int x_left = static_cast<int>(std::round(placement.to_level(keypoint.x)));
+  const int y = static_cast<int>(std::round(placement.to_level(keypoint.y)));
+  const int x_right = static_cast<int>(std::round(placement.to_level(coarse_u)));
   if (!cut_windows(left.levels[level], right.levels[level], x_left, x_right, y, windows)) {
     return false;
   }
@@ -133,8 +134,8 @@ bool refine(const Keypoint& keypoint, float coarse_u, const ImagePyramid& left,
   const float at = static_cast<float>(sums[best]);
   const float after = static_cast<float>(sums[best + 1]);
   const float delta = (before - after) / (2.0F * (before + after - 2.0F * at));
-  refined.right_u = scales.scale(keypoint.level) *
-                    (static_cast<float>(x_right) + static_cast<float>(best - kHalfSearch) + delta);
+  refined.right_u = placement.to_image(static_cast<float>(x_right) +
+                                       static_cast<float>(best - kHalfSearch) + delta);
   refined.sad = sums[best];
   return true;
 }

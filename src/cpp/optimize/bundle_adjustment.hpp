@@ -30,17 +30,24 @@ struct BundleProblem {
   std::vector<Observation> observations;
 };
 
+/// kBlocks is our own: blocks of fixed size, four lanes at once, the same bytes with any number of
+/// threads; for bundles whose keyframes nearly all share points (docs/method/adjustment.md#blocks).
+/// kCeres is for large and sparse ones, and a second opinion.
+enum class BundleSolver { kBlocks, kCeres };
+
 struct BundleOptions {
   int robust_iterations = 5;  ///< first stage, with Huber kernel if `robust`
   /// Second stage, without kernel, on the inliers of the first. 0: no such stage.
   int final_iterations = 10;
   bool robust = true;
-  int n_threads = 1;  ///< 1 gives the same bytes in every run
+  int n_threads = 1;  ///< with Ceres only 1 gives the same bytes in every run
   /// Steps along directions and inverse depths of points (see BundlePoint) instead of coordinates.
   /// Large maps, whose points of small parallax otherwise forbid long steps, need half the steps.
+  /// With Ceres only.
   bool inverse_depth = false;
   /// No iteration is begun that would probably end later; 0: no limit. What was reached is used.
   double max_seconds = 0;
+  BundleSolver solver = BundleSolver::kBlocks;
 };
 
 struct BundleSummary {
@@ -54,10 +61,10 @@ struct BundleSummary {
   std::vector<std::uint8_t> outlier;  ///< per observation, judged at the final estimate
 };
 
-/// Solves in place with Ceres (points eliminated by Schur complement, analytic Jacobians).
-/// `abort` is polled once per iteration; nullptr: never. Observations behind their camera or with
-/// NaN or infinite numbers at the start take no part in the first stage. Throws StateError when an
-/// observation names a camera or point that does not exist.
+/// Solves in place (points eliminated by Schur complement, analytic Jacobians). `abort` is polled
+/// once per iteration; nullptr: never. Observations behind their camera or with NaN or infinite
+/// numbers at the start take no part in the first stage. Throws StateError when an observation
+/// names a camera or point that does not exist, or for options that exclude each other.
 BundleSummary solve_bundle(BundleProblem& problem, const BundleOptions& options,
                            const std::atomic<bool>* abort);
 

@@ -34,6 +34,7 @@ BundleSummary solve_full_bundle(GatheredBundle& bundle, const FullBundleOptions&
   solver.n_threads = n_threads;
   solver.inverse_depth = bundle.keyframes.size() > kManyKeyframes;
   solver.max_seconds = options.max_seconds;
+  solver.solver = BundleSolver::kCeres;  // the keyframes of a map hardly ever all share points
   const BundleSummary summary = solve_bundle(bundle.problem, solver, abort);
   // A comparison with NaN is false.
   bundle.solved = !summary.aborted && summary.iterations > 0 &&

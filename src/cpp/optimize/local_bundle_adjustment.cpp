@@ -98,7 +98,7 @@ GatheredBundle gather(const Map& map, KeyFrameId current, bool monocular,
 
 LocalBundleResult local_bundle_adjustment(Map& map, KeyFrameId current,
                                           const std::atomic<bool>* abort, bool monocular,
-                                          int n_threads) {
+                                          int n_threads, BundleSolver solver) {
   LocalBundleResult result;
   if (abort != nullptr && abort->load()) {
     result.summary.aborted = true;
@@ -108,6 +108,7 @@ LocalBundleResult local_bundle_adjustment(Map& map, KeyFrameId current,
   if (bundle.problem.observations.empty()) return result;
   BundleOptions options;
   options.n_threads = n_threads;
+  options.solver = solver;
   result.summary = solve_bundle(bundle.problem, options, abort);
   // Every accepted step lowers the cost; without one there is nothing to write.
   const bool moved = result.summary.iterations > 0;

@@ -31,6 +31,7 @@ struct LocalBundleResult {
 /// docs/method/adjustment.md#local-bundle-adjustment.
 LocalBundleResult local_bundle_adjustment(Map& map, KeyFrameId current,
                                           const std::atomic<bool>* abort, bool monocular = false,
-                                          int n_threads = 1);
+                                          int n_threads = 1,
+                                          BundleSolver solver = BundleOptions().solver);
 
 }  // namespace orbslam

@@ -8,15 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from orbslam2py import _palette as palette
 from orbslam2py._files import atomic_write
+from orbslam2py._palette import hexadecimal
 from orbslam2py.calibration.calibration import Calibration
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_DOTS = "#1f5fa8"
-_ARROWS = "#c2452d"
-_LINES = "#9a9a9a"
+_DOTS = hexadecimal(palette.PAPER_PATH)
+_ARROWS = hexadecimal(palette.PAPER_LOOP)
+_LINES = hexadecimal(palette.PAPER_LINE)
 #: Length of the arrow of a large residual, as a part of the image's width.
 _ARROW = 0.04
 #: Nice scales for arrows.
@@ -129,7 +131,7 @@ def _draw_views(axes: Axes, calibration: Calibration) -> None:
 
 
 def _tidy(axes: Axes) -> None:
-    axes.grid(color="#eeeeee", linewidth=0.8)
+    axes.grid(color=hexadecimal(palette.PAPER_GRID), linewidth=0.8)
     axes.set_axisbelow(True)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)

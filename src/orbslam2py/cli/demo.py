@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -67,5 +69,22 @@ def demo(
     if not quiet:
         typer.echo(f"Look at {output / 'trajectory.png'}.")
         if not viewer:
-            typer.echo("To see it while it runs: orbslam2py demo --viewer")
+            typer.echo(f"To see it while it runs: {own_name()} demo --viewer")
     raise typer.Exit(code)
+
+
+def own_name() -> str:
+    """What a person types to call this program, also from where it is not on the path."""
+    own = Path(sys.argv[0])
+    if own.name == "__main__.py":
+        return f"{_from_here(Path(sys.executable))} -m orbslam2py"
+    found = shutil.which("orbslam2py")
+    if found is not None or own.name != "orbslam2py":
+        return "orbslam2py"
+    return str(_from_here(own))
+
+
+def _from_here(path: Path) -> Path:
+    """A path as it is typed in the working folder: below it without what leads there."""
+    absolute, here = path.absolute(), Path.cwd()
+    return absolute.relative_to(here) if absolute.is_relative_to(here) else path

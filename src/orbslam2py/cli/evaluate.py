@@ -18,7 +18,7 @@ from rich.table import Table
 from orbslam2py._arrays import FloatArray
 from orbslam2py._files import atomic_write
 from orbslam2py.cli.display import log_to
-from orbslam2py.datasets import Layout, open_sequence, recognise
+from orbslam2py.datasets import Layout, is_recording, open_sequence, recognise
 from orbslam2py.datasets.euroc import find_root
 from orbslam2py.datasets.euroc_calibration import read_sensor_yaml
 from orbslam2py.datasets.extrinsics import read_extrinsics
@@ -54,7 +54,8 @@ def evaluate(
         Path, typer.Argument(help="The estimate: a file in TUM or KITTI format.")
     ],
     ground_truth: Annotated[
-        Path, typer.Argument(help="The truth: a trajectory file, or the folder of a sequence.")
+        Path,
+        typer.Argument(help="The truth: a trajectory file, the folder of a sequence, or a bag."),
     ],
     alignment: Annotated[
         Alignment,
@@ -170,7 +171,7 @@ def _read_both(
     times = None if times_file is None else read_times(times_file)
     T_body_camera = None if extrinsics is None else read_extrinsics(extrinsics)
     estimate = read_estimate(trajectory, file_format, times=times)
-    if ground_truth.is_dir():
+    if ground_truth.is_dir() or is_recording(ground_truth):
         truth = _truth_of_sequence(ground_truth, sensor, T_body_camera)
     else:
         truth = read_truth(ground_truth, file_format, times=times)
@@ -200,7 +201,7 @@ def _see_that_they_fit(path: Path | None, times: FloatArray, files: tuple[Poses,
 
 
 def _truth_of_sequence(folder: Path, sensor: Sensor | None, extrinsics: FloatArray | None) -> Poses:
-    is_euroc = recognise(folder) is Layout.EUROC
+    is_euroc = not is_recording(folder) and recognise(folder) is Layout.EUROC
     sequence = open_sequence(folder, sensor if is_euroc else None)
     root = find_root(folder) if is_euroc else None
     if root is not None and extrinsics is not None:

@@ -37,6 +37,7 @@ from orbslam2py.cli.run_options import (
     StartOption,
     StrideOption,
     TimesOption,
+    TopicsOption,
     VocabularyOption,
 )
 from orbslam2py.cli.viewing import ViewerExit, ViewerFlag, ViewerHost, ViewerOptions, ViewerPort
@@ -58,6 +59,8 @@ EXAMPLE = """
     orbslam2py run video.mp4 --sensor mono --settings my.yaml
 
     orbslam2py run phone --sensor rgbd --settings camera.yaml
+
+    orbslam2py run drive.mcap --sensor stereo
 
     orbslam2py run 0 --sensor mono --settings my.yaml
 
@@ -81,6 +84,7 @@ def run(
     fps: FpsOption = None,
     times: TimesOption = None,
     mask: MaskOption = None,
+    topics: TopicsOption = None,
     load: LoadOption = None,
     initial_pose: InitialPoseOption = None,
     allow_other_setup: AllowOtherSetupFlag = False,
@@ -112,7 +116,9 @@ def run(
         if sensor is not None:
             check_sensor(loaded, sensor)
         sensor, chosen = loaded.sensor, loaded.settings
-    images = open_input(sequence, sensor, settings=chosen, fps=fps, times=times, mask=mask)
+    images = open_input(
+        sequence, sensor, settings=chosen, fps=fps, times=times, mask=mask, topics=topics
+    )
     options = RunOptions(
         images.sensor,
         SystemOptions(

@@ -15,8 +15,8 @@ SequenceArgument = Annotated[
     str,
     typer.Argument(
         help="Folder of a TUM RGB-D, KITTI odometry or EuRoC sequence; folder of images, "
-        "or one that holds a folder of images and one of depth; video file; number of a camera "
-        "(ends with Ctrl-C)."
+        "or one that holds a folder of images and one of depth; bag of ROS 1 or ROS 2 (.bag, .db3, "
+        ".mcap, or its folder); video file; number of a camera (ends with Ctrl-C)."
     ),
 ]
 SensorOption = Annotated[
@@ -46,6 +46,14 @@ TimesOption = Annotated[
     typer.Option(
         help="File with a time stamp per image of a folder or video: decimal seconds or whole "
         "nanoseconds, with the images' file names or without (rgb.txt, data.csv)."
+    ),
+]
+TopicsOption = Annotated[
+    str | None,
+    typer.Option(
+        help="Topics of a bag: left (or image), right, depth, info, right_info, truth  "
+        "[guessed by types and names].",
+        metavar="left=/a,right=/b",
     ),
 ]
 MaskOption = Annotated[

@@ -36,7 +36,8 @@ Sensors = Annotated[Sensor, typer.Option(help="What delivers the images.")]
 Layouts = Annotated[
     Layout | None,
     typer.Option(
-        help="File names and formats: tum for mono and rgbd, kitti or euroc for mono and stereo.  "
+        help="File names and formats: tum for mono and rgbd, kitti or euroc for mono and stereo; "
+        "rosbag1, rosbag2, mcap: a bag of ROS 1 or 2, for all.  "
         "[default: kitti for stereo, else tum]"
     ),
 ]

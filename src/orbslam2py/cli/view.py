@@ -39,13 +39,13 @@ def view(
 
         orbslam2py view runs/06 --sequence dataset/sequences/06
     """
+    from orbslam2py.runs.report_page import read_run  # noqa: PLC0415
     from orbslam2py.viewer.live import announce, wait_for_interrupt  # noqa: PLC0415  # slow to load
     from orbslam2py.viewer.replay import Replay  # noqa: PLC0415
-    from orbslam2py.viewer.run_folder import RunFolder  # noqa: PLC0415
     from orbslam2py.viewer.server import LOOPBACK  # noqa: PLC0415
 
     log_to(Console(stderr=True), quiet=False)
-    run = RunFolder.read(folder)
+    run = read_run(folder)
     images = None
     if sequence is not None:
         opened = open_input(sequence, run.sensor, settings=str(folder / "settings.yaml"))

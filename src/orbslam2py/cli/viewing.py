@@ -135,11 +135,9 @@ class Viewing:
         if self._view is None or self._options.exit or interrupted:
             return
         self._view.tell_end(f"The run has ended; its results are in {folder}.")
-        from orbslam2py.viewer.live import wait_for_interrupt  # noqa: PLC0415
-
         text = f"The viewer stays at {self._view.address} until Ctrl-C."
         console.print(text, highlight=False, soft_wrap=True)
-        wait_for_interrupt()
+        self._view.wait()
 
     def _stop_run(self) -> None:
         self._stopped_in_page = True

@@ -82,6 +82,7 @@ class FileWatchers:
             duration=duration,
             in_time=self.in_time,
             unit="m" if options.sensor.has_depth else "units",
+            ground_truth=_truth(source),
         )
         self.watchers.append(self.video)
         self.files["video"] = path

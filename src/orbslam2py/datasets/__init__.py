@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Images: TUM RGB-D, KITTI odometry, EuRoC, folders of images, videos, cameras."""
+"""Images: TUM RGB-D, KITTI odometry, EuRoC, bags, folders of images, videos, cameras."""
 
+from orbslam2py.datasets.bags import BagSequence
 from orbslam2py.datasets.base import Images, Layout, LiveFrame, LiveSource, Sequence, Source
 from orbslam2py.datasets.depth_folders import DepthFolders
 from orbslam2py.datasets.euroc import EurocSequence
@@ -10,12 +11,13 @@ from orbslam2py.datasets.kitti import KittiSequence
 from orbslam2py.datasets.live import LiveCamera
 from orbslam2py.datasets.masks import MaskedCamera, MaskedSequence
 from orbslam2py.datasets.open_input import open_input
-from orbslam2py.datasets.recognise import open_sequence, recognise
+from orbslam2py.datasets.recognise import is_recording, open_sequence, recognise
 from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.datasets.tum import TumSequence
 from orbslam2py.datasets.video import VideoReader, VideoSequence
 
 __all__ = [
+    "BagSequence",
     "DepthFolders",
     "EurocSequence",
     "Frame",
@@ -35,6 +37,7 @@ __all__ = [
     "TumSequence",
     "VideoReader",
     "VideoSequence",
+    "is_recording",
     "open_input",
     "open_sequence",
     "recognise",

@@ -26,6 +26,9 @@ class Layout(str, Enum):
     TUM = "tum"
     KITTI = "kitti"
     EUROC = "euroc"
+    ROSBAG1 = "rosbag1"
+    ROSBAG2 = "rosbag2"
+    MCAP = "mcap"
 
     @classmethod
     def _missing_(cls, value: object) -> Layout:

@@ -98,18 +98,36 @@ def read_any(path: Path) -> NDArray[np.generic]:
         raise DatasetError(f"image {path} is listed but missing") from None
     except OSError as error:
         raise ImageError(f"cannot read image {path}: {error.strerror or error}") from error
+    return decode_any(content, path)
+
+
+def decode_any(content: bytes, what: object) -> NDArray[np.generic]:
+    """Decode the content of an image file of any depth and number of channels as it is.
+
+    Parameters
+    ----------
+    content
+        The bytes of the file.
+    what
+        Its name for messages.
+
+    Raises
+    ------
+    ImageError
+        If it is no complete image.
+    """
     # Some versions of OpenCV fill the rest of a truncated image with grey and say nothing.
     for begin, end in ((_PNG, _PNG_END), (_JPEG, _JPEG_END)):
         if content.startswith(begin) and end not in content[-_TAIL:]:
-            raise ImageError(f"image {path} is truncated ({len(content)} bytes)")
+            raise ImageError(f"image {what} is truncated ({len(content)} bytes)")
     image = None
     if content:
         try:
             image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
         except cv2.error as error:
-            raise ImageError(f"cannot decode image {path}: {error}") from error
+            raise ImageError(f"cannot decode image {what}: {error}") from error
     if image is None or image.size == 0:
         raise ImageError(
-            f"{path} is no readable image ({len(content)} bytes); replace it, or leave it out"
+            f"{what} is no readable image ({len(content)} bytes); replace it, or leave it out"
         )
     return np.asarray(image)

@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""From what a user names to images: a folder, a video or a camera."""
+"""From what a user names to images: a folder, a bag, a video or a camera."""
 
 from __future__ import annotations
 
 import mimetypes
+from collections.abc import Mapping
 from pathlib import Path
 
 import cv2
 
 from orbslam2py._arguments import is_whole, path_of
 from orbslam2py._files import IMAGE_SUFFIXES
+from orbslam2py.datasets.bags import BagSequence
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.depth_folders import DepthFolders, find_depth_pair
@@ -17,7 +19,13 @@ from orbslam2py.datasets.image_folder import ImageFolder, image_files
 from orbslam2py.datasets.images import quiet_opencv
 from orbslam2py.datasets.live import LiveCamera
 from orbslam2py.datasets.masks import MaskedCamera, MaskedSequence
-from orbslam2py.datasets.recognise import has_layout, is_depth_pair, open_sequence
+from orbslam2py.datasets.recognise import (
+    has_layout,
+    is_depth_pair,
+    is_recording,
+    open_sequence,
+)
+from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.datasets.video import VideoSequence
 from orbslam2py.errors import DatasetError
 from orbslam2py.settings import Sensor
@@ -37,15 +45,16 @@ def open_input(
     fps: float | None = None,
     times: str | Path | None = None,
     mask: str | Path | None = None,
+    topics: Mapping[str, str] | str | None = None,
 ) -> Sequence | LiveSource:
-    """Open a recorded sequence, a folder of images, a video or a camera.
+    """Open a recorded sequence, a bag, a folder of images, a video or a camera.
 
     Parameters
     ----------
     source
         Folder of a TUM RGB-D, KITTI or EuRoC sequence, folder of images, folder with a folder of
-        images and one of depth, video file, or number of a camera (also as text, if there is no
-        file of that name).
+        images and one of depth, bag of ROS 1 or ROS 2 (file or folder), video file, or number of a
+        camera (also as text, if there is no file of that name).
     sensor
         What to deliver images for; by default the richest there is.
     settings
@@ -57,6 +66,8 @@ def open_input(
         whole nanoseconds, with the images' file names or without.
     mask
         An image file, 0 where no keypoint may lie, or a folder with one per image.
+    topics
+        Of a bag: which topics are the images, as `BagSequence` takes them.
 
     Returns
     -------
@@ -81,11 +92,17 @@ def open_input(
             raise DatasetError(
                 "--times does not go with a camera: its images get their own times; leave it out"
             )
+        _refuse_topics(source, topics)
         camera = LiveCamera(number, sensor, settings=settings, fps=fps)
         live: LiveSource = camera if mask is None else MaskedCamera(camera, mask)
         live.open()
         return live
-    sequence = _open_recorded(named, sensor, settings, fps, times)
+    if is_recording(named):
+        sequence: Sequence = BagSequence(named, sensor, settings=settings, topics=topics)
+        _refuse_times(named, sequence.layout, fps, times)
+    else:
+        _refuse_topics(named, topics)
+        sequence = _open_recorded(named, sensor, settings, fps, times)
     return sequence if mask is None else MaskedSequence(sequence, mask)
 
 
@@ -109,14 +126,24 @@ def _open_recorded(
         if inner and not any(has_layout(child) for child in path.iterdir()):
             raise DatasetError(f"no images in {path} itself; did you mean {inner[0]}?")
     sequence = open_sequence(path, sensor, settings=settings)
-    sequence.require_images()
+    if isinstance(sequence, RecordedSequence):
+        sequence.require_images()
+    _refuse_times(path, sequence.layout, fps, times)
+    return sequence
+
+
+def _refuse_times(path: Path, layout: str, fps: float | None, times: str | Path | None) -> None:
     for name, value in (("--fps", fps), ("--times", times)):
         if value is not None:
             raise DatasetError(
-                f"{name} is for a folder of images or a video; {path} is {sequence.layout}, "
+                f"{name} is for a folder of images or a video; {path} is {layout}, "
                 "which has its own time stamps"
             )
-    return sequence
+
+
+def _refuse_topics(source: object, topics: Mapping[str, str] | str | None) -> None:
+    if topics is not None:
+        raise DatasetError(f"--topics is for a bag, which {source} is not; leave it out")
 
 
 def _require_video(path: Path) -> None:
@@ -135,8 +162,8 @@ def _require_video(path: Path) -> None:
         readable = not kind.startswith("text/") and cv2.VideoCapture(str(path)).isOpened()
     if not readable:
         raise DatasetError(
-            f"{path} is neither a video, nor a folder, nor a camera; give the folder of a "
-            "sequence, a folder of images, a video or the number of a camera"
+            f"{path} is neither a video, nor a bag, nor a folder, nor a camera; give the folder of "
+            "a sequence, a folder of images, a bag, a video or the number of a camera"
         )
 
 

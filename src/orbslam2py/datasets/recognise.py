@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from orbslam2py._arguments import path_of
+from orbslam2py.datasets.bags import BagSequence, is_bag
 from orbslam2py.datasets.base import Layout
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.depth_folders import (
@@ -15,12 +17,14 @@ from orbslam2py.datasets.depth_folders import (
     no_depth_pair,
 )
 from orbslam2py.datasets.euroc import EurocSequence, find_root
+from orbslam2py.datasets.image_folder import image_files
 from orbslam2py.datasets.kitti import KittiSequence, find_cameras
 from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.datasets.tum import TumSequence, find_association
 from orbslam2py.errors import DatasetError
 from orbslam2py.settings import Sensor
 
+_BAGS = (Layout.ROSBAG1, Layout.ROSBAG2, Layout.MCAP)
 _MARKS = (
     "rgb.txt or associations.txt (TUM), times.txt with image_0 or image_2 (KITTI), "
     "mav0/cam0 or cam0 (EuRoC)"
@@ -97,14 +101,16 @@ def open_sequence(
     settings: SettingsChoice = None,
     association: str | Path | None = None,
     layout: Layout | str | None = None,
-) -> RecordedSequence:
-    """Open the sequence in a folder, recognised by its files.
+    topics: Mapping[str, str] | str | None = None,
+) -> RecordedSequence | BagSequence:
+    """Open the sequence in a folder or a bag, recognised by its files.
 
     Parameters
     ----------
     folder
-        TUM RGB-D, KITTI odometry or EuRoC (the sequence or its ``mav0``), or a folder with a folder
-        of images and a folder of depth images.
+        TUM RGB-D, KITTI odometry or EuRoC (the sequence or its ``mav0``), a folder with a folder
+        of images and a folder of depth images, or a bag of ROS 1 or ROS 2 (a file, or the folder of
+        a recording).
     sensor
         What to deliver images for; by default the richest the folder has images for.
     settings
@@ -113,10 +119,12 @@ def open_sequence(
         Association file of a TUM sequence; by default one in the folder, else by time stamps.
     layout
         How to read the folder, if it should not be recognised.
+    topics
+        Of a bag: which topics are the images, as `datasets.BagSequence` takes them.
 
     Returns
     -------
-    RecordedSequence
+    RecordedSequence or BagSequence
         With the interface of `datasets.base.Sequence`; images are read when asked for.
 
     Raises
@@ -129,15 +137,25 @@ def open_sequence(
     folder = path_of(folder, "the folder of the sequence")
     if association is not None:
         association = path_of(association, "association")
+    layout = None if layout is None else Layout(layout)
+    if layout in _BAGS or (layout is None and is_recording(folder)):
+        return BagSequence(folder, sensor, settings=settings, topics=topics)
+    if topics is not None:
+        raise DatasetError(f"topics belong to a bag; {folder} is none: leave out --topics")
     if layout is None and association is None and is_depth_pair(folder, sensor):
         return DepthFolders(folder, sensor, settings=settings)
-    layout = recognise(folder) if layout is None else Layout(layout)
+    layout = layout or recognise(folder)
     if layout is Layout.TUM:
         return TumSequence(folder, sensor, settings=settings, association=association)
     if association is not None:
         raise DatasetError(f"an association file belongs to a TUM sequence; {folder} is {layout}")
     kind = KittiSequence if layout is Layout.KITTI else EurocSequence
     return kind(folder, sensor, settings=settings)
+
+
+def is_recording(path: Path) -> bool:
+    """Tell whether a path is a bag, and no folder of images with a bag beside them."""
+    return is_bag(path) and not (path.is_dir() and (_layouts(path) or image_files(path)))
 
 
 def _layouts(folder: Path) -> list[Layout]:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How far an estimate is from the truth: paths, laps, poses found in a map, closed loops."""
 
-from orbslam2py.evaluation.alignment import Alignment, differ_in_unit
+from orbslam2py.evaluation.alignment import Alignment, FitByTime, differ_in_unit, fit_by_time
 from orbslam2py.evaluation.keyframes import (
     PoseError,
     errors_through_keyframes,
@@ -35,6 +35,7 @@ __all__ = [
     "Alignment",
     "ErrorStatistics",
     "Evaluation",
+    "FitByTime",
     "LapError",
     "LoopError",
     "Matched",
@@ -51,6 +52,7 @@ __all__ = [
     "errors_through_keyframes",
     "evaluate_trajectory",
     "find_revisits",
+    "fit_by_time",
     "lap_error",
     "loop_error",
     "match_poses",

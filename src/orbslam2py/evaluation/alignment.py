@@ -3,14 +3,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 
 from orbslam2py._arguments import shown
-from orbslam2py._arrays import FloatArray
+from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.errors import DatasetError
-from orbslam2py.trajectory import align
+from orbslam2py.trajectory import MAX_DIFFERENCE, Similarity, align, associate
 
 #: Lengths that differ by more than this factor are those of one camera, not of a wrong baseline.
 _OTHER_UNIT = 1.5
@@ -76,3 +77,48 @@ def differ_in_unit(points: FloatArray, targets: FloatArray) -> float | None:
         float(np.linalg.norm(found.apply(points) - targets)) for found in (rigid, scaled)
     )
     return scaled.scale if after < 0.5 * before else None
+
+
+@dataclass(frozen=True, eq=False)
+class FitByTime:
+    """How one path lies on another."""
+
+    similarity: Similarity
+    """From the world of the one to that of the other."""
+    rows: IntArray
+    """(k,) poses of the one that were compared."""
+    other_rows: IntArray
+    """(k,) poses of the other, at the same times."""
+
+
+def fit_by_time(
+    times: FloatArray,
+    positions: FloatArray,
+    other_times: FloatArray,
+    other_positions: FloatArray,
+    *,
+    with_scale: bool,
+    fewest: int = _FEWEST_POSES,
+) -> FitByTime | None:
+    """Find what moves a path onto another, by the poses at the same times (Umeyama, PAMI 1991).
+
+    Parameters
+    ----------
+    times, other_times
+        Seconds, float64 (n,) and (m,).
+    positions, other_positions
+        Float64 (n, 3) and (m, 3), each in a world of its own.
+    with_scale
+        The worlds may differ in their unit.
+    fewest
+        Poses at the same times (0.02 s) that tell how the paths lie to each other.
+
+    Returns
+    -------
+    FitByTime or None
+        None if there are fewer.
+    """
+    i, j = associate(times, other_times, MAX_DIFFERENCE)
+    if len(i) < fewest:
+        return None
+    return FitByTime(align(positions[i], other_positions[j], with_scale=with_scale), i, j)

@@ -4,11 +4,11 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import json
 import os
 import sqlite3
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -22,6 +22,7 @@ from orbslam2py.maps.map_tables import join_blobs, read_contents, read_one, read
 from orbslam2py.maps.map_writer import connect
 from orbslam2py.maps.saved_map import RecordedFrames, Run, SavedMap, VocabularyIdentity
 from orbslam2py.maps.schema import APPLICATION_ID, CREATE, FORMAT_VERSION, TABLES, Table
+from orbslam2py.settings.keys import ORIGINAL_COORDINATES
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
 
@@ -64,7 +65,7 @@ def load_map(path: str | os.PathLike[str], *, images: bool = False) -> SavedMap:
             saved = _read(connection, images=images)
         core.check_map_contents(saved.contents.as_dict())
         _check_frames(saved)
-    return dataclasses.replace(saved, source=named)
+    return replace(saved, source=named)
 
 
 def _check_header(path: Path, named: str) -> None:
@@ -140,11 +141,19 @@ def _read(connection: sqlite3.Connection, *, images: bool) -> SavedMap:
     pictures = read_rows(connection, TABLES["images"]) if images else []
     return SavedMap(
         contents,
-        Settings.from_yaml(yaml, Sensor(sensor)),
+        _settings_of(yaml, Sensor(sensor)),
         VocabularyIdentity(name, content_hash, comment),
         runs,
         dict(pictures),
     )
+
+
+def _settings_of(yaml: str, sensor: Sensor) -> Settings:
+    settings = Settings.from_yaml(yaml, sensor)
+    if ORIGINAL_COORDINATES in yaml:
+        return settings
+    # A map from before there was a choice: its keypoints lie where the original puts them.
+    return replace(settings, orb=replace(settings.orb, original_coordinates=True))
 
 
 def _read_runs(connection: sqlite3.Connection) -> Iterator[Run]:

@@ -60,4 +60,6 @@ def _differences(saved: Settings, present: Settings) -> Iterator[str]:
         before = getattr(getattr(saved, key.group), key.field)
         now = getattr(getattr(present, key.group), key.field)
         if before != now and present.sensor in key.sensors:
+            # As it is written in the file: 0 or 1, not False or True.
+            now, before = (int(v) if key.kind is bool else v for v in (now, before))
             yield f"{key.name} is {now}, in the map {before}"

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from orbslam2py._arrays import ByteArray
+from orbslam2py._palette import GROUND
 from orbslam2py.pictures.overlay import fit_size, status_height
-from orbslam2py.pictures.palette import GROUND
 
 #: Images wider than this, relative to their height, stand above the time line.
 _WIDE = 2.0

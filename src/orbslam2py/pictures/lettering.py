@@ -16,7 +16,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from orbslam2py._arrays import ByteArray
-from orbslam2py.pictures.palette import TEXT, Colour
+from orbslam2py._palette import TEXT, Colour
 
 #: Where a text lies beside the place it is drawn at.
 Anchor = Literal["left", "centre", "right"]

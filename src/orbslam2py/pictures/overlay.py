@@ -13,8 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py._arrays import ByteArray
-from orbslam2py.pictures.lettering import draw_text, text_width
-from orbslam2py.pictures.palette import (
+from orbslam2py._palette import (
     FAINT_TEXT,
     HALO,
     LOST,
@@ -27,6 +26,7 @@ from orbslam2py.pictures.palette import (
     VISUAL_ODOMETRY,
     Colour,
 )
+from orbslam2py.pictures.lettering import draw_text, text_width
 from orbslam2py.slam.records import TrackingState
 
 Pixels = npt.NDArray[np.floating]

@@ -10,9 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py._arrays import ByteArray, FloatArray
-from orbslam2py.pictures.lettering import draw_text, text_width
-from orbslam2py.pictures.overlay import state_colour
-from orbslam2py.pictures.palette import (
+from orbslam2py._palette import (
     FAINT_TEXT,
     FRAME,
     KEYFRAME,
@@ -23,6 +21,8 @@ from orbslam2py.pictures.palette import (
     TEXT,
     Colour,
 )
+from orbslam2py.pictures.lettering import draw_text, text_width
+from orbslam2py.pictures.overlay import state_colour
 from orbslam2py.slam.records import TrackingRecord, TrackingState
 
 _SHIFT = 4

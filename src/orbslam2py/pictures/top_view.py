@@ -13,9 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py._arrays import ByteArray, FloatArray
-from orbslam2py.pictures.framing import Framing
-from orbslam2py.pictures.lettering import draw_text, text_width
-from orbslam2py.pictures.palette import (
+from orbslam2py._palette import (
     CAMERA,
     COVISIBILITY,
     FAINT_TEXT,
@@ -31,6 +29,8 @@ from orbslam2py.pictures.palette import (
     TRUTH,
     Colour,
 )
+from orbslam2py.pictures.framing import Framing
+from orbslam2py.pictures.lettering import draw_text, text_width
 
 _SHIFT = 4
 #: The box of what is to be seen is found with at most so many points.
@@ -162,7 +162,8 @@ def draw_ground(scene: MapPicture, framing: Framing, *, text: int = 14) -> ByteA
     # Thousands of thin lines: smooth ones take five times as long.
     edges = _edge_pixels(scene.covisibility, framing)
     _lines(picture, edges, COVISIBILITY, thin, smooth=len(edges) < _MANY_EDGES)
-    _draw_path(picture, scene.truth, None, framing, TRUTH, 3 * thin)
+    # Wider than the path above it, which hides it where the estimate is right.
+    _draw_path(picture, scene.truth, None, framing, TRUTH, 6 * thin)
     _draw_keyframes(picture, scene.keyframes, framing, size)
     return picture
 

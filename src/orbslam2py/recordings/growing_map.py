@@ -12,7 +12,6 @@ from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.maps import MapChanges
 from orbslam2py.pictures.top_view import MapPicture
 from orbslam2py.slam.records import TrackingRecord
-from orbslam2py.trajectory import Trajectory
 
 _NO_EDGES = np.zeros((0, 2), np.int64)
 
@@ -96,12 +95,10 @@ class GrowingMap:
             path_gaps=gaps,
         )
 
-    def trajectory(self) -> Trajectory:
-        """The path so far, as the map is now; without rotations."""
+    def path(self) -> tuple[FloatArray, FloatArray]:
+        """The path so far, as the map is now: time stamps (n,) in seconds, positions (n, 3)."""
         positions, _ = self._path.positions(self.map_index, self._poses)
-        T_wc = np.tile(np.eye(4), (len(positions), 1, 1))
-        T_wc[:, :3, 3] = positions
-        return Trajectory(timestamps=self._path.times(self.map_index), T_wc=T_wc)
+        return self._path.times(self.map_index), positions
 
     def points_between(self, first: int, end: int) -> npt.NDArray[np.floating]:
         """Positions (p, 3) of the points with ids from `first` to before `end`."""

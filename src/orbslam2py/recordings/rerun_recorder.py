@@ -12,9 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py._arrays import ByteArray, FloatArray
-from orbslam2py.errors import OrbSlamError
-from orbslam2py.maps import MapChanges
-from orbslam2py.pictures.palette import (
+from orbslam2py._palette import (
     COVISIBILITY,
     KEYFRAME,
     LOOP,
@@ -27,6 +25,8 @@ from orbslam2py.pictures.palette import (
     VISUAL_ODOMETRY,
     Colour,
 )
+from orbslam2py.errors import OrbSlamError
+from orbslam2py.maps import MapChanges
 from orbslam2py.recordings.growing_map import GrowingMap
 from orbslam2py.recordings.output_file import OutputFile
 from orbslam2py.settings import Settings
@@ -246,7 +246,7 @@ class RerunRecorder:
         self._lines("world/map/covisibility", list(scene.covisibility), COVISIBILITY, 0.5)
         self._lines("world/map/loop_edges", list(scene.loop_edges), LOOP, 2.0)
         if self._truth is not None:
-            laid = lay_truth(self._map.trajectory(), self._truth, with_scale=self._with_scale)
+            laid = lay_truth(*self._map.path(), self._truth, with_scale=self._with_scale)
             if laid is not None:
                 self._lines("world/map/ground_truth", [laid.positions], TRUTH, 1.5)
 

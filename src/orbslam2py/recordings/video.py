@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import threading
+from collections import deque
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -22,10 +23,14 @@ from orbslam2py.recordings.growing_map import GrowingMap
 from orbslam2py.recordings.video_file import VideoFile
 from orbslam2py.slam.events import Event, LoopClosed
 from orbslam2py.slam.records import TrackingState
+from orbslam2py.trajectory import Trajectory
+from orbslam2py.viewer.paths import TruthBeside
 from orbslam2py.viewer.watching import FrameView
 
 #: A pause of a stream of images is shown by at most so many pictures.
 _LONGEST_PAUSE = 300
+#: Images over which the rate of a recording is measured.
+_RATE_IMAGES = 30
 #: Keyframes, edges and tens of points that are drawn anew for each image.
 _DRAWN_AT_ONCE = 4000
 
@@ -51,7 +56,9 @@ class VideoWriter:
         Images may be missing, as in real time: a picture stays until the next one. Otherwise there
         is one picture for each image.
     unit : str
-        Unit of length: "m", or "units" with a single camera.
+        Unit of length: "m", or "units" with a single camera, whose map has its own.
+    ground_truth : Trajectory, optional
+        Laid beside the path in the map, as far as it has come.
     size : (int, int)
         Width and height of the video [px], both even and at least 320 and 240.
 
@@ -71,6 +78,7 @@ class VideoWriter:
         duration: float | None = None,
         in_time: bool = False,
         unit: str = "m",
+        ground_truth: Trajectory | None = None,
         size: tuple[int, int] = (1280, 720),
     ) -> None:
         if size[0] < 320 or size[1] < 240 or size[0] % 2 or size[1] % 2:
@@ -82,6 +90,10 @@ class VideoWriter:
         self._file = VideoFile(path, size, self._frames_per_second)
         self._in_time = in_time
         self._unit = unit
+        self._truth = (
+            None if ground_truth is None else TruthBeside(ground_truth, with_scale=unit != "m")
+        )
+        self._times: deque[float] = deque(maxlen=_RATE_IMAGES)
         self._size = size
         self._map = GrowingMap()
         self._history = GrowingHistory(duration)
@@ -95,6 +107,7 @@ class VideoWriter:
         self._local_points: IntArray | None = None
         self._last_pose: tuple[int, FloatArray] | None = None
         self._begin: float | None = None
+        self._now: float | None = None
         self._unused: list[_Unused] = []
         self._n_seen = 0
         self._lock = threading.Lock()
@@ -163,6 +176,7 @@ class VideoWriter:
     # ---- pictures --------------------------------------------------------------------------------
     def _take(self, view: FrameView, composition: Composition) -> None:
         record = view.record
+        self._now = record.timestamp
         n_wandering = int(np.count_nonzero(view.visual_odometry))
         n_matched = int(np.count_nonzero(view.matched))
         self._history.add(record, wanders=n_wandering > n_matched)
@@ -178,10 +192,18 @@ class VideoWriter:
             n_points=self._map.n_points,
             n_matches=n_matched,
             n_visual_odometry=n_wandering,
-            frames_per_second=view.queue.frames_per_second or None,
+            frames_per_second=self._rate(view),
             n_dropped=view.queue.n_dropped if self._in_time else None,
         )
         self._shown = draw_overlay(view.image, _marks(view), size=composition.image.size)
+
+    def _rate(self, view: FrameView) -> float | None:
+        """Images a second: those tracked, or those of the recording, which waits for its video."""
+        if self._in_time:
+            return view.queue.frames_per_second or None
+        self._times.append(view.record.timestamp)
+        seconds = self._times[-1] - self._times[0]
+        return (len(self._times) - 1) / seconds if seconds > 0 else None
 
     def _show_unused(self) -> None:
         """Show the images that could not be used, as far as their turn has come."""
@@ -215,6 +237,9 @@ class VideoWriter:
         # A large map takes long to draw, and one image more changes little of it.
         due = self._ground is None or self._age > self._ground_cost // _DRAWN_AT_ONCE
         scene = self._map.picture(self._local_points, renew=due)
+        if self._truth is not None and self._now is not None:
+            truth = self._truth.until(self._now, self._map.map_index, self._map.path)
+            scene = replace(scene, truth=truth)
         low, high = bounds(scene)
         framing = frame_all(low, high, composition.map.size)
         if self._framing is not None:

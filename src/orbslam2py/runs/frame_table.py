@@ -13,7 +13,7 @@ import numpy as np
 
 from orbslam2py._files import atomic_write
 from orbslam2py.runs.result import FrameRow
-from orbslam2py.slam.records import TrackingRecord
+from orbslam2py.slam.records import Evidence, TrackingRecord
 from orbslam2py.trajectory.rotations import quaternions_from_rotations
 
 STAGES = ("wait", "extract", "stereo", "predict", "local_map", "keyframe", "track")
@@ -21,7 +21,8 @@ STAGES = ("wait", "extract", "stereo", "predict", "local_map", "keyframe", "trac
 _ALWAYS = ["index", "timestamp", "map", "state", "reason"]
 _TRACKED = [
     *("inliers", "matches", "keyframe", "reference_keyframe"),
-    *("tx", "ty", "tz", "qx", "qy", "qz", "qw", "std_position", "std_angle", "visual_odometry"),
+    *("tx", "ty", "tz", "qx", "qy", "qz", "qw", "std_position", "std_angle"),
+    *("visual_odometry", "evidence", "method", "found", "unconfirmed"),
     *(f"ms_{stage}" for stage in STAGES),
 ]
 
@@ -86,5 +87,13 @@ def _fields(row: FrameRow) -> list[object]:
         *pose,
         *([""] * 2 if deviation is None else [f"{value:.9f}" for value in deviation]),
         int(record.visual_odometry) if record.T_wc is not None else "",
+        *_evidence_fields(record.evidence),
+        int(record.unconfirmed) if record.T_wc is not None else "",
         *(f"{record.milliseconds.get(stage, 0.0):.3f}" for stage in STAGES),
     ]
+
+
+def _evidence_fields(evidence: Evidence | None) -> list[object]:
+    if evidence is None:
+        return [""] * 3
+    return [str(evidence.verdict), str(evidence.method), f"{evidence.found:.3f}"]

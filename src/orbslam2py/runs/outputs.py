@@ -20,7 +20,11 @@ from orbslam2py.runs.frame_errors import truth_of_frames, worst_frames
 from orbslam2py.runs.frame_table import write_frames
 from orbslam2py.runs.report import RunEvaluation
 from orbslam2py.runs.report_page import write_report_page
-from orbslam2py.runs.report_page.frame_images import choose_frames, has_images, write_frame_images
+from orbslam2py.runs.report_page.frame_images import (
+    choose_frames,
+    has_any_images,
+    write_frame_images,
+)
 from orbslam2py.runs.result import RunResult
 from orbslam2py.runs.run_picture import anchored_points, draw_run
 from orbslam2py.settings.sensor import Sensor
@@ -154,7 +158,7 @@ class OutputWriter:
     def _write_page(self, result: RunResult, evaluation: RunEvaluation | None) -> None:
         worst = None if evaluation is None else worst_frames(result, evaluation)
         frames = choose_frames(result, worst)
-        if frames and has_images(result.sequence):
+        if frames and has_any_images(result):
             self._write("frame_images.zip", lambda path: write_frame_images(path, result, frames))
         # It is made from the other files, wherever they could be written.
         folders = [self.folder, *([] if self._rescue is None else [self._rescue])]

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from orbslam2py import _palette as palette
 from orbslam2py._files import atomic_write
+from orbslam2py._palette import hexadecimal
 from orbslam2py.runs.gravity import Height
 from orbslam2py.runs.report_page.plane_view import FROM_ABOVE, View, choose_view
 from orbslam2py.runs.report_page.round_numbers import round_down, short
@@ -21,14 +23,15 @@ if TYPE_CHECKING:
 
 FloatArray = npt.NDArray[np.float64]
 
-_ESTIMATE = "#1f5fa8"
-_TRUTH = "#8fce7e"
-_UNTRACKED = "#f6cfc6"
-_EARLIER = "#e2e2e2"
-_POINTS = "#c9b99a"
-_LOOP = "#c8442c"
-#: From no error to the largest: a part of matplotlib's plasma, seen well on white.
-_ERRORS = ["#2a0593", "#7d03a8", "#c33d80", "#ee7f4e", "#f99a3e"]
+_ESTIMATE = hexadecimal(palette.PAPER_PATH)
+_TRUTH = hexadecimal(palette.PAPER_TRUTH)
+_UNTRACKED = hexadecimal(palette.PAPER_UNTRACKED)
+_EARLIER = hexadecimal(palette.PAPER_EARLIER)
+_POINTS = hexadecimal(palette.PAPER_POINTS)
+_LOOP = hexadecimal(palette.PAPER_LOOP)
+_TEXT = hexadecimal(palette.PAPER_TEXT)
+_GRID = hexadecimal(palette.PAPER_GRID)
+_ERRORS = [hexadecimal(colour) for colour in palette.PAPER_ERRORS]
 #: Width by height of the view from above.
 _SHAPE = 1.85
 
@@ -112,7 +115,7 @@ def draw_trajectory(
     below.set_xlabel("time since the first image [s]")
     below.set_ylabel(f"{height.label} [{unit}]")
     for axes in (above, below):
-        axes.grid(color="#eeeeee", linewidth=0.8)
+        axes.grid(color=_GRID, linewidth=0.8)
         axes.set_axisbelow(True)
         for side in ("top", "right"):
             axes.spines[side].set_visible(False)
@@ -238,12 +241,14 @@ def _say_where_up_is(axes: Axes, view: View, unit: str) -> None:
     axes.set_ylabel(f"{view.up_name} [{unit}]")
     whence = "From above" if view is FROM_ABOVE else "From behind"
     text = f"{whence}: up in the picture is {view.up_name}, as the first keyframe looked"
-    axes.set_title(text, fontsize=9, loc="left", color="#555555")
+    axes.set_title(text, fontsize=9, loc="left", color=hexadecimal(palette.PAPER_FAINT_TEXT))
     left, right = axes.get_xlim()
     bottom, top = axes.get_ylim()
     length = round_down(0.2 * (right - left))
     x, y = left + 0.03 * (right - left), bottom + 0.05 * (top - bottom)
-    axes.plot([x, x + length], [y, y], color="#222222", linewidth=2.0, zorder=6)
+    axes.plot(
+        [x, x + length], [y, y], color=hexadecimal(palette.PAPER_TEXT), linewidth=2.0, zorder=6
+    )
     axes.annotate(f"{short(length, 1)} {unit}", (x + length / 2, y), xytext=(0, 3),
                   textcoords="offset points", ha="center", fontsize=9)  # fmt: skip
 

@@ -32,7 +32,11 @@ _WHAT_HELPS = {
     Reason.FEW_INLIERS_REFERENCE: "a mask for what moves (--mask); the right calibration",
     Reason.FEW_INLIERS_LOCAL_MAP: "more features (ORBextractor.nFeatures), texture and light, a "
     "wider lens; more time at one place before moving on",
+    Reason.WEAK_EVIDENCE: "slower turns, higher frame rate, less blur; more features "
+    "(ORBextractor.nFeatures), a wider lens",
     Reason.NOT_FOUND_IN_MAP: "come back to a place seen before, from a similar direction",
+    Reason.BLURRED: "slower motion, more light, a shorter exposure",
+    Reason.NOT_CONFIRMED: "stay at a place seen before for a moment, from a similar direction",
     Reason.SEARCHING_LOADED_MAP: "begin at a place that is in the map, from a similar direction, "
     "or say where the camera is (--initial-pose); without --load a new map is made",
 }

@@ -24,7 +24,7 @@ from orbslam2py.runs.result import RunResult
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.events import LoopClosed
 from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
-from orbslam2py.slam.records import TrackingState
+from orbslam2py.slam.records import TrackingState, Verdict
 from orbslam2py.trajectory.trajectory import Trajectory
 
 _log = logging.getLogger(__name__)
@@ -118,6 +118,7 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "loops_closed": len(result.loops),
         "relocalisations": result.n_relocalizations,
         "resets": result.n_resets,
+        "weak_frames": weak_frames(result),
         **losses,
         "initialisation_reasons": initialization_reasons(result),
         "depth": depth_entry(result),
@@ -158,6 +159,17 @@ def depth_entry(result: RunResult) -> dict[str, Any] | None:
     if result.median_depth is None:
         return None
     return {"median_m": result.median_depth, "factor": result.settings.depth_factor}
+
+
+def weak_frames(result: RunResult) -> int:
+    """How many frames have a pose with weak evidence."""
+    records = [row.record for row in result.rows if row.record is not None]
+    return sum(
+        record.T_cw is not None
+        and record.evidence is not None
+        and record.evidence.verdict is Verdict.WEAK
+        for record in records
+    )
 
 
 def options_entry(options: RunOptions) -> dict[str, Any]:

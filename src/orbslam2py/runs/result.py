@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from orbslam2py.slam.events import LoopClosed
 from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
 from orbslam2py.slam.records import TrackingRecord, TrackingState
 from orbslam2py.trajectory.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from orbslam2py.runs.report_page.kept_images import KeptImages
 
 
 @dataclass(frozen=True)
@@ -78,6 +82,8 @@ class RunResult:
     """(o, 2) ids of a point of the last map and of a keyframe that observes it."""
     drawing: MapArrays | None = None
     """What is drawn of the last map."""
+    kept_images: KeptImages | None = None
+    """Of some frames of a camera, which cannot be read again; None for a recording."""
     stages: dict[str, dict[str, float]] = field(default_factory=dict)
     seconds: float = 0.0
     slam_seconds: float = 0.0

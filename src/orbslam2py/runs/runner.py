@@ -24,6 +24,7 @@ from orbslam2py.runs.calibration_watch import CalibrationWatch, settings_beside
 from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.feeds import FedFrame, LiveFeed, RecordedFeed, is_sequence
 from orbslam2py.runs.options import RunOptions
+from orbslam2py.runs.report_page.kept_images import KeptImages
 from orbslam2py.runs.result import DROPPED, FrameRow, RunResult
 from orbslam2py.settings.depth_check import doubt_of_tum_factor
 from orbslam2py.settings.sensor import Sensor
@@ -87,6 +88,7 @@ class SequenceRunner:
             options=options,
             n_frames=self._feed.n_frames,
             is_live=self._feed.is_live,
+            kept_images=KeptImages(settings) if self._feed.is_live else None,
         )
 
     def run(
@@ -225,6 +227,8 @@ class SequenceRunner:
             self.result.slam_seconds += time.perf_counter() - begin
         if self._watch is not None:
             self._watch.look(frame.item)
+        if self.result.kept_images is not None:
+            self.result.kept_images.look(len(self.result.rows), frame.item.image, record)
         return _row(frame, record, str(record.reason))
 
     def _call(self, system: System, images: Images, timestamp: float) -> TrackingRecord:

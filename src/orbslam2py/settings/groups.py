@@ -127,6 +127,9 @@ class OrbSettings:
         Ratio between neighbouring pyramid levels and their number.
     ini_th_fast, min_th_fast
         FAST thresholds in grey levels: the second serves cells where the first finds nothing.
+    original_coordinates
+        Whether keypoints of coarse levels lie where the original puts them, up to 1.3 pixels from
+        their true place: for comparisons with it.
     """
 
     n_features: int = 1000
@@ -134,6 +137,7 @@ class OrbSettings:
     n_levels: int = 8
     ini_th_fast: int = 20
     min_th_fast: int = 7
+    original_coordinates: bool = False
 
     def __post_init__(self) -> None:
         problems = check_group("orb", self)

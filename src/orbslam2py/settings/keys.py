@@ -88,6 +88,10 @@ _COEFFICIENT = _between(-1e4, 1e4)
 _SIZE = _between(1, 65535, "pixels")
 _WIDTH = _above_zero(1e6)
 _PLACE = _between(-1e6, 1e6)
+_ORIGINAL = Rule("0 (true places) or 1 (as the original)", lambda value: value in (0, 1))
+
+#: Where keypoints of coarse levels lie. Files from before it was known are of the original's way.
+ORIGINAL_COORDINATES = "ORBextractor.originalCoordinates"
 
 KEYS: tuple[Key, ...] = (
     _key("Camera.fx", "camera", "fx", float, _FOCAL, "0.5 to 1.5 times the image's width"),
@@ -153,6 +157,7 @@ KEYS: tuple[Key, ...] = (
     _key("ORBextractor.nLevels", "orb", "n_levels", int, _between(1, 16), "8"),
     _key("ORBextractor.iniThFAST", "orb", "ini_th_fast", int, _between(1, 254), "20"),
     _key("ORBextractor.minThFAST", "orb", "min_th_fast", int, _between(1, 254), "7"),
+    Key(ORIGINAL_COORDINATES, "orb", "original_coordinates", bool, _ORIGINAL),
     Key("Viewer.KeyFrameSize", "viewer", "keyframe_size", float, _WIDTH),
     Key("Viewer.KeyFrameLineWidth", "viewer", "keyframe_line_width", float, _WIDTH),
     Key("Viewer.GraphLineWidth", "viewer", "graph_line_width", float, _WIDTH),

@@ -208,7 +208,8 @@ class Settings:
             if camera.is_distorted
             else "no distortion",
             f"ORB: {orb.n_features} features, {orb.n_levels} levels, factor {orb.scale_factor:g}, "
-            f"FAST thresholds {orb.ini_th_fast} and {orb.min_th_fast}",
+            f"FAST thresholds {orb.ini_th_fast} and {orb.min_th_fast}"
+            + (", coordinates of the original" if orb.original_coordinates else ""),
         ]
         if self.depth is not None:
             lines.append(

@@ -30,21 +30,46 @@ class FrameRecorder:
         self._recorder = core.TrajectoryRecorder()
         self._ended: list[Trajectory] = []
         self._lock = threading.Lock()
+        self._doubted: core.TrackedFrame | None = None
+        self._waiting: core.TrackedFrame | None = None
+
+    def doubt(self, frame: core.TrackedFrame) -> None:
+        """Take back the pose of this frame, recorded next, if the one after it is lost."""
+        self._doubted = frame
 
     def record(self, frame: core.TrackedFrame, *, lost: bool) -> None:
         """Keep a frame; a lost one is noted without a pose of its own."""
         with self._lock:
-            self._recorder.record(self._map, frame, lost=lost)
+            self._settle(believed=not lost)
+            if frame is self._doubted:
+                # A copy: the frame itself goes on following the map while others may read.
+                self._waiting = core.TrackedFrame(frame.features)
+                self._waiting.T_cw = frame.T_cw
+                self._waiting.share_anchor(frame)
+            else:
+                self._recorder.record(self._map, frame, lost=lost)
+            self._doubted = None
+
+    def _settle(self, *, believed: bool = True) -> None:
+        """Record the frame that waits for the next one; who asks before that gets its pose."""
+        frame, self._waiting = self._waiting, None
+        if frame is None:
+            return
+        if not believed:
+            frame.T_cw = None
+        self._recorder.record(self._map, frame, lost=not believed)
 
     def end_map(self) -> None:
         """Keep the trajectory of the map as it is now: it is about to be dropped."""
         with self._lock:
+            self._settle()
             self._ended.append(self._present())
             self._recorder.clear()
 
     def trajectories(self) -> list[Trajectory]:
         """One trajectory a map, relative to its keyframe 0: those ended, then the present one."""
         with self._lock:
+            self._settle()
             return [*self._ended, self._present()]
 
     def recorded(self, map_index: int, known: npt.NDArray[np.int64]) -> RecordedFrames:
@@ -59,6 +84,7 @@ class FrameRecorder:
             another one are left for the next time.
         """
         with self._lock:
+            self._settle()
             if self._map.epoch != map_index or not len(self._recorder):
                 return RecordedFrames.none()
             entries = self._recorder.entries()

@@ -87,7 +87,7 @@ class FrontEnd:
             frame = core.build_monocular_frame(
                 context, frame_id, timestamp, extractor.extract(grey, mask)
             )
-            return self._coloured(frame, image)
+            return self._finished(frame, image, grey)
 
     def _extractor_for(self, factor: int) -> core.OrbExtractor:
         if factor not in self._extractors:
@@ -126,7 +126,7 @@ class FrontEnd:
             frame = core.build_stereo_frame(
                 context, frame_id, timestamp, features_left, features_right
             )
-            return self._coloured(frame, left)
+            return self._finished(frame, left, left_grey)
 
     def rgbd(
         self,
@@ -159,9 +159,12 @@ class FrontEnd:
         with timer("stereo"):
             metres = core.to_depth_metres(depth, self._settings.depth_factor)
             frame = core.build_rgbd_frame(context, frame_id, timestamp, extraction, metres)
-            return self._coloured(frame, image)
+            return self._finished(frame, image, grey)
 
-    def _coloured(self, frame: core.Frame, image: npt.NDArray[np.uint8]) -> core.Frame:
+    def _finished(
+        self, frame: core.Frame, image: npt.NDArray[np.uint8], grey: npt.NDArray[np.uint8]
+    ) -> core.Frame:
+        core.keep_small_image(frame, grey)
         if image.ndim == 3:
             core.sample_colours(frame, image, self._settings.camera.rgb)
         return frame
@@ -227,6 +230,7 @@ def _orb_options(settings: Settings, factor: int = 1) -> core.OrbOptions:
         n_levels=settings.orb.n_levels,
         initial_threshold=settings.orb.ini_th_fast,
         minimum_threshold=settings.orb.min_th_fast,
+        original_coordinates=settings.orb.original_coordinates,
     )
 
 

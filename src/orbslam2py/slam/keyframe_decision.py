@@ -21,6 +21,8 @@ class KeyframeClock:
 
     last_keyframe: int
     last_relocalization: int
+    in_loaded_map: bool = False
+    """The map was loaded: it may end where the camera was found, and is extended soon."""
 
 
 class KeyframeDecision:
@@ -59,6 +61,7 @@ class KeyframeDecision:
         frame: core.TrackedFrame,
         reference_keyframe: int,
         n_inliers: int,
+        velocity: core.Pose | None,
         last: KeyframeClock,
     ) -> bool:
         """Whether a tracked frame is to become a keyframe now.
@@ -71,6 +74,8 @@ class KeyframeDecision:
             Shares most points with it.
         n_inliers : int
             Of its pose.
+        velocity : Pose or None
+            Motion from the frame before, if known.
         last : KeyframeClock
             When the last keyframe was made, and the last relocalization.
         """
@@ -79,11 +84,14 @@ class KeyframeDecision:
         limits = self.limits
         interval = self._max_keyframe_interval
         n_keyframes = self._map.n_keyframes
-        if frame.id < last.last_relocalization + interval and n_keyframes > interval:
+        wait = min(interval, limits.wait_in_loaded_map) if last.in_loaded_map else interval
+        if frame.id < last.last_relocalization + wait and n_keyframes > wait:
             return False
 
         n_reference = self._points_of(reference_keyframe, n_keyframes)
-        needs_close_points = self._has_depth and self._lacks_close_points(frame)
+        needs_close_points = self._has_depth and (
+            self._lacks_close_points(frame) or self._turns_away(frame, n_inliers, velocity)
+        )
         idle = self._mapping.idle
         one_second_passed = frame.id >= last.last_keyframe + interval
         tracking_is_weak = self._has_depth and (
@@ -114,3 +122,18 @@ class KeyframeDecision:
         tracked, untracked = frame.n_close_tracked_untracked()
         limits = self.limits
         return tracked < limits.few_close_points and untracked > limits.many_untracked_close_points
+
+    def _turns_away(
+        self, frame: core.TrackedFrame, n_inliers: int, velocity: core.Pose | None
+    ) -> bool:
+        """Whether what is tracked is about to leave the view, and there are points to follow it."""
+        T_nw = frame.T_cw
+        if velocity is None or T_nw is None:
+            return False
+        for _ in range(self.limits.turn_frames):
+            T_nw = velocity @ T_nw
+        staying = core.count_staying(frame, T_nw)
+        if staying >= self.limits.staying_share * n_inliers:
+            return False
+        _, untracked = frame.n_close_tracked_untracked()
+        return untracked > self.limits.many_untracked_close_points

@@ -22,6 +22,9 @@ from orbslam2py.maps.map_keeper import MapKeeper, encode_image
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.back_end import RESET_PATIENCE, BackEnd
 from orbslam2py.slam.events import Callbacks, Relocalized, TrackingLost
+from orbslam2py.slam.evidence.belief import Belief
+from orbslam2py.slam.evidence.harder_search import HarderSearch
+from orbslam2py.slam.evidence.judgement import EvidenceJudge
 from orbslam2py.slam.frame_recorder import FrameRecorder
 from orbslam2py.slam.front_end import FrontEnd
 from orbslam2py.slam.initialization import DepthInitializer, Initializer, MonocularInitializer
@@ -147,6 +150,8 @@ class Pipeline:
             )
         self.statistics.add(timer.milliseconds)
 
+        if outcome.estimate.unconfirmed:
+            self.recorder.doubt(frame)
         self._keep(frame, outcome)
         record = self._record(frame, outcome, timer, details=details)
         self._announce(state_before, record)
@@ -221,8 +226,10 @@ class Pipeline:
             is_keyframe=outcome.is_keyframe,
             reference_keyframe=self.tracking.reference_keyframe,
             visual_odometry=ok and estimate.visual_odometry,
+            unconfirmed=ok and estimate.unconfirmed,
             milliseconds=timer.milliseconds,
             features=frame_features(frame, outcome.inliers) if details else None,
+            evidence=estimate.evidence,
         )
 
     def _announce(self, before: TrackingState, record: TrackingRecord) -> None:
@@ -290,12 +297,15 @@ def _make_tracking(setup: Setup, back_end: BackEnd, seed: int) -> Tracking:
     else:
         n_features = setup.settings.orb.n_features
         initializer = DepthInitializer(slam_map, vocabulary, mapping, n_features)
+    searching = search(Relocalizer(slam_map, back_end.keyframe_index, seed))
+    judge = EvidenceJudge(searching.motion_model_window, setup.settings.camera.fx)
     return Tracking(
         slam_map,
         vocabulary,
         mapping,
         initializer=initializer,
-        search=search(Relocalizer(slam_map, back_end.keyframe_index, seed)),
+        search=searching,
+        belief=Belief(searching, judge, HarderSearch(searching, judge)),
         keyframe_decision=KeyframeDecision(slam_map, mapping.worker, sensor, max_keyframe_interval),
         has_depth=sensor.has_depth,
     )

@@ -8,11 +8,30 @@ Mur-Artal, Montiel and Tardos, 2015, sections V-B to V-D; ``docs/method/tracking
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
+import numpy as np
+
 from orbslam2py import _core as core
+from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.records import PoseEstimate, Reason
-from orbslam2py.slam.relocalization import Relocalizer
+from orbslam2py.slam.records import PoseEstimate, PoseMethod, Reason
+from orbslam2py.slam.relocalization import PlaceOfLoss, Relocalizer
 from orbslam2py.slam.thresholds import TrackingThresholds
+
+
+@dataclass(frozen=True)
+class RefinedPose:
+    """A pose with all that was found of the map around it."""
+
+    frame: core.TrackedFrame
+    """Holds pose and associations."""
+    estimate: PoseEstimate
+    local_map: core.LocalMap
+    visible: IntArray
+    """Ids of the points in view that the first estimate did not hold."""
+    n_predicted: int
+    """Points that should be in view."""
 
 
 class MotionModel:
@@ -57,6 +76,24 @@ class MotionModel:
         T_lw = self.last.T_cw
         assert T_lw is not None
         frame.T_cw = T_lw if self.velocity is None else self.velocity @ T_lw
+        frame.share_anchor(self.last)
+
+    def predict_turned(self, frame: core.TrackedFrame, quaternion_xyzw: FloatArray) -> None:
+        """Give a frame the pose on the way that the speed leads to, but turned as given.
+
+        Parameters
+        ----------
+        frame : orbslam2py._core.TrackedFrame
+            The frame.
+        quaternion_xyzw : array of float64, (4,)
+            Rotation of the last camera's directions into the frame's.
+        """
+        T_lw = self.last.T_cw
+        assert T_lw is not None
+        # Where the camera's centre goes, in the last camera's frame.
+        way = np.zeros(3) if self.velocity is None else self.velocity.center
+        turn = core.Pose(quaternion_xyzw, np.zeros(3))
+        frame.T_cw = core.Pose(quaternion_xyzw, -(turn @ way)) @ T_lw
         frame.share_anchor(self.last)
 
     def stand_still(self, frame: core.TrackedFrame) -> None:
@@ -149,6 +186,38 @@ class PoseSearch:
         self.local_map: core.LocalMap | None = None
         self.last_relocalization = 0
         self.initial_pose: core.Pose | None = None
+        self._place_of_loss: PlaceOfLoss | None = None
+        if self._relocalizer is not None:
+            self._relocalizer.reset()
+
+    def lose(self, *, confirmed: bool) -> None:
+        """Tracking was lost: it is searched from where the last frame was.
+
+        Parameters
+        ----------
+        confirmed : bool
+            False if the last frame had just been found again: then it is searched on from where
+            tracking was lost before.
+        """
+        if confirmed:
+            self._place_of_loss = PlaceOfLoss(
+                self.motion.last, self.motion.velocity, self.reference_keyframe
+            )
+            if self._relocalizer is not None:
+                self._relocalizer.lose(self._place_of_loss)
+        else:
+            self.motion = MotionModel()
+            self.reference_keyframe = -1
+            if self._place_of_loss is not None:
+                self.motion.remember(self._place_of_loss.last)
+                self.reference_keyframe = self._place_of_loss.reference_keyframe
+        self.motion.lose()
+
+    def confirm(self) -> None:
+        """A pose found again is believed: the place of the loss is history."""
+        self._place_of_loss = None
+        if self._relocalizer is not None:
+            self._relocalizer.reset()
 
     @property
     def has_last_frame(self) -> bool:
@@ -164,6 +233,13 @@ class PoseSearch:
         """Whether the camera was found again in this frame or right before it."""
         return frame.id < self.last_relocalization + self.limits.frames_after_relocalization
 
+    @property
+    def motion_model_window(self) -> float:
+        """Half width of the motion model's search window, pixels at level 0."""
+        stereo = self._sensor is Sensor.STEREO
+        limits = self.limits
+        return limits.motion_model_window_stereo if stereo else limits.motion_model_window
+
     # ---- first estimate --------------------------------------------------------------------------
     def by_motion_model(
         self, frame: core.TrackedFrame, *, beyond_the_map: bool = False
@@ -177,12 +253,23 @@ class PoseSearch:
         beyond_the_map : bool
             Also from depths that the last frame measured and the map does not hold.
         """
-        limits, motion = self.limits, self.motion
+        motion = self.motion
         motion.predict(frame)
         if beyond_the_map:
             core.add_temporary_points(motion.last, motion.last_points)
-        stereo = self._sensor is Sensor.STEREO
-        narrow = limits.motion_model_window_stereo if stereo else limits.motion_model_window
+        return self.around_prediction(frame, self.motion_model_window)
+
+    def around_prediction(self, frame: core.TrackedFrame, narrow: float) -> PoseEstimate:
+        """From the points that the last frame saw, searched where the frame's pose puts them.
+
+        Parameters
+        ----------
+        frame : orbslam2py._core.TrackedFrame
+            The frame, with a predicted pose.
+        narrow : float
+            Half width of the search window, pixels at level 0; it is widened once.
+        """
+        limits, motion = self.limits, self.motion
         n_matches = 0
         for window in (narrow, limits.motion_model_widening * narrow):
             frame.clear_associations()
@@ -202,7 +289,27 @@ class PoseSearch:
         )
         if n_matches < self.limits.reference_matches:
             return PoseEstimate(Reason.FEW_MATCHES_REFERENCE, n_matches)
-        return self._optimize(frame, n_matches, Reason.FEW_INLIERS_REFERENCE)
+        estimate = self._optimize(frame, n_matches, Reason.FEW_INLIERS_REFERENCE)
+        return replace(estimate, method=PoseMethod.REFERENCE_KEYFRAME)
+
+    def by_keyframes_around(self, frame: core.TrackedFrame, n_neighbours: int) -> PoseEstimate:
+        """The same from that of the reference keyframe and its neighbours that matches best."""
+        self.motion.stand_still(frame)
+        core.describe(frame.features, self._vocabulary)
+        best, n_best = frame, -1
+        neighbours = self._map.best_neighbours(self.reference_keyframe, n_neighbours)
+        for keyframe in (self.reference_keyframe, *map(int, neighbours)):
+            version = core.TrackedFrame(frame.features)
+            self.motion.stand_still(version)
+            n_matches = core.match_keyframe_by_words(
+                self._map, keyframe, version, self.limits.reference_ratio
+            )
+            if n_matches > n_best:
+                best, n_best = version, n_matches
+        frame.take_over(best)
+        if n_best < self.limits.reference_matches:
+            return PoseEstimate(Reason.FEW_MATCHES_REFERENCE, n_best)
+        return self._optimize(frame, n_best, Reason.FEW_INLIERS_REFERENCE)
 
     def by_relocalization(self, frame: core.TrackedFrame) -> PoseEstimate:
         """From the user's guess, if any; else from any keyframe that looks like the frame."""
@@ -219,7 +326,12 @@ class PoseSearch:
             return PoseEstimate(not_found)
         # Keyframe 0 always lives: any anchor serves until the local map has been searched.
         core.anchor_frame(self._map, frame, max(0, self.reference_keyframe))
-        return PoseEstimate(n_matches=n_inliers, n_inliers=n_inliers, relocalized=True)
+        return PoseEstimate(
+            n_matches=n_inliers,
+            n_inliers=n_inliers,
+            relocalized=True,
+            method=PoseMethod.RELOCALIZATION,
+        )
 
     def _optimize(self, frame: core.TrackedFrame, n_matches: int, too_few: Reason) -> PoseEstimate:
         optimized = core.optimize_pose(frame)
@@ -233,19 +345,19 @@ class PoseSearch:
         return estimate if enough else estimate.failed(too_few)
 
     # ---- local map -------------------------------------------------------------------------------
-    def in_local_map(self, frame: core.TrackedFrame, first: PoseEstimate) -> PoseEstimate:
-        """Refine a first estimate with all points around it; the final verdict on the pose."""
-        self.local_map = local_map = core.select_local_map(self._map, frame)
-        if local_map.reference_keyframe >= 0:
-            self.reference_keyframe = local_map.reference_keyframe
+    def in_local_map(self, frame: core.TrackedFrame, first: PoseEstimate) -> RefinedPose:
+        """Refine a first estimate with all points around it, and see how many are found.
+
+        Nothing is remembered of it before `settle`: there may be several ways to a pose.
+        """
+        local_map = core.select_local_map(self._map, frame)
+        n_held = frame.n_associated()
         matches = core.match_local_map(
             frame, local_map.points, first.discarded, self._local_map_window(frame)
         )
         n_matches = frame.n_associated()
         optimized = core.optimize_pose(frame)
-        core.count_sightings(self._map, frame, matches.visible)
-        if self._sensor is Sensor.STEREO:
-            frame.discard_outliers()
+        visible = matches.visible
         estimate = PoseEstimate(
             n_matches=n_matches,
             n_inliers=optimized.n_inliers,
@@ -253,8 +365,18 @@ class PoseSearch:
             discarded=first.discarded,
             relocalized=first.relocalized,
         )
-        enough = estimate.n_inliers >= self._local_map_inliers(frame)
-        return estimate if enough else estimate.failed(Reason.FEW_INLIERS_LOCAL_MAP)
+        if estimate.n_inliers < self._local_map_inliers(frame):
+            estimate = estimate.failed(Reason.FEW_INLIERS_LOCAL_MAP)
+        return RefinedPose(frame, estimate, local_map, visible, n_held + len(visible))
+
+    def settle(self, refined: RefinedPose) -> None:
+        """Take a refined pose, found or not, as that of its frame."""
+        self.local_map = local_map = refined.local_map
+        if local_map.reference_keyframe >= 0:
+            self.reference_keyframe = local_map.reference_keyframe
+        core.count_sightings(self._map, refined.frame, refined.visible)
+        if self._sensor.has_depth:
+            refined.frame.discard_outliers()
 
     def _local_map_inliers(self, frame: core.TrackedFrame) -> int:
         if frame.id < self.last_relocalization + self._max_keyframe_interval:

@@ -36,14 +36,82 @@ class Reason(str, enum.Enum):
     NO_THIRD_VIEW = "no third view agrees with the two that were chosen"
     INITIAL_MAP_FAILED = "the first map was too small or had no depth"
     NOT_FOUND_IN_MAP = "not found in the map"
+    BLURRED = "blurred image, not searched"
+    NOT_CONFIRMED = "found again, but not confirmed by the next image"
     SEARCHING_LOADED_MAP = "searching the loaded map"
     FEW_MATCHES_LAST_FRAME = "too few matches with the last frame"
     FEW_MATCHES_REFERENCE = "too few matches with the reference keyframe"
     FEW_INLIERS_REFERENCE = "too few inliers from the reference keyframe"
     FEW_INLIERS_LOCAL_MAP = "too few inliers in the local map"
+    WEAK_EVIDENCE = "the pose found explains too little of what should be seen"
 
     def __str__(self) -> str:
         return self.value
+
+
+class Verdict(str, enum.Enum):
+    """Whether a pose is believed, by its evidence."""
+
+    STRONG = "strong"
+    """As much of what should be seen was found as in the frames before."""
+    WEAK = "weak"
+    """Believed, but much less was found: such a frame brings nothing into the map."""
+    REFUSED = "refused"
+    """Not believed: the frame is lost."""
+
+    def __str__(self) -> str:
+        return self.value
+
+
+class PoseMethod(str, enum.Enum):
+    """What found a pose."""
+
+    MOTION_MODEL = "motion model"
+    REFERENCE_KEYFRAME = "reference keyframe"
+    RELOCALIZATION = "relocalization"
+    ALIGNED_IMAGES = "aligned images"
+    KEYFRAMES_AROUND = "keyframes around"
+    WIDE_WINDOW = "wide window"
+
+    def __str__(self) -> str:
+        return self.value
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What speaks for a pose that was found in the map.
+
+    "Usual" is a running mean over the frames before whose evidence was strong; ratios to it are 1
+    where there were none.
+    """
+
+    verdict: Verdict
+    method: PoseMethod
+    """What found the pose."""
+    doubted: bool
+    """The evidence of the pose that was found first fell so suddenly that it was searched by other
+    ways as well."""
+    confirmed: bool
+    """Then a second method, which does not begin where this one did, came to the same pose."""
+    n_predicted: int
+    """Map points that should be in view."""
+    found: float
+    """Share of these that were found and accepted, 0 to 1."""
+    found_to_usual: float
+    """That share by the usual one."""
+    inliers_to_usual: float
+    """Inliers by their usual number."""
+    n_cells: int
+    """Cells of the image, of 8 x 6, that hold an inlier."""
+    n_octaves: int
+    """Octaves of depth (1 to 2, 2 to 4, 4 to 8... of the map's units) that hold an inlier."""
+    deviation_to_usual: float
+    """Standard deviation of the position by the usual one."""
+    turn_change: float
+    """Degrees by which the camera turned otherwise than from the frame before the last to the
+    last; 0 where the motion is not known."""
+    move_change: float
+    """The same for its way, metres (one camera: the map's units)."""
 
 
 @dataclass(frozen=True)
@@ -93,9 +161,14 @@ class TrackingRecord:
     """Keyframe that shares most points with the frame, -1 for none."""
     visual_odometry: bool = False
     """In localization mode: outside the map, the pose hangs on the depths of the frame before."""
+    unconfirmed: bool = False
+    """Found again in this image: the next one has to confirm it before the map grows."""
     milliseconds: dict[str, float] = field(default_factory=dict)
     """Time per stage: wait, extract, stereo, predict, local_map, keyframe, track (all of it)."""
     features: FrameFeatures | None = None
+    evidence: Evidence | None = None
+    """What speaks for the pose, or, if the reason is `Reason.WEAK_EVIDENCE`, spoke against it; None
+    where no pose was found in the map, and in the frame that begins one."""
 
     @property
     def T_wc(self) -> FloatArray | None:
@@ -135,6 +208,12 @@ class PoseEstimate:
     """The pose hangs on the depths of the frame before more than on the map."""
     relocalized: bool = False
     """Found without a guess from the frame before."""
+    method: PoseMethod = PoseMethod.MOTION_MODEL
+    """What found it."""
+    evidence: Evidence | None = None
+    """See `TrackingRecord.evidence`."""
+    unconfirmed: bool = False
+    """Found again, and not yet confirmed by the next frame."""
 
     @property
     def found(self) -> bool:

@@ -95,6 +95,50 @@ class TrackingThresholds:
 
 
 @dataclass(frozen=True)
+class EvidenceThresholds:
+    """How much must speak for a pose, and where else it is looked for."""
+
+    gain: float = 0.25
+    """Weight of the newest frame in what is usual."""
+    sudden_share: float = 0.6
+    """Below this share of the usual inliers, or of the usual share of points in view, a pose is
+    not believed before it was searched by other ways ..."""
+    sudden_deviation: float = 2.5
+    """... nor with a position so many times less certain than usual ..."""
+    surprise_windows: float = 1.0
+    """... nor if the camera turned otherwise than before by more than so many windows of the
+    motion model, in pixels of the image."""
+    weak_share: float = 0.5
+    """Below this share of both, evidence is weak."""
+    weak_cells: int = 4
+    """With inliers in so few of the 48 cells of the image or fewer it is weak ..."""
+    weak_deviation: float = 4.0
+    """... and with a position this much less certain than usual."""
+    refused_share: float = 0.3
+    """A pose with less than this share of the usual inliers ..."""
+    refused_inliers: int = 100
+    """... and fewer than this is not believed at all, unless a second method confirms it."""
+    better: float = 1.1
+    """Another way to the pose wins with so many times the inliers."""
+    enough_share: float = 0.75
+    """With this share of the usual inliers no further way is tried."""
+    aligned_correlation: float = 0.6
+    """Least correlation of two small images that tells how the camera turned."""
+    aligned_window: float = 15.0
+    """Half width of the search window around points turned so, pixels at level 0."""
+    wide_window: float = 40.0
+    """The same around points predicted by the motion model, when that is doubted."""
+    keyframes_around: int = 3
+    """So many neighbours of the reference keyframe are matched by words."""
+    same_windows: float = 0.5
+    """Two ways came to the same pose if they differ by fewer windows, in pixels of the image ..."""
+    same_deviations: float = 3.0
+    """... and in position by fewer standard deviations, both added."""
+    weak_frames: int = 2
+    """After so many weak frames in a row a confirmed one may become a keyframe."""
+
+
+@dataclass(frozen=True)
 class KeyframeThresholds:
     """Which frames become keyframes."""
 
@@ -116,10 +160,17 @@ class KeyframeThresholds:
     """With fewer close points tracked than this ..."""
     many_untracked_close_points: int = 70
     """... and more close points than this not in the map, a keyframe is needed."""
+    turn_frames: int = 3
+    """Where the camera will be after so many frames of the present speed ..."""
+    staying_share: float = 0.65
+    """... less than this share of the inliers would still be in view: a keyframe is needed before
+    the camera has turned away from them (stereo, RGB-D), if many close points are not tracked."""
     inliers: int = 15
     """A keyframe needs more inliers than this."""
     queue: int = 3
     """A busy mapper is given a keyframe only if fewer than this wait (stereo, RGB-D)."""
+    wait_in_loaded_map: int = 2
+    """Frames without a keyframe from a relocalization on, in a loaded map; else one second's."""
 
 
 @dataclass(frozen=True)
@@ -154,6 +205,42 @@ class RelocalizationThresholds:
     """... their points searched in this radius, pixels at level 0 ..."""
     guess_distance: int = 64
     """... with at most so many differing bits."""
+    guessed_frames: int = 60
+    """For so many frames after a loss the camera is looked for near the place of the loss ..."""
+    motion_frames: int = 10
+    """... and for so many where its motion would have led it; at first within `guess_window` ..."""
+    widening: float = 0.25
+    """... which grows by this share of itself at every failure ..."""
+    widest: float = 3.0
+    """... up to this multiple."""
+    word_frames: int = 3
+    """Lost frames, this one included, whose words name candidates."""
+    word_candidates: int = 8
+    """Candidates named by words that are matched with one frame ..."""
+    near_candidates: int = 4
+    """... and those near the place of the loss: half of each likeliest, the others in turns."""
+    covisible_keyframes: int = 10
+    """Near the loss: keyframes that see most of what its reference keyframe sees ..."""
+    last_keyframes: int = 5
+    """... and the last ones made."""
+    verified_poses: int = 20
+    """Poses of RANSAC that are optimised and widened for one frame."""
+    common_points: int = 15
+    """The frame after one found again confirms it with so many points that both see ..."""
+    confirming_cosine: float = 0.87
+    """... if the camera turned by no more than this in between: cosine of the angle, 30 degrees."""
+
+
+@dataclass(frozen=True)
+class BlurThresholds:
+    """When a frame counts as blurred."""
+
+    frames: int = 15
+    """Frames before it that it is compared with: half a second ..."""
+    fewest: int = 5
+    """... and how many there must be at least."""
+    share: float = 0.4
+    """Less than this share of their median sharpness is blur."""
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ section V; Mur-Artal and Tardos, "ORB-SLAM2", 2017, section III. Step by step:
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -16,12 +17,14 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._timing import StageTimer
+from orbslam2py.slam.evidence.belief import Belief
 from orbslam2py.slam.initialization import Initializer
 from orbslam2py.slam.keyframe_decision import KeyframeClock, KeyframeDecision
 from orbslam2py.slam.local_mapping import LocalMapping
 from orbslam2py.slam.localization_mode import FirstEstimateInFixedMap
 from orbslam2py.slam.pose_search import MotionModel, PoseSearch
 from orbslam2py.slam.records import PoseEstimate, Reason, TrackingOutcome, TrackingState
+from orbslam2py.slam.relocalization import BlurWatch, Confirmation
 from orbslam2py.slam.watched_frame import accepted_keypoints
 
 _log = logging.getLogger(__name__)
@@ -72,6 +75,10 @@ class FirstEstimateInGrowingMap:
             if estimate.found:
                 return estimate
         estimate = search.by_reference_keyframe(frame)
+        if not lost and not estimate.found and search.just_relocalized(frame):
+            # Found again where the map ends, the frame before shows most of what this one does.
+            standing = search.by_motion_model(frame)
+            return standing if standing.found else estimate
         if lost and not estimate.found:
             return estimate.failed(Reason.NOT_FOUND_IN_MAP)
         return estimate
@@ -95,6 +102,8 @@ class Tracking:
         How a map begins.
     search : PoseSearch
         The ways to a pose.
+    belief : Belief
+        Whether enough speaks for a pose.
     keyframe_decision : KeyframeDecision
         Which frames become keyframes.
     has_depth : bool
@@ -109,6 +118,7 @@ class Tracking:
         *,
         initializer: Initializer,
         search: PoseSearch,
+        belief: Belief,
         keyframe_decision: KeyframeDecision,
         has_depth: bool,
     ) -> None:
@@ -117,10 +127,13 @@ class Tracking:
         self._mapping = mapping
         self._initializer = initializer
         self._search = search
+        self._belief = belief
         self._keyframe_decision = keyframe_decision
         self._has_depth = has_depth
         self._in_growing_map = FirstEstimateInGrowingMap(search)
         self._in_fixed_map = FirstEstimateInFixedMap(search, has_depth=has_depth)
+        self._blur_watch = BlurWatch()
+        self._confirmation = Confirmation()
         #: How often tracking was found again, over all maps.
         self.n_relocalizations = 0
         self.reset()
@@ -129,6 +142,9 @@ class Tracking:
         """Forget a map that came to nothing, but not the frames that a new one may begin from."""
         frames = self._initializer.remembered()
         self.reset()
+        if frames:
+            # The count of the frames goes on, and the next map is young as well.
+            self._search.last_relocalization = frames[-1].id
         self._initializer.restart(frames)
 
     def reset(self) -> None:
@@ -137,9 +153,14 @@ class Tracking:
         self._last_keyframe_frame_id = 0
         # Whether the map was loaded, or localization mode has been on in it.
         self._map_is_kept = False
+        self._map_was_loaded = False
         self._search.reset()
+        self._belief.reset()
         self._in_fixed_map.reset()
         self._initializer.reset()
+        self._blur_watch.reset()
+        self._confirmation.reset()
+        self._blurred = False
 
     def begin_in_loaded_map(self, initial_pose: core.Pose | None) -> None:
         """Start lost in the map as it is: every image is searched in it, and it is kept.
@@ -150,7 +171,7 @@ class Tracking:
             ``T_cw`` where the camera may be; tried before all else.
         """
         self.state = TrackingState.LOST
-        self._map_is_kept = True
+        self._map_is_kept = self._map_was_loaded = True
         self._search.initial_pose = initial_pose
 
     @property
@@ -213,13 +234,13 @@ class Tracking:
             return self._begin_map(frame, timer)
         if self._map.n_keyframes <= self._search.limits.small_map:
             self._initializer.remember(frame)
+        self._blurred = self._blur_watch.is_blurred(frame.features)
         estimate = self._find_pose(frame, timer, localize)
+        if estimate.found:
+            estimate = self._confirm(frame, estimate)
         if not estimate.found:
             return self._lose(frame, estimate)
 
-        if self.state is TrackingState.LOST:
-            self.n_relocalizations += 1
-            self._search.initial_pose = None
         self.state = TrackingState.OK
         self._search.motion.update_velocity(frame)
         # Before temporary points go, and a keyframe's keypoints become points.
@@ -229,8 +250,14 @@ class Tracking:
             core.discard_temporary(frame)
         else:
             with timer("keyframe"):
-                is_keyframe = self._keyframe_wanted(frame, estimate)
+                is_keyframe = self._belief.allows_keyframe(
+                    estimate.evidence
+                ) and self._keyframe_wanted(frame, estimate)
                 if is_keyframe:
+                    if estimate.evidence is not None and estimate.evidence.doubted:
+                        # Bundle adjustment, which tries them again, would have few inliers to
+                        # tell them by.
+                        frame.discard_outliers()
                     self._create_keyframe(frame)
         # Outliers went into the keyframe, where bundle adjustment decides about them; the next
         # frame must not start from them.
@@ -253,20 +280,35 @@ class Tracking:
         self, frame: core.TrackedFrame, timer: StageTimer, localize: bool
     ) -> PoseEstimate:
         lost = self.state is TrackingState.LOST
+        if lost and self._blurred:
+            return PoseEstimate(Reason.BLURRED)
         strategy: FirstEstimate = self._in_growing_map
         if localize:
             self._map_is_kept = True
             strategy = self._in_fixed_map
         with timer("predict"):
             estimate = strategy.estimate(frame, lost=lost)
-        if not estimate.found:
+        if estimate.visual_odometry or (lost and not estimate.found):
             return estimate
         if lost or estimate.relocalized:
             self._search.last_relocalization = frame.id
-        if estimate.visual_odometry:
-            return estimate
         with timer("local_map"):
-            return self._search.in_local_map(frame, estimate)
+            return self._belief.refine(frame, estimate, lost=lost)
+
+    def _confirm(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> PoseEstimate:
+        """A pose found again waits for the next frame; that one confirms it, or both are wrong."""
+        confirmation = self._confirmation
+        if self.state is TrackingState.LOST:
+            self.n_relocalizations += 1
+            self._search.initial_pose = None
+            confirmation.found(frame)
+            return replace(estimate, unconfirmed=True)
+        if confirmation.waiting:
+            if not confirmation.follows(frame):
+                return estimate.failed(Reason.NOT_CONFIRMED)
+            confirmation.reset()
+            self._search.confirm()
+        return estimate
 
     def _begin_map(self, frame: core.TrackedFrame, timer: StageTimer) -> TrackingOutcome:
         self.state = TrackingState.NOT_INITIALIZED
@@ -286,11 +328,14 @@ class Tracking:
         return TrackingOutcome(self.state, estimate, is_keyframe=True, earlier=earlier)
 
     def _lose(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> TrackingOutcome:
-        if self.state is TrackingState.OK:
+        was_ok = self.state is TrackingState.OK
+        if was_ok:
             _log.info("tracking lost at frame %d: %s", frame.id, estimate.reason)
         self.state = TrackingState.LOST
         # The last pose stays where tracking was lost: the reference keyframe is tried from there.
-        self._search.motion.lose()
+        if was_ok:
+            self._search.lose(confirmed=not self._confirmation.waiting)
+        self._confirmation.reset()
         self._in_fixed_map.reset()
         frame.clear_associations()
         frame.T_cw = None
@@ -300,12 +345,15 @@ class Tracking:
 
     # ---- keyframes -------------------------------------------------------------------------------
     def _keyframe_wanted(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> bool:
+        if self._blurred or estimate.unconfirmed:
+            return False
         since = KeyframeClock(
             last_keyframe=self._last_keyframe_frame_id,
             last_relocalization=self._search.last_relocalization,
+            in_loaded_map=self._map_was_loaded,
         )
         return self._keyframe_decision.wanted(
-            frame, self.reference_keyframe, estimate.n_inliers, since
+            frame, self.reference_keyframe, estimate.n_inliers, self.motion.velocity, since
         )
 
     def _create_keyframe(self, frame: core.TrackedFrame) -> None:

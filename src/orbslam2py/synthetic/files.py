@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Synthetic sequences as folders in the layouts of TUM RGB-D, KITTI odometry and EuRoC."""
+"""Synthetic sequences as folders in the layouts of TUM RGB-D, KITTI odometry, EuRoC, or bags."""
 
 from __future__ import annotations
 
 import dataclasses
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -18,6 +19,7 @@ from orbslam2py._files import atomic_folder
 from orbslam2py.datasets import Layout, Sequence
 from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.settings import CameraSettings, Sensor
+from orbslam2py.synthetic.bag_files import BAG_LAYOUTS, BagContents, write_bag
 from orbslam2py.synthetic.options import SyntheticOptions
 from orbslam2py.trajectory import Trajectory
 from orbslam2py.trajectory.rotations import quaternions_from_rotations
@@ -31,6 +33,7 @@ _SENSORS = {
     Layout.TUM: (Sensor.MONOCULAR, Sensor.RGBD),
     Layout.KITTI: (Sensor.MONOCULAR, Sensor.STEREO),
     Layout.EUROC: (Sensor.MONOCULAR, Sensor.STEREO),
+    **dict.fromkeys(map(Layout, BAG_LAYOUTS), tuple(Sensor)),
 }
 
 
@@ -94,10 +97,11 @@ def write_sequence(
 ) -> Path:
     """Write a sequence; see `SyntheticSequence.write`."""
     chosen = choose_layout(layout, sequence.sensor)
-    writers = {
+    writers: dict[Layout, Callable[[WritableSequence, Path, Progress], None]] = {
         Layout.TUM: _write_tum,
         Layout.KITTI: _write_kitti,
         Layout.EUROC: _write_euroc,
+        **{Layout(name): partial(_write_bag, name) for name in BAG_LAYOUTS},
     }
     _check_replaceable(folder, force=force)
     with atomic_folder(folder) as temporary:
@@ -188,6 +192,24 @@ def _write_euroc(sequence: WritableSequence, folder: Path, progress: Progress) -
     truth = top / "state_groundtruth_estimate0"
     truth.mkdir()
     _write_text(truth / "data.csv", lines)
+
+
+def _write_bag(layout: str, sequence: WritableSequence, folder: Path, progress: Progress) -> None:
+    def load(index: int) -> tuple[NDArray[Any], ...]:
+        images = sequence.load(index)
+        arrays = (images.image, images.right, images.depth)
+        return tuple(image for image in arrays if image is not None)
+
+    depth = sequence.default_settings().depth
+    contents = BagContents(
+        str(sequence.sensor),
+        sequence.camera,
+        sequence.nanoseconds.tolist(),
+        _upright(sequence.ground_truth().T_wc),
+        load,
+        (depth and depth.raw_per_metre) or 1.0,
+    )
+    write_bag(contents, folder, layout, progress)
 
 
 def _upright(T_wc: FloatArray) -> FloatArray:

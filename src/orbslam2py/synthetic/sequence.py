@@ -268,8 +268,9 @@ class SyntheticSequence(FramesInOrder):
         folder
             Appears when everything is written.
         layout
-            ``tum`` (mono, RGB-D), ``kitti`` or ``euroc`` (mono, stereo); by default TUM for RGB-D
-            and mono, KITTI for stereo.
+            ``tum`` (mono, RGB-D), ``kitti`` or ``euroc`` (mono, stereo); ``rosbag1``, ``rosbag2``
+            or ``mcap`` (all, with the package rosbags); by default TUM for RGB-D and mono, KITTI
+            for stereo.
         force
             Replace a folder that holds a synthetic sequence.
         progress

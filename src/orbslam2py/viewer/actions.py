@@ -32,11 +32,6 @@ class ActionsOnSystem:
         self._system = system
         self._folder = folder
 
-    @property
-    def localization(self) -> bool:
-        """The mode that the next image will be tracked in."""
-        return self._system.localization_mode
-
     def set_localization(self, wanted: bool) -> str | None:
         """Switch localization mode, with the next image."""
         self._system.localization_mode = wanted

@@ -7,8 +7,8 @@ import html
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol
 
-from orbslam2py.pictures import palette
-from orbslam2py.pictures.palette import Colour
+from orbslam2py import _palette as palette
+from orbslam2py._palette import Colour
 from orbslam2py.viewer.follow import Follow
 from orbslam2py.viewer.point_colours import ColourBy
 from orbslam2py.viewer.scene import HIDDEN, LAYERS

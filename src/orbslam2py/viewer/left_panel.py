@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py._arrays import ByteArray
+from orbslam2py._palette import HALO, MAPPED, UNMATCHED, VISUAL_ODOMETRY, Colour
 from orbslam2py.pictures.album import KeyframePicture
 from orbslam2py.pictures.overlay import Marks, Status, draw_marks, fit_size, to_rgb
-from orbslam2py.pictures.palette import HALO, MAPPED, UNMATCHED, VISUAL_ODOMETRY, Colour
 from orbslam2py.viewer.plots import Plots
 from orbslam2py.viewer.watching import FrameView
 
@@ -113,6 +113,7 @@ class LeftPanel:
             )
         panel.dock_left()
         panel.set_width(_WIDTH)
+        panel.expand()  # on a telephone it is a section of the sheet below, closed by itself
 
     def show_image(self, picture: ByteArray) -> None:
         """Show what the camera sees, red, green, blue."""
@@ -143,7 +144,9 @@ def _status_html(status: Status | None, note: str) -> str:
         mode, words, numbers, colour = status.mode, status.words, status.numbers, status.colour
     style = "padding:0.3em 0.9em 0.1em;font-size:0.85em;line-height:1.5"
     chip = f"border-left:0.4em solid rgb{colour};padding-left:0.6em"
-    more = f'<div style="opacity:0.8">{html.escape(note)}</div>' if note else ""
+    more = "".join(
+        f'<div style="opacity:0.8">{html.escape(line)}</div>' for line in note.splitlines()
+    )
     return (
         f'<div style="{style}"><div style="{chip}"><b>{html.escape(mode)}</b> '
         f"{html.escape(words)}</div>"

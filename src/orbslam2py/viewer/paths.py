@@ -3,24 +3,25 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
-from orbslam2py.evaluation import align
+from orbslam2py.evaluation import Similarity, fit_by_time
 from orbslam2py.slam.records import TrackingRecord
 from orbslam2py.trajectory import Trajectory
-from orbslam2py.trajectory.association import associate
 
 #: A path is drawn with at most so many corners.
 MAX_CORNERS = 4000
 #: So many poses must have a true one at their time before the truth is laid beside them.
 _MIN_PAIRS = 5
+#: Seconds of a path after which the truth is laid beside it anew.
+_LAY_EVERY = 1.0
 #: What the true path must span along one axis [m]: a camera that stands tells no rotation.
 _MIN_SPAN = 1e-3
-#: Poses belong together if their time stamps differ by less [s].
-_SAME_TIME = 0.02
 
 
 @dataclass
@@ -85,15 +86,21 @@ class LaidTruth:
     """(n, 3) world of the map."""
     error: float
     """Root mean square distance of the poses that were compared [m]."""
+    similarity: Similarity
+    """From the world of the truth to that of the map."""
 
 
-def lay_truth(path: Trajectory, truth: Trajectory, *, with_scale: bool) -> LaidTruth | None:
-    """Move the true path onto the estimated one (Umeyama, PAMI 1991).
+def lay_truth(
+    timestamps: FloatArray, positions: FloatArray, truth: Trajectory, *, with_scale: bool
+) -> LaidTruth | None:
+    """Move the true path onto the estimated one.
 
     Parameters
     ----------
-    path : Trajectory
-        The estimate, in the world of the map.
+    timestamps : array (n,)
+        Seconds of the estimate.
+    positions : array (n, 3)
+        The estimate, in the world of the map, without lost poses.
     truth : Trajectory
         What it should be, in a world of its own.
     with_scale : bool
@@ -104,14 +111,62 @@ def lay_truth(path: Trajectory, truth: Trajectory, *, with_scale: bool) -> LaidT
     LaidTruth or None
         None while too few poses are known to have a true one.
     """
-    known = path.select(~path.lost)
-    i, j = associate(known.timestamps, truth.timestamps, _SAME_TIME)
-    if len(i) < _MIN_PAIRS:
+    fit = fit_by_time(
+        truth.timestamps,
+        truth.positions,
+        timestamps,
+        positions,
+        with_scale=with_scale,
+        fewest=_MIN_PAIRS,
+    )
+    if fit is None or np.ptp(truth.positions[fit.rows], axis=0).max() < _MIN_SPAN:
         return None
-    estimated, true = known.positions[i], truth.positions[j]
-    if np.ptp(true, axis=0).max() < _MIN_SPAN:
-        return None
-    moved = align(true, estimated, with_scale=with_scale)
-    off = moved.apply(true) - estimated
-    error = float(np.sqrt(np.mean(np.sum(off**2, axis=1)))) / moved.scale
-    return LaidTruth(moved.apply(truth.positions), error)
+    laid = fit.similarity.apply(truth.positions)
+    off = laid[fit.rows] - positions[fit.other_rows]
+    error = float(np.sqrt(np.mean(np.sum(off**2, axis=1)))) / fit.similarity.scale
+    return LaidTruth(laid, error, fit.similarity)
+
+
+class TruthBeside:
+    """The true path beside a growing one, as far as that has come; laid anew every second of it.
+
+    Parameters
+    ----------
+    truth : Trajectory
+        What the path should be, in a world of its own.
+    with_scale : bool
+        Also scale: the map of a single camera has its own unit.
+    """
+
+    def __init__(self, truth: Trajectory, *, with_scale: bool) -> None:
+        self._truth, self._with_scale = truth, with_scale
+        self._similarity: Similarity | None = None
+        self._map_index = -1
+        self._laid_at = -math.inf
+
+    def until(
+        self,
+        now: float,
+        map_index: int,
+        path: Callable[[], tuple[FloatArray, FloatArray]],
+    ) -> FloatArray:
+        """True positions (n, 3) until a time, in the world of the map.
+
+        Parameters
+        ----------
+        now : float
+            Seconds.
+        map_index : int
+            Which map it is: what lay beside another one is void.
+        path : callable
+            Tells the path through the map: time stamps (n,), positions (n, 3), without lost poses.
+        """
+        if map_index != self._map_index:
+            self._map_index, self._similarity, self._laid_at = map_index, None, -math.inf
+        if self._similarity is None or now >= self._laid_at + _LAY_EVERY:
+            laid = lay_truth(*path(), self._truth, with_scale=self._with_scale)
+            if laid is not None:
+                self._similarity, self._laid_at = laid.similarity, now
+        if self._similarity is None:
+            return np.zeros((0, 3))
+        return self._similarity.apply(self._truth.positions[self._truth.timestamps <= now])

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
-from orbslam2py.pictures.palette import MAPPED, STAGE_COLOURS, TEXT, Colour
+from orbslam2py._palette import MAPPED, STAGE_COLOURS, TEXT, Colour
 from orbslam2py.slam.records import TrackingRecord, TrackingState
 
 if TYPE_CHECKING:
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 SPAN = 60.0
 #: Images that are kept; of those beyond, every other one is left out.
 _CAPACITY = 4096
+#: Around the axes [px]: above, so that the highest number is whole, right, below, left.
+_PADDING = (12, 8, 0, 0)
 #: Stages of tracking that are shown if there are such.
 STAGES = ("extract", "stereo", "predict", "local_map", "keyframe")
 
@@ -66,8 +68,9 @@ class Plots:
             (none, none),
             ({"label": "s"}, _series("inliers", MAPPED)),
             title="Inliers",
+            padding=_PADDING,
             scales=scales,
-            axes=(time_axis, {"size": 44}),
+            axes=(time_axis, {"size": 52}),
             height=120,
         )
         self._stages = server.gui.add_uplot(
@@ -78,8 +81,9 @@ class Plots:
                 *(_series(name.replace("_", " "), STAGE_COLOURS[name]) for name in STAGES),
             ),
             title="Tracking, milliseconds",
+            padding=_PADDING,
             scales=scales,
-            axes=(time_axis, {"size": 44}),
+            axes=(time_axis, {"size": 52}),
             height=150,
         )
 

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from orbslam2py._arrays import ByteArray, FloatArray
-from orbslam2py.pictures.palette import POINTS
+from orbslam2py._palette import POINTS
 from orbslam2py.viewer.map_model import MapModel
 
 #: How far the span of the values may grow or shrink before all points are coloured anew.

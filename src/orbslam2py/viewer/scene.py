@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
-from orbslam2py.pictures.palette import (
+from orbslam2py._palette import (
     CAMERA,
     COVISIBILITY,
     KEYFRAME,
@@ -267,7 +267,7 @@ class Scene:
         colour, width = {
             "path": (PATH, 2.5),
             "online": (ONLINE_PATH, 1.5),
-            "truth": (TRUTH, 2.0),
+            "truth": (TRUTH, 3.5),
         }[layer]
         self._lines(f"/{layer}/all", lines, colour, width)
 

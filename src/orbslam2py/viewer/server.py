@@ -45,7 +45,7 @@ def start_server(host: str = LOOPBACK, port: int | None = None) -> viser.ViserSe
     StateError
         If viser is not installed, the port is taken or the host is none of this computer's.
     """
-    _require_viser()
+    require_viser()
     chosen = _find_port(host, DEFAULT_PORT if port is None else port, only=port is not None)
     if port is None and chosen != DEFAULT_PORT:
         _log.warning("port %d is taken: the viewer is at port %d", DEFAULT_PORT, chosen)
@@ -99,7 +99,14 @@ def _has_screen() -> bool:
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-def _require_viser() -> None:
+def require_viser() -> None:
+    """See that viser is installed.
+
+    Raises
+    ------
+    StateError
+        With the line that installs it.
+    """
     try:
         import viser  # noqa: F401, PLC0415  # optional, and slow to load
     except ModuleNotFoundError as error:

@@ -59,7 +59,7 @@ class Golden : public ::testing::TestWithParam<Case> {
   }
 
   const Kernels* kernels_ = nullptr;
-  ScalePyramid scales_{1.2F, 8};
+  ScalePyramid scales_{1.2F, 8, true};
   cv::Mat image_;
 };
 
@@ -90,6 +90,7 @@ TEST_P(Golden, Stages) {
 TEST_P(Golden, Features) {
   OrbOptions options;
   options.n_features = GetParam().n_features;
+  options.original_coordinates = true;
   OrbExtractor extractor(options, GetParam().kernels);
   const Features features = extractor.extract(image_).features;
   const auto keypoints = read_npy<float>(per_count("kp"));

@@ -10,6 +10,7 @@
 
 #include "base/errors.hpp"
 #include "features/images.hpp"
+#include "features/level_placement.hpp"
 
 namespace orbslam {
 namespace {
@@ -68,9 +69,11 @@ TEST(OrbExtractor, KeypointsKeepTheirDistanceAndTheirQuota) {
       for (const Keypoint& keypoint : result.features.keypoints) {
         const cv::Mat& level = result.pyramid.levels[static_cast<std::size_t>(keypoint.level)];
         const float scale = scales.scale(keypoint.level);
-        const float x = std::round(keypoint.x / scale), y = std::round(keypoint.y / scale);
-        EXPECT_EQ(x * scale, keypoint.x);
-        EXPECT_EQ(y * scale, keypoint.y);
+        const LevelPlacement placement(scales, keypoint.level);
+        const float x = std::round(placement.to_level(keypoint.x));
+        const float y = std::round(placement.to_level(keypoint.y));
+        EXPECT_EQ(placement.to_image(x), keypoint.x);
+        EXPECT_EQ(placement.to_image(y), keypoint.y);
         EXPECT_GE(std::min(x, y), 19);
         EXPECT_LE(x, level.cols - 20);
         EXPECT_LE(y, level.rows - 20);
@@ -92,6 +95,45 @@ TEST(OrbExtractor, KeypointsKeepTheirDistanceAndTheirQuota) {
         EXPECT_GT(wanted, 0);  // a level without quota gives nothing
       }
     }
+  }
+}
+
+// A ramp says of every pixel of every level where it comes from.
+TEST(LevelPlacement, ALevelsPixelsLieWhereTheirGreyValuesComeFrom) {
+  cv::Mat ramp(240, 240, CV_8UC1);
+  for (int x = 0; x < ramp.cols; ++x) ramp.col(x) = cv::Scalar(x);
+  const ScalePyramid scales(1.2F, 8);
+  const ImagePyramid pyramid = build_pyramid(ramp, scales);
+  for (int level = 0; level < 8; ++level) {
+    const cv::Mat& image = pyramid.levels[static_cast<std::size_t>(level)];
+    const LevelPlacement placement(scales, level);
+    // Sizes of levels are rounded, which shows more and more to the right, grey values at every
+    // level.
+    constexpr int kColumns = 12;
+    double off = 0;
+    for (int x = 0; x < kColumns; ++x) {
+      off += placement.to_image(static_cast<float>(x)) - image.at<std::uint8_t>(10, x);
+    }
+    EXPECT_NEAR(off / kColumns, 0, 0.3) << level;
+    EXPECT_FLOAT_EQ(placement.to_level(placement.to_image(21)), 21);
+  }
+}
+
+TEST(LevelPlacement, TheOriginalsIsHalfAPixelLessAtBothScales) {
+  OrbOptions options = options_of(1000);
+  const cv::Mat image = random_image(640, 480, 7);
+  const Features here = OrbExtractor(options).extract(image).features;
+  options.original_coordinates = true;
+  OrbExtractor original(options);
+  EXPECT_TRUE(original.scales().original_coordinates());
+  const Features there = original.extract(image).features;
+  ASSERT_EQ(here.size(), there.size());
+  for (std::size_t i = 0; i < here.size(); ++i) {
+    const float scale = original.scales().scale(here.keypoints[i].level);
+    EXPECT_NEAR(here.keypoints[i].x - there.keypoints[i].x, (scale - 1) / 2, 1e-4);
+    EXPECT_NEAR(here.keypoints[i].y - there.keypoints[i].y, (scale - 1) / 2, 1e-4);
+    EXPECT_EQ(there.keypoints[i].x, scale * std::round(there.keypoints[i].x / scale));
+    EXPECT_EQ(here.descriptors[i].words, there.descriptors[i].words);
   }
 }
 

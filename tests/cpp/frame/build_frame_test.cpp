@@ -18,8 +18,9 @@ using testing::read_extraction;
 using testing::read_npy;
 using testing::test_data;
 
-FrameContext context_of(const CameraOptions& options) {
-  return {std::make_shared<Camera>(options), std::make_shared<ScalePyramid>(1.2F, 8)};
+FrameContext context_of(const CameraOptions& options, bool original_coordinates = false) {
+  return {std::make_shared<Camera>(options),
+          std::make_shared<ScalePyramid>(1.2F, 8, original_coordinates)};
 }
 
 CameraOptions rectified_options() {
@@ -97,7 +98,7 @@ TEST(BuildFrame, RectifiedFramesKeepNoSecondCopyOfTheKeypoints) {
 }
 
 TEST(BuildFrame, StereoFrameHasTheMatchersDepth) {
-  const ScalePyramid scales(1.2F, 8);
+  const ScalePyramid scales(1.2F, 8, true);
   const std::string folder = test_data("golden/stereo_synth");
   const Extraction left = read_extraction(folder, "left", 8, scales);
   const Extraction right = read_extraction(folder, "right", 8, scales);
@@ -105,7 +106,7 @@ TEST(BuildFrame, StereoFrameHasTheMatchersDepth) {
   CameraOptions options = rectified_options();
   options.pinhole = {k_bf[0], k_bf[1], k_bf[2], k_bf[3]};
   options.bf = k_bf[4];
-  const auto frame = build_stereo_frame(context_of(options), 1, 0.1, left, right);
+  const auto frame = build_stereo_frame(context_of(options, true), 1, 0.1, left, right);
   EXPECT_EQ(frame->right_u, read_npy<float>(folder + "/uRight.npy").values);
   EXPECT_EQ(frame->depth, read_npy<float>(folder + "/depth.npy").values);
   EXPECT_EQ(frame->size(), left.features.size());
@@ -116,10 +117,19 @@ TEST(BuildFrame, StereoFrameHasTheMatchersDepth) {
   }
 }
 
-TEST(BuildFrame, RgbdDepthIsReadAtTheTruncatedRawPixel) {
+TEST(BuildFrame, RgbdDepthIsReadInTheNearestRawPixel) {
   cv::Mat depth = constant_depth(0);
   depth.at<float>(60, 50) = 2.0F;
-  const auto frame = build_rgbd_frame(context_of(rectified_options()), 0, 0,
+  const auto frame =
+      build_rgbd_frame(context_of(rectified_options()), 0, 0,
+                       features_at({{49.6F, 60.4F}, {50.4F, 59.6F}, {50.6F, 60}}), depth);
+  EXPECT_EQ(frame->depth, (std::vector<float>{2.0F, 2.0F, -1.0F}));
+}
+
+TEST(BuildFrame, RgbdDepthIsReadAtTheTruncatedRawPixelOfTheOriginal) {
+  cv::Mat depth = constant_depth(0);
+  depth.at<float>(60, 50) = 2.0F;
+  const auto frame = build_rgbd_frame(context_of(rectified_options(), true), 0, 0,
                                       features_at({{50.9F, 60.9F}, {51, 60}, {50, 59.9F}}), depth);
   EXPECT_EQ(frame->depth, (std::vector<float>{2.0F, -1.0F, -1.0F}));
   EXPECT_EQ(frame->right_u, (std::vector<float>{50.9F - 20.0F, -1.0F, -1.0F}));

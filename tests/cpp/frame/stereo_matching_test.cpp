@@ -8,6 +8,7 @@
 #include <random>
 
 #include "base/errors.hpp"
+#include "features/level_placement.hpp"
 #include "frame/stereo_pair.hpp"
 
 namespace orbslam {
@@ -50,14 +51,15 @@ ShiftedPair shifted_pair(int shift, int level = 0) {
       resized_pyramid(texture(cv::Rect(shift, 0, width, height)).clone(), scales());
   std::mt19937_64 generator(6);
   const float scale = scales().scale(level);
+  const LevelPlacement placement(scales(), level);
   const int first = 20;
   for (int y = first; static_cast<float>(y) * scale < static_cast<float>(height) - 20 * scale;
        y += 20) {
     for (int x = first; static_cast<float>(x) * scale < static_cast<float>(width) - 20 * scale;
          x += 20) {
       Keypoint keypoint;
-      keypoint.x = static_cast<float>(x) * scale;
-      keypoint.y = static_cast<float>(y) * scale;
+      keypoint.x = placement.to_image(static_cast<float>(x));
+      keypoint.y = placement.to_image(static_cast<float>(y));
       keypoint.level = level;
       Descriptor descriptor;
       for (auto& word : descriptor.words) word = generator();
@@ -78,10 +80,11 @@ int count_matched(const StereoMatches& matches) {
 
 TEST(StereoMatching, EqualsTheGoldenPairBitByBit) {
   const std::string folder = test_data("golden/stereo_synth");
-  const Extraction left = read_extraction(folder, "left", 8, scales());
-  const Extraction right = read_extraction(folder, "right", 8, scales());
+  const ScalePyramid original(1.2F, 8, true);
+  const Extraction left = read_extraction(folder, "left", 8, original);
+  const Extraction right = read_extraction(folder, "right", 8, original);
   const auto k_bf = read_npy<float>(folder + "/K_bf.npy").values;
-  const StereoMatches matches = match_stereo(left, right, scales(), k_bf[4], k_bf[0]);
+  const StereoMatches matches = match_stereo(left, right, original, k_bf[4], k_bf[0]);
   EXPECT_EQ(matches.right_u, read_npy<float>(folder + "/uRight.npy").values);
   EXPECT_EQ(matches.depth, read_npy<float>(folder + "/depth.npy").values);
 }

@@ -8,17 +8,21 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
-#include <random>
+#include <string>
 #include <thread>
 
 #include "base/errors.hpp"
 #include "golden.hpp"
+#include "random_bundles.hpp"
 
 namespace orbslam {
 namespace {
 
+using testing::all_finite;
 using testing::golden_bundle;
 using testing::GoldenBundle;
+using testing::numbers;
+using testing::random_bundle;
 
 double chi2_of(const BundleProblem& problem, const BundleProblem::Observation& o) {
   const auto& camera = problem.cameras[o.camera];
@@ -32,15 +36,20 @@ double chi2_of(const BundleProblem& problem, const BundleProblem::Observation& o
 struct GoldenCase {
   const char* set;
   double cost;  ///< of the reference over the observations it keeps
+  BundleSolver solver;
 };
 
-void PrintTo(const GoldenCase& item, std::ostream* out) { *out << item.set; }
+void PrintTo(const GoldenCase& item, std::ostream* out) {
+  *out << item.set << (item.solver == BundleSolver::kCeres ? " with Ceres" : " by blocks");
+}
 
 class BundleGolden : public ::testing::TestWithParam<GoldenCase> {};
 
 TEST_P(BundleGolden, AgreesWithTheReference) {
   GoldenBundle golden = golden_bundle(GetParam().set);
-  const BundleSummary summary = solve_bundle(golden.problem, BundleOptions(), nullptr);
+  BundleOptions options;
+  options.solver = GetParam().solver;
+  const BundleSummary summary = solve_bundle(golden.problem, options, nullptr);
   EXPECT_TRUE(summary.stage_one_done);
   EXPECT_FALSE(summary.aborted);
   EXPECT_LT(summary.final_cost, summary.initial_cost);
@@ -72,82 +81,44 @@ TEST_P(BundleGolden, AgreesWithTheReference) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sets, BundleGolden,
-                         ::testing::Values(GoldenCase{"lba_mono", 3771.96},
-                                           GoldenCase{"lba_stereo", 5434.80},
-                                           GoldenCase{"lba_small", 88.397}));
+                         ::testing::Values(GoldenCase{"lba_mono", 3771.96, BundleSolver::kBlocks},
+                                           GoldenCase{"lba_stereo", 5434.80, BundleSolver::kBlocks},
+                                           GoldenCase{"lba_small", 88.397, BundleSolver::kBlocks},
+                                           GoldenCase{"lba_mono", 3771.96, BundleSolver::kCeres},
+                                           GoldenCase{"lba_stereo", 5434.80, BundleSolver::kCeres},
+                                           GoldenCase{"lba_small", 88.397, BundleSolver::kCeres}));
 
-double uniform(std::mt19937_64& random, double low, double high) {
-  return low + (high - low) * static_cast<double>(random() >> 11) * 0x1.0p-53;
-}
-
-/// Cameras in a row that look at a box of points; poses and points are disturbed.
-BundleProblem random_bundle(std::uint64_t seed, std::size_t n_cameras, std::size_t n_points,
-                            std::size_t n_fixed, bool with_depth) {
-  std::mt19937_64 random(seed);
-  BundleProblem problem;
-  std::vector<Pose> truth;
-  for (std::size_t i = 0; i < n_cameras; ++i) {
-    const Pose T_cw(Eigen::Quaterniond::Identity(),
-                    Eigen::Vector3d(-0.3 * static_cast<double>(i), 0, 0));
-    truth.push_back(T_cw);
-    Vector6d xi;
-    for (int k = 0; k < 6; ++k) xi(k) = uniform(random, -0.01, 0.01);
-    const bool fixed = i < n_fixed;
-    problem.cameras.push_back(
-        {fixed ? T_cw : Pose::exp(xi) * T_cw, {500, 500, 320, 240}, 40, fixed});
+class SolveBundle : public ::testing::TestWithParam<BundleSolver> {
+ protected:
+  static BundleOptions options() {
+    BundleOptions options;
+    options.solver = GetParam();
+    return options;
   }
-  for (std::size_t i = 0; i < n_points; ++i) {
-    const Eigen::Vector3d point(uniform(random, -1, 3), uniform(random, -2, 2),
-                                uniform(random, 3, 9));
-    for (std::size_t c = 0; c < n_cameras; ++c) {
-      const Eigen::Vector3d p_c = truth[c] * point;
-      const Eigen::Vector2d pixel = problem.cameras[c].pinhole.project(p_c);
-      BundleProblem::Observation o;
-      o.camera = static_cast<std::uint32_t>(c);
-      o.point = static_cast<std::uint32_t>(i);
-      o.u = static_cast<float>(pixel.x() + uniform(random, -0.5, 0.5));
-      o.v = static_cast<float>(pixel.y() + uniform(random, -0.5, 0.5));
-      o.has_depth = with_depth && (i + c) % 2 == 0;
-      o.right_u = static_cast<float>(pixel.x() - 40 / p_c.z() + uniform(random, -0.5, 0.5));
-      problem.observations.push_back(o);
-    }
-    problem.points.push_back(point + 0.05 * Eigen::Vector3d(uniform(random, -1, 1),
-                                                            uniform(random, -1, 1),
-                                                            uniform(random, -1, 1)));
-  }
-  return problem;
+};
+
+std::string name_of(const ::testing::TestParamInfo<BundleSolver>& info) {
+  return info.param == BundleSolver::kCeres ? "Ceres" : "Blocks";
 }
 
-std::vector<double> numbers(const BundleProblem& problem) {
-  std::vector<double> all;
-  for (const auto& camera : problem.cameras) {
-    const Eigen::Matrix4d m = camera.T_cw.matrix();
-    all.insert(all.end(), m.data(), m.data() + 16);
-  }
-  for (const auto& point : problem.points) all.insert(all.end(), point.data(), point.data() + 3);
-  return all;
-}
+INSTANTIATE_TEST_SUITE_P(Solvers, SolveBundle,
+                         ::testing::Values(BundleSolver::kBlocks, BundleSolver::kCeres), name_of);
 
-bool all_finite(const BundleProblem& problem) {
-  const std::vector<double> all = numbers(problem);
-  return std::all_of(all.begin(), all.end(), [](double x) { return std::isfinite(x); });
-}
-
-TEST(SolveBundle, RepeatsBitByBit) {
+TEST_P(SolveBundle, RepeatsBitByBit) {
   for (const bool with_depth : {false, true}) {
     BundleProblem a = random_bundle(1, 8, 150, 2, with_depth), b = a;
-    const BundleSummary first = solve_bundle(a, BundleOptions(), nullptr);
-    const BundleSummary second = solve_bundle(b, BundleOptions(), nullptr);
+    const BundleSummary first = solve_bundle(a, options(), nullptr);
+    const BundleSummary second = solve_bundle(b, options(), nullptr);
     EXPECT_EQ(numbers(a), numbers(b));
     EXPECT_EQ(first.outlier, second.outlier);
     EXPECT_EQ(first.final_cost, second.final_cost);
   }
 }
 
-TEST(SolveBundle, FixedCamerasStay) {
+TEST_P(SolveBundle, FixedCamerasStay) {
   BundleProblem problem = random_bundle(2, 6, 80, 3, true);
   const BundleProblem start = problem;
-  const BundleSummary summary = solve_bundle(problem, BundleOptions(), nullptr);
+  const BundleSummary summary = solve_bundle(problem, options(), nullptr);
   EXPECT_LT(summary.final_cost, 0.1 * summary.initial_cost);
   for (std::size_t i = 0; i < 6; ++i) {
     const bool same = problem.cameras[i].T_cw.matrix() == start.cameras[i].T_cw.matrix();
@@ -155,18 +126,19 @@ TEST(SolveBundle, FixedCamerasStay) {
   }
 }
 
-TEST(SolveBundle, ManyCamerasTakeTheSparseSolver) {
+TEST_P(SolveBundle, ManyCameras) {
   BundleProblem problem = random_bundle(3, 36, 100, 2, true);
-  const BundleSummary summary = solve_bundle(problem, BundleOptions(), nullptr);
+  const BundleSummary summary = solve_bundle(problem, options(), nullptr);
   EXPECT_LT(summary.final_cost, 0.1 * summary.initial_cost);
 }
 
-TEST(SolveBundle, InverseDepthsFindTheSameMinimum) {
+TEST(InverseDepths, FindTheSameMinimum) {
   for (const bool with_depth : {false, true}) {
     BundleProblem by_coordinates = random_bundle(11, 8, 150, 2, with_depth);
     by_coordinates.points.push_back({1, 2, 3});  // nobody sees it
     BundleProblem by_inverse_depth = by_coordinates;
     BundleOptions options;
+    options.solver = BundleSolver::kCeres;
     options.robust_iterations = 30;
     options.final_iterations = 0;
     const BundleSummary expected = solve_bundle(by_coordinates, options, nullptr);
@@ -181,7 +153,7 @@ TEST(SolveBundle, InverseDepthsFindTheSameMinimum) {
   }
 }
 
-TEST(SolveBundle, InverseDepthsBearPointsThatLieNowhere) {
+TEST(InverseDepths, BearPointsThatLieNowhere) {
   // Seen twice from nearly the same place, with a disparity of the wrong sign: beyond infinity.
   BundleProblem problem = random_bundle(12, 6, 100, 2, false);
   for (int k = 0; k < 5; ++k) {
@@ -199,6 +171,7 @@ TEST(SolveBundle, InverseDepthsBearPointsThatLieNowhere) {
     }
   }
   BundleOptions options;
+  options.solver = BundleSolver::kCeres;
   options.robust_iterations = 20;
   options.final_iterations = 0;
   options.inverse_depth = true;
@@ -211,56 +184,56 @@ TEST(SolveBundle, InverseDepthsBearPointsThatLieNowhere) {
   }
 }
 
-TEST(SolveBundle, SinglePoseFixedOrFree) {
+TEST_P(SolveBundle, SinglePoseFixedOrFree) {
   BundleProblem one_fixed = random_bundle(4, 4, 60, 1, true);
-  BundleSummary summary = solve_bundle(one_fixed, BundleOptions(), nullptr);
+  BundleSummary summary = solve_bundle(one_fixed, options(), nullptr);
   EXPECT_LT(summary.final_cost, summary.initial_cost);
   EXPECT_TRUE(all_finite(one_fixed));
 
   BundleProblem none_fixed = random_bundle(5, 4, 60, 0, false);  // free gauge and scale
-  summary = solve_bundle(none_fixed, BundleOptions(), nullptr);
+  summary = solve_bundle(none_fixed, options(), nullptr);
   EXPECT_LT(summary.final_cost, summary.initial_cost);
   EXPECT_TRUE(all_finite(none_fixed));
 
   BundleProblem only_points = random_bundle(6, 3, 60, 3, false);
-  summary = solve_bundle(only_points, BundleOptions(), nullptr);
+  summary = solve_bundle(only_points, options(), nullptr);
   EXPECT_LT(summary.final_cost, summary.initial_cost);
 
   BundleProblem alone = random_bundle(7, 1, 60, 0, false);  // depths undetermined
-  summary = solve_bundle(alone, BundleOptions(), nullptr);
+  summary = solve_bundle(alone, options(), nullptr);
   EXPECT_LE(summary.final_cost, summary.initial_cost);
   EXPECT_TRUE(all_finite(alone));
 }
 
-TEST(SolveBundle, NothingToDo) {
+TEST_P(SolveBundle, NothingToDo) {
   BundleProblem empty;
-  EXPECT_EQ(solve_bundle(empty, BundleOptions(), nullptr).iterations, 0);
+  EXPECT_EQ(solve_bundle(empty, options(), nullptr).iterations, 0);
   BundleProblem problem = random_bundle(8, 3, 5, 1, false);
   problem.observations.clear();
   const std::vector<double> start = numbers(problem);
-  const BundleSummary summary = solve_bundle(problem, BundleOptions(), nullptr);
+  const BundleSummary summary = solve_bundle(problem, options(), nullptr);
   EXPECT_EQ(summary.iterations, 0);
   EXPECT_TRUE(summary.stage_one_done);
   EXPECT_EQ(numbers(problem), start);
 }
 
-TEST(SolveBundle, UnknownCameraOrPointIsAnError) {
+TEST_P(SolveBundle, UnknownCameraOrPointIsAnError) {
   BundleProblem problem = random_bundle(9, 2, 5, 1, false);
   problem.observations[3].camera = 2;
-  EXPECT_THROW(solve_bundle(problem, BundleOptions(), nullptr), StateError);
+  EXPECT_THROW(solve_bundle(problem, options(), nullptr), StateError);
   problem.observations[3].camera = 0;
   problem.observations[3].point = 5;
-  EXPECT_THROW(solve_bundle(problem, BundleOptions(), nullptr), StateError);
+  EXPECT_THROW(solve_bundle(problem, options(), nullptr), StateError);
 }
 
-TEST(SolveBundle, OutliersAreFoundAndDoNotPull) {
+TEST_P(SolveBundle, OutliersAreFoundAndDoNotPull) {
   BundleProblem problem = random_bundle(10, 6, 100, 2, true);
   std::vector<std::uint8_t> wrong(problem.observations.size(), 0);
   for (std::size_t i = 0; i < wrong.size(); i += 23) {
     problem.observations[i].u += 30;
     wrong[i] = 1;
   }
-  const BundleSummary summary = solve_bundle(problem, BundleOptions(), nullptr);
+  const BundleSummary summary = solve_bundle(problem, options(), nullptr);
   for (std::size_t i = 0; i < wrong.size(); ++i) EXPECT_EQ(summary.outlier[i], wrong[i]) << i;
   for (std::size_t c = 2; c < 6; ++c) {
     const Eigen::Vector3d center = problem.cameras[c].T_cw.center();
@@ -268,14 +241,14 @@ TEST(SolveBundle, OutliersAreFoundAndDoNotPull) {
   }
 }
 
-TEST(SolveBundle, BrokenNumbersAndPointsBehindTheCamera) {
+TEST_P(SolveBundle, BrokenNumbersAndPointsBehindTheCamera) {
   BundleProblem problem = random_bundle(11, 5, 60, 2, true);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   problem.points[3].y() = nan;
   problem.points[7].z() = -4;
   problem.points[9] = problem.cameras[0].T_cw.center();  // depth zero
   problem.observations[100].u = static_cast<float>(nan);
-  const BundleSummary summary = solve_bundle(problem, BundleOptions(), nullptr);
+  const BundleSummary summary = solve_bundle(problem, options(), nullptr);
   EXPECT_TRUE(std::isfinite(summary.final_cost));
   EXPECT_LT(summary.final_cost, summary.initial_cost);
   EXPECT_EQ(summary.outlier[100], 1);
@@ -291,7 +264,7 @@ TEST(SolveBundle, BrokenNumbersAndPointsBehindTheCamera) {
 }
 
 // OD-109: observations are judged anew at the final estimate.
-TEST(SolveBundle, PointThatComesToTheFrontTakesPartInTheSecondStage) {
+TEST_P(SolveBundle, PointThatComesToTheFrontTakesPartInTheSecondStage) {
   BundleProblem problem = random_bundle(14, 6, 60, 2, false);
   // A fixed camera further ahead sees a point 0.5 m away, which starts 0.2 m behind it.
   problem.cameras.push_back({Pose(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 0, -2.5)),
@@ -312,16 +285,16 @@ TEST(SolveBundle, PointThatComesToTheFrontTakesPartInTheSecondStage) {
     o.v = static_cast<float>(pixel.y());
     problem.observations.push_back(o);
   }
-  const BundleSummary summary = solve_bundle(problem, BundleOptions(), nullptr);
+  const BundleSummary summary = solve_bundle(problem, options(), nullptr);
   EXPECT_EQ(summary.outlier.back(), 0);
   EXPECT_LT((problem.points[60] - truth).norm(), 0.01);
 }
 
-TEST(SolveBundle, RaisedFlagStopsBeforeAnything) {
+TEST_P(SolveBundle, RaisedFlagStopsBeforeAnything) {
   BundleProblem problem = random_bundle(12, 5, 60, 2, true);
   const std::vector<double> start = numbers(problem);
   const std::atomic<bool> abort{true};
-  const BundleSummary summary = solve_bundle(problem, BundleOptions(), &abort);
+  const BundleSummary summary = solve_bundle(problem, options(), &abort);
   EXPECT_TRUE(summary.aborted);
   EXPECT_FALSE(summary.stage_one_done);
   EXPECT_EQ(summary.iterations, 0);
@@ -329,7 +302,7 @@ TEST(SolveBundle, RaisedFlagStopsBeforeAnything) {
   EXPECT_EQ(numbers(problem), start);
 }
 
-TEST(SolveBundle, FlagRaisedDuringTheWorkKeepsTheProgress) {
+TEST_P(SolveBundle, FlagRaisedDuringTheWorkKeepsTheProgress) {
   // Wherever the other thread's flag hits, the result is some prefix of the iterations: never
   // worse than the start, with flags that belong to it.
   const BundleProblem start = random_bundle(13, 20, 600, 2, true);
@@ -340,7 +313,7 @@ TEST(SolveBundle, FlagRaisedDuringTheWorkKeepsTheProgress) {
       std::this_thread::sleep_for(std::chrono::milliseconds(2 * delay));
       abort = true;
     });
-    const BundleSummary summary = solve_bundle(problem, BundleOptions(), &abort);
+    const BundleSummary summary = solve_bundle(problem, options(), &abort);
     other.join();
     EXPECT_LE(summary.final_cost, summary.initial_cost);
     EXPECT_TRUE(all_finite(problem));

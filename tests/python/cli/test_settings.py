@@ -81,6 +81,7 @@ def test_built_in_settings_are_shown(
     done = command("settings", "show", choice, *more)
     assert (done.code, done.err) == (0, "")
     Path("a.yaml").write_text(done.out)
+    assert "ORBextractor.originalCoordinates: 0\n" in done.out
     assert Settings.load("a.yaml", sensor) == builtin_settings(choice, sensor)
 
 

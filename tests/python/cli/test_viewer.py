@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from orbslam2py.cli.demo import own_name
 from support.browser import Browser
 from support.command_line import CommandLine, Results
 from support.viewer_pages import click_on, open_viewer
@@ -27,6 +28,25 @@ def test_the_demo_names_the_viewer_as_the_next_thing(command: CommandLine) -> No
     assert done.code == 0
     assert "orbslam2py demo --viewer" in done.out
     assert (Path("runs/demo") / "map.npz").is_file()
+
+
+@pytest.mark.parametrize(
+    ("called", "on_path", "typed"),
+    [
+        ("{here}/.venv/bin/orbslam2py", False, ".venv/bin/orbslam2py"),
+        ("/opt/tools/bin/orbslam2py", False, "/opt/tools/bin/orbslam2py"),
+        ("/opt/tools/bin/orbslam2py", True, "orbslam2py"),
+        ("{here}/src/orbslam2py/__main__.py", True, f"{sys.executable} -m orbslam2py"),
+    ],
+)
+def test_the_program_is_named_as_it_can_be_called(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, called: str, on_path: bool, typed: str
+) -> None:
+    """After `make demo` it is in a folder that is not on the path."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [called.format(here=tmp_path), "demo"])
+    monkeypatch.setattr("shutil.which", lambda name: f"/usr/bin/{name}" if on_path else None)
+    assert own_name() == typed
 
 
 def test_a_run_with_a_viewer_leaves_the_same_bytes(command: CommandLine) -> None:
@@ -47,6 +67,29 @@ def test_a_run_with_a_viewer_leaves_the_same_bytes(command: CommandLine) -> None
         "map.npz",
     ):
         assert (Path("with") / name).read_bytes() == (Path("without") / name).read_bytes(), name
+
+
+def test_a_run_without_a_viewer_loads_nothing_of_it(tmp_path: Path) -> None:
+    """Neither the page nor what it is made of, nor anything that starts processes in its place."""
+    code = """
+import sys
+from orbslam2py.cli import main
+try:
+    main()
+finally:
+    heavy = {"viser", "websockets", "msgspec", "multiprocessing", "rerun", "plotly"}
+    names = {name for name in sys.modules if name.startswith("orbslam2py.viewer")}
+    print("loaded:", *sorted((heavy & sys.modules.keys()) | names))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code, *DEMO, "--quiet"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1].split() == ["loaded:"]
 
 
 def started(arguments: tuple[str, ...], folder: Path) -> tuple[subprocess.Popen[str], str]:

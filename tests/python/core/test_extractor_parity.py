@@ -16,7 +16,8 @@ from support.data import shared_arrays
 @pytest.mark.parametrize("name", ["euroc_a", "kitti_a", "tum_a", "synth7", "synth11"])
 def test_equals_the_reference(name: str, n_features: int, kernels: str) -> None:
     golden = shared_arrays(f"extractor_{name}")
-    extractor = _core.OrbExtractor(_core.OrbOptions(n_features=n_features), kernels=kernels)
+    options = _core.OrbOptions(n_features=n_features, original_coordinates=True)
+    extractor = _core.OrbExtractor(options, kernels=kernels)
     result = extractor.extract(golden["image"])
 
     np.testing.assert_array_equal(result.keypoints, golden[f"n{n_features}_kp"])

@@ -34,6 +34,30 @@ def test_extraction_arrays() -> None:
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize("original", [False, True])
+def test_pixels_of_coarse_levels_lie_at_their_true_place(original: bool) -> None:
+    options = _core.OrbOptions(n_features=300, n_levels=4, original_coordinates=original)
+    extractor = _core.OrbExtractor(options)
+    assert extractor.scales.original_coordinates is original
+    result = extractor.extract(noise(240, 320))
+    scale = extractor.scales.scale[result.levels]
+    centre = np.zeros_like(scale) if original else (scale - 1) / 2
+    pixels = (result.keypoints[:, :2] - centre[:, None]) / scale[:, None]
+    np.testing.assert_allclose(pixels, np.round(pixels), atol=1e-4)
+
+
+def test_masks_are_read_at_the_true_place() -> None:
+    # One column of ten is allowed: whatever is found lies there and nowhere else.
+    mask = np.zeros((240, 320), np.uint8)
+    mask[:, 100:130] = 255
+    for original in (False, True):
+        options = _core.OrbOptions(n_features=300, original_coordinates=original)
+        x = _core.OrbExtractor(options).extract(noise(240, 320), mask).keypoints[:, 0]
+        assert len(x) > 30
+        assert x.min() >= 100
+        assert x.max() <= 129
+
+
 def test_no_keypoints_is_an_empty_result() -> None:
     result = _core.OrbExtractor().extract(np.full((100, 100), 7, np.uint8))
     assert result.keypoints.shape == (0, 5)

@@ -21,12 +21,13 @@ def test_stereo_frame_equals_the_reference(name: str, n_features: int) -> None:
     fx, fy, cx, cy, bf = (float(value) for value in golden["K_bf"])
     left, right = golden["left"], golden["right"]
 
-    extractor = core.PairExtractor(core.OrbOptions(n_features=n_features))
+    options = core.OrbOptions(n_features=n_features, original_coordinates=True)
+    extractor = core.PairExtractor(options)
     pair = extractor.extract(left, right)
 
     height, width = left.shape
     camera = core.Camera(core.CameraOptions(fx, fy, cx, cy, width, height, bf=bf, depth_ratio=35.0))
-    context = core.FrameContext(camera, core.ScalePyramid(1.2, 8))
+    context = core.FrameContext(camera, core.ScalePyramid(1.2, 8, original_coordinates=True))
     frame = core.build_stereo_frame(context, 0, 0.0, *pair)
 
     np.testing.assert_array_equal(frame.keypoints, golden["left_kp"][:, :2])

@@ -96,6 +96,8 @@ class Page:
         words = shlex.split(command, comments=True)
         if words[0] == "orbslam2py":
             self.make_room(words)
+            if words[1] == "demo":
+                words += shlex.split(SHORTER["demo"])
             return call(main, words)
         if words[0] == "python":
             return call(lambda: run_python(words[1:]), words[1:])
@@ -180,7 +182,8 @@ def test_examples_of_the_commands_run(
                 continue  # stays until Ctrl-C; tests/python/viewer drives it
             if line.startswith("orbslam2py map "):
                 continue  # tests/python/cli/test_map_files.py, on maps that are long enough
-            code, printed = page.shell(f"{line} {SHORTER.get(line.split()[1], '')}")
+            more = "" if line.split()[1] == "demo" else SHORTER.get(line.split()[1], "")
+            code, printed = page.shell(f"{line} {more}")
             assert code == 0, f"{line}\n{printed}"
 
 

@@ -221,6 +221,16 @@ def test_edited_numbers_are_refused(tmp_path: Path, statement: str, what: str) -
     _refused(path, what, "copy of the file")
 
 
+def test_a_map_from_before_there_was_a_choice_has_the_places_of_the_original(
+    tmp_path: Path,
+) -> None:
+    path = written(tmp_path)
+    assert not load_map(path).settings.orb.original_coordinates
+    line = "ORBextractor.originalCoordinates: 0"
+    edit(path, f"UPDATE settings SET yaml = replace(yaml, '{line}', '')")
+    assert load_map(path).settings.orb.original_coordinates
+
+
 def test_lost_rows_are_noticed(tmp_path: Path) -> None:
     path = written(tmp_path)
     with closing(sqlite3.connect(path)) as connection, connection:

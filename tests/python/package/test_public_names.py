@@ -21,6 +21,7 @@ NAMES = {
     "CameraSettings",
     "DatasetError",
     "DepthSettings",
+    "Evidence",
     "FrameFeatures",
     "FullAdjustmentRecord",
     "ImageError",
@@ -33,6 +34,7 @@ NAMES = {
     "OrbSettings",
     "OrbSlamError",
     "OutputFileError",
+    "PoseMethod",
     "Publisher",
     "Reason",
     "Relocalized",
@@ -46,6 +48,7 @@ NAMES = {
     "TrackingRecord",
     "TrackingState",
     "Trajectory",
+    "Verdict",
     "VideoWriter",
     "Viewer",
     "VocabularyError",
@@ -162,7 +165,16 @@ def test_names_in_examples_are_public(name: str) -> None:
 
 
 # ---- light doors ---------------------------------------------------------------------------------
-HEAVY = {"numpy", "cv2", "orbslam2py._core", "matplotlib", "typer", "rich"}
+HEAVY = {
+    "numpy",
+    "cv2",
+    "orbslam2py._core",
+    "matplotlib",
+    "typer",
+    "rich",
+    "viser",
+    "multiprocessing",
+}
 
 #: What importing a module may load of these.
 LIGHT: dict[str, set[str]] = {

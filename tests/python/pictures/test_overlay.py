@@ -5,6 +5,14 @@ import numpy as np
 import pytest
 
 from orbslam2py import TrackingState
+from orbslam2py._palette import (
+    LOST,
+    MAPPED,
+    NOT_TRACKED,
+    STARTING,
+    UNMATCHED,
+    VISUAL_ODOMETRY,
+)
 from orbslam2py.pictures.overlay import (
     Marks,
     Status,
@@ -12,14 +20,6 @@ from orbslam2py.pictures.overlay import (
     draw_status,
     status_height,
     to_rgb,
-)
-from orbslam2py.pictures.palette import (
-    LOST,
-    MAPPED,
-    NOT_TRACKED,
-    STARTING,
-    UNMATCHED,
-    VISUAL_ODOMETRY,
 )
 
 GREY = np.full((240, 320), 90, np.uint8)

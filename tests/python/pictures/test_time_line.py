@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from orbslam2py import Reason, TrackingRecord, TrackingState
+from orbslam2py._palette import FRAME, KEYFRAME, LOOP, LOST, MAPPED, NOT_TRACKED, NOW
 from orbslam2py.pictures import GrowingHistory, History, draw_time_line
-from orbslam2py.pictures.palette import FRAME, KEYFRAME, LOOP, LOST, MAPPED, NOT_TRACKED, NOW
 
 SIZE = (900, 120)
 

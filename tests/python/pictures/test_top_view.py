@@ -4,8 +4,7 @@
 import numpy as np
 import pytest
 
-from orbslam2py.pictures import MapPicture, bounds, draw_ground, draw_top_view, frame_all
-from orbslam2py.pictures.palette import (
+from orbslam2py._palette import (
     CAMERA,
     COVISIBILITY,
     FAINT_TEXT,
@@ -16,6 +15,7 @@ from orbslam2py.pictures.palette import (
     PATH,
     TEXT,
 )
+from orbslam2py.pictures import MapPicture, bounds, draw_ground, draw_top_view, frame_all
 from orbslam2py.pictures.top_view import nice_length
 
 SIZE = (400, 300)

@@ -12,14 +12,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orbslam2py import OutputFileError, Reason, Sensor, TrackingRecord, TrackingState, VideoWriter
-from orbslam2py.pictures import compose
-from orbslam2py.pictures.palette import LOST, MAPPED, NOT_TRACKED, STARTING
+from orbslam2py import (
+    OutputFileError,
+    Reason,
+    Sensor,
+    TrackingRecord,
+    TrackingState,
+    Trajectory,
+    VideoWriter,
+)
+from orbslam2py._palette import LOST, MAPPED, NOT_TRACKED, STARTING, TRUTH
+from orbslam2py.pictures import Status, compose, draw_status
 from orbslam2py.recordings import output_file, video_file
 from orbslam2py.slam.records import FrameFeatures
 from orbslam2py.viewer import FrameView, Publisher, QueueState
 from support.files import names_in
-from support.small_sequences import black, new_system, play, track
+from support.small_sequences import SIZE, black, new_system, play, sequence, track
 from support.videos import read_video, share_of
 
 pytestmark = pytest.mark.watchdog(90)
@@ -64,6 +72,50 @@ def view(
         localization=False,
         queue=QueueState(n_frames=number + 1, frames_per_second=10.0),
     )
+
+
+def test_ground_truth_lies_beside_the_path_as_far_as_it_has_come(tmp_path: Path) -> None:
+    truth = sequence(Sensor.RGBD).ground_truth()
+    assert truth is not None
+    # In a world of its own: turned, and far away.
+    T = np.eye(4)
+    T[:3, :3] = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]
+    T[:3, 3] = (100, 20, -30)
+    elsewhere = Trajectory(truth.timestamps, T @ truth.T_wc)
+    amounts = []
+    for given in (None, elsewhere):
+        path = tmp_path / "run.mp4"
+        with new_system(Sensor.RGBD, deterministic=True) as system:
+            video = VideoWriter(path, ground_truth=given)
+            with Publisher(system, [video], every_frame=True):
+                play(system, 25)
+        pictures, _ = read_video(path)
+        box = compose(SIZE, (1280, 720)).map
+        parts = [
+            picture[box.y : box.y + box.height, box.x : box.x + box.width] for picture in pictures
+        ]
+        amounts.append([share_of(part, TRUTH, 30) for part in (parts[1], parts[-1])])
+    assert amounts[0][1] < 1e-4
+    assert amounts[1][0] < 1e-4  # not known yet
+    assert amounts[1][1] > 3e-4
+
+
+def test_the_rate_is_that_of_the_recording(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However busy the computer is on which a video is made."""
+    said: list[float | None] = []
+
+    def note(width: int, status: Status) -> np.ndarray:
+        said.append(status.frames_per_second)
+        return draw_status(width, status)
+
+    monkeypatch.setattr("orbslam2py.recordings.video.draw_status", note)
+    video = VideoWriter(tmp_path / "a.mp4")
+    for number in range(40):
+        slow = QueueState(n_frames=number, frames_per_second=0.7)
+        video.on_frame(replace(view(np.zeros((48, 64), np.uint8), number), queue=slow))
+    video.close()
+    assert said[0] is None
+    assert said[1:] == pytest.approx([10.0] * 39)
 
 
 def test_a_run_becomes_one_picture_for_each_image(tmp_path: Path) -> None:

@@ -172,6 +172,30 @@ def test_one_cursor_over_all_plots(browser: Browser, runs: dict[str, Path]) -> N
     page.close()
 
 
+def test_one_cursor_over_the_plots_of_several_runs(browser: Browser, runs: dict[str, Path]) -> None:
+    page = opened(browser, runs["both"])
+    x, y = page.middle_of("#plot-error .canvas")
+    page.mouse("mouseMoved", x, y)
+    hairs = "[...document.querySelectorAll('.hair')].filter((hair) => !hair.hidden)"
+    page.wait_for(f"{hairs}.length === document.querySelectorAll('[data-time]').length")
+    places = page.evaluate(f"{hairs}.map((hair) => parseFloat(hair.style.left))")
+    assert places == pytest.approx([50.0] * len(places), abs=0.5)
+    full, noisy, nothing = (
+        page.evaluate(f"document.querySelectorAll('#cursor .of-run')[{k}].innerText.trim()")
+        for k in range(3)
+    )
+    assert full.startswith("full: ")
+    assert noisy.startswith("noisy: error ")
+    assert "inliers" in noisy
+    assert nothing == "nothing: ended"  # it is shorter than the others
+    assert page.evaluate("document.querySelectorAll('#above .here').length") == 2
+    page.click("#cursor button")
+    page.wait_for("document.getElementById('cursor').hidden")
+    assert page.evaluate("document.querySelectorAll('.here').length") == 0
+    assert page.errors == []
+    page.close()
+
+
 def test_a_link_to_a_frame_opens_there(browser: Browser, runs: dict[str, Path]) -> None:
     page = browser.open(runs["full"].as_uri() + "#frame-10", width=390)
     page.wait_for("document.getElementById('cursor').innerText.includes('frame 10')")

@@ -11,53 +11,17 @@ import numpy as np
 import pytest
 
 from orbslam2py import DatasetError, Sensor
-from orbslam2py.datasets import Images, LiveFrame
+from orbslam2py.datasets import Images
 from orbslam2py.runs import RunOptions, SequenceRunner, SystemOptions
 from orbslam2py.runs.report import make_report
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+from support.cameras import Camera
 
 pytestmark = pytest.mark.watchdog(60)
 
 
 def recorded(sensor: Sensor) -> SyntheticSequence:
     return SyntheticSequence(SyntheticOptions(sensor=sensor, world="room", frames=6))
-
-
-class Camera:
-    """Delivers the images of a sequence as a camera does; every other one is lost."""
-
-    layout, name = "camera", "camera0"
-
-    def __init__(self, sequence: SyntheticSequence, *, fails: bool = False) -> None:
-        self._sequence = sequence
-        self._fails = fails
-        self.sensor, self.settings = sequence.sensor, sequence.settings
-        self.n_dropped = 0
-        self.is_open = False
-        self._next = 0
-
-    def open(self) -> None:
-        pass
-
-    def __enter__(self) -> Camera:
-        self.is_open = True
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.is_open = False
-
-    def ground_truth(self) -> None:
-        return None
-
-    def take(self, timeout: float, /) -> LiveFrame | None:
-        if self._next == 4:
-            if self._fails:
-                raise DatasetError("unplugged")
-            return None
-        index, self._next = self._next, self._next + 1
-        self.n_dropped += 1
-        time = float(self._sequence.timestamps[index])
-        return LiveFrame(time, f"{time:.6f}", self._sequence.load(index))
 
 
 def test_camera_runs_until_stopped() -> None:

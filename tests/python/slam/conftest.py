@@ -10,6 +10,8 @@ import pytest
 from orbslam2py import Sensor, System
 from orbslam2py._worker import Worker
 from orbslam2py.slam import keyframe_decision, localization_mode, pose_search, tracking
+from orbslam2py.slam.evidence import harder_search, judgement
+from orbslam2py.slam.relocalization import blur
 from support.interleaving import LIMIT, Stage
 from support.small_sequences import new_system, play
 from support.tracking_scene import FakeCore, Scene
@@ -46,7 +48,10 @@ def stage(monkeypatch: pytest.MonkeyPatch) -> Iterator[Stage]:
 def core(monkeypatch: pytest.MonkeyPatch) -> FakeCore:
     """Stands in for the verbs that tracking calls."""
     core = FakeCore()
-    for module in (tracking, pose_search, localization_mode, keyframe_decision):
+    for module in (
+        *(tracking, pose_search, localization_mode, keyframe_decision),
+        *(harder_search, judgement, blur),
+    ):
         monkeypatch.setattr(module, "core", core)
     return core
 

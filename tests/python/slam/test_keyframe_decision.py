@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import pytest
 
@@ -12,8 +13,10 @@ from orbslam2py.slam.thresholds import TrackingThresholds
 from support.tracking_scene import (
     MAX_FRAMES,
     FakeCore,
+    FakeFrame,
     Scene,
     lose,
+    pose,
 )
 
 
@@ -112,3 +115,46 @@ def test_no_keyframe_soon_after_a_recovery_in_a_large_map(
     scene.map.n_keyframes = n_keyframes
     scene.core.n_reference = 1000
     assert scene.track(frame_id=recovered + since).is_keyframe == keyframe
+
+
+@pytest.mark.parametrize(
+    ("staying", "untracked", "keyframe"),
+    [(64, 71, True), (65, 71, False), (64, 70, False)],
+)
+def test_a_keyframe_before_the_camera_has_turned_away(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch, staying: int, untracked: int, keyframe: bool
+) -> None:
+    """100 inliers, and as many points of the reference keyframe: nothing else asks for one."""
+    original = scene.core.optimize_pose
+
+    def moves(frame: FakeFrame) -> SimpleNamespace:
+        frame.T_cw = pose(0.5 * frame.id)
+        return original(frame)
+
+    monkeypatch.setattr(scene.core, "optimize_pose", moves)
+    scene.run(3)
+    scene.core.n_reference = 100
+    scene.core.n_staying = staying
+    outcome = scene.track(close_counts=(200, untracked))
+    assert outcome.is_keyframe == keyframe
+    assert scene.core.looked_ahead == pytest.approx(1.5)
+
+
+def test_without_a_speed_nobody_looks_ahead(scene: Scene) -> None:
+    scene.run(40)
+    scene.core.n_reference = 100
+    scene.core.n_staying = 0
+    assert not scene.track(frame_id=50, close_counts=(200, 500)).is_keyframe
+
+
+@pytest.mark.parametrize(("since", "keyframe"), [(1, False), (2, True)])
+def test_a_loaded_map_is_extended_soon_after_the_camera_was_found(
+    scene: Scene, since: int, keyframe: bool
+) -> None:
+    scene.run(40)
+    scene.tracking.begin_in_loaded_map(None)
+    scene.run(1)
+    found = scene.last.id
+    scene.map.n_keyframes = MAX_FRAMES + 1
+    scene.core.n_reference = 1000
+    assert scene.track(frame_id=found + since).is_keyframe == keyframe

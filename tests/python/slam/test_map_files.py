@@ -156,6 +156,14 @@ def test_another_camera_is_told_and_refused() -> None:
         assert slam.settings == other
 
 
+def test_another_place_of_keypoints_is_told_and_refused() -> None:
+    settings = sequence(Sensor.RGBD).settings
+    orb = dataclasses.replace(settings.orb, original_coordinates=True)
+    told = r"ORBextractor\.originalCoordinates is 1, in the map 0"
+    with pytest.raises(SettingsError, match=told):
+        _loaded(settings=dataclasses.replace(settings, orb=orb))
+
+
 def test_the_rate_of_the_images_may_change() -> None:
     settings = sequence(Sensor.RGBD).settings
     other = dataclasses.replace(settings, camera=dataclasses.replace(settings.camera, fps=5.0))

@@ -133,8 +133,7 @@ def test_deterministic_run_after_a_reset_equals_a_fresh_one() -> None:
 @pytest.mark.parametrize("deterministic", [True, False])
 def test_lost_and_found_again(sensor: Sensor, deterministic: bool) -> None:
     with new_system(sensor, deterministic=deterministic, wait_for_mapping=True) as system:
-        play(system, 75)
-        assert system.wait_until_idle(20)
+        play(system, 75, settled=True)
         assert system.n_keyframes > 5, "a smaller map would be given up"
         reasons = {75: Reason.FEW_MATCHES_REFERENCE, 76: Reason.NOT_FOUND_IN_MAP}
         for i, reason in reasons.items():
@@ -201,7 +200,7 @@ def test_failed_mapping_reaches_the_caller(
     system.wait_until_idle(20)
     monkeypatch.setattr(_core, verb, breaks)
     with pytest.raises(WorkerError, match="local mapping stopped: out of order") as caught:
-        play(system, 60, first=10)
+        play(system, 60, first=10, settled=True)
     assert isinstance(caught.value.__cause__, BrokenError)
     with pytest.raises(WorkerError):
         track(system, 79)

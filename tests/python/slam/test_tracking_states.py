@@ -225,7 +225,7 @@ def test_reference_keyframe_follows_the_votes(scene: Scene) -> None:
     assert scene.tracking.reference_keyframe == scene.last.reference_keyframe == 4
 
 
-def test_outliers_of_the_local_map(scene: Scene, sensor: Sensor) -> None:
+def test_outliers_of_the_local_map(scene: Scene) -> None:
     scene.run(3)
-    # Of the first estimate; of the local map (stereo); before the frame is remembered.
-    assert scene.last.n_discards == (3 if sensor is Sensor.STEREO else 2)
+    # Of the first estimate; of the local map; before the frame is remembered.
+    assert scene.last.n_discards == 3

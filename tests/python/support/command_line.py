@@ -10,10 +10,12 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
+import typer.main
 
 from orbslam2py.cli import main
 
@@ -59,6 +61,10 @@ def logging_restored() -> Iterator[None]:
         datasets.setLevel(level_of_datasets)
 
 
+#: The tree of all commands takes longer to build than most tests take to call one of them.
+_command_built_once = cache(typer.main.get_command)
+
+
 class CommandLine:
     """Calls ``orbslam2py`` in the folder of the test."""
 
@@ -70,6 +76,7 @@ class CommandLine:
         patch.chdir(folder)
 
     def __call__(self, *arguments: object) -> Outcome:
+        self._patch.setattr(typer.main, "get_command", _command_built_once)
         self._patch.setattr(sys, "argv", ["orbslam2py", *map(str, arguments)])
         self._capture.readouterr()
         with logging_restored(), pytest.raises(SystemExit) as end:

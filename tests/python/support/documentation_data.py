@@ -50,6 +50,9 @@ def make_data(folder: Path) -> None:
     for name, (sensor, layout) in sequences.items():
         _walk(sensor).write(folder / name, layout)
     (folder / "mypair").symlink_to(folder / "V1_01_easy")
+    bag = _walk("stereo").write(folder / "bag", "mcap")
+    (bag / "images.mcap").replace(folder / "drive.mcap")
+    shutil.rmtree(bag)
     _write_phone(folder / "phone")
     single = _walk("mono")
     images = [single.load(i).image for i in range(FRAMES)]

@@ -44,8 +44,19 @@ def track(
     return feed(system, shown or images(sensor, index), seconds, details=details)
 
 
-def play(system: System, n_frames: int, first: int = 0) -> list[TrackingRecord]:
-    return [track(system, i) for i in range(first, first + n_frames)]
+def play(
+    system: System, n_frames: int, first: int = 0, *, settled: bool = False
+) -> list[TrackingRecord]:
+    """Track frames in a row.
+
+    An idle mapper takes more keyframes than a busy one. `settled` waits for it after every image:
+    what becomes a keyframe does not depend on the speed of the machine then.
+    """
+    records = []
+    for i in range(first, first + n_frames):
+        records.append(track(system, i))
+        assert not settled or system.wait_until_idle(20)
+    return records
 
 
 def black(sensor: Sensor) -> Images:

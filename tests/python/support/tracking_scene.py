@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass, field
 from types import SimpleNamespace
@@ -12,10 +13,13 @@ import numpy as np
 
 from orbslam2py import Reason, Sensor, TrackingState, _core
 from orbslam2py._timing import StageTimer
+from orbslam2py.slam.evidence.belief import Belief
+from orbslam2py.slam.evidence.harder_search import HarderSearch
+from orbslam2py.slam.evidence.judgement import EvidenceJudge
 from orbslam2py.slam.keyframe_decision import KeyframeDecision
 from orbslam2py.slam.pose_search import PoseSearch
 from orbslam2py.slam.records import TrackingOutcome
-from orbslam2py.slam.thresholds import TrackingThresholds
+from orbslam2py.slam.thresholds import EvidenceThresholds, TrackingThresholds
 from orbslam2py.slam.tracking import Tracking
 
 MAX_FRAMES = 30
@@ -32,7 +36,9 @@ class FakeFrame:
     def __init__(self, frame_id: int) -> None:
         self.id = frame_id
         self.timestamp = frame_id / 30
-        self.features = SimpleNamespace(size=1000, depth=np.ones(1000, np.float32), described=False)
+        self.features = SimpleNamespace(
+            size=1000, depth=np.ones(1000, np.float32), described=False, frame_id=frame_id
+        )
         self.T_cw: _core.Pose | None = None
         self.reference_keyframe = -1
         self.map_points = np.arange(100)
@@ -46,6 +52,11 @@ class FakeFrame:
     def share_anchor(self, other: FakeFrame) -> None:
         self.anchor_x, self.big_change = other.anchor_x, other.big_change
         self.reference_keyframe = other.reference_keyframe
+
+    def take_over(self, other: FakeFrame) -> None:
+        assert other.id == self.id
+        self.T_cw = other.T_cw
+        self.share_anchor(other)
 
     def clear_associations(self) -> None:
         self.n_cleared += 1
@@ -72,6 +83,9 @@ class FakeMap:
 
     def living(self, keyframe: int) -> int:
         return self.culled.get(keyframe, keyframe)
+
+    def best_neighbours(self, keyframe: int, n: int) -> np.ndarray:
+        return np.array([keyframe + 1000])
 
 
 class FakeWorker:
@@ -102,6 +116,7 @@ class FakeCore:
     motion: deque[int] = field(default_factory=deque)
     words: deque[int] = field(default_factory=deque)
     inliers: deque[int] = field(default_factory=deque)
+    sharpnesses: deque[float] = field(default_factory=deque)
     n_reference: int = 100
     local_reference: int = 4
     calls: list[str] = field(default_factory=list)
@@ -113,6 +128,31 @@ class FakeCore:
     min_observations: list[int] = field(default_factory=list)
     start_poses: list[float] = field(default_factory=list)
     n_inserted: int = 0
+    #: Rotation of the next small images and their correlation; none: they say nothing.
+    aligned: deque[SimpleNamespace] = field(default_factory=deque)
+    n_cells: int = 30
+    #: Of the inliers, after three more frames of the present speed; how far that was.
+    n_staying: int = 1000
+    looked_ahead: float = 0.0
+    #: Points in view that are not held before the local map is matched.
+    n_visible: int = 3
+
+    def TrackedFrame(self, features: SimpleNamespace) -> FakeFrame:
+        version = FakeFrame(features.frame_id)
+        version.features = features
+        return version
+
+    def align_rotation(self, last: Any, features: Any) -> SimpleNamespace | None:
+        self.calls.append("align")
+        return self.aligned.popleft() if self.aligned else None
+
+    def spread_of_inliers(self, frame: FakeFrame) -> SimpleNamespace:
+        return SimpleNamespace(cells=self.n_cells, octaves=4)
+
+    def count_staying(self, frame: FakeFrame, T_nw: _core.Pose) -> int:
+        assert frame.T_cw is not None
+        self.looked_ahead = float((T_nw.matrix - frame.T_cw.matrix)[0, 3])
+        return self.n_staying
 
     def PointBatch(self) -> str:
         return "no points"
@@ -127,6 +167,9 @@ class FakeCore:
     def anchor_frame(self, world: FakeMap, frame: FakeFrame, keyframe: int) -> None:
         frame.anchor_x = world.keyframe_x
         frame.reference_keyframe = keyframe
+
+    def sharpness(self, features: object) -> float:
+        return self.sharpnesses.popleft() if self.sharpnesses else 1000.0
 
     def add_temporary_points(self, last: FakeFrame, points: str) -> int:
         return 0
@@ -174,10 +217,10 @@ class FakeCore:
         assert points == "local points"
         self.radius_factors.append(factor)
         self.discarded.append(discarded)
-        return SimpleNamespace(visible=np.arange(3))
+        return SimpleNamespace(visible=np.arange(self.n_visible))
 
     def count_sightings(self, world: FakeMap, frame: FakeFrame, visible: np.ndarray) -> None:
-        assert len(visible) == 3
+        assert len(visible) == self.n_visible
         self.calls.append("sightings")
 
     def count_tracked_points(self, world: FakeMap, keyframe: int, min_observations: int) -> int:
@@ -227,11 +270,34 @@ class FakeInitializer:
         return Reason.NONE
 
 
+#: Whatever is found is believed.
+CREDULOUS = EvidenceThresholds(
+    sudden_share=0,
+    sudden_deviation=math.inf,
+    surprise_windows=math.inf,
+    weak_share=0,
+    weak_cells=-1,
+    weak_deviation=math.inf,
+    refused_share=0,
+)
+
+
+class NoFurtherSearch:
+    """What was not found at first is not found."""
+
+    def look_again(self, frame: FakeFrame, first: Any) -> Any:
+        return first
+
+
 class Scene:
-    """A tracker among fakes."""
+    """A tracker among fakes, which believes what it finds unless it is given `evidence`."""
 
     def __init__(
-        self, sensor: Sensor, core: FakeCore, thresholds: TrackingThresholds | None = None
+        self,
+        sensor: Sensor,
+        core: FakeCore,
+        thresholds: TrackingThresholds | None = None,
+        evidence: EvidenceThresholds | None = None,
     ) -> None:
         self.core = core
         self.map = FakeMap()
@@ -241,19 +307,23 @@ class Scene:
         self.localize = False
         fakes: Any = self
         vocabulary: Any = "vocabulary"
+        search = PoseSearch(
+            fakes.map,
+            vocabulary,
+            sensor,
+            MAX_FRAMES,
+            relocalizer=None,
+            thresholds=thresholds or TrackingThresholds(),
+        )
+        judge = EvidenceJudge(search.motion_model_window, 500.0, evidence or CREDULOUS)
+        again: Any = NoFurtherSearch() if evidence is None else HarderSearch(search, judge)
         self.tracking = Tracking(
             fakes.map,
             vocabulary,
             fakes.mapping,
             initializer=fakes.initializer,
-            search=PoseSearch(
-                fakes.map,
-                vocabulary,
-                sensor,
-                MAX_FRAMES,
-                relocalizer=None,
-                thresholds=thresholds or TrackingThresholds(),
-            ),
+            search=search,
+            belief=Belief(search, judge, again),
             keyframe_decision=KeyframeDecision(fakes.map, fakes.mapping.worker, sensor, MAX_FRAMES),
             has_depth=sensor.has_depth,
         )

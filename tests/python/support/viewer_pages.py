@@ -93,10 +93,10 @@ def wait_until_seen(page: Page, condition: Callable[[ByteArray], bool], what: st
     raise BrowserError(f"not seen within {PATIENCE} s: {what}; what was seen is in {path}")
 
 
-def wait_until(condition: Callable[[], bool], what: str) -> None:
+def wait_until(condition: Callable[[], bool], what: str, patience: float = PATIENCE) -> None:
     """Wait for something that the page has asked for."""
-    end = time.monotonic() + PATIENCE
+    end = time.monotonic() + patience
     while not condition():
         if time.monotonic() > end:
-            raise AssertionError(f"not within {PATIENCE} s: {what}")
+            raise AssertionError(f"not within {patience} s: {what}")
         time.sleep(0.02)  # between two looks

@@ -45,5 +45,6 @@ def worker_threads() -> list[str]:
         "worker under test",
         "viewer publisher",
         "viewer page",
+        "viewer request",
     }
     return [thread.name for thread in threading.enumerate() if thread.name in names]

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from orbslam2py import FrameFeatures, Sensor, TrackingState
-from orbslam2py.pictures.palette import MAPPED, STARTING, UNMATCHED, VISUAL_ODOMETRY
+from orbslam2py._palette import MAPPED, STARTING, UNMATCHED, VISUAL_ODOMETRY
 from orbslam2py.viewer import FrameView, QueueState
 from orbslam2py.viewer.left_panel import overlaid, status_of
 from support.small_sequences import new_system, track

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from orbslam2py import Sensor, System, TrackingState, Viewer
+from orbslam2py._palette import KEYFRAME, LOCAL_POINTS, MAPPED
 from orbslam2py.maps import load_map
-from orbslam2py.pictures.palette import KEYFRAME, LOCAL_POINTS, MAPPED
 from support.browser import Browser, Page
 from support.small_sequences import new_system, play, sequence
 from support.viewer_pages import (
@@ -74,13 +74,13 @@ def test_image_map_cameras_and_figures_are_seen(show: Show, tmp_path: Path) -> N
     assert amount(left, MAPPED, 40) > 300  # keypoints in the image
     image = left[80:380, 20:400]
     assert image.std() > 30  # a picture, and no grey rectangle
-    text = show.page.wait_for("document.body.innerText")
-    assert "SLAM" in text
-    assert f"{show.system.n_keyframes} keyframes" in text
-    assert "from the ground truth" in text
+    for text in ("SLAM", f"{show.system.n_keyframes} keyframes", "from the ground truth"):
+        show.page.wait_for(f"document.body.innerText.includes('{text}')", 50)
     plots = "document.querySelectorAll('.uplot canvas').length"
     assert show.page.evaluate(plots) == 2
-    assert all("THREE.Clock" in error for error in show.page.errors), show.page.errors
+    # The drawing library of the page speaks of itself, and of graphics that are drawn in software.
+    own = [text for text in show.page.errors if "THREE.Clock" not in text and "WebGL" not in text]
+    assert own == []
 
 
 def test_nothing_is_asked_of_other_computers(show: Show) -> None:

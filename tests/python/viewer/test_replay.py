@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import shutil
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,11 +12,11 @@ import numpy as np
 import pytest
 
 from orbslam2py import DatasetError, MapFileError, Sensor, run_sequence
+from orbslam2py._palette import KEYFRAME
 from orbslam2py.maps import MapArrays
-from orbslam2py.pictures.palette import KEYFRAME
 from orbslam2py.runs import RunOptions, SystemOptions
+from orbslam2py.runs.report_page import read_run
 from orbslam2py.viewer.replay import Replay
-from orbslam2py.viewer.run_folder import RunFolder
 from support.browser import Browser
 from support.small_sequences import sequence
 from support.viewer_pages import (
@@ -43,7 +44,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def replay(folder: Path) -> Iterator[Replay]:
-    replay = Replay(RunFolder.read(folder), sequence(Sensor.RGBD), port=0)
+    replay = Replay(read_run(folder), sequence(Sensor.RGBD), port=0)
     yield replay
     replay.stop()
 
@@ -91,9 +92,19 @@ def test_it_is_seen_and_played(replay: Replay) -> None:
         page.close()
 
 
-def test_a_folder_that_is_none_of_a_run_is_named(tmp_path: Path) -> None:
-    with pytest.raises(DatasetError, match="is no folder of a run"):
-        RunFolder.read(tmp_path)
+def test_without_the_sequence_the_images_in_the_folder_are_shown(folder: Path) -> None:
+    replay = Replay(read_run(folder), port=0)
+    try:
+        wait_until(lambda: replay.position == N_FRAMES - 1, "the last image")
+        with zipfile.ZipFile(folder / "frame_images.zip") as archive:
+            kept = sorted(int(Path(name).stem) for name in archive.namelist())
+        for position in (kept[-1], kept[0]):
+            shown = replay._picture(position)
+            assert shown is not None
+            assert shown.std() > 20
+            assert f"shown is image {position}" in replay._note(position)
+    finally:
+        replay.stop()
 
 
 def test_a_map_that_is_cut_off_is_named(folder: Path, tmp_path: Path) -> None:
@@ -102,7 +113,16 @@ def test_a_map_that_is_cut_off_is_named(folder: Path, tmp_path: Path) -> None:
     data = (copy / "map.npz").read_bytes()
     (copy / "map.npz").write_bytes(data[: len(data) // 2])
     with pytest.raises(MapFileError, match=r"map\.npz is no file of a map, or not whole"):
-        RunFolder.read(copy)
+        Replay(read_run(copy), port=0)
+
+
+def test_a_run_that_saw_nothing_is_named(folder: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "run"
+    shutil.copytree(folder, copy)
+    header = (copy / "frames.csv").read_text().splitlines()[0]
+    (copy / "frames.csv").write_text(header + "\n")
+    with pytest.raises(DatasetError, match="lists no frames; give the folder of a run that saw"):
+        Replay(read_run(copy), port=0)
 
 
 def test_without_a_map_the_path_is_shown_and_that_is_said(
@@ -111,7 +131,8 @@ def test_without_a_map_the_path_is_shown_and_that_is_said(
     copy = tmp_path / "run"
     shutil.copytree(folder, copy)
     (copy / "map.npz").unlink()
-    run = RunFolder.read(copy)
+    run = read_run(copy)
+    Replay(run, port=0).stop()
     assert run.map is None
     assert len(run.path) == N_FRAMES
     assert "only the path is shown" in caplog.text

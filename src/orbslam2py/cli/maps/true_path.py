@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from orbslam2py.datasets import open_sequence
+from orbslam2py.datasets import is_recording, open_sequence
 from orbslam2py.errors import DatasetError
 from orbslam2py.settings import Sensor
 from orbslam2py.trajectory import Trajectory, TrajectoryFormat, read_trajectory
@@ -17,7 +17,7 @@ def read_true_path(path: Path, sensor: Sensor) -> Trajectory:
     Parameters
     ----------
     path
-        A file in TUM's format, or the folder of a sequence.
+        A file in TUM's format, the folder of a sequence, or a bag.
     sensor
         What the sequence is opened for.
 
@@ -26,7 +26,7 @@ def read_true_path(path: Path, sensor: Sensor) -> Trajectory:
     DatasetError
         If there are none, or they are without time stamps or not of the camera.
     """
-    if path.is_dir():
+    if path.is_dir() or is_recording(path):
         truth = open_sequence(path, sensor).ground_truth()
         if truth is None:
             raise DatasetError(

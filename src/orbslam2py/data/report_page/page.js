@@ -38,7 +38,7 @@ class Solid {
   constructor(canvas) {
     this.canvas = canvas;
     this.layers = { points: true, keyframes: true, truth: true, loops: true };
-    this.cursor = null;
+    this.cursors = [];
     this.points = this.unpackPoints();
     this.paths = data.paths ?? [{ positions: data.positions, colours: data.colour }];
     this.home();
@@ -156,7 +156,7 @@ class Solid {
     if (this.layers.keyframes) this.drawKeyframes(ratio);
     if (this.layers.loops) this.drawLoops(ratio);
     this.drawAxes(ratio);
-    if (this.cursor) this.drawCursor(ratio);
+    for (const at of this.cursors) this.drawCursor(at, ratio);
     canvas.dataset.drawn = "yes";
   }
 
@@ -238,9 +238,9 @@ class Solid {
     this.pen.stroke();
   }
 
-  drawCursor(ratio) {
-    this.ring(this.cursor, "--ground", 6 * ratio, 5 * ratio);
-    this.ring(this.cursor, "--text", 6 * ratio, 2.5 * ratio);
+  drawCursor(at, ratio) {
+    this.ring(at, "--ground", 6 * ratio, 5 * ratio);
+    this.ring(at, "--text", 6 * ratio, 2.5 * ratio);
   }
 
   // Where right, up and forward of the first keyframe are, in a corner.
@@ -250,12 +250,13 @@ class Solid {
     pen.font = `${12 * ratio}px system-ui, sans-serif`;
     pen.fillStyle = pen.strokeStyle = this.colour("--soft");
     pen.lineWidth = 1.5 * ratio;
-    pen.textAlign = "center";
     for (const [name, k, sign] of [["right", 0, 1], ["up", 1, -1], ["forward", 2, 1]]) {
       const [x, y] = [sign * a[k] * length, sign * b[k] * length];
       if (Math.hypot(x, y) < 0.3 * length) continue;
       pen.beginPath(); pen.moveTo(u, v); pen.lineTo(u + x, v + y); pen.stroke();
-      pen.fillText(name, u + 1.3 * x, v + 1.3 * y + 4 * ratio);
+      // Beside the end of its line, so that two that point nearly the same way do not overlap.
+      pen.textAlign = Math.abs(x) < 0.2 * length ? "center" : x > 0 ? "left" : "right";
+      pen.fillText(name, u + 1.2 * x, v + 1.3 * y + 4 * ratio);
     }
   }
 
@@ -335,12 +336,9 @@ const hairs = find("[data-time]").map((plot) => {
   return { plot, hair, duration: Number(plot.dataset.time) || 1 };
 });
 const plane = document.getElementById("above");
-const here = make("div", "here");
-here.hidden = true;
-plane?.append(here);
 
-const nearest = (seconds) => {
-  const times = data.seconds;
+// Row of the time that is nearest to a number of seconds.
+const nearest = (seconds, times = data.seconds) => {
   let low = 0, high = times.length - 1;
   while (high - low > 1) {
     const middle = (low + high) >> 1;
@@ -349,10 +347,61 @@ const nearest = (seconds) => {
   return seconds - times[low] < times[high] - seconds ? low : high;
 };
 
+const placeHairs = (seconds) => {
+  for (const { hair, duration } of hairs) {
+    hair.hidden = seconds === null;
+    if (seconds !== null) hair.style.left = `${(100 * seconds) / duration}%`;
+  }
+};
+
+// Where the cameras are at that time: in three dimensions and from above.
+const placeCameras = (places) => {
+  if (solid) { solid.cursors = places; solid.draw(); }
+  plane?.querySelectorAll(".here").forEach((mark) => mark.remove());
+  if (!plane) return;
+  const [left, bottom, right, top] = plane.dataset.window.split(",").map(Number);
+  const [x, y, sign] = plane.dataset.axes.split(",").map(Number);
+  for (const at of places) {
+    const here = make("div", "here");
+    here.style.left = `${(100 * (at[x] - left)) / (right - left)}%`;
+    here.style.top = `${(100 * (top - sign * at[y])) / (top - bottom)}%`;
+    plane.append(here);
+  }
+};
+
+const say = (parts) => {
+  aside.hidden = parts === null;
+  if (parts === null) return;
+  const close = make("button", "", "×");
+  close.type = "button";
+  close.setAttribute("aria-label", "close");
+  close.addEventListener("click", () => { putNothing(); history.replaceState(null, "", location.pathname); });
+  aside.replaceChildren(...parts, close);
+};
+
+const putNothing = () => {
+  placeHairs(null);
+  placeCameras([]);
+  say(null);
+  for (const image of find(".here-too")) image.classList.remove("here-too");
+};
+
+const follow = (then) => {
+  for (const { plot, duration } of hairs) {
+    const move = (event) => {
+      const box = plot.getBoundingClientRect();
+      then((duration * (event.clientX - box.left)) / box.width);
+    };
+    plot.addEventListener("pointermove", move);
+    plot.addEventListener("pointerdown", move);
+  }
+};
+
+const stateNames = { OK: "tracked", LOST: "lost", NOT_INITIALIZED: "no map yet", DROPPED: "dropped", SKIPPED: "skipped" };
+
 const words = (k) => {
-  const names = { OK: "tracked", LOST: "lost", NOT_INITIALIZED: "no map yet", DROPPED: "dropped", SKIPPED: "skipped" };
   const state = data.states[data.state[k]], reason = data.reasons[data.reason[k]];
-  const said = [`frame ${data.index[k]}`, `${data.seconds[k].toFixed(2)} s`, names[state] ?? state];
+  const said = [`frame ${data.index[k]}`, `${data.seconds[k].toFixed(2)} s`, stateNames[state] ?? state];
   if (reason) said.push(reason);
   if (data.keyframe[k]) said.push("keyframe");
   if (data.error[k] !== null) said.push(`error ${data.error[k]} ${data.unit}`);
@@ -362,39 +411,16 @@ const words = (k) => {
 };
 
 const put = (k) => {
-  for (const { hair, duration } of hairs) {
-    hair.hidden = k === null;
-    if (k !== null) hair.style.left = `${(100 * data.seconds[k]) / duration}%`;
-  }
-  aside.hidden = k === null;
-  const at = k === null ? [null] : data.positions.slice(3 * k, 3 * k + 3);
-  here.hidden = at[0] === null;
-  if (solid) { solid.cursor = at[0] === null ? null : at; solid.draw(); }
-  for (const image of find(".here-too")) image.classList.remove("here-too");
-  if (k === null) return;
+  putNothing();
+  placeHairs(data.seconds[k]);
+  const at = data.positions.slice(3 * k, 3 * k + 3);
+  placeCameras(at[0] === null ? [] : [at]);
   document.getElementById(`image-${data.index[k]}`)?.classList.add("here-too");
-  const close = make("button", "", "×");
-  close.type = "button";
-  close.setAttribute("aria-label", "close");
-  close.addEventListener("click", () => { put(null); history.replaceState(null, "", location.pathname); });
-  aside.replaceChildren(...words(k).map((word) => make("span", "", word)), close);
-  if (plane && at[0] !== null) {
-    const [left, bottom, right, top] = plane.dataset.window.split(",").map(Number);
-    const [x, y, sign] = plane.dataset.axes.split(",").map(Number);
-    here.style.left = `${(100 * (at[x] - left)) / (right - left)}%`;
-    here.style.top = `${(100 * (top - sign * at[y])) / (top - bottom)}%`;
-  }
+  say(words(k).map((word) => make("span", "", word)));
 };
 
 if (data.seconds?.length) {
-  for (const { plot, duration } of hairs) {
-    const move = (event) => {
-      const box = plot.getBoundingClientRect();
-      put(nearest((duration * (event.clientX - box.left)) / box.width));
-    };
-    plot.addEventListener("pointermove", move);
-    plot.addEventListener("pointerdown", move);
-  }
+  follow((seconds) => put(nearest(seconds)));
   const go = () => {
     const number = /^#frame-(\d+)$/.exec(location.hash)?.[1];
     if (number === undefined) return;
@@ -419,5 +445,32 @@ if (data.seconds?.length) {
   });
   addEventListener("hashchange", go);
   go();
+}
+
+// ---- several runs: one moment of all of them ----------------------------------------------
+if (data.runs?.length) {
+  const wordsOf = (run, seconds) => {
+    const line = make("span", "of-run");
+    line.append(make("i", run.look), ` ${run.name}: `);
+    const last = run.seconds.length - 1;
+    if (last < 0 || seconds > run.seconds[last] + 0.5) { line.append("ended"); return line; }
+    const k = nearest(seconds, run.seconds), said = [];
+    if (run.state[k] !== "OK") said.push(stateNames[run.state[k]] ?? run.state[k]);
+    if (run.error[k] !== null) said.push(`error ${run.error[k]} ${run.unit}`);
+    if (run.inliers[k] !== null) said.push(`${run.inliers[k]} inliers`);
+    if (run.track[k] !== null) said.push(`${run.track[k]} ms`);
+    line.append(said.join(", ") || "-");
+    return line;
+  };
+  const longest = Math.max(...data.runs.map((run) => run.seconds.at(-1) ?? 0));
+  follow((wanted) => {
+    const seconds = Math.min(longest, Math.max(0, wanted));
+    placeHairs(seconds);
+    placeCameras(data.paths.flatMap(({ positions, seconds: times }) => {
+      const k = nearest(seconds, times), near = Math.abs(times[k] - seconds) < 0.5;
+      return near ? [positions.slice(3 * k, 3 * k + 3)] : [];
+    }));
+    say([make("span", "", `${seconds.toFixed(2)} s`), ...data.runs.map((run) => wordsOf(run, seconds))]);
+  });
 }
 document.body.dataset.ready = "yes";

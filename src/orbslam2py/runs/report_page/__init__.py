@@ -13,9 +13,17 @@ from orbslam2py._files import atomic_write
 from orbslam2py.runs.report_page.comparison import Comparison, Row
 from orbslam2py.runs.report_page.comparison_page import comparison_page
 from orbslam2py.runs.report_page.page import run_page
-from orbslam2py.runs.report_page.run_folder import read_run
+from orbslam2py.runs.report_page.run_folder import RunFolder, read_run
 
-__all__ = ["Comparison", "Row", "compare_runs", "write_comparison", "write_report_page"]
+__all__ = [
+    "Comparison",
+    "Row",
+    "RunFolder",
+    "compare_runs",
+    "read_run",
+    "write_comparison",
+    "write_report_page",
+]
 
 
 def write_report_page(path: Path, folders: Path | Sequence[Path]) -> None:

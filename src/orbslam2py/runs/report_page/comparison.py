@@ -10,18 +10,15 @@ import numpy as np
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import DatasetError
-from orbslam2py.evaluation import align
+from orbslam2py.evaluation import fit_by_time
 from orbslam2py.runs.report_page.explained import FIGURES, Figure
 from orbslam2py.runs.report_page.run_folder import RunFolder
 from orbslam2py.runs.report_page.story import Story
-from orbslam2py.trajectory import MAX_DIFFERENCE, associate
 
 #: Groups of figures that are compared.
 GROUPS = ("Accuracy", "Tracking", "Map", "Speed")
 #: Figures that say what was compared, not how it went.
 _LEFT_OUT = frozenset(["frames", "seen_frames", "lost_at_end", "matched_of_poses"])
-#: So many poses at the same times tell how two paths lie to each other.
-_FEWEST = 3
 
 
 @dataclass(frozen=True)
@@ -132,12 +129,14 @@ def _in_frame_of(first: RunFolder, run: RunFolder) -> FloatArray | None:
         return positions if len(positions) else None
     # By the truth, if both have one: then the picture shows the errors that are plotted.
     own, other = (run.truth, first.truth) if run.truth and first.truth else (run.path, first.path)
-    i, j = associate(own.timestamps, other.timestamps, MAX_DIFFERENCE)
-    if len(i) < _FEWEST or run.name != first.name:
+    if run.name != first.name:
         return None
-    # Where both are in metres, a difference in scale is an error to be seen.
-    with_scale = run.unit != "m" or first.unit != "m"
-    moved = align(
-        run.metres * own.positions[i], first.metres * other.positions[j], with_scale=with_scale
+    fit = fit_by_time(
+        own.timestamps,
+        run.metres * own.positions,
+        other.timestamps,
+        first.metres * other.positions,
+        # Where both are in metres, a difference in scale is an error to be seen.
+        with_scale=run.unit != "m" or first.unit != "m",
     )
-    return moved.apply(run.metres * run.path.positions)
+    return None if fit is None else fit.similarity.apply(run.metres * run.path.positions)

@@ -23,6 +23,8 @@ from orbslam2py.runs.timeline import gaps_in_time
 _N_COLOURS = 6
 #: Most corners of a path in three dimensions.
 _CORNERS = 2500
+#: Most frames of a run that the cursor tells of.
+_FRAMES = 5000
 
 
 def comparison_page(comparison: Comparison) -> str:
@@ -202,11 +204,37 @@ def _data(comparison: Comparison) -> dict[str, object]:
             continue
         keep = np.arange(0, len(path), max(1, len(path) // _CORNERS))
         corners = rounded(path[keep].ravel(), 4)
-        paths.append({"positions": corners, "look": f"--c{number % _N_COLOURS}"})
+        run = comparison.runs[number]
+        since = run.path.timestamps[keep] - run.frames.timestamps[:1].sum()
+        colour = f"--c{number % _N_COLOURS}"
+        paths.append({"positions": corners, "look": colour, "seconds": rounded(since, 3)})
     data: dict[str, object] = {"paths": paths, "points": "", "box": [0, 0, 0, 1]}
+    data["runs"] = [
+        _run_data(story, name, look(k))
+        for k, (name, story) in enumerate(zip(comparison.names, comparison.stories, strict=True))
+    ]
     truth = comparison.runs[0].truth
     if truth is not None and paths:
         keep = np.arange(0, len(truth), max(1, len(truth) // _CORNERS))
         positions = comparison.runs[0].metres * truth.positions[keep]
         data["truth"] = rounded(positions.ravel(), 4)
     return data
+
+
+def _run_data(story: Story, name: str, look_of_run: str) -> dict[str, object]:
+    """What the cursor tells of a run, frame by frame."""
+    frames = story.run.frames
+    keep = np.arange(0, len(frames), max(1, -(-len(frames) // _FRAMES)))
+    tracked = np.where(frames.state == "OK", frames.inliers, np.nan)
+    calls = frames.milliseconds.get("track", np.full(len(frames), np.nan))
+    return {
+        "name": name,
+        "look": look_of_run,
+        "unit": story.run.unit,
+        "seconds": rounded(frames.seconds[keep], 3),
+        "index": frames.index[keep].tolist(),
+        "state": frames.state[keep].tolist(),
+        "error": rounded(story.errors[keep], 4),
+        "inliers": rounded(tracked[keep], 0),
+        "track": rounded(calls[keep], 2),
+    }

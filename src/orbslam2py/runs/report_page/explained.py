@@ -146,6 +146,8 @@ FIGURES: dict[str, tuple[Figure, ...]] = {
         Figure("relocalisations", "relocalisations", "",
                "how often a lost camera was found; the first finding in a loaded map counts"),
         Figure("resets", "resets", "", "how often a map was given up", -1),
+        Figure("weak_frames", "weak frames", "",
+               "images whose pose explains much less of what should be seen than usual", -1),
         Figure("interrupted", "interrupted", "", "whether Ctrl-C ended the run"),
     ),
     "Map": (

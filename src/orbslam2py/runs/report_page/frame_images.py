@@ -10,13 +10,13 @@ from typing import TypeGuard, cast
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from orbslam2py._arrays import ByteArray, FloatArray, IntArray
+from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._files import atomic_write, describe_error
 from orbslam2py.datasets.base import LiveSource, Sequence, Source
 from orbslam2py.errors import OrbSlamError
 from orbslam2py.runs.feeds import is_sequence
+from orbslam2py.runs.report_page.kept_images import SmallImage, shrink
 from orbslam2py.runs.result import RunResult
 from orbslam2py.settings.settings import Settings
 from orbslam2py.trajectory.rotations import inverse_poses
@@ -27,8 +27,6 @@ _log = logging.getLogger(__name__)
 _N_KEYFRAMES = 8
 #: Frames in which tracking was lost that are shown.
 _N_LOST = 4
-#: Of the images [px].
-_WIDTH = 480
 _QUALITY = 72
 
 #: Fill and rim of a point [BGR]: seen on light and dark ground, whatever colours one can see.
@@ -38,6 +36,15 @@ _FILL, _RIM = (66, 228, 240), (60, 40, 0)
 def has_images(source: Source) -> TypeGuard[Sequence]:
     """Whether images can be read again: those of a camera are gone."""
     return is_sequence(cast("Sequence | LiveSource", source))
+
+
+def has_any_images(result: RunResult) -> bool:
+    """Whether images of a run can be shown: read again, or kept while it ran."""
+    return has_images(result.sequence) or bool(_kept(result))
+
+
+def _kept(result: RunResult) -> list[int]:
+    return [] if result.kept_images is None else result.kept_images.positions
 
 
 def choose_frames(result: RunResult, extra: IntArray | None = None) -> list[int]:
@@ -57,12 +64,14 @@ def choose_frames(result: RunResult, extra: IntArray | None = None) -> list[int]
         loops, the first images of losses, and the extra ones.
     """
     keyframes = result.keyframes.indices
+    if result.kept_images is not None:
+        keyframes = keyframes[np.isin(keyframes, _kept(result))]
     spread = np.unique(np.linspace(0, max(0, len(keyframes) - 1), _N_KEYFRAMES).astype(np.int64))
     chosen = set(keyframes[spread].tolist()) if len(keyframes) else set()
     snapshot = result.snapshot
-    if len(keyframes) == len(snapshot.keyframe_ids):
+    if len(result.keyframes) == len(snapshot.keyframe_ids):
         of_loops = np.isin(snapshot.keyframe_ids, snapshot.loop_edges[:3])
-        chosen |= set(keyframes[of_loops].tolist())
+        chosen |= set(result.keyframes.indices[of_loops].tolist())
     states = ["OK", *(row.state for row in result.rows)]
     began = [i for i in range(len(result.rows)) if states[i] == "OK" and states[i + 1] == "LOST"]
     chosen |= set(began[:_N_LOST])
@@ -87,42 +96,39 @@ def write_frame_images(path: Path, result: RunResult, positions: list[int]) -> N
     ):
         for position in positions:
             row = result.rows[position]
-            image = _read(result.sequence, row.index)
-            if image is not None:
+            small = _find(result, position)
+            if small is not None:
                 points = _points_seen(result, position)
-                jpeg = draw_frame(image, points, result.settings)
+                jpeg = draw_frame(small, points, result.settings)
                 # A date of its own would make the bytes of two equal runs differ.
                 archive.writestr(zipfile.ZipInfo(f"{row.index:06d}.jpg"), jpeg)
 
 
-def draw_frame(image: ByteArray, points: FloatArray, settings: Settings) -> bytes:
-    """Draw an image small, with points in it.
+def draw_frame(small: SmallImage, points: FloatArray, settings: Settings) -> bytes:
+    """Draw points into an image.
 
     Parameters
     ----------
-    image
-        uint8 (h, w), (h, w, 3) or (h, w, 4), as the sequence gives it.
+    small
+        The image; its picture is changed.
     points
         In the camera's frame, float64 (p, 3), lengths in any unit.
     settings
-        Of the camera: its lens, the order of colours.
+        Of the camera: its lens.
 
     Returns
     -------
     bytes
         A JPEG file.
     """
-    shown = _as_bgr(image, rgb=settings.camera.rgb)
-    height, width = shown.shape[:2]
-    scale = min(1.0, _WIDTH / width)
-    size = (max(1, round(scale * width)), max(1, round(scale * height)))
-    shown = np.asarray(cv2.resize(shown, size, interpolation=cv2.INTER_AREA), np.uint8)
+    shown = small.picture
+    size = shown.shape[1::-1]
     front = points[points[:, 2] > 1e-6]
     if len(front):
         camera = settings.camera
         origin = np.zeros(3)
         pixels = cv2.projectPoints(front, origin, origin, camera.matrix, camera.distortion)[0]
-        pixels = pixels[:, 0] * scale
+        pixels = pixels[:, 0] * small.scale
         inside = np.all((pixels > -1) & (pixels < np.array(size) + 1), axis=1)
         for radius, colour in ((3, _RIM), (2, _FILL)):
             for u, v in np.rint(pixels[inside]).astype(int).tolist():
@@ -132,21 +138,18 @@ def draw_frame(image: ByteArray, points: FloatArray, settings: Settings) -> byte
     return jpeg.tobytes()
 
 
-def _read(source: Source, index: int) -> ByteArray | None:
+def _find(result: RunResult, position: int) -> SmallImage | None:
+    """The image of a frame, read again or kept."""
+    if result.kept_images is not None:
+        return result.kept_images.find(position)
+    source, index = result.sequence, result.rows[position].index
     if not has_images(source):
         return None
     try:
-        return source.load(index).image
+        return shrink(source.load(index).image, rgb=result.settings.camera.rgb)
     except (OrbSlamError, OSError) as error:
         _log.debug("no picture of frame %d: %s", index, describe_error(error))
         return None
-
-
-def _as_bgr(image: ByteArray, *, rgb: bool) -> npt.NDArray[np.uint8]:
-    if image.ndim == 2:
-        return np.repeat(image[:, :, None], 3, axis=2)
-    three = image[:, :, 2::-1] if rgb else image[:, :, :3]
-    return np.ascontiguousarray(three)
 
 
 def _points_seen(result: RunResult, position: int) -> FloatArray:

@@ -8,6 +8,7 @@ import json
 import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +17,12 @@ import numpy.typing as npt
 
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._files import describe_error
-from orbslam2py.errors import DatasetError
+from orbslam2py.errors import DatasetError, SettingsError
+from orbslam2py.maps.map_arrays import MapArrays
 from orbslam2py.maps.ply import read_points
 from orbslam2py.runs.frame_table import STAGES
 from orbslam2py.runs.result import empty_trajectory
+from orbslam2py.settings.sensor import Sensor
 from orbslam2py.trajectory import Trajectory, read_tum
 
 
@@ -37,6 +40,10 @@ class Frames:
     inliers: FloatArray
     is_keyframe: npt.NDArray[np.bool_]
     visual_odometry: npt.NDArray[np.bool_]
+    is_weak: npt.NDArray[np.bool_]
+    """Whether the pose has weak evidence."""
+    found: FloatArray
+    """Share of the points that should be in view that were found."""
     has_pose: npt.NDArray[np.bool_]
     """Whether there is a pose."""
     milliseconds: dict[str, FloatArray]
@@ -70,6 +77,40 @@ class RunFolder:
     """Map points (p, 3) in the frame and unit of `path`."""
     images: dict[int, bytes]
     """JPEG of some frames by their number in the sequence."""
+    places: list[Path]
+    """Folders in which the files are looked for; each is taken from the first that has it."""
+
+    @cached_property
+    def online(self) -> Trajectory:
+        """The path as first tracked, without gaps."""
+        return _read_path(self.places, "trajectory_online.txt")
+
+    @cached_property
+    def map(self) -> MapArrays | None:
+        """What is drawn of the last map; None if the file is not there.
+
+        Raises
+        ------
+        MapFileError
+            If it is not whole.
+        """
+        file = _find(self.places, "map.npz")
+        return None if file is None else MapArrays.load(file)
+
+    @property
+    def sensor(self) -> Sensor:
+        """What delivered the images.
+
+        Raises
+        ------
+        DatasetError
+            If the report names none that there is.
+        """
+        try:
+            return Sensor(self.report["sensor"])
+        except SettingsError as error:
+            file = self.folder / "report.json"
+            raise DatasetError(f"{file} is no report of a run; give another folder") from error
 
     @property
     def name(self) -> str:
@@ -123,6 +164,7 @@ def read_run(folders: Path | Sequence[Path]) -> RunFolder:
         truth=None if truth is None else read_tum(truth),
         points=np.zeros((0, 3)) if points is None else read_points(points),
         images=_read_images(_find(places, "frame_images.zip")),
+        places=places,
     )
 
 
@@ -196,6 +238,7 @@ def _frames_of(columns: dict[str, list[str]]) -> Frames:
     def numbers(name: str) -> FloatArray:
         return np.array([text or "nan" for text in columns[name]], dtype=np.float64)
 
+    nothing = [""] * len(columns["index"])
     return Frames(
         index=np.array(columns["index"], dtype=np.int64),
         timestamps=np.array(columns["timestamp"], dtype=np.float64),
@@ -205,6 +248,9 @@ def _frames_of(columns: dict[str, list[str]]) -> Frames:
         inliers=numbers("inliers"),
         is_keyframe=np.array([text == "1" for text in columns["keyframe"]], bool),
         visual_odometry=np.array([text == "1" for text in columns["visual_odometry"]], bool),
+        # Folders of earlier versions do not have the next two.
+        is_weak=np.array([text == "weak" for text in columns.get("evidence", nothing)], bool),
+        found=np.array([text or "nan" for text in columns.get("found", nothing)], np.float64),
         has_pose=np.array([text != "" for text in columns["tx"]], bool),
         milliseconds={
             stage: numbers(f"ms_{stage}") for stage in STAGES if f"ms_{stage}" in columns

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections import Counter
 
 import numpy as np
+import numpy.typing as npt
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py.runs.report_page.explained import STAGES
@@ -18,6 +19,7 @@ from orbslam2py.runs.report_page.story import Story, positions_of
 #: Class and name of every state, in the order of the legend.
 STATES = {
     "OK": ("ok", "tracked"),
+    "WEAK": ("weak", "tracked with weak evidence"),
     "LOST": ("lost", "lost"),
     "NOT_INITIALIZED": ("waiting", "no map yet"),
     "DROPPED": ("dropped", "dropped"),
@@ -56,7 +58,7 @@ def state_strip(story: Story) -> Markup:
     """States over time, keyframes and events below them."""
     frames = story.run.frames
     seconds = frames.seconds
-    there = Counter(frames.state.tolist())
+    there = Counter(_shown_states(frames).tolist())
     legend = [
         (look, f"{name}: {there[state]}")
         for state, (look, name) in STATES.items()
@@ -89,6 +91,27 @@ def inliers_plot(story: Story) -> TimePlot:
         "Inliers",
         "keypoints that agree with the pose",
         [Line("", frames.seconds, inliers, "s-inliers")],
+        story.duration,
+        spans=untracked(story),
+        marks=loop_marks(story),
+    )
+
+
+def found_plot(story: Story) -> TimePlot | None:
+    """Share of the points that should be in view that were found; None where nobody counted."""
+    frames = story.run.frames
+    if not np.isfinite(frames.found).any():
+        return None
+    weak = frames.is_weak & frames.has_pose
+    lines = [Line("", frames.seconds, 100 * frames.found, "s-inliers")]
+    if weak.any():
+        dots = Line("weak", frames.seconds[weak], 100 * frames.found[weak], "s-worst", "dots")
+        lines.append(dots)
+    return TimePlot(
+        "plot-found",
+        "Points found",
+        "% of the map points that should be in view",
+        lines,
         story.duration,
         spans=untracked(story),
         marks=loop_marks(story),
@@ -145,7 +168,7 @@ def untracked(story: Story) -> list[Span]:
     return [
         Span(span.begin, span.end, f"back {span.look}", span.title)
         for span in state_spans(story.run.frames)
-        if span.look not in ("ok", "dropped")
+        if span.look not in ("ok", "weak", "dropped")
     ]
 
 
@@ -165,17 +188,24 @@ def state_spans(frames: Frames) -> list[Span]:
         return []
     seconds = frames.seconds
     step = float(np.median(np.diff(seconds))) if len(seconds) > 1 else 1.0
-    starts = np.flatnonzero(np.append(True, frames.state[1:] != frames.state[:-1]))
+    states = _shown_states(frames)
+    starts = np.flatnonzero(np.append(True, states[1:] != states[:-1]))
     ends = np.append(starts[1:], len(frames))
     after = np.append(seconds, seconds[-1] + step)
     spans = []
     for begin, end in zip(starts.tolist(), ends.tolist(), strict=True):
-        look, name = STATES.get(str(frames.state[begin]), ("skipped", str(frames.state[begin])))
+        look, name = STATES.get(str(states[begin]), ("skipped", str(states[begin])))
         reasons = Counter(reason for reason in frames.reason[begin:end] if reason)
         why = "".join(f"; {reason} ({count})" for reason, count in reasons.most_common(3))
         title = f"{name}: frames {frames.index[begin]} to {frames.index[end - 1]}{why}"
         spans.append(Span(float(seconds[begin]), float(after[end]), look, title))
     return spans
+
+
+def _shown_states(frames: Frames) -> npt.NDArray[np.str_]:
+    """The states, with that of weak evidence told apart."""
+    shown: npt.NDArray[np.str_] = np.where(frames.is_weak & frames.has_pose, "WEAK", frames.state)
+    return shown
 
 
 def _count(times: FloatArray, ends: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -92,7 +92,11 @@ def tracking_section(story: Story) -> Markup:
     happened = table(["when", "what happened"], events) if events else None
     plots = None
     if story.run.report.get("tracked"):
-        plots = figures(run_plots.inliers_plot(story), run_plots.keyframes_plot(story))
+        plots = figures(
+            run_plots.inliers_plot(story),
+            run_plots.found_plot(story),
+            run_plots.keyframes_plot(story),
+        )
     quiet = element("p", "Never lost; no loop was closed.") if not (rows or events) else None
     return section(
         "tracking", "Tracking", run_plots.state_strip(story), quiet, reasons, happened, plots

@@ -77,7 +77,9 @@ class EarlierFrames:
             frame.clear_associations()
             estimate = search.by_reference_keyframe(frame)
         if estimate.found:
-            estimate = search.in_local_map(frame, estimate)
+            refined = search.in_local_map(frame, estimate)
+            search.settle(refined)
+            estimate = refined.estimate
         if not estimate.found:
             return False
         frame.discard_outliers()

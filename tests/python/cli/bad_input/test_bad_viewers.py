@@ -49,10 +49,18 @@ def test_without_viser_its_installation_is_told_before_the_run(
     assert not Path("runs").exists()
 
 
-def test_a_folder_without_a_run_is_named(command: CommandLine) -> None:
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("empty",), "empty holds no run: report.json is missing; give a folder that"),
+        (("nowhere",), "nowhere is no folder; give one that orbslam2py run has written"),
+        ((), "runs/latest is no folder; give one that orbslam2py run has written"),
+    ],
+)
+def test_a_folder_without_a_run_is_named(
+    command: CommandLine, arguments: tuple[str, ...], text: str
+) -> None:
     Path("empty").mkdir()
-    for arguments in (("empty",), ("nowhere",), ()):
-        done = command("view", *arguments)
-        name = arguments[0] if arguments else "runs/latest"
-        assert done.code == 2
-        assert done.err.startswith(f"Error: {name} is no folder of a run")
+    done = command("view", *arguments)
+    assert done.code == 2
+    assert done.err.startswith(f"Error: {text}")

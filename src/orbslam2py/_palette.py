@@ -51,3 +51,30 @@ STAGE_COLOURS: dict[str, Colour] = {
     "local_map": (230, 159, 0),
     "keyframe": (204, 121, 167),
 }
+
+# ---- on white, as on paper ----------------------------------------------------------------------
+PAPER_TEXT: Colour = (34, 34, 34)
+PAPER_FAINT_TEXT: Colour = (85, 85, 85)
+PAPER_LINE: Colour = (154, 154, 154)
+PAPER_GRID: Colour = (238, 238, 238)
+PAPER_PATH: Colour = (31, 95, 168)
+PAPER_TRUTH: Colour = (143, 206, 126)
+PAPER_POINTS: Colour = (201, 185, 154)
+#: Loops, and what is left unexplained.
+PAPER_LOOP: Colour = (200, 68, 44)
+#: Times without a pose, and of maps that were given up.
+PAPER_UNTRACKED: Colour = (246, 207, 198)
+PAPER_EARLIER: Colour = (226, 226, 226)
+#: From no error to the largest: a part of matplotlib's plasma, seen well on white.
+PAPER_ERRORS: tuple[Colour, ...] = (
+    (42, 5, 147),
+    (125, 3, 168),
+    (195, 61, 128),
+    (238, 127, 78),
+    (249, 154, 62),
+)
+
+
+def hexadecimal(colour: Colour) -> str:
+    """A colour as ``#rrggbb``, for matplotlib and pages."""
+    return "#{:02x}{:02x}{:02x}".format(*colour)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Relocalization: the pose of a frame in the map without a guess.
+"""Relocalization: the pose of a frame in the map when the frame before has none.
 
 Mur-Artal and Tardos, "Fast Relocalisation and Loop Closing in Keyframe-Based SLAM", ICRA 2014;
 ``docs/method/relocalization.md``.
@@ -10,7 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from orbslam2py import _core as core
+from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.slam.front_end import intrinsics
+from orbslam2py.slam.relocalization.candidates import CandidatePlaces
+from orbslam2py.slam.relocalization.place_of_loss import PlaceOfLoss
 from orbslam2py.slam.thresholds import RelocalizationThresholds
 
 
@@ -32,7 +35,7 @@ class _Candidate:
 
 
 class Relocalizer:
-    """Finds a frame in the map.
+    """Finds a frame in the map, with work for one frame that does not grow with the map.
 
     Parameters
     ----------
@@ -54,26 +57,65 @@ class Relocalizer:
         thresholds: RelocalizationThresholds | None = None,
     ) -> None:
         self._map = slam_map
-        self._keyframe_index = keyframe_index
         self._seed = seed % 2**64
-        self._limits = thresholds or RelocalizationThresholds()
+        self._limits = limits = thresholds or RelocalizationThresholds()
+        self._places = CandidatePlaces(slam_map, keyframe_index, limits)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget where tracking was lost: it was found, or the map is another one."""
+        self._place: PlaceOfLoss | None = None
+        self._failures = 0
+        self._places.reset()
+
+    def lose(self, place: PlaceOfLoss) -> None:
+        """Take where tracking was lost; it is searched from there, wider at every failure."""
+        self.reset()
+        self._place = place
 
     def relocalize(self, frame: core.TrackedFrame) -> int:
         """Find pose and associations of a described frame.
+
+        Where tracking was lost is searched first, if it is known, then keyframes that look alike.
 
         Returns
         -------
         int
             Number of inliers; 0 if the frame was not found, and then it has no associations.
         """
+        n_inliers = self._near_loss(frame)
+        if n_inliers == 0:
+            n_inliers = self._by_likeness(frame)
+        self._failures += n_inliers == 0
+        return n_inliers
+
+    def _near_loss(self, frame: core.TrackedFrame) -> int:
+        limits = self._limits
+        place = self._place
+        if place is None or frame.id - place.last.id > limits.guessed_frames:
+            return 0
+        place.follow_map(self._map)
+        ids = np.array(place.keyframes(self._map, limits), np.int64)
+        T_wc = np.array([self._map.keyframe_pose(k).inverse().matrix for k in ids])
+        wider = min(1 + limits.widening * self._failures, limits.widest)
+        for guess in place.guesses(frame.id, limits):
+            n_inliers = self._near(frame, guess, self._nearest(guess, ids, T_wc), wider)
+            if n_inliers > 0:
+                return n_inliers
+        return 0
+
+    def _by_likeness(self, frame: core.TrackedFrame) -> int:
+        limits = self._limits
         candidates = self._candidates(frame)
-        while candidates:
+        n_verified = 0
+        while candidates and n_verified < limits.verified_poses:
             remaining = []
             for candidate in candidates:
-                pose = candidate.ransac.iterate(self._limits.iterations)
-                if pose is not None:
+                pose = candidate.ransac.iterate(limits.iterations)
+                if pose is not None and n_verified < limits.verified_poses:
+                    n_verified += 1
                     n_inliers = self._verify(frame, candidate, pose)
-                    if n_inliers >= self._limits.enough:
+                    if n_inliers >= limits.enough:
                         return n_inliers
                 if not candidate.ransac.exhausted:
                     remaining.append(candidate)
@@ -100,13 +142,24 @@ class Relocalizer:
         int
             As for `relocalize`.
         """
+        every = core.snapshot_keyframes(self._map)
+        return self._near(frame, T_cw, self._nearest(T_cw, every.ids, every.T_wc), 1.0)
+
+    def _near(
+        self, frame: core.TrackedFrame, T_cw: core.Pose, keyframes: list[int], wider: float
+    ) -> int:
         limits = self._limits
         nothing = np.zeros(0, np.int64)
-        for keyframe in self._keyframes_near(T_cw):
+        for keyframe in keyframes:
             frame.clear_associations()
             frame.T_cw = T_cw
             n_matches = core.match_keyframe_by_projection(
-                self._map, keyframe, frame, nothing, limits.guess_window, limits.guess_distance
+                self._map,
+                keyframe,
+                frame,
+                nothing,
+                wider * limits.guess_window,
+                limits.guess_distance,
             )
             if n_matches < limits.matches or self._optimize(frame) < limits.inliers:
                 continue
@@ -122,27 +175,28 @@ class Relocalizer:
         frame.T_cw = None
         return 0
 
-    def _keyframes_near(self, T_cw: core.Pose) -> list[int]:
-        keyframes = core.snapshot_keyframes(self._map)
-        T_wc = T_cw.inverse().matrix
-        distances = np.linalg.norm(keyframes.T_wc[:, :3, 3] - T_wc[:3, 3], axis=1)
+    def _nearest(self, T_cw: core.Pose, ids: IntArray, T_wc: FloatArray) -> list[int]:
+        """The keyframes (k,) with poses (k, 4, 4) that are nearest and look the same way."""
+        if not len(ids):
+            return []
+        guess = T_cw.inverse().matrix
+        distances = np.linalg.norm(T_wc[:, :3, 3] - guess[:3, 3], axis=1)
         # The optical axes; whoever looks the other way sees other points.
-        cosines = keyframes.T_wc[:, :3, 2] @ T_wc[:3, 2]
+        cosines = T_wc[:, :3, 2] @ guess[:3, 2]
         distances[cosines < self._limits.guess_cosine] = np.inf
         nearest = np.argsort(distances, kind="stable")[: self._limits.guess_keyframes]
-        return [int(keyframes.ids[i]) for i in nearest if np.isfinite(distances[i])]
+        return [int(ids[i]) for i in nearest if np.isfinite(distances[i])]
 
     def _candidates(self, frame: core.TrackedFrame) -> list[_Candidate]:
-        found = core.find_relocalization_candidates(self._keyframe_index, self._map, frame.features)
         candidates = []
-        for place in found:
+        for keyframe in self._places.of(frame.features, self._place, self._failures):
             matches = core.TrackedFrame(frame.features)
             n_matches = core.match_keyframe_by_words(
-                self._map, place.keyframe, matches, self._limits.ratio
+                self._map, keyframe, matches, self._limits.ratio
             )
             if n_matches >= self._limits.matches:
-                seed = core.seed_of(self._seed, frame.id, place.keyframe)
-                candidates.append(_Candidate(place.keyframe, matches, seed))
+                seed = core.seed_of(self._seed, frame.id, keyframe)
+                candidates.append(_Candidate(keyframe, matches, seed))
         return candidates
 
     def _verify(self, frame: core.TrackedFrame, candidate: _Candidate, pose: core.PnpPose) -> int:

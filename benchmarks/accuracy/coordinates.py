@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Keypoints of coarse levels at their true place, and where the original puts them.
+
+Every sequence that has a ground truth is run with both, deterministic, with every sensor that its
+folder serves: the ATE, and the error over one frame, in which the place of a keypoint shows most.
+Runs that begin a few frames later say how much a figure varies by itself.
+
+    python -m benchmarks.accuracy.coordinates --starts 3
+    python -m benchmarks.accuracy.coordinates --sequences ~/rgbd_dataset_freiburg1_desk
+"""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.harness.arguments import add_counts, add_sensors, add_width, console_of, new_parser
+from benchmarks.harness.folders import needed_shared_folder
+from benchmarks.harness.tables import new_table
+from orbslam2py import DatasetError, Sensor, SettingsError, System, Trajectory, open_sequence
+from orbslam2py._arrays import FloatArray
+from orbslam2py.datasets import Sequence
+from orbslam2py.evaluation import align, match_poses, relative_errors
+from orbslam2py.settings import Settings
+
+_FEWEST = 5  # poses that say something
+_FOLLOWS = 1.5  # a pose belongs to the next image if it comes within so many median intervals
+
+
+@dataclass(frozen=True)
+class Errors:
+    """What one run was off by; RMSE, metres and degrees."""
+
+    ate: float
+    step: float
+    step_degrees: float
+    tracked: float
+    keyframes: int
+
+
+def errors_of(sequence: Sequence, start: int, *, original: bool) -> Errors | None:
+    """One deterministic run of a sequence; None if it has too few poses to be judged."""
+    truth = sequence.ground_truth()
+    assert truth is not None
+    settings = with_coordinates(sequence.settings, original=original)
+    with System(settings, sequence.sensor, deterministic=True, seed=0) as slam:
+        for index in range(start, len(sequence)):
+            images, time = sequence.load(index), sequence.timestamps[index]
+            if images.depth is not None:
+                slam.track_rgbd(images.image, images.depth, time)
+            elif images.right is not None:
+                slam.track_stereo(images.image, images.right, time)
+            else:
+                slam.track_monocular(images.image, time)
+        path, keyframes = slam.trajectory(), slam.n_keyframes
+    path = path.select(~path.lost)
+    judged = judge(path, truth, with_scale=sequence.sensor is Sensor.MONOCULAR)
+    if judged is None:
+        return None
+    return Errors(*judged, len(path) / (len(sequence) - start), keyframes)
+
+
+def with_coordinates(settings: Settings, *, original: bool) -> Settings:
+    """The same settings with one of the two conventions."""
+    return replace(settings, orb=replace(settings.orb, original_coordinates=original))
+
+
+def judge(
+    path: Trajectory, truth: Trajectory, *, with_scale: bool
+) -> tuple[float, float, float] | None:
+    """ATE [m] and error over one frame [m], [degrees] of a path without lost poses."""
+    if len(path) < _FEWEST:
+        return None
+    i, j = match_poses(path, truth)
+    if len(i) < _FEWEST:
+        return None
+    true = truth.T_wc[j]
+    aligned = align(path.T_wc[i][:, :3, 3], true[:, :3, 3], with_scale=with_scale)
+    poses = aligned.apply_to_poses(path.T_wc[i])
+    gaps = np.diff(path.timestamps[i])
+    steps = np.flatnonzero(gaps < _FOLLOWS * np.median(gaps))
+    metres, radians = relative_errors(poses, true, (steps, steps + 1))
+    off = np.linalg.norm(poses[:, :3, 3] - true[:, :3, 3], axis=1)
+    return _rms(off), _rms(metres), float(np.degrees(_rms(radians)))
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def rows_of(sequence: Sequence, name: str, n_starts: int) -> Iterator[tuple[str, ...]]:
+    """One row for each convention, then the ratio of the medians."""
+    medians = []
+    for original in (True, False):
+        runs = [errors_of(sequence, start, original=original) for start in range(n_starts)]
+        judged = [run for run in runs if run is not None]
+        if not judged:
+            yield (name, str(sequence.sensor), _named(original), "no path")
+            return
+        columns = [[getattr(run, field) for run in judged] for field in ERRORS]
+        medians.append([statistics.median(column) for column in columns])
+        yield (
+            name,
+            str(sequence.sensor),
+            _named(original),
+            *(_spread(column) for column in columns),
+            f"{100 * min(run.tracked for run in judged):.0f} %",
+            str(statistics.median_low([run.keyframes for run in judged])),
+        )
+    before, after = medians
+    yield ("", "", "ratio", *(f"{new / old:.3f}" for old, new in zip(before, after, strict=True)))
+
+
+ERRORS = ("ate", "step", "step_degrees")
+
+
+def _named(original: bool) -> str:
+    return "the original's" if original else "true places"
+
+
+def _spread(values: list[float]) -> str:
+    middle = f"{statistics.median(values):.5f}"
+    if len(values) == 1:
+        return middle
+    return f"{middle} ({min(values):.5f}..{max(values):.5f})"
+
+
+def judged_sequences(folders: Iterable[Path], sensors: Iterable[str]) -> Iterator[Sequence]:
+    """The sequences that have a ground truth, with every sensor that they serve."""
+    for folder in folders:
+        for sensor in sensors:
+            try:
+                sequence = open_sequence(folder, sensor)
+            except (DatasetError, SettingsError):
+                continue  # not a sequence, or not for this sensor
+            if sequence.ground_truth() is not None:
+                yield sequence
+
+
+def main() -> None:
+    parser = new_parser(__doc__)
+    add_counts(parser, starts=(1, "first frames that runs begin with"))
+    parser.add_argument(
+        "--sequences", nargs="+", type=Path, help="folders [those shared by the tests]"
+    )
+    add_sensors(parser)
+    add_width(parser)
+    arguments = parser.parse_args()
+    console = console_of(arguments)
+    folders = arguments.sequences or sorted((needed_shared_folder() / "sequences").iterdir())
+    table = new_table(
+        "Places of keypoints: RMSE against the truth, median (least..most)",
+        ["sequence", "sensor", "keypoints"],
+        ["ATE [m]", "over one\nframe [m]", "over one\nframe [deg]", "tracked", "keyframes"],
+    )
+    for sequence in judged_sequences(folders, arguments.sensors):
+        for row in rows_of(sequence, sequence.name, arguments.starts):
+            table.add_row(*row)
+    console.print(table)
+
+
+if __name__ == "__main__":
+    main()

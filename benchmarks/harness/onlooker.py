@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Somebody who looks at the viewer's page and draws nothing."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from types import TracebackType
+
+# Takes what a browser takes; says where it looks from, as every page does when it has loaded.
+_ONLOOKER = """
+import sys
+import msgspec
+import viser
+from websockets.sync.client import connect
+
+camera = {
+    "type": "ViewerCameraMessage", "wxyz": (1.0, 0.0, 0.0, 0.0), "position": (0.0, 0.0, -3.0),
+    "fov": 0.9, "near": 0.01, "far": 1000.0, "image_height": 900, "image_width": 1600,
+    "look_at": (0.0, 0.0, 0.0), "up_direction": (0.0, -1.0, 0.0),
+}
+protocol = f"viser-v{viser.__version__}"
+address = sys.argv[1].replace("http", "ws")
+with connect(address, subprotocols=[protocol], max_size=None) as page:
+    page.send(msgspec.msgpack.encode(camera))
+    n_bytes = 0
+    try:
+        for message in page:
+            n_bytes += len(message)
+    finally:
+        print(n_bytes, flush=True)
+"""
+
+
+class Onlooker:
+    """A process that takes what a browser takes, until the page ends or the block does.
+
+    Parameters
+    ----------
+    address : str
+        Of the page.
+    """
+
+    def __init__(self, address: str) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", _ONLOOKER, address],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def n_bytes(self) -> int:
+        """Bytes that it was sent, once the page has ended.
+
+        Raises
+        ------
+        RuntimeError
+            With its words, if it has not looked.
+        """
+        printed, complaints = self._process.communicate(timeout=60)
+        if not printed.strip().isdigit():
+            raise RuntimeError(f"nobody looked: {complaints}")
+        return int(printed)
+
+    def __enter__(self) -> Onlooker:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._process.kill()
+        self._process.communicate()

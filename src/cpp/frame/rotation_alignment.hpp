@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Geometry>
+#include <optional>
+
+#include "camera/camera.hpp"
+#include "frame/small_image.hpp"
+
+namespace orbslam {
+
+/// How a camera turned between two images, by the images alone.
+struct ImageRotation {
+  Eigen::Quaterniond R_21 = Eigen::Quaterniond::Identity();  ///< directions of camera 1 into 2
+  double correlation = 0;  ///< of the grey values where both see, -1 to 1
+};
+
+/// Aligns small images of one size as if the camera had only turned, by up to a quarter of what it
+/// sees: the shift with the best correlation first, then Gauss-Newton over the rotation, gain and
+/// offset of the grey values (Klein and Murray 2008, sections 3 and 4.2; Benhimane and Malis 2004).
+/// None when the images are missing or of different sizes, have no contrast, or the iterations
+/// leave the image. `pinhole` is that of the whole image; the lens is not undistorted. Near things
+/// that move by parallax pull the result; it says where to search, never where the camera is. See
+/// docs/method/tracking.md#harder-search.
+std::optional<ImageRotation> align_rotation(const SmallImage& first, const SmallImage& second,
+                                            const Pinhole& pinhole);
+
+}  // namespace orbslam

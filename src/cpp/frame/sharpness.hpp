@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "frame/frame.hpp"
+
+namespace orbslam {
+
+/// Sum of the corners' responses on the two finest levels, in grey levels: blur takes away the
+/// finest detail first, and with it number and strength of these corners. To be compared with that
+/// of other frames of the same camera only. See docs/method/relocalization.md#blurred-frames.
+double sharpness(const Frame& frame);
+
+}  // namespace orbslam

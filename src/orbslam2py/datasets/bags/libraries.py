@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What reads messages and compressed parts of bags: rosbags, and what it brings along."""
+
+from __future__ import annotations
+
+import importlib
+import io
+import sys
+from functools import lru_cache
+from typing import Any, BinaryIO
+
+from orbslam2py.errors import DatasetError
+
+#: The bytes that compressed data (Zstandard) begin with; no serialised message does.
+ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
+_ZSTD = "compression.zstd" if sys.version_info >= (3, 14) else "backports.zstd"
+
+
+def require(name: str) -> Any:
+    """Import a module of rosbags or of what it needs.
+
+    Raises
+    ------
+    DatasetError
+        If it is not installed, with the line that installs it.
+    """
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise DatasetError(
+            "bags are read with the package rosbags, which is not installed; "
+            "install it: pip install 'orbslam2py[bags]'"
+        ) from error
+
+
+def lz4_decompress(content: bytes) -> bytes:
+    """Decompress a frame of LZ4."""
+    return bytes(require("lz4.frame").decompress(content))
+
+
+def zstd_decompress(content: bytes, most: int | None = None) -> bytes:
+    """Decompress Zstandard data, or so much that the first bytes are known.
+
+    Raises
+    ------
+    OSError
+        If the data are damaged.
+    """
+    zstd = require(_ZSTD)
+    try:
+        if most is None:
+            return bytes(zstd.decompress(content))
+        return bytes(zstd.ZstdDecompressor().decompress(content, max_length=most))
+    except zstd.ZstdError as error:
+        raise OSError(f"damaged Zstandard data: {error}") from error
+
+
+def open_zstd(stream: BinaryIO) -> io.BufferedIOBase:
+    """Open a stream of Zstandard data for reading."""
+    opened: io.BufferedIOBase = require(_ZSTD).open(stream, "rb")
+    return opened
+
+
+@lru_cache(maxsize=2)
+def type_store(encoding: str) -> Any:
+    """Return rosbags' types for messages of ROS 1 (``ros1``) or ROS 2 (``cdr``)."""
+    typesys = require("rosbags.typesys")
+    stores = typesys.Stores
+    store = stores.ROS1_NOETIC if encoding == "ros1" else stores.ROS2_HUMBLE
+    return typesys.get_typestore(store)

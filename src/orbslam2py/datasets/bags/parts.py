@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the files of all kinds of bags have in common: topics, where messages lie, chunks."""
+
+from __future__ import annotations
+
+import bz2
+import threading
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+from orbslam2py.datasets.bags.libraries import lz4_decompress, zstd_decompress
+from orbslam2py.errors import DatasetError
+
+#: Chunks that are kept decompressed: the cameras' messages of one moment lie close together.
+_KEPT_CHUNKS = 4
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Messages of one type under one name, as a file declares them.
+
+    Attributes
+    ----------
+    topic
+        Its name, with a ``/`` before it.
+    kind
+        Type of the messages, as in ROS 2: ``sensor_msgs/msg/Image``.
+    encoding
+        How they are serialised: ``ros1``, ``cdr``, or something else.
+    """
+
+    topic: str
+    kind: str
+    encoding: str
+
+
+class Place(NamedTuple):
+    """Where a message lies in its file; what the numbers mean is the file's own business."""
+
+    #: When it was recorded, nanoseconds.
+    recorded: int
+    #: Number of its chunk; -1 if it lies open in the file.
+    chunk: int
+    #: Where it begins (or its row in a database).
+    offset: int
+    #: Bytes of it.
+    size: int
+
+
+class BagFile(Protocol):
+    """One file of a bag, whatever its kind.
+
+    Attributes
+    ----------
+    doubts
+        What is wrong with the file although it can be read: sentences without the file's name.
+    """
+
+    doubts: list[str]
+
+    def counts(self) -> dict[Channel, int]:
+        """Tell the channels and how many messages each has."""
+        ...
+
+    def places(self, channel: Channel) -> list[Place]:
+        """Tell where the messages of a channel lie, in the order of recording."""
+        ...
+
+    def read(self, place: Place, most: int | None = None) -> bytes:
+        """Read a message, or its first bytes."""
+        ...
+
+
+def normal_kind(kind: str) -> str:
+    """Name a type as ROS 2 does today: ``sensor_msgs/Image`` is ``sensor_msgs/msg/Image``."""
+    package, _, rest = kind.partition("/")
+    return kind if not rest or "/" in rest else f"{package}/msg/{rest}"
+
+
+def normal_topic(topic: str) -> str:
+    """Name a topic with one ``/`` before each part."""
+    return "/" + "/".join(part for part in topic.split("/") if part)
+
+
+class ChunkCache:
+    """The last chunks that were decompressed; may be used by several threads.
+
+    Parameters
+    ----------
+    load
+        Reads and decompresses the chunk of a number.
+    """
+
+    def __init__(self, load: Callable[[int], bytes]) -> None:
+        self._load = load
+        self._kept: OrderedDict[int, bytes] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def __getitem__(self, number: int) -> bytes:
+        with self._lock:
+            if number in self._kept:
+                self._kept.move_to_end(number)
+                return self._kept[number]
+            content = self._load(number)
+            self._kept[number] = content
+            while len(self._kept) > _KEPT_CHUNKS:
+                self._kept.popitem(last=False)
+            return content
+
+
+def decompress(content: bytes, compression: str) -> bytes:
+    """Decompress a chunk.
+
+    Raises
+    ------
+    DatasetError
+        If it is damaged, or compressed in an unknown way; without the file's name.
+    """
+    try:
+        if compression in ("", "none"):
+            return content
+        if compression == "bz2":
+            return bz2.decompress(content)
+        if compression == "lz4":
+            return lz4_decompress(content)
+        if compression == "zstd":
+            return zstd_decompress(content)
+    except (OSError, ValueError, RuntimeError, EOFError) as error:
+        raise DatasetError(f"a chunk ({compression}) is damaged: {error}") from error
+    raise DatasetError(
+        f"its chunks are compressed as '{compression}', which is not known here; convert the bag"
+    )

@@ -1,0 +1,287 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A bag of ROS 1 or ROS 2 as a sequence, without ROS."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbslam2py._arrays import ByteArray, FloatArray
+from orbslam2py.datasets.bags.bag import Bag, Message, Topic
+from orbslam2py.datasets.bags.calibration import CameraInfo, settings_of_camera, settings_of_pair
+from orbslam2py.datasets.bags.messages import CAMERA_INFO, read_message
+from orbslam2py.datasets.bags.pixels import decode_depth, decode_image, units_per_metre
+from orbslam2py.datasets.bags.poses import read_poses
+from orbslam2py.datasets.bags.timing import (
+    TimedMessages,
+    pair_messages,
+    rate_of,
+    require_one_size,
+    stamps_of,
+    time_messages,
+    warn_of_gaps,
+)
+from orbslam2py.datasets.bags.topics import ImageTopic, TopicChoice, parse_topics
+from orbslam2py.datasets.base import Images, choose_sensor
+from orbslam2py.datasets.choose_settings import SettingsChoice
+from orbslam2py.datasets.frames import FramesInOrder
+from orbslam2py.datasets.rectification import Rectifier
+from orbslam2py.errors import DatasetError, ImageError
+from orbslam2py.settings import Sensor, Settings, resolve_settings
+from orbslam2py.trajectory import Trajectory
+
+_log = logging.getLogger(__name__)
+
+#: So many CameraInfo are looked at to find one of a calibrated camera.
+_MOST_INFOS = 10
+
+
+class BagSequence(FramesInOrder):
+    """The images of a bag; see `datasets.base.Sequence`.
+
+    Images are read when they are asked for, by their place in the file; the bag is never in memory
+    as a whole.
+
+    Parameters
+    ----------
+    path
+        A file of ROS 1 (``.bag``) or ROS 2 (``.db3``, ``.mcap``), or the folder of a recording.
+    sensor
+        What to deliver images for; by default the richest there are images for.
+    settings
+        Settings, a file, a built-in name, or None for what the CameraInfo of the bag tell.
+    topics
+        Names of topics by their roles, as a dictionary or as ``left=/a,right=/b``: ``left`` (or
+        ``image``), ``right``, ``depth``, ``left_info`` (or ``info``), ``right_info``, ``truth``. By
+        default guessed by types and names.
+
+    Raises
+    ------
+    DatasetError
+        If it is no bag, has no images for the sensor, or topics cannot be told.
+    SettingsError
+        If the settings given are wrong.
+    """
+
+    #: Direction of up in the world of the true poses is not known.
+    up_in_truth: FloatArray | None = None
+
+    def __init__(
+        self,
+        path: str | Path,
+        sensor: Sensor | str | None = None,
+        *,
+        settings: SettingsChoice = None,
+        topics: Mapping[str, str] | str | None = None,
+    ) -> None:
+        self.path = Path(path)
+        self.name = self.path.resolve().name.partition(".")[0]
+        named = parse_topics(topics) if isinstance(topics, str) else dict(topics or {})
+        self._bag = Bag(self.path)
+        self.layout = self._bag.layout
+        for doubt in self._bag.doubts:
+            _log.warning("%s", doubt)
+        choice = TopicChoice(self._bag, named)
+        self.sensor = choose_sensor(self.path, sensor, choice.sensors)
+        self.topics = choice.choose(self.sensor)
+        self._chosen = None if settings is None else resolve_settings(settings, self.sensor)
+        self._list_images()
+        self._stamps = stamps_of(self._nanoseconds)
+        warn_of_gaps(self.path, self.timestamps)
+        names = [one.topic.name for one in self._streams]
+        _log.info("%s: %d frames of %s", self.path, len(self), " and ".join(names))
+
+    @cached_property
+    def settings(self) -> Settings:
+        """The settings the caller chose, or `default_settings`."""
+        return self.default_settings() if self._chosen is None else self._chosen
+
+    def default_settings(self) -> Settings:
+        """Make settings of the CameraInfo in the bag.
+
+        Raises
+        ------
+        DatasetError
+            If there is none, or it cannot be used.
+        """
+        return self._default_settings
+
+    @cached_property
+    def _default_settings(self) -> Settings:
+        left = self._camera_info(self.topics.left, self.topics.left_info)
+        fps = rate_of(self.timestamps)
+        if self.topics.right is not None:
+            right = self._camera_info(self.topics.right, self.topics.right_info)
+            rectified = self.topics.left.is_rectified and self.topics.right.is_rectified
+            return settings_of_pair(left, right, fps, rectified=rectified)
+        depth = self.topics.depth
+        return settings_of_camera(
+            left,
+            self.sensor,
+            fps,
+            rectified=self.topics.left.is_rectified,
+            depth_factor=None if depth is None else units_per_metre(depth.encoding),
+        )
+
+    def __len__(self) -> int:
+        return len(self._nanoseconds)
+
+    @property
+    def timestamps(self) -> FloatArray:
+        """Time of every frame in seconds, float64 (n,): the stamps of the (left) images."""
+        return self._stamps.seconds
+
+    def timestamp_text(self, index: int, /) -> str:
+        """Return the time of a frame in seconds, with nine decimals."""
+        return self._stamps.texts[index]
+
+    def load(self, index: int, /) -> Images:
+        """Read (and rectify) the images of a frame; see `datasets.base.Sequence.load`."""
+        if not 0 <= index < len(self):
+            raise IndexError(f"frame {index} of {len(self)}")
+        left, *others = (messages[index] for messages in self._messages)
+        image = self._image(self.topics.left, left, 0)
+        if self.topics.right is not None:
+            return Images(image, right=self._image(self.topics.right, others[0], 1))
+        if self.topics.depth is not None:
+            return Images(image, depth=self._depth(self.topics.depth, others[0], image))
+        return Images(image)
+
+    def ground_truth(self) -> Trajectory | None:
+        """Read the poses of the topic ``truth``; see `datasets.base.Sequence.ground_truth`."""
+        topic = self.topics.truth
+        return None if topic is None else read_poses(self._bag, topic)
+
+    # ---- images ----------------------------------------------------------------------------------
+    @property
+    def _streams(self) -> list[ImageTopic]:
+        topics = (self.topics.left, self.topics.right, self.topics.depth)
+        return [one for one in topics if one is not None]
+
+    def _list_images(self) -> None:
+        """Find the messages of every frame."""
+        timed = [time_messages(self._bag, one.topic) for one in self._streams]
+        for one, messages in zip(self._streams, timed, strict=True):
+            require_one_size(self.path, one.topic, messages.sizes)
+        self._check_sizes(timed)
+        first = timed[0]
+        self._nanoseconds, self._messages = first.nanoseconds, [first.messages]
+        if len(timed) > 1:
+            names = (self._streams[0].topic.name, self._streams[1].topic.name)
+            i, j = pair_messages(self.path, first, timed[1], names)
+            self._nanoseconds = [first.nanoseconds[k] for k in i]
+            self._messages = [[first.messages[k] for k in i], [timed[1].messages[k] for k in j]]
+
+    def _check_sizes(self, timed: list[TimedMessages]) -> None:
+        left, *others = self._streams
+        for other in others:
+            if other.size == left.size or other.size is None or left.size is None:
+                continue
+            sizes = [
+                f"{one.topic.name} {one.size[0]} x {one.size[1]}"
+                for one in (left, other)
+                if one.size
+            ]
+            remedy = (
+                "take the topic of depth that is registered to the colour camera (--topics depth=)"
+                if other is self.topics.depth
+                else "name two cameras of one size with --topics"
+            )
+            raise DatasetError(f"{self.path}: images differ in size, {', '.join(sizes)}; {remedy}")
+        depth = self.topics.depth
+        if depth is not None and timed[0].frame != timed[1].frame:
+            _log.warning(
+                "%s: depth of %s is in the coordinates '%s', the images are in '%s': if it is not "
+                "registered to them, the result is wrong",
+                *(self.path, depth.topic.name, timed[1].frame, timed[0].frame),
+            )
+
+    def _message(self, one: ImageTopic, message: Message) -> Any:
+        try:
+            content = self._bag.read(message)
+            return read_message(content, one.topic.kind, one.topic.encoding)
+        except DatasetError as error:
+            raise ImageError(f"{self._where(one)}: {error}") from error
+
+    def _image(self, one: ImageTopic, message: Message, camera: int) -> ByteArray:
+        rgb = self.settings.camera.rgb
+        try:
+            read = self._message(one, message)
+            image = decode_image(read, compressed=one.is_compressed, rgb=rgb)
+        except ImageError as error:
+            raise ImageError(f"{self._where(one)}: {error}") from error
+        size = (image.shape[1], image.shape[0])
+        if one.size is not None and size != one.size:
+            raise ImageError(
+                f"an image of {self._where(one)} is {size[0]} x {size[1]}, the first one "
+                f"{one.size[0]} x {one.size[1]}"
+            )
+        if self.sensor is Sensor.STEREO and self._rectifiers is not None:
+            return self._rectifiers[camera].rectify(image, f"an image of {self._where(one)}")
+        return image
+
+    def _depth(self, one: ImageTopic, message: Message, image: ByteArray) -> NDArray[np.generic]:
+        try:
+            depth = decode_depth(self._message(one, message), compressed=one.is_compressed)
+        except ImageError as error:
+            raise ImageError(f"{self._where(one)}: {error}") from error
+        if depth.shape != image.shape[:2]:
+            raise ImageError(
+                f"depth of {self._where(one)} is {depth.shape[1]} x {depth.shape[0]}, its image "
+                f"{image.shape[1]} x {image.shape[0]}"
+            )
+        return depth
+
+    @cached_property
+    def _rectifiers(self) -> tuple[Rectifier, Rectifier] | None:
+        rectification = self.settings.rectification
+        if rectification is None:
+            return None
+        return Rectifier(rectification.left), Rectifier(rectification.right)
+
+    def _where(self, one: ImageTopic) -> str:
+        return f"{one.topic.name} in {self.path}"
+
+    # ---- calibration -----------------------------------------------------------------------------
+    def _camera_info(self, image: ImageTopic, topic: Topic | None) -> CameraInfo:
+        """Return the first calibration of a camera.
+
+        Raises
+        ------
+        DatasetError
+            If there is none, or it is for images of another size.
+        """
+        advice = (
+            "give --settings with a file or a built-in name; 'orbslam2py settings new' makes a "
+            "file of the numbers of the camera"
+        )
+        if topic is None:
+            infos = [one.name for one in self._bag.topics if one.kind == CAMERA_INFO and one.n]
+            named = f"take one of {', '.join(infos)} with --topics info=..., or " if infos else ""
+            raise DatasetError(
+                f"no settings for {self.path}: it has no CameraInfo for {image.topic.name}; "
+                f"{named}{advice}"
+            )
+        what = f"{topic.name} in {self.path}"
+        for message in self._bag.messages(topic)[:_MOST_INFOS]:
+            read = read_message(self._bag.read(message), topic.kind, topic.encoding)
+            info = CameraInfo.of(read, what)
+            if info is not None:
+                break
+        else:
+            raise DatasetError(
+                f"no settings for {self.path}: {topic.name} is of a camera that was not "
+                f"calibrated; {advice}"
+            )
+        if image.size is not None and info.size != image.size:
+            raise DatasetError(
+                f"{what} is for {info.size[0]} x {info.size[1]} pixels, but images of "
+                f"{image.topic.name} have {image.size[0]} x {image.size[1]}; {advice}"
+            )
+        return info

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""SQLite files of ROS 2: a table of topics and a table of messages."""
+
+from __future__ import annotations
+
+import contextlib
+import sqlite3
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+from orbslam2py._arguments import cannot_open
+from orbslam2py.datasets.bags.libraries import ZSTD_MAGIC, zstd_decompress
+from orbslam2py.datasets.bags.parts import Channel, Place, normal_kind, normal_topic
+from orbslam2py.errors import DatasetError
+
+MAGIC = b"SQLite format 3\0"
+
+
+class SqliteFile:
+    """A database of rosbag2; see `parts.BagFile`.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Raises
+    ------
+    DatasetError
+        If it is no database, or one of something else.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.doubts: list[str] = []
+        self._lock = threading.Lock()
+        self._database = self._open()
+        tables = {
+            name for (name,) in self._rows("SELECT name FROM sqlite_master WHERE type='table'")
+        }
+        if not {"topics", "messages"} <= tables:
+            raise DatasetError(
+                f"{path} is a database, but no bag of ROS 2: it has no tables 'topics' and "
+                "'messages'; give the file that 'ros2 bag record' wrote"
+            )
+        self._channels = {
+            number: Channel(normal_topic(topic), normal_kind(kind), encoding)
+            for number, topic, kind, encoding in self._rows(
+                "SELECT id, name, type, serialization_format FROM topics ORDER BY id"
+            )
+        }
+        self._entries: dict[int, list[tuple[int, int]]] = {}
+        self._list_messages()
+
+    def counts(self) -> dict[Channel, int]:
+        """Tell the channels and how many messages each has."""
+        counts: dict[Channel, int] = {}
+        for number, channel in self._channels.items():
+            counts[channel] = counts.get(channel, 0) + len(self._entries.get(number, ()))
+        return counts
+
+    def places(self, channel: Channel) -> list[Place]:
+        """Tell where the messages of a channel lie, in the order of recording."""
+        numbers = [number for number, one in self._channels.items() if one == channel]
+        entries = [entry for number in numbers for entry in self._entries.get(number, ())]
+        return [Place(recorded, -1, row, 0) for recorded, row in sorted(entries)]
+
+    def read(self, place: Place, most: int | None = None) -> bytes:
+        """Read a message, or its first bytes.
+
+        Raises
+        ------
+        DatasetError
+            If the database is damaged there.
+        """
+        try:
+            with self._lock:
+                content = self._first_bytes(place.offset, most)
+                if content.startswith(ZSTD_MAGIC):  # single messages may be compressed
+                    return zstd_decompress(self._first_bytes(place.offset, None), most)
+        except (sqlite3.Error, OSError) as error:
+            raise DatasetError(f"a message of {self.path} cannot be read: {error}") from error
+        return content
+
+    def _first_bytes(self, row: int, most: int | None) -> bytes:
+        if most is not None and sys.version_info >= (3, 11):
+            # Reads the first page of a message, where a query would read all of it.
+            with self._database.blobopen("messages", "data", row, readonly=True) as blob:
+                return blob.read(most)
+        query = "SELECT data FROM messages WHERE id = ?"
+        content = bytes(self._database.execute(query, (row,)).fetchone()[0])
+        return content if most is None else content[:most]
+
+    def _open(self) -> sqlite3.Connection:
+        try:
+            with self.path.open("rb") as stream:
+                start = stream.read(len(MAGIC))
+        except OSError as error:
+            raise DatasetError(cannot_open(self.path, error)) from error
+        if start != MAGIC:
+            raise DatasetError(
+                f"{self.path} is no SQLite database: it does not begin like one; copy it anew"
+            )
+        address = self.path.absolute().as_uri()
+        # Read beside a program that writes it; where that is not allowed, as it lies there.
+        for mode in ("mode=ro", "immutable=1"):
+            with contextlib.suppress(sqlite3.OperationalError):
+                database = sqlite3.connect(f"{address}?{mode}", uri=True, check_same_thread=False)
+                try:
+                    database.execute("SELECT count(*) FROM sqlite_master").fetchone()
+                except sqlite3.OperationalError:
+                    database.close()
+                    raise
+                except sqlite3.DatabaseError as error:
+                    # Without it, a file that is shorter than its head says is not even looked at.
+                    database.execute("PRAGMA writable_schema = ON")
+                    self.doubts.append(f"is damaged or cut off ({error}); read as far as it goes")
+                return database
+        raise DatasetError(f"{self.path} is a database that cannot be opened; copy it anew")
+
+    def _rows(self, query: str) -> list[tuple[Any, ...]]:
+        try:
+            return self._database.execute(query).fetchall()
+        except sqlite3.DatabaseError as error:
+            raise self._damaged(error) from error
+
+    def _list_messages(self) -> None:
+        """Note when and in which row each message is, as far as the database can be read."""
+        query = "SELECT id, topic_id, timestamp FROM messages ORDER BY id"
+        try:
+            for row, topic, recorded in self._database.execute(query):
+                self._entries.setdefault(topic, []).append((recorded, row))
+        except sqlite3.DatabaseError as error:
+            if not self.doubts:
+                self.doubts.append(f"is damaged or cut off ({error}); read as far as it goes")
+
+    def _damaged(self, error: sqlite3.Error) -> DatasetError:
+        return DatasetError(f"{self.path} is damaged or cut off ({error}); copy it anew")

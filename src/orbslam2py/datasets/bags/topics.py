@@ -1,0 +1,410 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which topics of a bag are the images: told by the user, or guessed by types and names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from orbslam2py.datasets.bags.bag import Bag, Topic
+from orbslam2py.datasets.bags.messages import (
+    CAMERA_INFO,
+    COMPRESSED_IMAGE,
+    ENCODINGS,
+    IMAGE,
+    POSES,
+    read_message,
+)
+from orbslam2py.datasets.bags.pixels import base_encoding, decode_depth, decode_image, is_depth
+from orbslam2py.errors import DatasetError, OrbSlamError
+from orbslam2py.settings import Sensor
+
+#: What may be named, and by which other words.
+ROLES = ("left", "right", "depth", "left_info", "right_info", "truth")
+_ALIASES = {"image": "left", "color": "left", "colour": "left", "rgb": "left", "info": "left_info"}
+#: The topic that is taken as the true poses of the camera if nobody names one.
+_TRUTH = "/ground_truth"
+#: Ways in which image_transport sends an image: the last part of the topic's name.
+_TRANSPORTS = ("compressed", "compressedDepth")
+#: Images of one camera, the best first: rectified before raw, grey before colour.
+_OF_ONE_CAMERA = (
+    *("image_rect", "image_rect_color", "image_rect_raw"),
+    *("image_mono", "image_raw", "image_color", "image"),
+)
+#: Words in names of the left and the right camera.
+_SIDES = (
+    *(("left", "right"), ("Left", "Right"), ("l", "r"), ("infra1", "infra2")),
+    *((f"{word}{i}", f"{word}{i + 1}") for i in (0, 1) for word in ("cam", "camera", "cam_")),
+    *((f"{word}{i}", f"{word}{i + 1}") for i in (0, 1) for word in ("camera_", "image", "image_")),
+)
+_COLOUR = re.compile(r"rgb|colou?r", re.IGNORECASE)
+_REGISTERED = re.compile(r"regist|aligned", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class ImageTopic:
+    """A topic with images.
+
+    Attributes
+    ----------
+    topic
+        The topic.
+    encoding
+        Encoding of its raw pixels: ``mono8``, ``16UC1`` ...
+    size
+        Width and height of the first image in pixels; None if it cannot be decoded.
+    problem
+        Why it cannot.
+    """
+
+    topic: Topic
+    encoding: str
+    size: tuple[int, int] | None
+    problem: str = ""
+
+    @property
+    def is_compressed(self) -> bool:
+        """Whether its messages are CompressedImage."""
+        return self.topic.kind == COMPRESSED_IMAGE
+
+    @property
+    def is_depth(self) -> bool:
+        """Whether its pixels are distances."""
+        named = self.encoding != "mono16" or "depth" in self.topic.name.lower()
+        return is_depth(self.encoding) and named
+
+    @property
+    def base(self) -> str:
+        """Name without the way of sending it."""
+        name, _, last = self.topic.name.rpartition("/")
+        return name if last in _TRANSPORTS and name else self.topic.name
+
+    @property
+    def camera(self) -> str:
+        """Name that the images of one camera share."""
+        name, _, last = self.base.rpartition("/")
+        return name or "/" if last in _OF_ONE_CAMERA else self.base
+
+    @property
+    def is_rectified(self) -> bool:
+        """Whether the name says so."""
+        return "rect" in self.base.rpartition("/")[2]
+
+    def __str__(self) -> str:
+        size = ", not readable" if self.size is None else f", {self.size[0]} x {self.size[1]}"
+        return f"{self.topic.name} ({self.topic.kind}, {self.encoding}{size}, {self.topic.n})"
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """The topics of a run.
+
+    Attributes
+    ----------
+    left
+        Images of the only, left or colour camera.
+    right, depth
+        Those that belong to them, if the sensor has them.
+    left_info, right_info
+        Calibration of the cameras, if there is one.
+    truth
+        True poses of the camera, if there are any.
+    """
+
+    left: ImageTopic
+    right: ImageTopic | None = None
+    depth: ImageTopic | None = None
+    left_info: Topic | None = None
+    right_info: Topic | None = None
+    truth: Topic | None = None
+
+
+def parse_topics(text: str) -> dict[str, str]:
+    """Read ``left=/cam0/image_raw,right=/cam1/image_raw``.
+
+    Raises
+    ------
+    DatasetError
+        If a part is no pair, or names no role.
+    """
+    named: dict[str, str] = {}
+    for part in text.split(","):
+        role, equals, topic = (piece.strip() for piece in part.partition("="))
+        role = _ALIASES.get(role, role)
+        if not (equals and topic) or role not in ROLES or role in named:
+            problem = "is there twice" if role in named else "is no ROLE=/TOPIC"
+            raise DatasetError(
+                f"--topics: '{part}' {problem}; roles are image or left, right, depth, info or "
+                "left_info, right_info, truth"
+            )
+        named[role] = topic
+    return named
+
+
+class TopicChoice:
+    """Chooses the topics of a bag.
+
+    Parameters
+    ----------
+    bag
+        The bag.
+    named
+        Topics by role, as the user gave them.
+
+    Raises
+    ------
+    DatasetError
+        If there are no images, or a topic that was named is not there.
+    """
+
+    def __init__(self, bag: Bag, named: Mapping[str, str]) -> None:
+        self._bag = bag
+        self._named = {_ALIASES.get(role, role): topic for role, topic in named.items()}
+        self._require_images()
+        for role, name in self._named.items():
+            if role not in ROLES:
+                raise DatasetError(
+                    f"topics: there is no role '{role}'; roles are {', '.join(ROLES)}"
+                )
+            self._topic(role, name)
+
+    @property
+    def sensors(self) -> tuple[Sensor, ...]:
+        """Sensors there are images for, as far as that can be told, the richest first."""
+        found = []
+        if "depth" in self._named or (self._depths and "right" not in self._named):
+            found.append(Sensor.RGBD)
+        if "right" in self._named or self._pairs:
+            found.append(Sensor.STEREO)
+        return (*found, Sensor.MONOCULAR)
+
+    def choose(self, sensor: Sensor) -> Chosen:
+        """Choose the topics for a sensor.
+
+        Raises
+        ------
+        DatasetError
+            If it cannot be told, with all images there are and their types.
+        """
+        right: ImageTopic | None = None
+        depth: ImageTopic | None = None
+        if sensor is Sensor.STEREO:
+            left, right = self._pair()
+        elif sensor is Sensor.RGBD:
+            depth = self._given("depth") or self._best_depth()
+            left = self._given("left") or self._colour()
+        else:
+            left = self._given("left") or self._single()
+        return Chosen(
+            left,
+            right,
+            depth,
+            self._info("left_info", left),
+            None if right is None else self._info("right_info", right),
+            self._truth(),
+        )
+
+    # ---- images ----------------------------------------------------------------------------------
+    @cached_property
+    def _all(self) -> list[ImageTopic]:
+        return [self._look_at(topic) for topic in self._bag.topics if _has_images(topic)]
+
+    @cached_property
+    def _cameras(self) -> list[ImageTopic]:
+        """Images for eyes, the best of each camera."""
+        best: dict[str, ImageTopic] = {}
+        for one in self._all:
+            if one.size is None or is_depth(one.encoding):
+                continue
+            if one.camera not in best or _rank(one) < _rank(best[one.camera]):
+                best[one.camera] = one
+        return list(best.values())
+
+    @cached_property
+    def _depths(self) -> list[ImageTopic]:
+        best: dict[str, ImageTopic] = {}
+        for one in self._all:
+            if one.is_depth and (one.base not in best or not one.is_compressed):
+                best[one.base] = one
+        return list(best.values())
+
+    @cached_property
+    def _pairs(self) -> list[tuple[ImageTopic, ImageTopic]]:
+        by_name = {one.base: one for one in self._cameras}
+        pairs = []
+        for one in self._cameras:
+            for left, right in _SIDES:
+                other = _exchanged(one.base, left, right)
+                if other != one.base and other in by_name:
+                    pairs.append((one, by_name[other]))
+                    break
+        # Of cam0, cam1, cam2 the first two are meant.
+        rights = {pair[1].base for pair in pairs}
+        return [pair for pair in pairs if pair[0].base not in rights]
+
+    def _pair(self) -> tuple[ImageTopic, ImageTopic]:
+        left, right = self._given("left"), self._given("right")
+        if left and right:
+            return left, right
+        fitting = [
+            pair
+            for pair in self._pairs
+            if (left is None or pair[0] == left) and (right is None or pair[1] == right)
+        ]
+        if len(fitting) != 1:
+            raise self._not_certain("the left and right images", "left=/...,right=/...")
+        return fitting[0]
+
+    def _colour(self) -> ImageTopic:
+        found = self._cameras
+        if len(found) > 1:
+            found = [one for one in found if _COLOUR.search(one.base)]
+        if len(found) != 1:
+            raise self._not_certain("the images that belong to the depth", "image=/...,depth=/...")
+        return found[0]
+
+    def _best_depth(self) -> ImageTopic:
+        found = self._depths
+        if len(found) > 1:
+            found = [one for one in found if _REGISTERED.search(one.base)]
+        if len(found) != 1:
+            raise self._not_certain("the depth", "image=/...,depth=/...")
+        return found[0]
+
+    def _single(self) -> ImageTopic:
+        found = self._cameras
+        if len(found) > 1 and len(self._pairs) == 1 and len(found) == 2:
+            return self._pairs[0][0]
+        if len(found) > 1:
+            found = [one for one in found if _COLOUR.search(one.base)]
+        if len(found) != 1:
+            raise self._not_certain("the images", "image=/...")
+        return found[0]
+
+    def _given(self, role: str) -> ImageTopic | None:
+        if role not in self._named:
+            return None
+        topic = self._topic(role, self._named[role])
+        if not _has_images(topic):
+            raise DatasetError(
+                f"topic {topic} of {self._bag.path} has no images that can be read; name another "
+                "one with --topics"
+            )
+        found = self._look_at(topic)
+        if role != "depth" and found.size is None:
+            raise DatasetError(
+                f"images of {topic.name} in {self._bag.path} cannot be read: {found.problem}; name "
+                "another topic with --topics"
+            )
+        return found
+
+    def _look_at(self, topic: Topic) -> ImageTopic:
+        """Decode the first image of a topic."""
+        messages = self._bag.messages(topic)
+        compressed = topic.kind == COMPRESSED_IMAGE
+        encoding, size, problem = "unknown", None, ""
+        try:
+            if not messages:
+                raise DatasetError("all its messages are cut off")
+            first = read_message(self._bag.read(messages[0]), topic.kind, topic.encoding)
+            encoding = base_encoding(str(first.format if compressed else first.encoding))
+            depth = is_depth(encoding)
+            image = (
+                decode_depth(first, compressed=compressed)
+                if depth
+                else decode_image(first, compressed=compressed, rgb=False)
+            )
+            size = (int(image.shape[1]), int(image.shape[0]))
+            if compressed and image.ndim == 2 and not depth:
+                encoding = "mono8"
+        except OrbSlamError as error:
+            problem = str(error)  # told if nothing else can be read
+        return ImageTopic(topic, encoding, size, problem)
+
+    # ---- others ----------------------------------------------------------------------------------
+    def _info(self, role: str, image: ImageTopic) -> Topic | None:
+        if role in self._named:
+            return self._topic(role, self._named[role])
+        parent = image.base.rpartition("/")[0]
+        wanted = [f"{image.base}/camera_info", f"{parent}/camera_info"]
+        found = {t.name: t for t in self._bag.topics if t.kind == CAMERA_INFO and t.n}
+        return next((found[name] for name in wanted if name in found), None)
+
+    def _truth(self) -> Topic | None:
+        if "truth" in self._named:
+            topic = self._topic("truth", self._named["truth"])
+            if topic.kind not in POSES:
+                raise DatasetError(
+                    f"topic {topic} has no poses; true poses are of the types {', '.join(POSES)}"
+                )
+            return topic
+        found = (t for t in self._bag.topics if t.name == _TRUTH and t.kind in POSES and t.n)
+        return next(found, None)
+
+    def _topic(self, role: str, name: str) -> Topic:
+        wanted = "/" + name.strip("/")
+        found = next((t for t in self._bag.topics if t.name == wanted and t.n), None)
+        if found is None:
+            raise DatasetError(
+                f"--topics: {self._bag.path} has no messages of {name} ({role}); it has "
+                f"{_listed(self._bag.topics)}"
+            )
+        return found
+
+    def _require_images(self) -> None:
+        path, topics = self._bag.path, [topic for topic in self._bag.topics if topic.n]
+        if not topics:
+            raise DatasetError(f"{path} holds no messages; record it anew")
+        if any(_has_images(topic) for topic in topics):
+            return
+        pictures = [topic for topic in topics if "Image" in topic.kind]
+        if pictures:
+            raise DatasetError(
+                f"{path} holds images only as {pictures[0]}, {pictures[0].encoding or 'untyped'}: "
+                "that cannot be read; convert them to sensor_msgs/msg/Image"
+            )
+        what = "calibrations (CameraInfo), but no" if _has_infos(topics) else "no"
+        raise DatasetError(
+            f"{path} holds {what} images: it has {_listed(topics)}; give a bag with "
+            "sensor_msgs/Image or sensor_msgs/CompressedImage"
+        )
+
+    def _not_certain(self, what: str, example: str) -> DatasetError:
+        broken = next((one for one in self._all if one.size is None), None)
+        if broken is not None and all(one.size is None for one in self._all):
+            return DatasetError(
+                f"{self._bag.path} has images that cannot be read; the first of "
+                f"{broken.topic.name}: {broken.problem}"
+            )
+        listed = "".join(f"\n  {one}" for one in self._all)
+        return DatasetError(
+            f"cannot tell which topics of {self._bag.path} are {what}; these have images, of type, "
+            f"pixels and number:{listed}\nname them with --topics {example}"
+        )
+
+
+def _has_images(topic: Topic) -> bool:
+    return bool(topic.n) and topic.kind in (IMAGE, COMPRESSED_IMAGE) and topic.encoding in ENCODINGS
+
+
+def _has_infos(topics: list[Topic]) -> bool:
+    return any(topic.kind == CAMERA_INFO for topic in topics)
+
+
+def _rank(one: ImageTopic) -> tuple[bool, int, bool]:
+    last = one.base.rpartition("/")[2]
+    place = _OF_ONE_CAMERA.index(last) if last in _OF_ONE_CAMERA else 0
+    return (not one.is_rectified, place, one.is_compressed)
+
+
+def _exchanged(name: str, left: str, right: str) -> str:
+    """Put one word in the place of another where it stands alone: ``cam1`` is not in ``cam10``."""
+    ends = r"(?![0-9])" if left[-1].isdigit() else r"(?![a-z])"
+    return re.sub(rf"(?<![A-Za-z]){re.escape(left)}{ends}", right, name)
+
+
+def _listed(topics: list[Topic]) -> str:
+    shown = ", ".join(map(str, topics[:4])) or "no topics"
+    return shown if len(topics) <= 4 else f"{shown} and {len(topics) - 4} more"

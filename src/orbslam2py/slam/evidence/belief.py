@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""From a first estimate to a pose that is believed, or not.
+
+``docs/method/tracking.md#evidence``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from orbslam2py import _core as core
+from orbslam2py.slam.evidence.harder_search import HarderSearch, Hypothesis
+from orbslam2py.slam.evidence.judgement import EvidenceJudge
+from orbslam2py.slam.pose_search import PoseSearch
+from orbslam2py.slam.records import Evidence, PoseEstimate, Reason, Verdict
+
+
+class Belief:
+    """Refines poses in the local map, weighs them, and has them searched again when in doubt.
+
+    Parameters
+    ----------
+    search : PoseSearch
+        The ways to a pose.
+    judge : EvidenceJudge
+        Says how much speaks for one.
+    harder_search : HarderSearch
+        Looks again.
+    """
+
+    def __init__(
+        self, search: PoseSearch, judge: EvidenceJudge, harder_search: HarderSearch
+    ) -> None:
+        self._search = search
+        self._judge = judge
+        self._harder_search = harder_search
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the frames before."""
+        self._judge.forget()
+        self._n_weak = 0
+
+    def refine(self, frame: core.TrackedFrame, first: PoseEstimate, *, lost: bool) -> PoseEstimate:
+        """Give a frame the pose for which most speaks, if enough does.
+
+        Parameters
+        ----------
+        frame : orbslam2py._core.TrackedFrame
+            With the pose and the associations of the first estimate, if that was found.
+        first : PoseEstimate
+            What was found so far.
+        lost : bool
+            The frame before has no pose.
+        """
+        if lost or first.relocalized:
+            self.reset()
+        estimate, hypothesis = first, None
+        if first.found:
+            refined = self._search.in_local_map(frame, first)
+            estimate = refined.estimate
+            if estimate.found:
+                evidence = self._judge.weigh(refined, self._search.motion, first.method)
+                hypothesis = Hypothesis(refined, first.method, evidence)
+        doubted = hypothesis is None or self._judge.fell_suddenly(hypothesis.evidence)
+        if doubted and not lost:
+            hypothesis = self._harder_search.look_again(frame, hypothesis)
+        if hypothesis is None:
+            if first.found:
+                self._search.settle(refined)
+            return estimate
+        evidence = replace(hypothesis.evidence, doubted=doubted)
+        return self._take(frame, replace(hypothesis, evidence=evidence))
+
+    def _take(self, frame: core.TrackedFrame, hypothesis: Hypothesis) -> PoseEstimate:
+        refined, evidence = hypothesis.refined, hypothesis.evidence
+        if refined.frame is not frame:
+            frame.take_over(refined.frame)
+            refined = replace(refined, frame=frame)
+            if refined.estimate.relocalized:
+                # Found without regard to where the camera was: the way from there is no speed.
+                self._search.last_relocalization = frame.id
+                self._search.motion.jump(None)
+        self._search.settle(refined)
+        estimate = replace(refined.estimate, evidence=evidence, method=hypothesis.method)
+        if evidence.verdict is Verdict.REFUSED:
+            return estimate.failed(Reason.WEAK_EVIDENCE)
+        if evidence.verdict is Verdict.STRONG or self._may_count(evidence):
+            self._judge.get_used_to(refined)
+        return estimate
+
+    def allows_keyframe(self, evidence: Evidence | None) -> bool:
+        """Whether a frame that is believed may become a keyframe; asked once for each frame."""
+        if evidence is None or evidence.verdict is Verdict.STRONG:
+            self._n_weak = 0
+            return True
+        allowed = self._may_count(evidence)
+        self._n_weak += 1
+        return allowed
+
+    def _may_count(self, evidence: Evidence) -> bool:
+        """Whether a weak frame is the usual from now on: not the first, and confirmed."""
+        return evidence.confirmed and self._n_weak >= self._judge.limits.weak_frames

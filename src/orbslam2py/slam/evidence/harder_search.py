@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Other ways to a pose whose evidence fell suddenly; the best supported one wins.
+
+``docs/method/tracking.md#harder-search``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+from orbslam2py import _core as core
+from orbslam2py.slam.evidence.judgement import EvidenceJudge
+from orbslam2py.slam.pose_search import PoseSearch, RefinedPose
+from orbslam2py.slam.records import Evidence, PoseEstimate, PoseMethod, Reason, Verdict
+
+Way = Callable[[core.TrackedFrame], PoseEstimate]
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A pose, what found it, and what speaks for it."""
+
+    refined: RefinedPose
+    method: PoseMethod
+    evidence: Evidence
+
+    @property
+    def n_inliers(self) -> int:
+        """Of the pose in the local map."""
+        return self.refined.estimate.n_inliers
+
+
+class HarderSearch:
+    """Tries ways that do not hang on the speed.
+
+    Parameters
+    ----------
+    search : PoseSearch
+        The ways to a pose.
+    judge : EvidenceJudge
+        Weighs what they find.
+    """
+
+    def __init__(self, search: PoseSearch, judge: EvidenceJudge) -> None:
+        self._search = search
+        self._judge = judge
+
+    def look_again(self, frame: core.TrackedFrame, first: Hypothesis | None) -> Hypothesis | None:
+        """Find the pose for which most speaks, and whether two ways lead there.
+
+        Parameters
+        ----------
+        frame : orbslam2py._core.TrackedFrame
+            The frame; it is not changed.
+        first : Hypothesis or None
+            What is in doubt; None if nothing was found.
+
+        Returns
+        -------
+        Hypothesis or None
+            The best supported one, `first` itself unless another one is clearly better; None if
+            nothing was found.
+        """
+        found = [] if first is None else [first]
+        for method, way in self._ways(found):
+            version = core.TrackedFrame(frame.features)
+            estimate = way(version)
+            if not estimate.found:
+                continue
+            refined = self._search.in_local_map(version, estimate)
+            if not refined.estimate.found:
+                continue
+            evidence = self._judge.weigh(refined, self._search.motion, method)
+            hypothesis = Hypothesis(refined, method, evidence)
+            enough = self._has_enough(hypothesis, found)
+            found.append(hypothesis)
+            if enough:
+                break
+        return self._best(found) if found else None
+
+    def _ways(self, found: list[Hypothesis]) -> Iterator[tuple[PoseMethod, Way]]:
+        """The ways in the order of their cost; relocalization only if none led anywhere."""
+        limits, search = self._judge.limits, self._search
+        yield PoseMethod.ALIGNED_IMAGES, self._by_aligned_images
+        yield (
+            PoseMethod.KEYFRAMES_AROUND,
+            lambda v: search.by_keyframes_around(v, limits.keyframes_around),
+        )
+        if search.motion.velocity is not None:
+            yield PoseMethod.WIDE_WINDOW, self._by_wide_window
+        if all(hypothesis.evidence.verdict is Verdict.REFUSED for hypothesis in found):
+            yield PoseMethod.RELOCALIZATION, search.by_relocalization
+
+    def _by_aligned_images(self, frame: core.TrackedFrame) -> PoseEstimate:
+        limits, motion = self._judge.limits, self._search.motion
+        aligned = core.align_rotation(motion.last.features, frame.features)
+        if aligned is None or aligned.correlation < limits.aligned_correlation:
+            return PoseEstimate(Reason.FEW_MATCHES_LAST_FRAME)
+        motion.predict_turned(frame, aligned.quaternion_xyzw)
+        return self._search.around_prediction(frame, limits.aligned_window)
+
+    def _by_wide_window(self, frame: core.TrackedFrame) -> PoseEstimate:
+        self._search.motion.predict(frame)
+        return self._search.around_prediction(frame, self._judge.limits.wide_window)
+
+    def _has_enough(self, hypothesis: Hypothesis, others: list[Hypothesis]) -> bool:
+        """Whether it is no use to look further."""
+        if hypothesis.evidence.inliers_to_usual >= self._judge.limits.enough_share:
+            return True
+        return any(self._confirms(hypothesis, other) for other in others)
+
+    def _confirms(self, one: Hypothesis, other: Hypothesis) -> bool:
+        by_words = (PoseMethod.REFERENCE_KEYFRAME, PoseMethod.KEYFRAMES_AROUND)
+        alike = one.method in by_words and other.method in by_words
+        return not alike and self._judge.is_same(one.refined, other.refined)
+
+    def _best(self, found: list[Hypothesis]) -> Hypothesis:
+        best = found[0]
+        for hypothesis in found[1:]:
+            # What was found first stays unless another one is clearly better.
+            if hypothesis.n_inliers > self._judge.limits.better * best.n_inliers:
+                best = hypothesis
+        if any(self._confirms(best, other) for other in found if other is not best):
+            best = replace(best, evidence=self._judge.confirm(best.evidence))
+        return best

@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Weighs a pose by what should have been seen, against the frames before.
+
+``docs/method/tracking.md#evidence``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from orbslam2py import _core as core
+from orbslam2py.slam.pose_search import MotionModel, RefinedPose
+from orbslam2py.slam.records import Evidence, PoseMethod, Verdict
+from orbslam2py.slam.thresholds import EvidenceThresholds
+
+
+@dataclass(frozen=True)
+class UsualFigures:
+    """Running means over frames with strong evidence."""
+
+    n_inliers: float
+    found: float
+    deviation: float
+
+    def moved_to(self, other: UsualFigures, gain: float) -> UsualFigures:
+        """A step towards the figures of a newer frame."""
+        return UsualFigures(
+            self.n_inliers + gain * (other.n_inliers - self.n_inliers),
+            self.found + gain * (other.found - self.found),
+            self.deviation + gain * (other.deviation - self.deviation),
+        )
+
+
+class EvidenceJudge:
+    """Knows what is usual, and says how far a pose is from it.
+
+    Parameters
+    ----------
+    window : float
+        Half width of the motion model's search window, pixels at level 0.
+    focal_length : float
+        Pixels.
+    thresholds : EvidenceThresholds, optional
+        Limits.
+    """
+
+    def __init__(
+        self, window: float, focal_length: float, thresholds: EvidenceThresholds | None = None
+    ) -> None:
+        self.limits = thresholds or EvidenceThresholds()
+        self._window = window
+        self._focal_length = focal_length
+        self.forget()
+
+    def forget(self) -> None:
+        """Nothing is usual: the place is another one."""
+        self._usual: UsualFigures | None = None
+
+    def weigh(self, refined: RefinedPose, motion: MotionModel, method: PoseMethod) -> Evidence:
+        """Weigh a refined pose.
+
+        Parameters
+        ----------
+        refined : RefinedPose
+            The pose, found in the local map.
+        motion : MotionModel
+            What the camera did before.
+        method : PoseMethod
+            What found the pose.
+        """
+        frame, estimate = refined.frame, refined.estimate
+        spread = core.spread_of_inliers(frame)
+        figures = _figures(refined)
+        usual = self._usual or figures
+        turn, move = _changes(frame, motion)
+        evidence = Evidence(
+            verdict=Verdict.STRONG,
+            method=method,
+            doubted=False,
+            confirmed=False,
+            n_predicted=refined.n_predicted,
+            found=figures.found,
+            found_to_usual=_ratio(figures.found, usual.found),
+            inliers_to_usual=_ratio(estimate.n_inliers, usual.n_inliers),
+            n_cells=spread.cells,
+            n_octaves=spread.octaves,
+            deviation_to_usual=_ratio(figures.deviation, usual.deviation),
+            turn_change=turn,
+            move_change=move,
+        )
+        return replace(evidence, verdict=self._verdict(evidence, estimate.n_inliers))
+
+    def fell_suddenly(self, evidence: Evidence) -> bool:
+        """Whether the pose has to be searched by other ways before it is believed."""
+        limits = self.limits
+        return (
+            evidence.verdict is not Verdict.STRONG
+            or min(evidence.inliers_to_usual, evidence.found_to_usual) < limits.sudden_share
+            or evidence.deviation_to_usual > limits.sudden_deviation
+            or self._windows(evidence.turn_change) > limits.surprise_windows
+        )
+
+    def is_same(self, first: RefinedPose, second: RefinedPose) -> bool:
+        """Whether two poses of a frame are one, as far as can be told."""
+        T_first, T_second = first.frame.T_cw, second.frame.T_cw
+        if T_first is None or T_second is None:
+            return False
+        turn, move = difference(T_first, T_second)
+        deviations = _position_deviation(first) + _position_deviation(second)
+        return (
+            self._windows(turn) < self.limits.same_windows
+            and move <= self.limits.same_deviations * deviations
+        )
+
+    def confirm(self, evidence: Evidence) -> Evidence:
+        """A second method came to the same pose: it is believed, though weak evidence stays so."""
+        refused = evidence.verdict is Verdict.REFUSED
+        verdict = Verdict.WEAK if refused else evidence.verdict
+        return replace(evidence, confirmed=True, verdict=verdict)
+
+    def get_used_to(self, refined: RefinedPose) -> None:
+        """Let a frame that is believed move what is usual."""
+        figures = _figures(refined)
+        usual = self._usual
+        self._usual = figures if usual is None else usual.moved_to(figures, self.limits.gain)
+
+    def _windows(self, degrees: float) -> float:
+        """How far a turn moves the image, in search windows of the motion model."""
+        return self._focal_length * math.radians(degrees) / self._window
+
+    def _verdict(self, evidence: Evidence, n_inliers: int) -> Verdict:
+        limits = self.limits
+        share = evidence.inliers_to_usual
+        if share < limits.refused_share and n_inliers < limits.refused_inliers:
+            return Verdict.REFUSED
+        if (
+            max(share, evidence.found_to_usual) < limits.weak_share
+            or evidence.n_cells <= limits.weak_cells
+            or evidence.deviation_to_usual > limits.weak_deviation
+        ):
+            return Verdict.WEAK
+        return Verdict.STRONG
+
+
+def _figures(refined: RefinedPose) -> UsualFigures:
+    estimate = refined.estimate
+    n_inliers = estimate.n_inliers
+    return UsualFigures(
+        float(n_inliers),
+        min(1.0, n_inliers / max(1, refined.n_predicted)),
+        _position_deviation(refined),
+    )
+
+
+def _position_deviation(refined: RefinedPose) -> float:
+    """Standard deviation of a pose's position, all directions together [m]; 0 if not known."""
+    covariance = refined.estimate.covariance
+    if covariance is None:
+        return 0.0
+    return math.sqrt(max(0.0, float(np.trace(covariance[3:, 3:]))))
+
+
+def _ratio(value: float, usual: float) -> float:
+    return value / usual if usual > 0 else 1.0
+
+
+def _changes(frame: core.TrackedFrame, motion: MotionModel) -> tuple[float, float]:
+    """Degrees and metres by which a frame moved otherwise than the frame before it."""
+    if motion.velocity is None or not motion.has_last:
+        return 0.0, 0.0
+    T_lw, T_cw = motion.last.T_cw, frame.T_cw
+    if T_lw is None or T_cw is None:
+        return 0.0, 0.0
+    return difference(T_cw, motion.velocity @ T_lw)
+
+
+def difference(T_aw: core.Pose, T_bw: core.Pose) -> tuple[float, float]:
+    """Degrees and metres between two poses of one camera."""
+    turn = (T_aw @ T_bw.inverse()).log()[:3]
+    return math.degrees(float(np.linalg.norm(turn))), float(
+        np.linalg.norm(T_aw.center - T_bw.center)
+    )

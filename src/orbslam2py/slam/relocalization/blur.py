@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Blurred frames, told by the frames before them; ``docs/method/relocalization.md#blurred-frames``.
+
+How much fine detail an image has depends on the scene more than on anything else, so a frame is
+compared with the ones right before it, and with nothing that was decided beforehand.
+"""
+
+from __future__ import annotations
+
+import statistics
+from collections import deque
+
+from orbslam2py import _core as core
+from orbslam2py.slam.thresholds import BlurThresholds
+
+
+class BlurWatch:
+    """Tells frames that have lost the fine detail that those before them had.
+
+    Parameters
+    ----------
+    thresholds : BlurThresholds, optional
+        Limits.
+    """
+
+    def __init__(self, thresholds: BlurThresholds | None = None) -> None:
+        self._limits = thresholds or BlurThresholds()
+        self._recent: deque[float] = deque(maxlen=self._limits.frames)
+
+    def reset(self) -> None:
+        """Forget the frames before: another camera, or another number of features."""
+        self._recent.clear()
+
+    def is_blurred(self, frame: core.Frame) -> bool:
+        """Judge the next frame; every frame is to be shown once.
+
+        A frame that is judged blurred counts among those before the next ones all the same: what
+        lasts, as a wall without texture does, is what is usual there after half of the frames that
+        are remembered. A frame without keypoints says nothing.
+
+        Parameters
+        ----------
+        frame : orbslam2py._core.Frame
+            With its keypoints.
+        """
+        sharpness = core.sharpness(frame)
+        if sharpness <= 0:
+            return False
+        known = len(self._recent) >= self._limits.fewest
+        usual = statistics.median(self._recent) if known else 0.0
+        self._recent.append(sharpness)
+        return sharpness < self._limits.share * usual

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which keyframes a lost frame is compared with: a bounded number, other ones at each failure."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from orbslam2py import _core as core
+from orbslam2py.slam.relocalization.place_of_loss import PlaceOfLoss
+from orbslam2py.slam.thresholds import RelocalizationThresholds
+
+
+class CandidatePlaces:
+    """Keyframes that may show what a lost frame shows.
+
+    Parameters
+    ----------
+    slam_map : orbslam2py._core.Map
+        The map.
+    keyframe_index : orbslam2py._core.KeyFrameIndex
+        Which keyframes contain which words.
+    thresholds : RelocalizationThresholds
+        Limits.
+    """
+
+    def __init__(
+        self,
+        slam_map: core.Map,
+        keyframe_index: core.KeyFrameIndex,
+        thresholds: RelocalizationThresholds,
+    ) -> None:
+        self._map = slam_map
+        self._keyframe_index = keyframe_index
+        self._limits = thresholds
+        self._recent: deque[dict[int, float]] = deque(maxlen=thresholds.word_frames)
+
+    def reset(self) -> None:
+        """Forget what the frames before looked like: the camera was found, or lost anew."""
+        self._recent.clear()
+
+    def of(self, frame: core.Frame, place: PlaceOfLoss | None, failures: int) -> list[int]:
+        """Choose keyframes for a described frame.
+
+        Parameters
+        ----------
+        frame : orbslam2py._core.Frame
+            With its words.
+        place : PlaceOfLoss or None
+            Where tracking was lost.
+        failures : int
+            Frames that were searched in vain since.
+
+        Returns
+        -------
+        list of int
+            Ids, the likeliest first, each once.
+        """
+        limits = self._limits
+        by_words = _taken(self._by_words(frame), limits.word_candidates, failures)
+        near = [] if place is None else place.keyframes(self._map, limits)
+        by_place = _taken(near, limits.near_candidates, failures)
+        return list(dict.fromkeys(by_words + by_place))
+
+    def _by_words(self, frame: core.Frame) -> list[int]:
+        """Keyframes that look like this frame or the ones before; the likeliest first.
+
+        A camera that is lost goes on moving as others do, so what several frames look like is
+        likelier than what one does.
+        """
+        found = core.find_relocalization_candidates(self._keyframe_index, self._map, frame)
+        self._recent.append({place.keyframe: place.group_score for place in found})
+        scores: dict[int, float] = {}
+        for named in self._recent:
+            for keyframe, score in named.items():
+                scores[keyframe] = scores.get(keyframe, 0.0) + score
+        living = [keyframe for keyframe in scores if self._map.has_keyframe(keyframe)]
+        return sorted(living, key=lambda keyframe: (-scores[keyframe], keyframe))
+
+
+def _taken(ranked: list[int], most: int, failures: int) -> list[int]:
+    """The first half of `most` always, the other half further down at every failure."""
+    if len(ranked) <= most:
+        return ranked
+    always = most - most // 2
+    others = ranked[always:]
+    start = failures * (most // 2) % len(others)
+    return ranked[:always] + (others + others)[start : start + most // 2]

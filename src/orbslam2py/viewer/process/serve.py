@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The process of the page: draws what it is told, asks what people want to know."""
+
+from __future__ import annotations
+
+import logging
+import os
+import queue
+import signal
+import threading
+import time
+from collections.abc import Callable
+from socket import socket
+from typing import TYPE_CHECKING, Any
+
+from orbslam2py.viewer.process.channel import Channel
+
+if TYPE_CHECKING:
+    from orbslam2py.viewer.process.live_page import LivePage
+
+#: How much less urgent than tracking, of 19.
+_NICE = 10
+#: Seconds between two looks whether the other process is still there.
+_LOOK = 1.0
+#: What must be drawn before more of it is sent.
+_PACED = frozenset({"on_frame", "on_map", "on_event"})
+
+
+class Parent:
+    """The process that tracks, as seen from that of the page.
+
+    Parameters
+    ----------
+    channel : Channel
+        Leads to it.
+    """
+
+    def __init__(self, channel: Channel) -> None:
+        self._channel = channel
+        self.messages: queue.SimpleQueue[tuple[Any, ...]] = queue.SimpleQueue()
+        self._condition = threading.Condition()
+        self._answers: dict[int, Any] = {}
+        self._n_asked = 0
+
+    def tell(self, *message: Any) -> None:
+        """Send a message; one to nobody ends this process."""
+        try:
+            self._channel.send(*message)
+        except OSError:
+            os._exit(0)
+
+    def ask(self, name: str, *arguments: Any) -> Any:
+        """Have something done there, and wait for what comes of it; None if it failed."""
+        with self._condition:
+            self._n_asked += 1
+            number = self._n_asked
+        self.tell("ask", number, name, arguments)
+        with self._condition:
+            self._condition.wait_for(lambda: number in self._answers)
+            return self._answers.pop(number)
+
+    def read(self) -> None:
+        """Take what comes, until the other process is no more: then this one ends, too."""
+        while (message := self._channel.receive()) is not None:
+            if message[0] == "answer":
+                with self._condition:
+                    self._answers[message[1]] = message[2]
+                    self._condition.notify_all()
+            else:
+                self.messages.put(message)
+        os._exit(0)
+
+
+class _LogToParent(logging.Handler):
+    """Hands messages of the package to the other process, which knows what becomes of them."""
+
+    def __init__(self, parent: Parent) -> None:
+        super().__init__(logging.WARNING)
+        self._parent = parent
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._parent.tell("log", record.name, record.levelno, record.getMessage())
+
+
+def main(number: int) -> None:
+    """Serve until the other process says stop, or is no more.
+
+    Parameters
+    ----------
+    number : int
+        File descriptor of the socket that leads to it.
+    """
+    _end_with(os.getppid())
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the run
+    os.nice(_NICE)
+    parent = Parent(Channel(socket(fileno=number)))
+    threading.Thread(target=parent.read, name="parent", daemon=True).start()
+    logging.getLogger("orbslam2py").addHandler(_LogToParent(parent))
+    _, host, port, title = parent.messages.get()
+    page = _open(parent, host, port, title)
+    if page is not None:
+        _serve(parent, page)
+
+
+def _end_with(process: int) -> None:
+    """End when the other process does; a copy of its socket may live on in a child of its own."""
+
+    def watch() -> None:
+        while os.getppid() == process:
+            time.sleep(_LOOK)
+        os._exit(0)
+
+    threading.Thread(target=watch, name="watch", daemon=True).start()
+
+
+def _open(parent: Parent, host: str, port: int | None, title: str) -> LivePage | None:
+    import cv2  # noqa: PLC0415  # when Ctrl-C is out of reach: it is large
+
+    from orbslam2py.errors import StateError  # noqa: PLC0415
+    from orbslam2py.viewer.process.live_page import LivePage  # noqa: PLC0415
+
+    cv2.setNumThreads(1)  # all cores are tracking's
+    try:
+        page = LivePage(parent.ask, host=host, port=port, title=title)
+    except StateError as error:
+        parent.tell("refused", str(error))
+        return None
+    parent.tell("opened", page.address)
+    return page
+
+
+def _serve(parent: Parent, page: LivePage) -> None:
+    calls: dict[str, Callable[..., None]] = {
+        "attach": page.attach,
+        "on_frame": page.on_frame,
+        "on_map": page.on_map,
+        "on_event": page.on_event,
+        "close": page.close,
+        "tell_end": page.tell_end,
+        "look_from": page.look_from,
+    }
+    while True:
+        name, *arguments = parent.messages.get()
+        if name == "stop":
+            page.stop()
+            return
+        try:
+            calls[name](*arguments)
+        except Exception as error:
+            parent.tell("failed", f"{type(error).__name__}: {error}")
+            raise
+        if name in _PACED:
+            parent.tell("done")

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "frame/sharpness.hpp"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <opencv2/imgproc.hpp>
+#include <random>
+
+#include "features/orb_extractor.hpp"
+#include "frame/build_frame.hpp"
+
+namespace orbslam {
+namespace {
+
+cv::Mat texture() {
+  std::mt19937_64 generator(5);
+  cv::Mat image(240, 320, CV_8UC1);
+  for (int y = 0; y < image.rows; ++y) {
+    for (int x = 0; x < image.cols; ++x) image.at<std::uint8_t>(y, x) = generator() & 255U;
+  }
+  cv::GaussianBlur(image, image, {0, 0}, 1.5);
+  cv::normalize(image, image, 0, 255, cv::NORM_MINMAX);
+  return image;
+}
+
+double sharpness_of(const cv::Mat& image) {
+  CameraOptions options;
+  options.pinhole = {300, 300, 160, 120};
+  options.image_size = {320, 240};
+  OrbExtractor extractor{OrbOptions{}};
+  const FrameContext context{std::make_shared<Camera>(options),
+                             std::make_shared<ScalePyramid>(extractor.scales())};
+  return sharpness(*build_monocular_frame(context, 0, 0, extractor.extract(image).features));
+}
+
+TEST(Sharpness, FallsWithEveryBlur) {
+  const cv::Mat image = texture();
+  double last = sharpness_of(image);
+  EXPECT_GT(last, 1000);
+  for (const int length : {5, 11, 21}) {
+    cv::Mat blurred;
+    cv::blur(image, blurred, {length, 1});
+    const double next = sharpness_of(blurred);
+    EXPECT_LT(next, 0.85 * last) << length;
+    last = next;
+  }
+}
+
+TEST(Sharpness, WithoutCornersItIsZero) {
+  EXPECT_EQ(sharpness_of(cv::Mat(240, 320, CV_8UC1, cv::Scalar(90))), 0);
+}
+
+}  // namespace
+}  // namespace orbslam

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""CameraInfo as the calibration: rectified images as they are, others rectified."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+import orbslam2py as orb
+from orbslam2py.datasets import BagSequence
+from orbslam2py.datasets.rectification import rectification_of_pair
+from support import bags
+
+SIZE = (320, 240)
+K = np.array([[200.0, 0, 155], [0, 205, 118], [0, 0, 1]])
+D = (-0.2, 0.05, 0.001, -0.0005, 0.0)
+GREY = cv2.GaussianBlur(
+    np.random.default_rng(2).integers(0, 256, SIZE[::-1]).astype(np.uint8), (0, 0), 2
+)
+
+
+def raw_pair() -> dict[str, dict[str, object]]:
+    """Calibration of a raw pair, as camera_calibration of ROS writes it."""
+    T = np.eye(4)
+    T[:3, :3] = cv2.Rodrigues(np.array([0.01, -0.02, 0.005]))[0]
+    T[:3, 3] = [-0.12, 0.001, 0.002]
+    found = rectification_of_pair((K, K), (np.array(D), np.array(D)), T, SIZE)
+    sides = {"left": found.left, "right": found.right}
+    return {
+        side: {"size": SIZE, "K": one.K, "D": D, "R": one.R, "P": one.P}
+        for side, one in sides.items()
+    }
+
+
+def messages(name: str, infos: dict[str, dict[str, object]]) -> list[bags.Made]:
+    made = []
+    for side, info in infos.items():
+        made.append(bags.camera_info(f"/{side}/camera_info", bags.START, **info))  # type: ignore[arg-type]
+        made.append(bags.raw_image(f"/{side}/{name}", bags.START, GREY, "mono8"))
+    return made
+
+
+@pytest.mark.parametrize("kind", bags.KINDS)
+def test_a_raw_pair_is_rectified(tmp_path: Path, kind: str) -> None:
+    infos = raw_pair()
+    sequence = BagSequence(bags.write(tmp_path / "b", kind, messages("image_raw", infos)))
+    rectification = sequence.settings.rectification
+    assert rectification is not None
+    camera = sequence.settings.camera
+    P = np.asarray(infos["right"]["P"])
+    assert (camera.fx, camera.cx, camera.bf) == (P[0, 0], P[0, 2], -P[0, 3])
+    images = sequence.load(0)
+    assert images.right is not None
+    for image, info in ((images.image, infos["left"]), (images.right, infos["right"])):
+        maps = cv2.initUndistortRectifyMap(
+            K, np.array(D), np.asarray(info["R"]), np.asarray(info["P"])[:, :3], SIZE, cv2.CV_32FC1
+        )
+        assert np.array_equal(image, cv2.remap(GREY, *maps, cv2.INTER_LINEAR))
+
+
+def test_a_rectified_pair_stays_as_it_is(tmp_path: Path) -> None:
+    infos = raw_pair()
+    sequence = BagSequence(bags.write(tmp_path / "b", "mcap", messages("image_rect", infos)))
+    assert sequence.settings.rectification is None
+    assert sequence.settings.camera.bf == -np.asarray(infos["right"]["P"])[0, 3]
+    images = sequence.load(0)
+    assert np.array_equal(images.image, GREY)
+    assert images.right is not None
+    assert np.array_equal(images.right, GREY)
+
+
+@pytest.mark.parametrize("name", ["image_raw", "image_rect"])
+def test_one_camera(tmp_path: Path, name: str) -> None:
+    """Raw images are undistorted by the system; rectified ones have the projection's camera."""
+    info = raw_pair()["left"]
+    made = messages(name, {"camera": info})
+    camera = BagSequence(bags.write(tmp_path / "b", "rosbag1", made)).settings.camera
+    if name == "image_raw":
+        assert (camera.fx, camera.cy, camera.k1, camera.p2) == (200, 118, -0.2, -0.0005)
+    else:
+        P = np.asarray(info["P"])
+        assert (camera.fx, camera.cy, camera.k1) == (P[0, 0], P[1, 2], 0)
+
+
+@pytest.mark.parametrize(
+    ("name", "left", "right", "message"),
+    [
+        ("image_raw", {}, {}, "do not tell the distance of the two cameras"),
+        ("image_rect", {}, {"bf": -3.0}, "stands to the left of the other one; exchange"),
+        ("image_raw", {"model": "equidistant"}, {"bf": 3.0, "D": D}, "equidistant is not support"),
+        ("image_rect", {}, {"bf": 3.0, "K": K * 2}, "are no rectified pair: their P differ"),
+        ("image_rect", {"size": (64, 48)}, {"bf": 3.0}, "is for 64 x 48 pixels, but images of"),
+        ("image_rect", {"K": np.zeros((3, 3))}, {}, "of a camera that was not calibrated"),
+    ],
+)
+def test_pairs_that_cannot_be_used(
+    tmp_path: Path,
+    name: str,
+    left: dict[str, object],
+    right: dict[str, object],
+    message: str,
+) -> None:
+    infos = {"left": {"size": SIZE, **left}, "right": {"size": SIZE, **right}}
+    sequence = BagSequence(bags.write(tmp_path / "b", "mcap", messages(name, infos)))
+    with pytest.raises(orb.DatasetError, match=message):
+        _ = sequence.settings
+
+
+def test_many_coefficients(tmp_path: Path) -> None:
+    """Eight that are not zero: nothing of one camera, but a pair is rectified with them."""
+    eight = (*D, 0.1, 0.02, 0.003)
+    info = {**raw_pair()["left"], "D": eight, "model": "rational_polynomial"}
+    bag = bags.write(tmp_path / "b", "mcap", messages("image_raw", {"camera": info}))
+    with pytest.raises(orb.DatasetError, match="8 coefficients is not supported for one camera"):
+        _ = BagSequence(bag).settings
+    infos = {side: {**one, "D": eight} for side, one in raw_pair().items()}
+    pair = BagSequence(bags.write(tmp_path / "c", "mcap", messages("image_raw", infos)))
+    assert pair.settings.rectification is not None
+    assert pair.settings.rectification.left.D.tolist() == list(eight)
+
+
+def test_no_calibration(tmp_path: Path) -> None:
+    made = [
+        m for m in messages("image_raw", {"camera": raw_pair()["left"]}) if m.kind == bags.IMAGE
+    ]
+    bag = bags.write(tmp_path / "b", "mcap", made)
+    with pytest.raises(
+        orb.DatasetError, match=r"no settings for .*: it has no CameraInfo for /cam"
+    ):
+        _ = BagSequence(bag).settings
+    other = bags.camera_info("/elsewhere/info", bags.START, size=SIZE)
+    bag = bags.write(tmp_path / "c", "mcap", [*made, other])
+    with pytest.raises(orb.DatasetError, match="take one of /elsewhere/info with --topics info="):
+        _ = BagSequence(bag).settings
+    assert BagSequence(bag, topics={"info": "/elsewhere/info"}).settings.camera.fx == 20
+    assert BagSequence(bag, settings="tum1").settings.camera.fx > 500

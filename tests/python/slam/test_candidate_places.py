@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which keyframes a lost frame is compared with, and where it may have gone."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from orbslam2py import _core
+from orbslam2py.slam.relocalization import CandidatePlaces, PlaceOfLoss, candidates, place_of_loss
+from orbslam2py.slam.thresholds import RelocalizationThresholds
+
+LIMITS = RelocalizationThresholds()
+FRAME: Any = SimpleNamespace()
+
+
+class FakeMap:
+    """Keyframes 0 to 99; neighbours of each are those right before it."""
+
+    def __init__(self) -> None:
+        self.dead: set[int] = set()
+
+    def has_keyframe(self, keyframe: int) -> bool:
+        return keyframe not in self.dead
+
+    def living(self, keyframe: int) -> int:
+        return -1 if keyframe in self.dead else keyframe
+
+    def best_neighbours(self, keyframe: int, n: int) -> np.ndarray:
+        return np.arange(keyframe - 1, keyframe - 1 - n, -1)
+
+    def keyframe_ids(self) -> np.ndarray:
+        return np.arange(100)
+
+
+class FakeCore:
+    """Names the keyframes that look like the next frame, with their scores."""
+
+    Pose = _core.Pose
+
+    def __init__(self) -> None:
+        self.found: dict[int, float] = {}
+        self.stretched = 1.0
+
+    def find_relocalization_candidates(self, *_: object) -> list[SimpleNamespace]:
+        return [SimpleNamespace(keyframe=k, group_score=s) for k, s in sorted(self.found.items())]
+
+    def follow_map(self, *_: object) -> tuple[str, float]:
+        return "points", self.stretched
+
+
+@pytest.fixture
+def fake(monkeypatch: pytest.MonkeyPatch) -> FakeCore:
+    fake = FakeCore()
+    for module in (candidates, place_of_loss):
+        monkeypatch.setattr(module, "core", fake)
+    return fake
+
+
+def places(slam_map: FakeMap) -> CandidatePlaces:
+    given: Any = slam_map
+    index: Any = "index"
+    return CandidatePlaces(given, index, LIMITS)
+
+
+def lost_at(keyframe: int, velocity: _core.Pose | None = None) -> PlaceOfLoss:
+    last: Any = SimpleNamespace(id=10, T_cw=_core.Pose([0, 0, 0, 1], [5.0, 0, 0]))
+    return PlaceOfLoss(last, velocity, keyframe)
+
+
+def test_the_most_similar_come_first(fake: FakeCore) -> None:
+    fake.found = {3: 0.1, 7: 0.5, 9: 0.3}
+    assert places(FakeMap()).of(FRAME, None, 0) == [7, 9, 3]
+
+
+def test_equal_ones_come_by_id(fake: FakeCore) -> None:
+    fake.found = {9: 0.3, 3: 0.3}
+    assert places(FakeMap()).of(FRAME, None, 0) == [3, 9]
+
+
+def test_what_several_frames_look_like_comes_before_what_one_does(fake: FakeCore) -> None:
+    chosen = places(FakeMap())
+    fake.found = {3: 0.3, 4: 0.1}
+    chosen.of(FRAME, None, 0)
+    fake.found = {3: 0.3, 8: 0.4}
+    assert chosen.of(FRAME, None, 1) == [3, 8, 4], "4 is remembered"
+    fake.found = {}
+    for _ in range(LIMITS.word_frames - 1):
+        remembered = chosen.of(FRAME, None, 2)
+    assert remembered == [8, 3]
+    assert chosen.of(FRAME, None, 3) == [], "not for longer than some frames"
+
+
+def test_the_dead_are_left_out(fake: FakeCore) -> None:
+    slam_map = FakeMap()
+    chosen = places(slam_map)
+    fake.found = {3: 0.3, 8: 0.4}
+    chosen.of(FRAME, None, 0)
+    slam_map.dead.add(8)
+    fake.found = {}
+    assert chosen.of(FRAME, None, 1) == [3]
+
+
+def test_a_reset_forgets_the_frames_before(fake: FakeCore) -> None:
+    chosen = places(FakeMap())
+    fake.found = {3: 0.3}
+    chosen.of(FRAME, None, 0)
+    fake.found = {}
+    chosen.reset()
+    assert chosen.of(FRAME, None, 0) == []
+
+
+def test_the_number_is_bounded_and_all_are_reached_in_the_end(fake: FakeCore) -> None:
+    fake.found = {k: 1.0 - k / 100 for k in range(40)}
+    chosen, place = places(FakeMap()), lost_at(80)
+    reached: set[int] = set()
+    for failures in range(20):
+        tried = chosen.of(FRAME, place, failures)
+        assert len(tried) <= LIMITS.word_candidates + LIMITS.near_candidates
+        assert tried[:4] == [0, 1, 2, 3], "the best are tried every time"
+        reached.update(tried)
+    near = {80, *range(70, 80), *range(95, 100)}
+    assert reached == set(range(40)) | near
+
+
+def test_the_place_of_loss_is_searched_without_any_word(fake: FakeCore) -> None:
+    assert places(FakeMap()).of(FRAME, lost_at(80), 0)[:2] == [80, 79]
+
+
+def test_a_place_that_died_names_nothing(fake: FakeCore) -> None:
+    slam_map = FakeMap()
+    slam_map.dead.add(80)
+    assert places(slam_map).of(FRAME, lost_at(80), 0) == []
+
+
+# ---- guesses -----------------------------------------------------------------------------------
+def test_the_camera_went_on_or_stayed() -> None:
+    place = lost_at(80, velocity=_core.Pose([0, 0, 0, 1], [0.5, 0, 0]))
+    went_on, stayed = place.guesses(13, LIMITS)
+    assert went_on.translation[0] == pytest.approx(5.0 + 3 * 0.5)
+    assert stayed.translation[0] == 5.0
+
+
+def test_after_a_while_nobody_knows_where_it_went() -> None:
+    place = lost_at(80, velocity=_core.Pose([0, 0, 0, 1], [0.5, 0, 0]))
+    assert len(place.guesses(10 + LIMITS.motion_frames, LIMITS)) == 2
+    assert len(place.guesses(11 + LIMITS.motion_frames, LIMITS)) == 1
+
+
+def test_a_motion_is_stretched_with_the_map(fake: FakeCore) -> None:
+    place = lost_at(80, velocity=_core.Pose([0, 0, 0, 1], [0.5, 0, 0]))
+    slam_map: Any = FakeMap()
+    fake.stretched = 2.0
+    place.follow_map(slam_map)
+    assert place.velocity is not None
+    assert place.velocity.translation[0] == 1.0

@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a pose must have for it to be believed, with the verbs of the core replaced."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from orbslam2py import Reason, Sensor, TrackingState
+from orbslam2py.slam.records import PoseMethod, Verdict
+from orbslam2py.slam.thresholds import EvidenceThresholds, TrackingThresholds
+from support.tracking_scene import FakeCore, FakeFrame, Scene, pose
+
+#: Frames until the first second after the start, with its own limit of inliers, is over.
+_SETTLED = 40
+
+
+@pytest.fixture
+def careful(core: FakeCore, sensor: Sensor) -> Scene:
+    """A tracker that weighs its poses, used to 100 inliers; refuses fewer than 30."""
+    scene = Scene(
+        sensor, core, TrackingThresholds(local_map_inliers=10), evidence=EvidenceThresholds()
+    )
+    scene.run(_SETTLED)
+    core.calls.clear()
+    return scene
+
+
+def turned(correlation: float = 0.9) -> SimpleNamespace:
+    return SimpleNamespace(quaternion_xyzw=np.array([0.0, 0, 0, 1]), correlation=correlation)
+
+
+def doubted(scene: Scene, first: int, aligned: int, by_words: int, wide: int) -> None:
+    """The inliers that each way ends with."""
+    scene.core.aligned.append(turned())
+    for n_inliers in (first, aligned, by_words, wide):
+        scene.core.inliers.extend([50, n_inliers])
+
+
+def apart(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every way ends somewhere else."""
+    original = scene.core.optimize_pose
+    places = iter(range(1000))
+
+    def elsewhere(frame: FakeFrame) -> SimpleNamespace:
+        estimate = original(frame)
+        frame.T_cw = pose(100.0 * next(places))
+        estimate.covariance = 1e-6 * np.eye(6)
+        return estimate
+
+    monkeypatch.setattr(scene.core, "optimize_pose", elsewhere)
+
+
+def test_an_ordinary_frame_is_searched_once(careful: Scene) -> None:
+    outcome = careful.track()
+    evidence = outcome.estimate.evidence
+    assert evidence is not None
+    assert evidence.verdict is Verdict.STRONG
+    assert evidence.method is PoseMethod.MOTION_MODEL
+    assert evidence.inliers_to_usual == pytest.approx(1)
+    assert evidence.n_predicted == 321 + careful.core.n_visible
+    assert evidence.found == pytest.approx(100 / evidence.n_predicted)
+    assert not evidence.confirmed
+    assert careful.core.calls == ["motion", "optimize", "local map", "optimize", "sightings"]
+
+
+def test_no_evidence_where_the_map_begins_and_where_no_pose_is_found(core: FakeCore) -> None:
+    scene = Scene(Sensor.STEREO, core, evidence=EvidenceThresholds())
+    assert scene.track().estimate.evidence is None
+    core.motion.extend([0] * 4)
+    core.words.extend([0] * 4)
+    lost = scene.track()
+    assert lost.state is TrackingState.LOST
+    assert lost.estimate.evidence is None
+
+
+def test_what_turns_with_the_images_wins(careful: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    apart(careful, monkeypatch)
+    doubted(careful, first=40, aligned=90, by_words=0, wide=0)
+    outcome = careful.track()
+    evidence = outcome.estimate.evidence
+    assert evidence is not None
+    assert evidence.method is PoseMethod.ALIGNED_IMAGES
+    assert evidence.verdict is Verdict.STRONG
+    assert outcome.estimate.n_inliers == 90
+    assert "words" not in careful.core.calls, "enough was found"
+    assert careful.core.calls.count("sightings") == 1, "only what is believed is counted"
+
+
+def test_the_first_pose_stays_unless_another_is_clearly_better(
+    careful: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    apart(careful, monkeypatch)
+    doubted(careful, first=55, aligned=60, by_words=60, wide=60)
+    outcome = careful.track()
+    assert outcome.estimate.evidence is not None
+    assert outcome.estimate.evidence.method is PoseMethod.MOTION_MODEL
+    assert outcome.estimate.n_inliers == 55
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.59])
+def test_images_that_do_not_agree_are_no_guide(
+    careful: Scene, monkeypatch: pytest.MonkeyPatch, correlation: float
+) -> None:
+    apart(careful, monkeypatch)
+    careful.core.aligned.append(turned(correlation))
+    careful.core.inliers.extend([50, 40, 50, 90])
+    outcome = careful.track()
+    assert outcome.estimate.evidence is not None
+    assert outcome.estimate.evidence.method is PoseMethod.KEYFRAMES_AROUND
+
+
+def test_a_pose_that_explains_little_is_refused(
+    careful: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    apart(careful, monkeypatch)
+    doubted(careful, first=29, aligned=20, by_words=20, wide=20)
+    outcome = careful.track()
+    assert outcome.state is TrackingState.LOST
+    assert outcome.estimate.reason is Reason.WEAK_EVIDENCE
+    assert outcome.estimate.evidence is not None
+    assert outcome.estimate.evidence.verdict is Verdict.REFUSED
+    assert careful.last.T_cw is None
+
+
+def test_a_second_way_to_it_makes_it_weak_and_believed(careful: Scene) -> None:
+    """All ways end at the same pose."""
+    doubted(careful, first=29, aligned=29, by_words=29, wide=29)
+    outcome = careful.track()
+    assert outcome.state is TrackingState.OK
+    assert outcome.estimate.evidence is not None
+    assert outcome.estimate.evidence.verdict is Verdict.WEAK
+    assert outcome.estimate.evidence.confirmed
+
+
+def test_a_weak_frame_is_no_keyframe_before_the_third_that_is_confirmed(careful: Scene) -> None:
+    careful.core.n_reference = 1000
+    keyframes = []
+    for _ in range(3):
+        doubted(careful, first=29, aligned=29, by_words=29, wide=29)
+        keyframes.append(careful.track().is_keyframe)
+    assert keyframes == [False, False, True]
+    assert careful.core.n_inserted == 1
+
+
+def test_without_a_second_way_it_never_is(careful: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    careful.core.n_reference = 1000
+    careful.core.n_visible = 2000  # much is in view that is not found
+    apart(careful, monkeypatch)
+    for _ in range(5):
+        doubted(careful, first=49, aligned=40, by_words=40, wide=40)
+        outcome = careful.track()
+        assert outcome.state is TrackingState.OK
+        assert outcome.estimate.evidence is not None
+        assert outcome.estimate.evidence.verdict is Verdict.WEAK
+        assert not outcome.is_keyframe
+    assert careful.core.n_inserted == 0
+
+
+def test_inliers_in_one_corner_of_the_image_are_weak(careful: Scene) -> None:
+    careful.core.n_reference = 1000
+    careful.core.n_cells = 4
+    outcome = careful.track()
+    assert outcome.estimate.evidence is not None
+    assert outcome.estimate.evidence.verdict is Verdict.WEAK
+    assert not outcome.is_keyframe
+    careful.core.n_cells = 5
+    assert careful.track().is_keyframe
+
+
+def test_a_turn_that_nobody_expected_is_looked_at_again(
+    careful: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    original = careful.core.optimize_pose
+
+    def turns(frame: FakeFrame) -> SimpleNamespace:
+        estimate = original(frame)
+        frame.T_cw = type(pose(0))([0, np.sin(0.02), 0, np.cos(0.02)], [0, 0, 0])
+        return estimate
+
+    monkeypatch.setattr(careful.core, "optimize_pose", turns)
+    outcome = careful.track()
+    assert outcome.estimate.evidence is not None
+    assert outcome.estimate.evidence.turn_change == pytest.approx(np.degrees(0.04))
+    assert "align" in careful.core.calls
+
+
+def test_a_frame_whose_first_estimate_fails_is_searched_further(careful: Scene) -> None:
+    careful.core.motion.extend([0, 0])
+    careful.core.words.append(0)
+    careful.core.aligned.append(turned())
+    outcome = careful.track()
+    assert outcome.state is TrackingState.OK
+    assert outcome.estimate.evidence is not None
+    assert outcome.estimate.evidence.method is PoseMethod.ALIGNED_IMAGES
+
+
+def test_what_is_usual_is_forgotten_with_the_place(careful: Scene) -> None:
+    careful.core.motion.extend([0] * 4)
+    careful.core.words.extend([0] * 4)
+    assert careful.track().state is TrackingState.LOST
+    careful.core.motion.clear()
+    careful.core.words.clear()
+    careful.core.inliers.extend([50, 52])
+    outcome = careful.track()
+    assert outcome.state is TrackingState.OK
+    assert outcome.estimate.evidence is not None
+    assert outcome.estimate.evidence.inliers_to_usual == 1

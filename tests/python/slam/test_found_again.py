@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Blurred frames, and poses found again that wait for the next frame; among fakes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from orbslam2py import Reason, TrackingState
+from orbslam2py.slam.records import TrackingOutcome
+from orbslam2py.slam.thresholds import BlurThresholds
+from support.tracking_scene import Scene, lose
+
+SHARP = 1000.0
+WANTED = 1000
+"""Points of a reference keyframe of which so few are seen that a keyframe is wanted."""
+
+
+def blurred(scene: Scene) -> None:
+    scene.core.sharpnesses.append(0.3 * SHARP)
+
+
+# ---- confirmed by the next frame ---------------------------------------------------------------
+def test_no_keyframe_until_the_next_frame_confirms_the_pose(scene: Scene) -> None:
+    scene.run(40)
+    lose(scene)
+    scene.core.n_reference = WANTED
+    found = scene.track()
+    assert (found.state, found.estimate.unconfirmed) == (TrackingState.OK, True)
+    assert not found.is_keyframe
+    confirmed = scene.track()
+    assert not confirmed.estimate.unconfirmed
+    assert confirmed.is_keyframe
+    assert scene.tracking.n_relocalizations == 1
+
+
+def not_confirmed(scene: Scene, how: str) -> TrackingOutcome:
+    if how == "other points":
+        return scene.track(map_points=np.arange(500, 600))
+    if how == "few points in common":
+        return scene.track(map_points=np.arange(86, 186))
+    return lose(scene)
+
+
+@pytest.mark.parametrize("how", ["other points", "few points in common", "lost at once"])
+def test_what_is_not_confirmed_is_searched_on_from_the_old_place(scene: Scene, how: str) -> None:
+    scene.run(40)
+    before = scene.tracking.reference_keyframe
+    lose(scene)
+    scene.core.local_reference = 77  # where it seems to be
+    found = scene.track()
+    assert found.estimate.unconfirmed
+    assert scene.tracking.reference_keyframe == 77
+    outcome = not_confirmed(scene, how)
+    assert outcome.state is TrackingState.LOST
+    if how != "lost at once":
+        assert outcome.estimate.reason is Reason.NOT_CONFIRMED
+    assert scene.last.T_cw is None
+    assert scene.tracking.reference_keyframe == before
+    assert scene.tracking.motion.last is scene.frames[39]
+
+
+def test_the_next_frame_is_also_searched_where_the_one_found_was(scene: Scene) -> None:
+    """At the border of the map a keyframe may show too little of it."""
+    scene.run(40)
+    lose(scene)
+    scene.track()
+    scene.core.calls.clear()
+    scene.core.words.append(0)
+    assert scene.track().state is TrackingState.OK
+    assert scene.core.calls[:2] == ["words", "motion"]
+
+
+def test_fifteen_points_in_common_confirm(scene: Scene) -> None:
+    scene.run(40)
+    lose(scene)
+    scene.track()
+    assert scene.track(map_points=np.arange(85, 185)).state is TrackingState.OK
+
+
+# ---- blur ------------------------------------------------------------------------------------
+def test_a_blurred_frame_is_not_searched_while_lost(scene: Scene) -> None:
+    scene.run(40)
+    lose(scene)
+    blurred(scene)
+    scene.core.calls.clear()
+    outcome = scene.track()
+    assert (outcome.state, outcome.estimate.reason) == (TrackingState.LOST, Reason.BLURRED)
+    assert scene.core.calls == []
+    assert scene.track().state is TrackingState.OK
+
+
+def test_a_blurred_frame_is_tracked_but_no_keyframe(scene: Scene) -> None:
+    scene.run(40)
+    scene.core.n_reference = WANTED
+    blurred(scene)
+    assert not scene.track().is_keyframe
+    assert scene.track().is_keyframe
+
+
+def test_what_stays_as_it_is_counts_as_sharp_after_half_of_the_frames(scene: Scene) -> None:
+    """A wall without texture is no blur."""
+    scene.run(40)
+    scene.core.n_reference = WANTED
+    n_frames = BlurThresholds().frames
+    scene.core.sharpnesses.extend([0.3 * SHARP] * n_frames)
+    keyframes = [scene.track().is_keyframe for _ in range(n_frames)]
+    assert keyframes.index(True) == n_frames // 2 + 1
+
+
+def test_a_black_frame_says_nothing_of_sharpness(scene: Scene) -> None:
+    scene.run(40)
+    scene.core.sharpnesses.extend([0.0] * 21)
+    lose(scene)
+    for _ in range(20):
+        assert lose(scene).estimate.reason is not Reason.BLURRED
+    blurred(scene)
+    assert scene.track().estimate.reason is Reason.BLURRED, "the sharp ones are remembered"

@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Losses of a camera in a synthetic world: a covered lens, blur, a jump away and back."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import cv2
+import numpy as np
+import pytest
+from benchmarks.accuracy.mapped_world import MappedWorld
+
+from orbslam2py import Reason, Sensor, TrackingRecord, TrackingState
+from orbslam2py import _core as core
+from orbslam2py._timing import StageTimer
+from orbslam2py.datasets import Images
+from orbslam2py.slam.relocalization import PlaceOfLoss, Relocalizer
+from orbslam2py.slam.thresholds import RelocalizationThresholds
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+
+pytestmark = pytest.mark.watchdog(120)
+
+SIZE = (320, 240)
+N_MAPPED = 50
+
+
+@lru_cache
+def sequence() -> SyntheticSequence:
+    options = SyntheticOptions(world="corridor", sensor=Sensor.RGBD, size=SIZE, noise=2)
+    return SyntheticSequence(options)
+
+
+@pytest.fixture
+def world() -> MappedWorld:
+    """A corridor whose first frames were mapped; the camera goes on."""
+    return MappedWorld(sequence(), range(N_MAPPED))
+
+
+def with_image(images: Images, image: np.ndarray) -> Images:
+    return Images(image, images.right, images.depth)
+
+
+def smeared(images: Images, length: int = 41) -> Images:
+    """As by a fast turn while the shutter was open."""
+    return with_image(images, cv2.blur(images.image, (length, 1)))
+
+
+def go_on(world: MappedWorld, n_frames: int) -> list[TrackingRecord]:
+    """The frames after the mapped ones, as many as were not seen passed meanwhile."""
+    first = world._n_shown
+    return [world.show(world.sequence.load(first + k)) for k in range(n_frames)]
+
+
+def off(world: MappedWorld, record: TrackingRecord, index: int) -> float:
+    return world.error(record, world.sequence.T_wc(index)).translation_m
+
+
+def test_a_covered_lens(world: MappedWorld) -> None:
+    """The camera goes on behind a hand, and is found where its motion led it."""
+    n_keyframes = world.system.n_keyframes
+    for _ in range(6):
+        assert world.show(world.black()).state is TrackingState.LOST
+    records = go_on(world, 6)
+    found = records[0]
+    assert (found.state, found.unconfirmed, found.is_keyframe) == (TrackingState.OK, True, False)
+    assert off(world, found, N_MAPPED + 6) < 0.03
+    assert not any(record.unconfirmed for record in records[1:])
+    assert all(record.state is TrackingState.OK for record in records)
+    assert world.system.n_keyframes >= n_keyframes
+    lost = world.system.trajectory().lost
+    assert lost[-12:-6].all()
+    assert not lost[-6:].any()
+    assert world.system.check_map() == []
+
+
+def test_blurred_frames_are_not_searched(world: MappedWorld) -> None:
+    world.lose()
+    for k in range(3):
+        record = world.show(smeared(world.sequence.load(N_MAPPED + k)))
+        assert (record.state, record.reason) == (TrackingState.LOST, Reason.BLURRED)
+    assert world.show(world.sequence.load(N_MAPPED + 4)).state is TrackingState.OK
+
+
+def test_a_blurred_frame_is_never_a_keyframe(world: MappedWorld) -> None:
+    records = []
+    for k in range(0, 24, 3):
+        records.append(world.show(smeared(world.sequence.load(N_MAPPED + k), 15)))
+        records += [world.show(world.sequence.load(N_MAPPED + k + step)) for step in (1, 2)]
+    assert not any(record.is_keyframe for record in records[::3])
+    assert any(record.is_keyframe for record in records)
+
+
+def test_a_jump_away_and_back(world: MappedWorld) -> None:
+    options = SyntheticOptions(world="room", sensor=Sensor.RGBD, size=SIZE, noise=2, seed=7)
+    elsewhere = SyntheticSequence(options)
+    n_keyframes = world.system.n_keyframes
+    away = [world.show(elsewhere.load(10 * k)) for k in range(12)]
+    assert all(record.state is TrackingState.LOST for record in away)
+    assert world.system.n_keyframes == n_keyframes
+    back = [world.show(world.sequence.load(20 + k)) for k in range(5)]
+    assert [record.state for record in back[1:]] == [TrackingState.OK] * 4
+    assert off(world, back[-1], 24) < 0.03
+
+
+def test_a_glimpse_is_not_believed(world: MappedWorld) -> None:
+    """Found in one frame, and then there is nothing: the search goes on from the old place."""
+    tracking = world.system.pipeline.tracking
+    believed, reference = tracking.motion.last.id, tracking.reference_keyframe
+    world.lose()
+    glimpse = world.show(world.sequence.load(5))
+    assert glimpse.unconfirmed
+    assert tracking.motion.last.id == glimpse.frame_id
+    world.lose()
+    assert world.system.trajectory().lost[-3:].all(), "its pose is taken back"
+    assert (tracking.motion.last.id, tracking.reference_keyframe) == (believed, reference)
+    assert world.show(world.sequence.load(N_MAPPED)).state is TrackingState.OK
+
+
+def test_who_asks_before_the_next_frame_gets_the_pose(world: MappedWorld) -> None:
+    world.lose()
+    found = world.show(world.sequence.load(N_MAPPED))
+    assert found.unconfirmed
+    path = world.system.trajectory()
+    assert not path.lost[-1]
+    assert len(path) == world._n_shown
+
+
+def test_the_same_losses_give_the_same_bytes() -> None:
+    paths = []
+    for _ in range(2):
+        world = MappedWorld(sequence(), range(N_MAPPED))
+        world.lose(3)
+        world.show(smeared(world.sequence.load(N_MAPPED + 3)))
+        records = go_on(world, 6)
+        assert records[-1].T_cw is not None
+        paths.append(records[-1].T_cw.tobytes())
+    assert paths[0] == paths[1]
+
+
+# ---- the verb ------------------------------------------------------------------------------------
+def described(world: MappedWorld, index: int) -> core.TrackedFrame:
+    shown = world.sequence.load(index)
+    assert shown.depth is not None
+    frame = world.system.pipeline.front_end.rgbd(
+        shown.image, shown.depth, index, 100.0, StageTimer()
+    )
+    core.describe(frame, world.system.vocabulary)
+    return core.TrackedFrame(frame)
+
+
+def relocalizer(
+    world: MappedWorld, limits: RelocalizationThresholds | None = None, *, words: bool = True
+) -> Relocalizer:
+    back_end = world.system.pipeline.back_end
+    index = back_end.keyframe_index if words else core.KeyFrameIndex()
+    return Relocalizer(back_end.map, index, 0, limits)
+
+
+def test_near_the_place_of_loss_no_word_is_needed(world: MappedWorld) -> None:
+    motion = world.system.pipeline.tracking.motion
+    found = relocalizer(world, words=False)
+    assert found.relocalize(described(world, N_MAPPED + 5)) == 0
+    reference = world.system.pipeline.tracking.reference_keyframe
+    found.lose(PlaceOfLoss(motion.last, motion.velocity, reference))
+    frame = described(world, N_MAPPED + 5)
+    assert found.relocalize(frame) >= 50
+    assert frame.T_cw is not None
+    found.reset()
+    assert found.relocalize(described(world, N_MAPPED + 5)) == 0, "the place is forgotten"
+
+
+def test_the_window_grows_with_every_failure(world: MappedWorld) -> None:
+    """Beside the path, where the first window does not reach."""
+    motion = world.system.pipeline.tracking.motion
+    limits = RelocalizationThresholds(
+        guess_window=0.5, widening=10.0, widest=40.0, near_candidates=0
+    )
+    found = relocalizer(world, limits, words=False)
+    reference = world.system.pipeline.tracking.reference_keyframe
+    found.lose(PlaceOfLoss(motion.last, None, reference))
+    tries = [found.relocalize(described(world, N_MAPPED + 6)) for _ in range(6)]
+    assert tries[0] == 0
+    assert tries[-1] >= 50
+
+
+def test_poses_that_are_verified_are_counted(world: MappedWorld) -> None:
+    limits = RelocalizationThresholds(verified_poses=0)
+    assert relocalizer(world).relocalize(described(world, 30)) >= 50
+    assert relocalizer(world, limits).relocalize(described(world, 30)) == 0
