@@ -140,7 +140,7 @@ def motion_cases(sensors: Sequence[str]) -> Iterator[Case]:
         turn, place = divmod(number, len(SITUATIONS))
         situation = SITUATIONS[place]
         sensor = sensors[(turn + place) % len(sensors)]
-        features = FEATURES[(turn // len(sensors) + place // len(sensors)) % len(FEATURES)]
+        features = FEATURES[(turn // len(sensors) + place) % len(FEATURES)]
         yield Case(situation, sensor, features, seed=turn)
         number += 1
 

@@ -1680,30 +1680,6 @@ class MotionScore:
         """
         Degrees; of the 51st best pair.
         """
-class TwoViewMotion:
-    """
-    A motion between two views, and what it places.
-    """
-    @property
-    def T_21(self) -> Pose:
-        """
-        Pose from camera 1 to camera 2, translation of length 1.
-        """
-    @property
-    def parallax(self) -> float:
-        """
-        Degrees.
-        """
-    @property
-    def points(self) -> numpy.typing.NDArray[numpy.float64]:
-        """
-        Per initial keypoint, (n, 3) float64 in the frame of camera 1; zero where missing.
-        """
-    @property
-    def triangulated(self) -> numpy.typing.NDArray[numpy.uint8]:
-        """
-        Per initial keypoint, (n,) uint8: the point is well placed.
-        """
 class TwoViewOptions:
     """
     Limits of reconstruct_two_views.

@@ -36,6 +36,8 @@ class InitializationThresholds:
     """... and the least one, around where a view's keypoints should have moved."""
     displacement: float = 5.0
     """A view is tried when its keypoints have moved by a median of so many pixels."""
+    tried_views: int = 3
+    """So many of the views that have moved so far are tried with a frame, from the furthest on."""
     parallax: float = 1.0
     """Degrees of parallax that a motion chosen by third views must have."""
     third_view_share: float = 0.2

@@ -142,6 +142,9 @@ class Tracking:
         """Forget a map that came to nothing, but not the frames that a new one may begin from."""
         frames = self._initializer.remembered()
         self.reset()
+        if frames:
+            # The count of the frames goes on, and the next map is young as well.
+            self._search.last_relocalization = frames[-1].id
         self._initializer.restart(frames)
 
     def reset(self) -> None:

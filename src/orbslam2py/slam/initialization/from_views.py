@@ -153,9 +153,7 @@ class MonocularInitializer:
         """Try all views with this frame, the ones that moved furthest first."""
         reason = Reason.LOW_PARALLAX
         candidates: list[Candidate] = []
-        for view in sorted(self._kept.views, key=lambda view: -view.displacement):
-            if view.displacement < self._limits.displacement:
-                break
+        for view in self._tried_views():
             result = core.reconstruct_two_views(
                 view.keypoints,
                 frame.features.keypoints,
@@ -178,6 +176,14 @@ class MonocularInitializer:
             if candidate.is_clear:
                 reason = Reason.NO_THIRD_VIEW
         return reason
+
+    def _tried_views(self) -> list[View]:
+        """A few of the views that have moved far enough, spread from the furthest on."""
+        limits = self._limits
+        moved = [view for view in self._kept.views if view.displacement >= limits.displacement]
+        moved.sort(key=lambda view: -view.displacement)
+        places = np.linspace(0, len(moved) - 1, min(limits.tried_views, len(moved)))
+        return [moved[place] for place in np.rint(places).astype(int)]
 
     # ---- the map ---------------------------------------------------------------------------------
     def _build_map(self, view: View, motion: Motion, second: core.TrackedFrame) -> Reason:

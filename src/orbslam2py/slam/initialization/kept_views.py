@@ -96,6 +96,7 @@ class KeptViews:
         self.views: list[View] = []
         self._last: View | None = None
         self._motion: ImageMotion | None = None
+        self._n_usual = 0
 
     def follow(self, frame: core.Frame) -> None:
         """Match all views with the next frame; those that have lost too much are let go."""
@@ -117,12 +118,19 @@ class KeptViews:
             pinhole = frame.camera.pinhole
             centre = np.array([pinhole.cx, pinhole.cy])
             self._motion = ImageMotion(centre, centre)
-        last.follow(frame, seen, self._motion, self._limits.window)
-        if last.n_matches < self._limits.matches:
-            # It turned otherwise than before, or further than the window.
-            still = ImageMotion(*self._motion.frame)
+        limits = self._limits
+        # As before, it is enough to look near to where that leads; else ever wider.
+        enough, windows = self._n_usual // 2, [(self._motion, limits.window)]
+        if self._motion.spread is not None:
+            windows.insert(0, (self._motion, limits.narrow_window + 4 * self._motion.spread))
+        still = ImageMotion(*self._motion.frame)
+        for motion, window in (*windows, (still, limits.wide_window)):
             last.positions = last.keypoints
-            last.follow(frame, seen, still, self._limits.wide_window)
+            last.follow(frame, seen, motion, window)
+            if last.n_matches >= max(limits.matches, enough):
+                break
+            enough = 0
+        self._n_usual = last.n_matches
         found = last.matches >= 0
         self._motion.fit(last.keypoints[found], (last.positions - last.keypoints)[found])
         return self._motion
