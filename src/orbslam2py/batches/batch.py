@@ -15,6 +15,7 @@ from orbslam2py._files import atomic_write, reason_of
 from orbslam2py.batches.engine import open_workers, run_on
 from orbslam2py.batches.jobs import Job, make_jobs, read_jobs
 from orbslam2py.batches.summary import Group, summarise
+from orbslam2py.batches.sweep_picture import write_sweep_picture
 from orbslam2py.batches.table import write_table
 from orbslam2py.batches.work import read_row, run_job
 from orbslam2py.errors import DatasetError
@@ -23,6 +24,8 @@ Progress = Callable[[dict[str, Any], int, int], None]
 
 #: Marks the folder of a batch.
 BATCH_FILE = "batch.json"
+#: Error against each parameter of a sweep.
+PICTURE = "sweep.png"
 
 
 @dataclass(frozen=True)
@@ -38,7 +41,7 @@ class BatchResult:
     n_left
         Runs that were not made because the batch was stopped.
     files
-        The files of the table.
+        The files of the table, and the picture of a sweep.
     """
 
     folder: Path
@@ -133,6 +136,8 @@ def batch(
             progress(row, len(rows), len(wanted))
     table = [rows[job.key] for job in wanted if job.key in rows]
     files = write_table(folder, table)
+    if write_sweep_picture(folder / PICTURE, table):
+        files.append(folder / PICTURE)
     return BatchResult(folder, table, len(wanted) - len(table), files)
 
 

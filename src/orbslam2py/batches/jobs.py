@@ -126,8 +126,11 @@ def read_jobs(path: Path) -> tuple[list[Job], Path | None]:
         document = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise SettingsError(cannot_open(path, error, "job file")) from error
+    except yaml.MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark else 1
+        raise SettingsError(f"{path}:{line} is no YAML: {error.problem}; correct it") from error
     except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise SettingsError(f"{path} is no YAML: {error}; correct it") from error
+        raise SettingsError(f"{path} is no text in YAML; give a job file") from error
     if not isinstance(document, Mapping):
         raise SettingsError(f"{path} holds no named values; it needs at least 'sequences:'")
     try:

@@ -11,9 +11,13 @@ import threading
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
+from matplotlib.axes import Axes
 
 import orbslam2py as orb
+from orbslam2py.batches.sweep_picture import write_sweep_picture
 from orbslam2py.batches.work import MEASURED
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
@@ -165,6 +169,30 @@ def test_sweep(sequences: Path, tmp_path: Path) -> None:
     assert [row["sweep.ORBextractor.nFeatures"] for row in done.rows] == [300, 900]
     few, many = (row["map_points"] for row in done.rows)
     assert few < many
+    picture = tmp_path / "out" / "sweep.png"
+    assert picture in done.files
+    assert np.ptp(cv2.imread(str(picture))) > 200
+
+
+def test_runs_without_a_result_are_in_the_picture(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[tuple[list[float], str]] = []
+    plot = Axes.plot
+
+    def watched(axes: Axes, values: Any, heights: Any, mark: str, **more: Any) -> Any:
+        drawn.append((list(values), mark))
+        return plot(axes, values, heights, mark, **more)
+
+    monkeypatch.setattr(Axes, "plot", watched)
+    rows: list[dict[str, Any]] = [
+        {"sequence": "a", "sweep.ThDepth": value, "ate_rmse_m": error}
+        for value, error in ((30, 0.1), (30, 0.3), (40, 0.2), (50, None))
+    ]
+    assert write_sweep_picture(tmp_path / "p.png", rows)
+    assert drawn == [([30, 30, 40], "o"), ([30, 40], "-"), ([50], "x")]
+    assert not write_sweep_picture(tmp_path / "none.png", [{"sequence": "a"}])
+    assert not (tmp_path / "none.png").exists()
 
 
 def test_two_workers(sequences: Path, tmp_path: Path) -> None:

@@ -128,6 +128,7 @@ def test_another_version_is_refused(
     cluster: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     cluster.add_worker()
+    monkeypatch.setattr(engine, "_PATIENCE", 90.0)
     monkeypatch.setattr(engine, "__version__", "9.9.9")
     with pytest.raises(orb.DatasetError, match=r"has orbslam2py .*, here it is 9\.9\.9; install"):
         orb.batch(jobs(tmp_path, 1), tmp_path / "out", scheduler=cluster.address)

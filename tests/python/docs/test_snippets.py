@@ -39,7 +39,11 @@ NOT_RUN = {
 
 
 #: What is added to the examples of long commands.
-SHORTER = {"demo": "--frames 12", "synthesize": "--frames 20 --size 320x240"}
+SHORTER = {
+    "batch": "--workers 0",
+    "demo": "--frames 12",
+    "synthesize": "--frames 20 --size 320x240",
+}
 
 
 def runnable(path: Path) -> list[Block]:

@@ -39,6 +39,9 @@ cam1:
   resolution: [320, 240]
 """
 
+#: What `batch` runs.
+JOBS = "sequences: [rgbd_dataset_freiburg1_desk]\noptions: {max_frames: 8}\nseeds: 2\n"
+
 
 def make_data(folder: Path) -> None:
     """Fill a folder with everything the documentation takes as given."""
@@ -71,6 +74,7 @@ def make_data(folder: Path) -> None:
     write_image(folder / "hood.png", hood)
     write_video(folder / "board.mp4", chessboard_views(single.camera.matrix, 16), 4)
     (folder / "camchain.yaml").write_text(CAMCHAIN)
+    (folder / "jobs.yaml").write_text(JOBS)
     _write_vocabulary(folder)
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py.datasets.bags.bag import Bag, Message, Topic
 from orbslam2py.datasets.bags.calibration import CameraInfo, settings_of_camera, settings_of_pair
+from orbslam2py.datasets.bags.image_topics import ImageTopic
 from orbslam2py.datasets.bags.messages import CAMERA_INFO, read_message
 from orbslam2py.datasets.bags.pixels import decode_depth, decode_image, units_per_metre
 from orbslam2py.datasets.bags.poses import read_poses
@@ -27,7 +28,7 @@ from orbslam2py.datasets.bags.timing import (
     time_messages,
     warn_of_gaps,
 )
-from orbslam2py.datasets.bags.topics import ImageTopic, TopicChoice, parse_topics
+from orbslam2py.datasets.bags.topics import TopicChoice, parse_topics
 from orbslam2py.datasets.base import Images, choose_sensor
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.frames import FramesInOrder

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from orbslam2py.datasets.bags.bag import Bag, Topic
+from orbslam2py.datasets.bags.image_topics import ImageTopic, names_of_right, rank_of
 from orbslam2py.datasets.bags.messages import (
     CAMERA_INFO,
     COMPRESSED_IMAGE,
@@ -26,75 +27,8 @@ ROLES = ("left", "right", "depth", "left_info", "right_info", "truth")
 _ALIASES = {"image": "left", "color": "left", "colour": "left", "rgb": "left", "info": "left_info"}
 #: The topic that is taken as the true poses of the camera if nobody names one.
 _TRUTH = "/ground_truth"
-#: Ways in which image_transport sends an image: the last part of the topic's name.
-_TRANSPORTS = ("compressed", "compressedDepth")
-#: Images of one camera, the best first: rectified before raw, grey before colour.
-_OF_ONE_CAMERA = (
-    *("image_rect", "image_rect_color", "image_rect_raw"),
-    *("image_mono", "image_raw", "image_color", "image"),
-)
-#: Words in names of the left and the right camera.
-_SIDES = (
-    *(("left", "right"), ("Left", "Right"), ("l", "r"), ("infra1", "infra2")),
-    *((f"{word}{i}", f"{word}{i + 1}") for i in (0, 1) for word in ("cam", "camera", "cam_")),
-    *((f"{word}{i}", f"{word}{i + 1}") for i in (0, 1) for word in ("camera_", "image", "image_")),
-)
 _COLOUR = re.compile(r"rgb|colou?r", re.IGNORECASE)
 _REGISTERED = re.compile(r"regist|aligned", re.IGNORECASE)
-
-
-@dataclass(frozen=True)
-class ImageTopic:
-    """A topic with images.
-
-    Attributes
-    ----------
-    topic
-        The topic.
-    encoding
-        Encoding of its raw pixels: ``mono8``, ``16UC1`` ...
-    size
-        Width and height of the first image in pixels; None if it cannot be decoded.
-    problem
-        Why it cannot.
-    """
-
-    topic: Topic
-    encoding: str
-    size: tuple[int, int] | None
-    problem: str = ""
-
-    @property
-    def is_compressed(self) -> bool:
-        """Whether its messages are CompressedImage."""
-        return self.topic.kind == COMPRESSED_IMAGE
-
-    @property
-    def is_depth(self) -> bool:
-        """Whether its pixels are distances."""
-        named = self.encoding != "mono16" or "depth" in self.topic.name.lower()
-        return is_depth(self.encoding) and named
-
-    @property
-    def base(self) -> str:
-        """Name without the way of sending it."""
-        name, _, last = self.topic.name.rpartition("/")
-        return name if last in _TRANSPORTS and name else self.topic.name
-
-    @property
-    def camera(self) -> str:
-        """Name that the images of one camera share."""
-        name, _, last = self.base.rpartition("/")
-        return name or "/" if last in _OF_ONE_CAMERA else self.base
-
-    @property
-    def is_rectified(self) -> bool:
-        """Whether the name says so."""
-        return "rect" in self.base.rpartition("/")[2]
-
-    def __str__(self) -> str:
-        size = ", not readable" if self.size is None else f", {self.size[0]} x {self.size[1]}"
-        return f"{self.topic.name} ({self.topic.kind}, {self.encoding}{size}, {self.topic.n})"
 
 
 @dataclass(frozen=True)
@@ -218,7 +152,7 @@ class TopicChoice:
         for one in self._all:
             if one.size is None or is_depth(one.encoding):
                 continue
-            if one.camera not in best or _rank(one) < _rank(best[one.camera]):
+            if one.camera not in best or rank_of(one) < rank_of(best[one.camera]):
                 best[one.camera] = one
         return list(best.values())
 
@@ -235,11 +169,9 @@ class TopicChoice:
         by_name = {one.base: one for one in self._cameras}
         pairs = []
         for one in self._cameras:
-            for left, right in _SIDES:
-                other = _exchanged(one.base, left, right)
-                if other != one.base and other in by_name:
-                    pairs.append((one, by_name[other]))
-                    break
+            right = next((by_name[n] for n in names_of_right(one.base) if n in by_name), None)
+            if right is not None:
+                pairs.append((one, right))
         # Of cam0, cam1, cam2 the first two are meant.
         rights = {pair[1].base for pair in pairs}
         return [pair for pair in pairs if pair[0].base not in rights]
@@ -391,18 +323,6 @@ def _has_images(topic: Topic) -> bool:
 
 def _has_infos(topics: list[Topic]) -> bool:
     return any(topic.kind == CAMERA_INFO for topic in topics)
-
-
-def _rank(one: ImageTopic) -> tuple[bool, int, bool]:
-    last = one.base.rpartition("/")[2]
-    place = _OF_ONE_CAMERA.index(last) if last in _OF_ONE_CAMERA else 0
-    return (not one.is_rectified, place, one.is_compressed)
-
-
-def _exchanged(name: str, left: str, right: str) -> str:
-    """Put one word in the place of another where it stands alone: ``cam1`` is not in ``cam10``."""
-    ends = r"(?![0-9])" if left[-1].isdigit() else r"(?![a-z])"
-    return re.sub(rf"(?<![A-Za-z]){re.escape(left)}{ends}", right, name)
 
 
 def _listed(topics: list[Topic]) -> str:

@@ -65,8 +65,16 @@ def test_the_format_of_an_export_comes_first(command: CommandLine, option: tuple
         ("phone.yaml", "is a settings file", "give it with --settings; the sequence comes first"),
         ("phone.YML", "is a settings file", "give it with --settings; the sequence comes first"),
         ("office.orbmap", "is a map file", "give it with --load; the sequence comes first"),
-        ("list.txt", "is neither a video, nor a folder, nor a camera", "the folder of a sequence"),
-        ("noise.bin", "is neither a video, nor a folder, nor a camera", "the folder of a sequence"),
+        (
+            "list.txt",
+            "is neither a video, nor a bag, nor a folder, nor a camera",
+            "the folder of a sequence",
+        ),
+        (
+            "noise.bin",
+            "is neither a video, nor a bag, nor a folder, nor a camera",
+            "the folder of a sequence",
+        ),
         ("noise.mp4", "is no video that can be read", "convert it"),
     ],
 )

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a topic with images is: its pixels, and what its name tells of the camera."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from orbslam2py.datasets.bags.bag import Topic
+from orbslam2py.datasets.bags.messages import COMPRESSED_IMAGE
+from orbslam2py.datasets.bags.pixels import is_depth
+
+#: Ways in which image_transport sends an image: the last part of the topic's name.
+_TRANSPORTS = ("compressed", "compressedDepth")
+#: Images of one camera, the best first: rectified before raw, grey before colour.
+_OF_ONE_CAMERA = (
+    *("image_rect", "image_rect_color", "image_rect_raw"),
+    *("image_mono", "image_raw", "image_color", "image"),
+)
+#: Words in names of the left and the right camera.
+_SIDES = (
+    *(("left", "right"), ("Left", "Right"), ("l", "r"), ("infra1", "infra2")),
+    *((f"{word}{i}", f"{word}{i + 1}") for i in (0, 1) for word in ("cam", "camera", "cam_")),
+    *((f"{word}{i}", f"{word}{i + 1}") for i in (0, 1) for word in ("camera_", "image", "image_")),
+)
+
+
+@dataclass(frozen=True)
+class ImageTopic:
+    """A topic with images.
+
+    Attributes
+    ----------
+    topic
+        The topic.
+    encoding
+        Encoding of its raw pixels: ``mono8``, ``16UC1`` ...
+    size
+        Width and height of the first image in pixels; None if it cannot be decoded.
+    problem
+        Why it cannot.
+    """
+
+    topic: Topic
+    encoding: str
+    size: tuple[int, int] | None
+    problem: str = ""
+
+    @property
+    def is_compressed(self) -> bool:
+        """Whether its messages are CompressedImage."""
+        return self.topic.kind == COMPRESSED_IMAGE
+
+    @property
+    def is_depth(self) -> bool:
+        """Whether its pixels are distances."""
+        named = self.encoding != "mono16" or "depth" in self.topic.name.lower()
+        return is_depth(self.encoding) and named
+
+    @property
+    def base(self) -> str:
+        """Name without the way of sending it."""
+        name, _, last = self.topic.name.rpartition("/")
+        return name if last in _TRANSPORTS and name else self.topic.name
+
+    @property
+    def camera(self) -> str:
+        """Name that the images of one camera share."""
+        name, _, last = self.base.rpartition("/")
+        return name or "/" if last in _OF_ONE_CAMERA else self.base
+
+    @property
+    def is_rectified(self) -> bool:
+        """Whether the name says so."""
+        return "rect" in self.base.rpartition("/")[2]
+
+    def __str__(self) -> str:
+        size = ", not readable" if self.size is None else f", {self.size[0]} x {self.size[1]}"
+        return f"{self.topic.name} ({self.topic.kind}, {self.encoding}{size}, {self.topic.n})"
+
+
+def rank_of(one: ImageTopic) -> tuple[bool, int, bool]:
+    """Sort key of the images of one camera, the best first."""
+    last = one.base.rpartition("/")[2]
+    place = _OF_ONE_CAMERA.index(last) if last in _OF_ONE_CAMERA else 0
+    return (not one.is_rectified, place, one.is_compressed)
+
+
+def names_of_right(left: str) -> list[str]:
+    """Return what the right camera may be called if a name is that of the left one."""
+    names = (_exchanged(left, *sides) for sides in _SIDES)
+    return [name for name in names if name != left]
+
+
+def _exchanged(name: str, left: str, right: str) -> str:
+    """Put one word in the place of another where it stands alone: ``cam1`` is not in ``cam10``."""
+    ends = r"(?![0-9])" if left[-1].isdigit() else r"(?![a-z])"
+    return re.sub(rf"(?<![A-Za-z]){re.escape(left)}{ends}", right, name)
