@@ -139,3 +139,19 @@ def test_no_workers(cluster: Cluster, tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.setattr(engine, "_PATIENCE", 1.0)
     with pytest.raises(orb.DatasetError, match="has no workers; start some with 'dask worker"):
         orb.batch(jobs(tmp_path, 1), tmp_path / "out", scheduler=cluster.address)
+
+
+@pytest.mark.watchdog(120)
+def test_own_workers_listen_on_loopback_addresses_only() -> None:
+    psutil = pytest.importorskip("psutil", reason="it comes with dask")
+    with engine.open_workers(None, 1, None) as client:
+        client.wait_for_workers(1)
+        own = psutil.Process()
+        listening = [
+            connection.laddr.ip
+            for process in (own, *own.children(recursive=True))
+            for connection in process.net_connections()
+            if connection.status == "LISTEN"
+        ]
+    assert len(listening) >= 2
+    assert set(listening) == {"127.0.0.1"}
