@@ -26,13 +26,13 @@ from orbslam2py.maps.exports.colours import with_colours
 from orbslam2py.maps.exports.g2o import export_g2o
 from orbslam2py.maps.exports.images import ImageOfKeyframe, ImageSequence, images_of
 from orbslam2py.maps.exports.nerfstudio import export_nerfstudio
+from orbslam2py.maps.exports.pcd import write_pcd
 from orbslam2py.maps.exports.points import export_points
 from orbslam2py.maps.exports.trajectories import export_trajectory, keyframe_path
 from orbslam2py.maps.map_arrays import MapArrays
 from orbslam2py.maps.map_copies import restore_contents, take_contents
 from orbslam2py.maps.map_file import MapFile, save_map
 from orbslam2py.maps.map_reader import load_map
-from orbslam2py.maps.pcd import write_pcd
 from orbslam2py.maps.ply import write_ply
 from orbslam2py.maps.reprojection import reprojection_errors
 from orbslam2py.maps.saved_map import RecordedFrames, Run, SavedMap, VocabularyIdentity

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.contents import MapContents
-from orbslam2py.maps.pcd import write_pcd
+from orbslam2py.maps.exports.pcd import write_pcd
 from orbslam2py.maps.ply import write_ply
 from orbslam2py.maps.units import unit_of
 
