@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import faulthandler
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,6 +13,8 @@ from types import FrameType
 
 #: A hang takes for ever; a machine that has other things to do takes so many times the usual limit.
 _SLOWEST = 4
+#: What a test puts in its place may be no file.
+_STDERR = sys.__stderr__ or sys.stderr
 
 
 class HangError(Exception):
@@ -27,12 +30,12 @@ def watchdog(seconds: float) -> Iterator[None]:
     seconds *= _SLOWEST
 
     def expired(_signal: int, _frame: FrameType | None) -> None:
-        faulthandler.dump_traceback()
+        faulthandler.dump_traceback(_STDERR)
         raise HangError(f"not done after {seconds} s")
 
     before = signal.signal(signal.SIGALRM, expired)
     signal.setitimer(signal.ITIMER_REAL, seconds)
-    faulthandler.dump_traceback_later(2 * seconds + 10, exit=True)
+    faulthandler.dump_traceback_later(2 * seconds + 10, exit=True, file=_STDERR)
     try:
         yield
     finally:
