@@ -12,8 +12,8 @@
 namespace orbslam {
 namespace {
 
-constexpr double kFuseMonoGate = 5.99;             // chi-square, 95 %, 2 degrees of freedom
-constexpr double kFuseStereoGate = 7.8;            // 3 degrees of freedom, rounded as in the original
+constexpr double kFuseMonoGate = 5.99;         // chi-square, 95 %, 2 degrees of freedom
+constexpr double kFuseStereoGate = 7.8;        // 3 degrees of freedom, rounded as in the original
 constexpr std::size_t kSecondDegree = 5;       // neighbours of a neighbour that take part
 constexpr std::size_t kRefreshedAtOnce = 200;  // points per write section, to keep it short
 constexpr float kNeighbourRadius = 3.0F;
