@@ -219,8 +219,8 @@ def test_cut_soon_after_the_beginning_starts_a_new_map() -> None:
     assert len(camera.system.trajectories()) == camera.system.n_resets + 1
 
 
-@pytest.mark.parametrize("gap", [3, 7])
-def test_sequence_with_gaps(gap: int) -> None:
+@pytest.mark.parametrize(("gap", "error"), [(3, 0.1), (7, 0.15)])  # of 6 and 15 m
+def test_sequence_with_gaps(gap: int, error: float) -> None:
     camera = Camera()
     records = camera.play(range(0, 60 * gap, gap))
     for record in records:
@@ -228,7 +228,7 @@ def test_sequence_with_gaps(gap: int) -> None:
         assert (record.reason is Reason.NONE) == (record.state is TrackingState.OK)
     assert camera.system.check_map() == []
     if len(camera.system.trajectory()) > 5:
-        assert camera.ate() < 0.1
+        assert camera.ate() < error
     if gap == 3:
         assert n_ok(records) > 40
 
