@@ -59,7 +59,7 @@ test-cpp: build/.system-packages
 	@ctest --test-dir build/release --output-on-failure -j $(JOBS)
 
 test-python: install
-	@$(BIN)/python -m pytest -q -n $(JOBS) --dist loadfile
+	@$(BIN)/python -m pytest -q -n $(JOBS) --dist loadfile --no-loadscope-reorder
 
 lint: $(VENV)/.requirements
 	@$(BIN)/ruff check src tests examples benchmarks scripts

@@ -12,6 +12,30 @@ import pytest
 from support.data import shared_folder
 from support.watchdog import watchdog, worker_threads
 
+#: Files that take longest, and folders of such: with several workers they come first, so that no
+#: worker is left alone with one at the end (with ``--no-loadscope-reorder``).
+LONGEST_FIRST = (
+    "slam/test_loops.py",
+    "docs/test_snippets.py",
+    "package/test_accuracy.py",
+    "package/test_calibration_matrix.py",
+    "viewer",
+    "batches",
+    "slam",
+)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the longest files first; the order within a file stays."""
+    here = Path(__file__).parent
+
+    def rank(item: pytest.Item) -> int:
+        place = item.path.relative_to(here).as_posix()
+        ranks = (i for i, name in enumerate(LONGEST_FIRST) if place.startswith(name))
+        return next(ranks, len(LONGEST_FIRST))
+
+    items.sort(key=rank)
+
 
 @pytest.fixture(autouse=True)
 def _no_hang_and_no_thread_left(request: pytest.FixtureRequest) -> Iterator[None]:
