@@ -103,7 +103,8 @@ class BlobTable:
         self._present: dict[str, NDArray[np.bool_]] = {}
         for blob, *sizes in zip(table.blobs, *(row[n_keys + 1 :] for row in rows), strict=True):
             self._check_sizes(blob, sizes)
-            self._present[blob.field] = np.array([size is not None for size in sizes], bool)
+            present = np.array([size is not None for size in sizes], bool)
+            self._present[blob.field] = present & (present.all() or not blob.all_or_none)
 
     def has(self, field: str) -> NDArray[np.bool_]:
         """(n,) which rows hold something of an optional array."""
@@ -143,7 +144,7 @@ class BlobTable:
                     f"{blob.column} of {self._table.name} {key[0]} has the wrong length"
                 )
         missing = sizes.count(None)
-        if missing and missing != len(sizes) and not blob.sparse:
+        if missing and missing != len(sizes) and not (blob.sparse or blob.all_or_none):
             raise MapFileError(f"{blob.column} is missing in some rows of {self._table.name}")
 
     def _arrays(self, n: int) -> dict[str, NDArray[Any]]:
@@ -165,7 +166,7 @@ class BlobTable:
             raise MapFileError(f"the table {self._table.name} changed while it was read")
         blobs = zip(self._table.blobs, self._sizes, row[first + 1 :], strict=True)
         for blob, size, value in blobs:
-            if value is None:
+            if value is None or not self._present[blob.field][number]:
                 continue
             array = arrays[blob.field]
             if not isinstance(value, bytes) or len(value) != count * size:

@@ -28,6 +28,8 @@ class Blob(NamedTuple):
     """NULL when the array is empty."""
     sparse: bool = False
     """NULL in single rows too, which are zeros in the array."""
+    all_or_none: bool = False
+    """NULL in single rows too; the array is then empty: it is of use only where all have it."""
 
 
 KEYPOINTS = (
@@ -40,7 +42,7 @@ KEYPOINTS = (
     Blob("depths", "depth", "<f4"),
     Blob("right_columns", "right_u", "<f4"),
     Blob("colours", "colours", "|u1", 3, optional=True, sparse=True),
-    Blob("words", "words", "<u4", optional=True),
+    Blob("words", "words", "<u4", optional=True, all_or_none=True),
 )
 MAP_POINTS = (
     Blob("ids", "ids", "<i8"),

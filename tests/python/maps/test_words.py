@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import hashlib
 from pathlib import Path
@@ -22,6 +23,8 @@ from orbslam2py.maps import (
     save_map,
     take_contents,
 )
+from orbslam2py.maps.map_rows import all_rows, keypoint_rows
+from orbslam2py.maps.map_writer import MapWriter
 from support import small_sequences
 from support.saved_maps import edit, small_map, written, written_as_version_1
 
@@ -50,6 +53,24 @@ def test_a_map_knows_the_words_of_its_features() -> None:
     keyframes = small_map().contents.keyframes
     words, _, weights = load_vocabulary().quantise(keyframes.descriptors)
     assert np.array_equal(keyframes.words, np.where(weights > 0, words, STOPPED))
+
+
+def test_a_keyframe_that_was_saved_before_it_had_words(tmp_path: Path) -> None:
+    """As one that nobody has described yet, in a file that is kept up to date."""
+    saved, path = small_map(), tmp_path / "map.orbmap"
+    contents, late = saved.contents, int(saved.contents.keyframes.ids[3])
+    keyframes = dataclasses.replace(contents.keyframes, words=np.zeros(0, np.uint32))
+    bare = dataclasses.replace(contents, keyframes=keyframes)
+    with contextlib.closing(MapWriter(path)) as writer:
+        rows = [row for row in all_rows(saved) if row[0] != "keypoints" or row[1][0] != late]
+        writer.commit([*rows, *keypoint_rows(bare, [3])])
+    loaded = load_map(path)
+    assert loaded.contents.keyframes.words.size == 0
+    assert bare.first_difference(loaded.contents) is None
+    slam_map, vocabulary = core.Map(), load_vocabulary()
+    MapFile(path).restore(slam_map, vocabulary, core.KeyFrameIndex())
+    words = take_contents(slam_map).keyframes.words
+    assert np.array_equal(words, contents.keyframes.words)
 
 
 def test_known_words_and_words_found_again_are_the_same() -> None:

@@ -167,9 +167,7 @@ def test_a_keyframe_that_is_clicked_is_shown(show: Show) -> None:
     for tries_left in range(4, -1, -1):  # a click misses while the view still moves
         _click_on_the_last_keyframe(show.page)
         try:
-            show.page.wait_for(
-                "document.body.innerText.includes('Neighbours (points shared)')", 15
-            )
+            show.page.wait_for("document.body.innerText.includes('Neighbours (points shared)')", 15)
             break
         except BrowserError:
             if not tries_left:
