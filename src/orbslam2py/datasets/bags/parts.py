@@ -6,12 +6,14 @@ from __future__ import annotations
 import bz2
 import threading
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, TypeVar
 
 from orbslam2py.datasets.bags.libraries import lz4_decompress, zstd_decompress
 from orbslam2py.errors import DatasetError
+
+EntryT = TypeVar("EntryT")
 
 #: Chunks that are kept decompressed: the cameras' messages of one moment lie close together.
 _KEPT_CHUNKS = 4
@@ -132,3 +134,21 @@ def decompress(content: bytes, compression: str) -> bytes:
     raise DatasetError(
         f"its chunks are compressed as '{compression}', which is not known here; convert the bag"
     )
+
+
+def count_messages(
+    channels: Mapping[int, Channel], entries: Mapping[int, Sequence[object]]
+) -> dict[Channel, int]:
+    """Tell how many messages each channel has; a file may declare one under several numbers."""
+    counts: dict[Channel, int] = {}
+    for number, channel in channels.items():
+        counts[channel] = counts.get(channel, 0) + len(entries.get(number, ()))
+    return counts
+
+
+def entries_of(
+    channel: Channel, channels: Mapping[int, Channel], entries: Mapping[int, Sequence[EntryT]]
+) -> list[EntryT]:
+    """Tell what a file lists of a channel, under all numbers that it has."""
+    numbers = [number for number, one in channels.items() if one == channel]
+    return [entry for number in numbers for entry in entries.get(number, ())]

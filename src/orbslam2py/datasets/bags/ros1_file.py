@@ -18,7 +18,9 @@ from orbslam2py.datasets.bags.parts import (
     Channel,
     ChunkCache,
     Place,
+    count_messages,
     decompress,
+    entries_of,
     normal_kind,
     normal_topic,
 )
@@ -78,15 +80,11 @@ class Ros1File:
 
     def counts(self) -> dict[Channel, int]:
         """Tell the channels and how many messages each has."""
-        counts: dict[Channel, int] = {}
-        for number, channel in self._channels.items():
-            counts[channel] = counts.get(channel, 0) + len(self._entries.get(number, ()))
-        return counts
+        return count_messages(self._channels, self._entries)
 
     def places(self, channel: Channel) -> list[Place]:
         """Tell where the messages of a channel lie, in the order of recording."""
-        numbers = [number for number, one in self._channels.items() if one == channel]
-        entries = [entry for number in numbers for entry in self._entries.get(number, ())]
+        entries = entries_of(channel, self._channels, self._entries)
         return sorted(place for entry in entries if (place := self._place(entry)) is not None)
 
     def read(self, place: Place, most: int | None = None) -> bytes:

@@ -12,7 +12,14 @@ from typing import Any
 
 from orbslam2py._arguments import cannot_open
 from orbslam2py.datasets.bags.libraries import ZSTD_MAGIC, zstd_decompress
-from orbslam2py.datasets.bags.parts import Channel, Place, normal_kind, normal_topic
+from orbslam2py.datasets.bags.parts import (
+    Channel,
+    Place,
+    count_messages,
+    entries_of,
+    normal_kind,
+    normal_topic,
+)
 from orbslam2py.errors import DatasetError
 
 MAGIC = b"SQLite format 3\0"
@@ -56,15 +63,11 @@ class SqliteFile:
 
     def counts(self) -> dict[Channel, int]:
         """Tell the channels and how many messages each has."""
-        counts: dict[Channel, int] = {}
-        for number, channel in self._channels.items():
-            counts[channel] = counts.get(channel, 0) + len(self._entries.get(number, ()))
-        return counts
+        return count_messages(self._channels, self._entries)
 
     def places(self, channel: Channel) -> list[Place]:
         """Tell where the messages of a channel lie, in the order of recording."""
-        numbers = [number for number, one in self._channels.items() if one == channel]
-        entries = [entry for number in numbers for entry in self._entries.get(number, ())]
+        entries = entries_of(channel, self._channels, self._entries)
         return [Place(recorded, -1, row, 0) for recorded, row in sorted(entries)]
 
     def read(self, place: Place, most: int | None = None) -> bytes:
