@@ -20,8 +20,8 @@ from orbslam2py.maps import (
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
 
-def corridor(frames: int) -> SyntheticSequence:
-    options = SyntheticOptions(world="corridor", sensor="rgbd", frames=frames, size=(320, 240))
+def corridor(frames: int, size: tuple[int, int] = (320, 240)) -> SyntheticSequence:
+    options = SyntheticOptions(world="corridor", sensor="rgbd", frames=frames, size=size)
     return SyntheticSequence(options)
 
 

@@ -55,14 +55,14 @@ def run_once(folder: Path, sensor: str, *, watched: bool) -> Watched:
         command += ["--realtime", "--output", output, "--force", "--quiet"]
         if watched:
             command += ["--viewer", "--viewer-port", "0", "--viewer-exit"]
+        onlooker = Onlooker() if watched else None  # has its libraries before the run begins
         process = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
-        onlooker = _look(process) if watched else None
-        _, errors = process.communicate()
-        sent = 0
         if onlooker is not None:
-            sent = onlooker.n_bytes()
+            onlooker.look(_address_of(process))
+        _, errors = process.communicate()
+        sent = 0 if onlooker is None else onlooker.n_bytes()
         if process.returncode != 0:
             raise RuntimeError(errors)
         report = json.loads((Path(output) / "report.json").read_text())
@@ -70,8 +70,8 @@ def run_once(folder: Path, sensor: str, *, watched: bool) -> Watched:
     return Watched(track["median"], track["p99"], report["dropped_frames"], sent / 1e6)
 
 
-def _look(process: subprocess.Popen[str]) -> Onlooker:
-    """Wait until the viewer says where it is, and look."""
+def _address_of(process: subprocess.Popen[str]) -> str:
+    """Wait until the viewer says where it is."""
     assert process.stdout is not None
     said: queue.Queue[str] = queue.Queue()
     reader = threading.Thread(target=lambda: said.put(process.stdout.readline()), daemon=True)
@@ -80,7 +80,7 @@ def _look(process: subprocess.Popen[str]) -> Onlooker:
     address = next((word.rstrip(":") for word in words if word.startswith("http://")), None)
     if address is None:
         raise RuntimeError(f"the viewer did not say where it is: {' '.join(words)}")
-    return Onlooker(address)
+    return address
 
 
 def viewer_tables(n_pairs: int) -> Iterator[object]:

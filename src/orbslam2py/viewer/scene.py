@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
 from orbslam2py._palette import (
@@ -146,15 +147,7 @@ class Scene:
         if page is None or not len(page.ids):
             self._remove(name)
             return
-        self._nodes[name] = self._scene.add_point_cloud(
-            name,
-            page.positions,
-            self._colours.of_page(number),
-            point_size=self._point_size,
-            point_shape="circle",
-            point_shading="flat",
-            precision="float32",
-        )
+        self._cloud(name, page.positions, self._colours.of_page(number), self._point_size)
 
     def set_point_size(self, factor: float) -> None:
         """Draw points larger or smaller than usual."""
@@ -188,15 +181,8 @@ class Scene:
         if not len(positions):
             self._remove("/local/points")
             return
-        self._nodes["/local/points"] = self._scene.add_point_cloud(
-            "/local/points",
-            positions,
-            np.array(LOCAL_POINTS, np.uint8),
-            point_size=1.35 * self._point_size,
-            point_shape="circle",
-            point_shading="flat",
-            precision="float32",
-        )
+        colour = np.array(LOCAL_POINTS, np.uint8)
+        self._cloud("/local/points", positions, colour, 1.35 * self._point_size)
 
     def _draw_keyframes(self, number: int) -> None:
         rows = self._model.rows_in_page(number)
@@ -290,6 +276,29 @@ class Scene:
         self._lines("/selection/neighbours", ends, NOW, 1.5)
 
     # ---- nodes -----------------------------------------------------------------------------------
+    def _cloud(
+        self,
+        name: str,
+        positions: npt.NDArray[np.floating],
+        colours: ByteArray,
+        size: float,
+    ) -> None:
+        known = self._nodes.get(name)
+        if known is not None:  # a new node takes several times as long
+            known.points = np.asarray(positions, np.float32)
+            known.colors = colours
+            known.point_size = size
+            return
+        self._nodes[name] = self._scene.add_point_cloud(
+            name,
+            positions,
+            colours,
+            point_size=size,
+            point_shape="circle",
+            point_shading="flat",
+            precision="float32",
+        )
+
     def _lines(self, name: str, ends: FloatArray, colour: Colour, width: float) -> None:
         if not len(ends):
             self._remove(name)

@@ -23,7 +23,7 @@ _ROOM = 1 << 22
 #: Seconds that are waited at a time. A process that stood still itself counts one of them.
 SLICE = 0.5
 #: Slices in which nothing is taken, until the other end is said to hang.
-_PATIENCE = 40
+_PATIENCE = 120
 
 
 class Channel:

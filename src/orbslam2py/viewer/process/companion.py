@@ -27,8 +27,9 @@ _CODE = (
 )
 #: Large messages that may wait until they are drawn: one that is, and one to go on with.
 _AT_ONCE = 2
-#: Slices of time in which one of them must be drawn: whoever takes longer hangs.
-_PATIENCE = round(20 / SLICE)
+#: Slices of time in which one of them must be drawn: whoever takes longer hangs. It is
+#: given only the time that others leave.
+_PATIENCE = round(60 / SLICE)
 #: Seconds for starting (its libraries are large, and disks can be slow), and for ending.
 _START, _END = 60.0, 5.0
 
@@ -40,7 +41,8 @@ class CompanionError(OrbSlamError):
 class Companion:
     """A process that draws what this one sees, and passes on what people ask for.
 
-    It has a low priority, ends with this process whatever ends it, and is not reached by Ctrl-C.
+    It takes only time that nobody else wants, ends with this process whatever ends it, and is not
+    reached by Ctrl-C.
 
     Parameters
     ----------

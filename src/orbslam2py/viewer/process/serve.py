@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
 import queue
@@ -10,6 +11,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 from socket import socket
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +20,7 @@ from orbslam2py.viewer.process.channel import Channel
 if TYPE_CHECKING:
     from orbslam2py.viewer.process.live_page import LivePage
 
-#: How much less urgent than tracking, of 19.
+#: How much less urgent than others it is while it starts, of 19.
 _NICE = 10
 #: Seconds between two looks whether the other process is still there.
 _LOOK = 1.0
@@ -115,6 +117,7 @@ def _end_with(process: int) -> None:
 
 def _open(parent: Parent, host: str, port: int | None, title: str) -> LivePage | None:
     import cv2  # noqa: PLC0415  # when Ctrl-C is out of reach: it is large
+    import numpy.ma  # noqa: F401, PLC0415  # which numpy.unique loads, beside the first images
 
     from orbslam2py.errors import StateError  # noqa: PLC0415
     from orbslam2py.viewer.process.live_page import LivePage  # noqa: PLC0415
@@ -125,8 +128,21 @@ def _open(parent: Parent, host: str, port: int | None, title: str) -> LivePage |
     except StateError as error:
         parent.tell("refused", str(error))
         return None
+    _stand_back()
     parent.tell("opened", page.address)
     return page
+
+
+def _stand_back() -> None:
+    """Take only time that nobody else wants, where the system knows such a thing (Linux).
+
+    A thread that is merely less urgent keeps its core for some milliseconds when tracking wakes up.
+    """
+    if not hasattr(os, "SCHED_IDLE"):
+        return
+    for thread in Path("/proc/self/task").iterdir():
+        with contextlib.suppress(ProcessLookupError):  # it has ended
+            os.sched_setscheduler(int(thread.name), os.SCHED_IDLE, os.sched_param(0))
 
 
 def _serve(parent: Parent, page: LivePage) -> None:
