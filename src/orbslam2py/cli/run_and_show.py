@@ -25,6 +25,7 @@ from orbslam2py.cli.interrupts import StopOnInterrupt
 from orbslam2py.cli.viewing import ViewerOptions, Viewing
 from orbslam2py.cli.watching import file_watchers, watch_all
 from orbslam2py.datasets.base import LiveSource, Sequence
+from orbslam2py.runs.feeds import is_sequence
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.outputs import new_output_folder
 from orbslam2py.runs.remedies import why_nothing_was_tracked
@@ -56,7 +57,10 @@ def run_and_show(
     with contextlib.ExitStack() as page:
         with StopOnInterrupt() as interrupt:
             files = page.enter_context(file_watchers(sequence, options, video, record))
-            viewing = Viewing(viewer or ViewerOptions(), sequence, interrupt.event)
+            in_real_time = options.realtime or not is_sequence(sequence)
+            viewing = Viewing(
+                viewer or ViewerOptions(), sequence, interrupt.event, in_real_time=in_real_time
+            )
             page.enter_context(viewing)
             with progress_bar(console) as bar:
                 display = Display(bar, n_frames)

@@ -74,6 +74,8 @@ class Viewing:
         Whether, and where.
     sequence : Sequence or LiveSource
         What is run.
+    in_real_time : bool
+        Images come when they come: what is drawn must not make tracking late.
     stop : threading.Event
         Ends the run when it is set.
 
@@ -84,9 +86,15 @@ class Viewing:
     """
 
     def __init__(
-        self, options: ViewerOptions, sequence: Sequence | LiveSource, stop: threading.Event
+        self,
+        options: ViewerOptions,
+        sequence: Sequence | LiveSource,
+        stop: threading.Event,
+        *,
+        in_real_time: bool,
     ) -> None:
         self._options = options
+        self._in_real_time = in_real_time
         self._sequence = sequence
         self._stop = stop
         self._view: LiveView | None = None
@@ -99,7 +107,9 @@ class Viewing:
 
             host = self._options.host or _LOOPBACK
             name = self._sequence.name
-            self._view = LiveView(host=host, port=self._options.port, title=name)
+            self._view = LiveView(
+                host=host, port=self._options.port, title=name, stand_back=self._in_real_time
+            )
             announce(self._view.address, open_browser=not self._options.exit)
         return self
 

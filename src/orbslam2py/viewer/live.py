@@ -42,8 +42,8 @@ FRAME_RATE = 10.0
 class LiveView:
     """A watcher that shows what it is told in a page, which a process of its own serves.
 
-    That process takes only time that nobody else wants, is not reached by Ctrl-C, and ends with
-    this one. If it is the first to end, the run goes on without it.
+    That process has a low priority, is not reached by Ctrl-C, and ends with this one. If it is the
+    first to end, the run goes on without it.
 
     Parameters
     ----------
@@ -53,6 +53,9 @@ class LiveView:
         The port, which must be free; by default 8080 or the next free one.
     title : str
         What is seen, for the head of the page.
+    stand_back : bool
+        Take only time that nobody else wants, where the system knows such a thing (Linux): for
+        images that come in real time. Where all cores are at work, little is seen.
 
     Raises
     ------
@@ -63,7 +66,12 @@ class LiveView:
     name = "the viewer"
 
     def __init__(
-        self, *, host: str = LOOPBACK, port: int | None = None, title: str = "orbslam2py"
+        self,
+        *,
+        host: str = LOOPBACK,
+        port: int | None = None,
+        title: str = "orbslam2py",
+        stand_back: bool = False,
     ) -> None:
         if importlib.util.find_spec("viser") is None:
             require_viser()  # what it says
@@ -73,7 +81,12 @@ class LiveView:
         self._n_dropped = 0
         self._watches = self._missed = False
         self._companion = Companion(
-            host=host, port=port, title=title, answers=self._answers, on_end=self._ended
+            host=host,
+            port=port,
+            title=title,
+            stand_back=stand_back,
+            answers=self._answers,
+            on_end=self._ended,
         )
 
     @property

@@ -41,12 +41,11 @@ class CompanionError(OrbSlamError):
 class Companion:
     """A process that draws what this one sees, and passes on what people ask for.
 
-    It takes only time that nobody else wants, ends with this process whatever ends it, and is not
-    reached by Ctrl-C.
+    It has a low priority, ends with this process whatever ends it, and is not reached by Ctrl-C.
 
     Parameters
     ----------
-    host, port, title
+    host, port, title, stand_back
         See `LiveView`.
     answers : mapping of str to callable
         What it may ask of this process; each call is made in a thread of its own.
@@ -72,6 +71,7 @@ class Companion:
         host: str,
         port: int | None,
         title: str,
+        stand_back: bool,
         answers: Mapping[str, Callable[..., object]],
         on_end: Callable[[], None],
     ) -> None:
@@ -95,7 +95,7 @@ class Companion:
         self._reader = threading.Thread(target=self._read, name="viewer page", daemon=True)
         self._reader.start()
         try:
-            self.address = self._open(host, port, title)
+            self.address = self._open(host, port, title, stand_back)
         except BaseException:  # a Ctrl-C as well
             self.stop()
             raise
@@ -110,9 +110,9 @@ class Companion:
         """Why it has ended, in words."""
         return self._why
 
-    def _open(self, host: str, port: int | None, title: str) -> str:
+    def _open(self, *wishes: str | int | None) -> str:
         with contextlib.suppress(CompanionError):  # told below
-            self.tell("open", host, port, title)
+            self.tell("open", *wishes)
         with self._condition:
             self._condition.wait_for(
                 lambda: self._opened is not None or self.ended.is_set(), _START

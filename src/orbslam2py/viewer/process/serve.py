@@ -20,7 +20,7 @@ from orbslam2py.viewer.process.channel import Channel
 if TYPE_CHECKING:
     from orbslam2py.viewer.process.live_page import LivePage
 
-#: How much less urgent than others it is while it starts, of 19.
+#: How much less urgent than tracking, of 19.
 _NICE = 10
 #: Seconds between two looks whether the other process is still there.
 _LOOK = 1.0
@@ -98,10 +98,14 @@ def main(number: int) -> None:
     parent = Parent(Channel(socket(fileno=number)))
     threading.Thread(target=parent.read, name="parent", daemon=True).start()
     logging.getLogger("orbslam2py").addHandler(_LogToParent(parent))
-    _, host, port, title = parent.messages.get()
+    _, host, port, title, stand_back = parent.messages.get()
     page = _open(parent, host, port, title)
-    if page is not None:
-        _serve(parent, page)
+    if page is None:
+        return
+    if stand_back:
+        _stand_back()
+    parent.tell("opened", page.address)
+    _serve(parent, page)
 
 
 def _end_with(process: int) -> None:
@@ -128,8 +132,6 @@ def _open(parent: Parent, host: str, port: int | None, title: str) -> LivePage |
     except StateError as error:
         parent.tell("refused", str(error))
         return None
-    _stand_back()
-    parent.tell("opened", page.address)
     return page
 
 
