@@ -14,7 +14,7 @@ from typing import Any
 import typer
 from typer.models import ArgumentInfo, OptionInfo
 
-from orbslam2py.cli.app import app
+from orbslam2py.cli.app import SUBCOMMANDS
 
 PROGRAM = "orbslam2py"
 _VALUES = {int: "INTEGER", float: "NUMBER", str: "TEXT"}
@@ -65,14 +65,16 @@ class Command:
         return text.strip(), [line.strip() for line in example.splitlines() if line.strip()]
 
 
-def commands(below: typer.Typer = app, prefix: str = "") -> Iterator[Command]:
+def commands() -> Iterator[Command]:
     """Yield every command, in the order of the help."""
-    for entry in below.registered_commands:
-        assert entry.callback is not None
-        yield Command(f"{prefix}{entry.name}", entry.callback)
-    for group in below.registered_groups:
-        assert group.typer_instance is not None
-        yield from commands(group.typer_instance, f"{prefix}{group.name} ")
+    for name, subcommand in SUBCOMMANDS.items():
+        target = subcommand.load()
+        if not isinstance(target, typer.Typer):
+            yield Command(name, target)
+            continue
+        for entry in target.registered_commands:
+            assert entry.callback is not None
+            yield Command(f"{name} {entry.name}", entry.callback)
 
 
 def reference() -> str:

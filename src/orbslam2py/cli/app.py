@@ -1,38 +1,152 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Assembles the subcommands and turns errors into messages and exit codes."""
+"""Assembles the subcommands and turns errors into messages and exit codes.
+
+A subcommand is loaded when it is asked for: most need libraries that take longer to load than a
+list of commands may take.
+"""
 
 from __future__ import annotations
 
+import importlib
 import sys
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import typer
 import typer.core
+import typer.main
 from rich.console import Console
 
-from orbslam2py._files import describe_error
 from orbslam2py._version import __version__
-from orbslam2py.cli import (
-    batch,
-    calibrate,
-    demo,
-    evaluate,
-    maps,
-    report,
-    run,
-    settings,
-    synthesize,
-    view,
-    vocabulary,
-)
-from orbslam2py.cli.display import print_error, tell_repeated
 from orbslam2py.cli.exit_codes import ExitCode
-from orbslam2py.cli.run_arguments import RunCommand
+from orbslam2py.cli.messages import print_error, tell_repeated
 from orbslam2py.errors import OrbSlamError
 
 
+@dataclass(frozen=True)
+class Subcommand:
+    """A command, or a group of them, that is not loaded yet."""
+
+    module: str
+    """In this package."""
+    target: str
+    """A function, or the `typer.Typer` of a group."""
+    summary: str
+    """The first line of its help, for the list of commands."""
+    command_class: str | None = None
+    """A module of this package and its class of commands, for arguments that typer cannot read."""
+
+    def load(self) -> Callable[..., None] | typer.Typer:
+        """The function, or the group."""
+        found: Callable[..., None] | typer.Typer = getattr(_module(self.module), self.target)
+        return found
+
+    def build(self, name: str) -> Any:
+        """The command as it is called."""
+        target = self.load()
+        if not isinstance(target, typer.Typer):
+            cls = None
+            if self.command_class is not None:
+                module, _, class_name = self.command_class.partition(".")
+                cls = getattr(_module(module), class_name)
+            function, target = target, typer.Typer(rich_markup_mode="markdown")
+            target.command(name, cls=cls)(function)
+        target._add_completion = False  # that of the program is enough
+        return typer.main.get_command(target)
+
+
+def _module(name: str) -> Any:
+    return importlib.import_module(f"orbslam2py.cli.{name}")
+
+
+#: In the order of the help.
+SUBCOMMANDS = {
+    "run": Subcommand(
+        "run",
+        "run",
+        "Track a recorded sequence, a video or a camera; write trajectory, map and report.",
+        "run_arguments.RunCommand",
+    ),
+    "batch": Subcommand(
+        "batch",
+        "batch",
+        "Run many sequences, settings and seeds on all cores or a cluster; write one table.",
+    ),
+    "demo": Subcommand(
+        "demo", "demo", "Track a camera once around a synthetic corridor: needs no data."
+    ),
+    "synthesize": Subcommand(
+        "synthesize",
+        "synthesize",
+        "Write a synthetic sequence with calibration and exact ground truth.",
+    ),
+    "view": Subcommand(
+        "view",
+        "view",
+        "Show a finished run in the browser, with a slider for the time, until Ctrl-C.",
+    ),
+    "evaluate": Subcommand(
+        "evaluate",
+        "evaluate",
+        "Compare a trajectory with ground truth: ATE, RPE and KITTI's segment errors.",
+    ),
+    "report": Subcommand(
+        "report",
+        "report",
+        "Make the page of a finished run again, from the files in its folder.",
+    ),
+    "compare": Subcommand(
+        "report",
+        "compare",
+        "Set finished runs side by side: figures, paths, errors and times, in a table and as a "
+        "page.",
+    ),
+    "calibrate": Subcommand(
+        "calibrate",
+        "calibrate",
+        "Calibrate a camera with a chessboard; write a settings file that run takes.",
+    ),
+    "import-camera": Subcommand(
+        "calibrate",
+        "import_camera",
+        "Turn another program's calibration into a settings file.",
+    ),
+    "settings": Subcommand("settings", "app", "Make, show, check and list settings files."),
+    "vocabulary": Subcommand("vocabulary", "app", "Train, convert and inspect vocabularies."),
+    "map": Subcommand(
+        "maps",
+        "app",
+        "Look at map files, check, compare, cut, move and refine them, and export them.",
+    ),
+}
+
+
 class _Group(typer.core.TyperGroup):
-    """Leaves the names of classes out of messages about wrong usage."""
+    """Loads a subcommand when it is asked for; leaves names of classes out of wrong usage."""
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        self._built: dict[str, Any] = {}
+        for name, subcommand in SUBCOMMANDS.items():
+            self.commands[name] = typer.core.TyperCommand(name, help=subcommand.summary)
+        self._lists = False
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """The subcommand itself, but only its name and summary for a list of them."""
+        if self._lists or cmd_name not in SUBCOMMANDS:
+            return super().get_command(ctx, cmd_name)
+        if cmd_name not in self._built:
+            self._built[cmd_name] = SUBCOMMANDS[cmd_name].build(cmd_name)
+        return self._built[cmd_name]
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Print the help, with the list of commands."""
+        self._lists = True
+        try:
+            super().format_help(ctx, formatter)
+        finally:
+            self._lists = False
 
     def invoke(self, ctx: Any) -> Any:
         """Run the subcommand."""
@@ -70,26 +184,13 @@ def _options(
     """Visual SLAM for one camera, a stereo pair or RGB-D: images in, path and map out."""
 
 
-app.command("run", cls=RunCommand)(run.run)
-app.command("batch")(batch.batch)
-app.command("demo")(demo.demo)
-app.command("synthesize")(synthesize.synthesize)
-app.command("view")(view.view)
-app.command("evaluate")(evaluate.evaluate)
-app.command("report")(report.report)
-app.command("compare")(report.compare)
-app.command("calibrate")(calibrate.calibrate)
-app.command("import-camera")(calibrate.import_camera)
-app.add_typer(settings.app, name="settings")
-app.add_typer(vocabulary.app, name="vocabulary")
-app.add_typer(maps.app, name="map")
-
-
 def run_app() -> None:
     """Run the subcommand; errors a person can act on become one message and an exit code."""
     try:
         app()
     except (OrbSlamError, OSError) as error:
+        from orbslam2py._files import describe_error  # noqa: PLC0415  # loaded by now, or is slow
+
         tell_repeated()  # warnings before what they led to
         print_error(Console(stderr=True), "Error", describe_error(error))
         sys.exit(ExitCode.BAD_INPUT)

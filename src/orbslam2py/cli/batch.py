@@ -14,9 +14,9 @@ from rich.table import Table
 
 from orbslam2py.batches import BatchResult, Spread
 from orbslam2py.batches import batch as run_batch
-from orbslam2py.cli.display import log_to
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.interrupts import StopOnInterrupt
+from orbslam2py.cli.messages import log_to
 
 EXAMPLE = """
 **Example**

@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a person sees of a run: progress, warnings, and the figures at the end."""
+"""What a person sees of a run: its progress, and the figures at the end."""
 
 from __future__ import annotations
 
-import logging
-from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
@@ -21,72 +19,6 @@ from orbslam2py.runs.report_page.explained import (
 )
 from orbslam2py.runs.result import FrameRow
 from orbslam2py.slam.system import System
-
-
-def print_error(console: Console, title: str, text: str) -> None:
-    """Print a message in one line: paths can be copied from it."""
-    console.print(f"[bold red]{title}:[/] {escape(text)}", highlight=False, soft_wrap=True)
-
-
-#: How often a warning of one kind is printed before the next ones are only counted.
-_TOLD_EACH = 3
-
-
-class _ConsoleHandler(logging.Handler):
-    """Prints warnings like errors, in one line each: paths can be copied from it.
-
-    Of warnings of one kind, which differ only in what they name, the fourth and later ones are
-    counted; `tell_rest` says how many there were.
-    """
-
-    def __init__(self, console: Console) -> None:
-        super().__init__()
-        self._console = console
-        self._counts: Counter[str] = Counter()
-        self._last: dict[str, logging.LogRecord] = {}
-
-    def emit(self, record: logging.LogRecord) -> None:
-        kind = str(record.msg)
-        # What a kind is is told by the text with its gaps; a text without any is its own kind.
-        if record.levelno < logging.ERROR:
-            self._counts[kind] += 1
-            if self._counts[kind] > _TOLD_EACH:
-                self._last[kind] = record
-                return
-        self._print(record, self.format(record))
-
-    def tell_rest(self) -> None:
-        """Print how many warnings were only counted, kind by kind, and begin anew."""
-        for kind, record in self._last.items():
-            more = self._counts[kind] - _TOLD_EACH
-            text = self.format(record)
-            self._print(record, text if more == 1 else f"{more} more like this, the last: {text}")
-        self._counts.clear()
-        self._last.clear()
-
-    def _print(self, record: logging.LogRecord, text: str) -> None:
-        colour = "red" if record.levelno >= logging.ERROR else "yellow"
-        name = "Note" if record.levelno < logging.WARNING else record.levelname.capitalize()
-        title = f"[bold {colour}]{name}:[/]"
-        self._console.print(f"{title} {escape(text)}", highlight=False, soft_wrap=True)
-
-
-def log_to(console: Console, *, quiet: bool) -> None:
-    """Print the package's warnings (errors, if quiet) on a console."""
-    tell_repeated()
-    logger = logging.getLogger("orbslam2py")
-    logger.handlers = [_ConsoleHandler(console)]
-    logger.propagate = False
-    logger.setLevel(logging.ERROR if quiet else logging.WARNING)
-    # What was guessed of the input is said as well.
-    logging.getLogger(f"{logger.name}.datasets").setLevel(logging.ERROR if quiet else logging.INFO)
-
-
-def tell_repeated() -> None:
-    """Print how many warnings were only counted because there had been three like them."""
-    for handler in logging.getLogger("orbslam2py").handlers:
-        if isinstance(handler, _ConsoleHandler):
-            handler.tell_rest()
 
 
 def progress_bar(console: Console) -> Progress:

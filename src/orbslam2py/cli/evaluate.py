@@ -17,7 +17,7 @@ from rich.table import Table
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py._files import atomic_write
-from orbslam2py.cli.display import log_to
+from orbslam2py.cli.messages import log_to
 from orbslam2py.datasets import Layout, is_recording, open_sequence, recognise
 from orbslam2py.datasets.euroc import find_root
 from orbslam2py.datasets.euroc_calibration import read_sensor_yaml

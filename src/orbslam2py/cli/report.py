@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from orbslam2py.cli.display import log_to
+from orbslam2py.cli.messages import log_to
 from orbslam2py.errors import DatasetError
 from orbslam2py.runs.report_page import (
     Comparison,

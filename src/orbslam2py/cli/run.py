@@ -6,7 +6,7 @@ from __future__ import annotations
 import typer
 from rich.console import Console
 
-from orbslam2py.cli.display import log_to
+from orbslam2py.cli.messages import log_to
 from orbslam2py.cli.run_and_show import run_and_show
 from orbslam2py.cli.run_arguments import read_initial_pose
 from orbslam2py.cli.run_options import (

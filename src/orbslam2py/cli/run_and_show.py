@@ -12,16 +12,10 @@ from rich.console import Console
 from rich.markup import escape
 
 from orbslam2py._files import describe_error
-from orbslam2py.cli.display import (
-    Display,
-    log_to,
-    print_error,
-    progress_bar,
-    report_table,
-    tell_repeated,
-)
+from orbslam2py.cli.display import Display, progress_bar, report_table
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.interrupts import StopOnInterrupt
+from orbslam2py.cli.messages import log_to, print_error, tell_repeated
 from orbslam2py.cli.viewing import ViewerOptions, Viewing
 from orbslam2py.cli.watching import file_watchers, watch_all
 from orbslam2py.datasets.base import LiveSource, Sequence

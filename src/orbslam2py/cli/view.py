@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from orbslam2py.cli.display import log_to
+from orbslam2py.cli.messages import log_to
 from orbslam2py.cli.viewing import ViewerHost, ViewerPort
 from orbslam2py.datasets import open_input
 from orbslam2py.errors import DatasetError

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from orbslam2py.cli.display import log_to, tell_repeated
+from orbslam2py.cli.messages import log_to, tell_repeated
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.command_line import CommandLine, Results, logging_restored
 

@@ -17,7 +17,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from orbslam2py._arrays import ByteArray
 from orbslam2py.cli.calibrate import Force, Quiet, check_target
-from orbslam2py.cli.display import log_to
+from orbslam2py.cli.messages import log_to
 from orbslam2py.datasets import open_input
 from orbslam2py.errors import DatasetError
 from orbslam2py.maps import (
