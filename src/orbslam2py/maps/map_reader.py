@@ -207,11 +207,13 @@ def check_frames(runs: tuple[Run, ...], keyframes: IntArray, removed: IntArray) 
     known = np.concatenate([keyframes, removed, [-1]])
     for number, run in enumerate(runs):
         frames = run.frames
+        with np.errstate(over="ignore"):  # infinite is not 1
+            lengths = np.linalg.norm(frames.T_cr[:, :4], axis=1)
         good = (
             np.isin(frames.keyframes, known).all()
             and np.isfinite(frames.timestamps).all()
             and np.isfinite(frames.T_cr).all()
-            and np.allclose(np.linalg.norm(frames.T_cr[:, :4], axis=1), 1, atol=1e-6)
+            and np.allclose(lengths, 1, atol=1e-6)
         )
         if not good:
             raise MapFileError(f"the trajectory of run {number} has a frame out of range")

@@ -287,7 +287,8 @@ def _read_cameras(rows: list[Row]) -> Cameras:
 
 
 def _column(rows: list[Row], place: int, dtype: Any) -> NDArray[Any]:
-    return np.array([row[place] for row in rows], dtype)
+    with np.errstate(over="ignore"):  # what is not finite then is refused with the rest
+        return np.array([row[place] for row in rows], dtype)
 
 
 def _poses(blobs: list[bytes]) -> NDArray[np.float64]:

@@ -207,10 +207,12 @@ def test_every_flipped_bit_in_the_data_is_noticed(tmp_path: Path) -> None:
         ("UPDATE frames SET poses = zeroblob(length(poses))", "trajectory"),
         ("UPDATE frames SET keyframes = ids", "trajectory"),
         ("INSERT INTO loop_edges VALUES (0, 777, 0)", "loop edge"),
+        ("UPDATE cameras SET scale_factor = 1e300", "pyramid"),
         ("CREATE TABLE more (x)", "tables"),
         ("DROP TABLE images", "tables|images"),
     ],
 )
+@pytest.mark.filterwarnings("error")
 def test_edited_numbers_are_refused(tmp_path: Path, statement: str, what: str) -> None:
     path = written(tmp_path)
     if statement.startswith("DROP"):
