@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from typing import Any
 
 from rich.console import Console
@@ -13,7 +13,9 @@ from rich.table import Table
 
 from orbslam2py._arguments import number_of
 from orbslam2py.runs.report_page.explained import (
+    ALIGNMENTS,
     compared_over,
+    depth_words,
     loaded_map_words,
     relocalisations_words,
 )
@@ -60,6 +62,97 @@ class Display:
         self._shown_at = now
 
 
+def report_table(report: dict[str, Any]) -> Table:
+    """What report.json says about how well it went, for reading; the rest is left to the page."""
+    title = escape(f"{report['sequence']} ({report['sensor']})")
+    table = Table(title=title, show_header=False)
+    table.add_column(justify="left")
+    table.add_column(justify="left")
+    for group in (_tracking_rows, _map_rows, _error_rows, _cost_rows):
+        for name, text in group(report):
+            table.add_row(escape(name), escape(text))
+        table.add_section()
+    return table
+
+
+_Rows = Iterator[tuple[str, str]]
+
+#: Keys that hold frames by reason, and how the table calls them.
+_COUNTED = {"initialisation_reasons": "no map yet", "lost_reasons": "lost"}
+#: Keys that are told only if there is something to tell.
+_UNUSUAL = {
+    "skipped_frames": "skipped",
+    "dropped_frames": "dropped",
+    "weak_frames": "weak",
+    "resets": "maps given up",
+}
+
+
+def _tracking_rows(report: dict[str, Any]) -> _Rows:
+    if "tracked" in report:
+        part = f" ({100 * report['tracked_fraction']:.1f} %)" if report["frames"] else ""
+        yield "tracked", f"{report['tracked']} of {number_of(report['frames'], 'frame')}{part}"
+    yield "lost", _describe_losses(report)
+    if report.get("lost_at_end"):
+        yield "lost at end", "yes"
+    for key, name in _COUNTED.items():
+        for reason, count in report.get(key, {}).items():
+            yield f"{name}: {reason}", str(count)
+    for key, name in _UNUSUAL.items():
+        if report.get(key):
+            yield name, str(report[key])
+    if report.get("relocalisations"):
+        yield "relocalisations", relocalisations_words(report)
+
+
+def _map_rows(report: dict[str, Any]) -> _Rows:
+    if report.get("loaded_map") is not None:
+        yield "loaded map", loaded_map_words(report)
+    if "keyframes" in report:
+        points = number_of(report["map_points"], "map point")
+        yield "map", f"{number_of(report['keyframes'], 'keyframe')}, {points}"
+    unit = "units" if report["sensor"] == "mono" else "m"
+    for loop in report.get("loops", []):
+        yield "loop", _describe_loop(loop, unit)
+    adjustments = report.get("full_adjustments")
+    if adjustments:
+        used = sum(entry["used"] for entry in adjustments)
+        yield "full adjustments", f"{used} of {len(adjustments)} used"
+    if report.get("final_adjustment") is not None:
+        yield "final adjustment", _describe_adjustment(report["final_adjustment"])
+    if report.get("depth") is not None:
+        yield "depth", depth_words(report)
+
+
+def _error_rows(report: dict[str, Any]) -> _Rows:
+    if report.get("ate_rmse_m") is not None:
+        how = ALIGNMENTS.get(report.get("ate_alignment", ""), "")
+        parts = [f"{report['ate_rmse_m']:.4f} m", compared_over(report)]
+        yield "error (ATE, RMSE)", " ".join(filter(None, parts)) + (f"; {how}" if how else "")
+    if report.get("rpe_translation_rmse_m") is not None:
+        moved, turned = report["rpe_translation_rmse_m"], report["rpe_rotation_rmse_deg"]
+        yield "pose to pose (RPE, RMSE)", f"{moved:.4f} m, {turned:.3f} deg"
+    if report.get("t_rel_percent") is not None:
+        along, turned = report["t_rel_percent"], report["r_rel_deg_per_100m"]
+        yield "KITTI's segments", f"{along:.2f} %, {turned:.3f} deg over 100 m"
+    if report.get("matched_path_m") is not None:
+        compared = f"{report['matched_path_m']:.2f}"
+        if report.get("true_path_m") is not None:
+            compared += f" of {report['true_path_m']:.2f}"
+        yield "true path compared", f"{compared} m"
+
+
+def _cost_rows(report: dict[str, Any]) -> _Rows:
+    if report.get("slam_frames_per_second") is not None:
+        yield "speed", f"{report['slam_frames_per_second']:.1f} frames a second"
+    for stage, name in (("track", "tracking an image"), ("mapping", "mapping a keyframe")):
+        if stage in report["milliseconds"]:
+            times = report["milliseconds"][stage]
+            yield name, f"median {times['median']:.1f} ms, p99 {times['p99']:.1f} ms"
+    if report.get("peak_memory_mb") is not None:
+        yield "memory", f"at most {report['peak_memory_mb']:.0f} MB"
+
+
 def _describe_loop(loop: dict[str, Any], unit: str) -> str:
     matched, current = loop["keyframes"]
     text = f"keyframe {current} at {matched}: {loop['correction_m']:.3f} {unit}"
@@ -67,78 +160,6 @@ def _describe_loop(loop: dict[str, Any], unit: str) -> str:
     if loop["scale"] != 1.0:
         text += f", scale {loop['scale']:.4f}"
     return text
-
-
-#: Keys of report.json that the table leaves out: they are its title, or told by another row.
-_UNTOLD = {
-    *("sequence", "sensor", "milliseconds", "settings", "losses", "warnings"),
-    *("options", "command", "command_folder", "machine"),
-    *("lost_frames", "lost_seconds", "longest_loss_seconds"),
-    *("matched_of_poses", "true_path_m"),
-}
-
-#: Keys that hold frames by reason, and how the table calls them.
-_COUNTED = {"initialisation_reasons": "no map yet", "lost_reasons": "lost"}
-
-
-def _rows_of(key: str, value: Any, report: dict[str, Any]) -> list[tuple[str, str]]:
-    """What the table says about one key of report.json: names and texts."""
-    if key in _UNTOLD or value is None:
-        return []
-    if key in _COUNTED:
-        return [(f"{_COUNTED[key]}: {reason}", str(count)) for reason, count in value.items()]
-    if key == "loops":
-        unit = "units" if report["sensor"] == "mono" else "m"
-        return [("loop", _describe_loop(loop, unit)) for loop in value]
-    text = f"{value:.4f}" if isinstance(value, float) else str(value)
-    if key in _IN_WORDS:
-        return [_IN_WORDS[key](report)]
-    if key == "final_adjustment":
-        text = _describe_adjustment(value)
-    elif key == "depth":
-        text = f"median {value['median_m']:.2f} m with DepthMapFactor {value['factor']:g}"
-    elif key == "lost":
-        text = _describe_losses(report)
-    elif key == "lost_at_end":
-        text = "yes" if value else ""
-    elif key == "full_adjustments":
-        text = f"{sum(entry['used'] for entry in value)} of {len(value)} used" if value else ""
-    return [(key.replace("_", " "), text)] if text else []
-
-
-def _error_row(report: dict[str, Any]) -> tuple[str, str]:
-    return "ate rmse m", " ".join([f"{report['ate_rmse_m']:.4f}", compared_over(report)]).strip()
-
-
-def _poses_row(report: dict[str, Any]) -> tuple[str, str]:
-    of_poses = number_of(report.get("matched_of_poses", report["matched_poses"]), "pose")
-    text = f"{report['matched_poses']} of {of_poses} of the last map"
-    return "poses compared with the truth", text
-
-
-def _path_row(report: dict[str, Any]) -> tuple[str, str]:
-    text = f"{report['matched_path_m']:.2f} m"
-    if report.get("true_path_m") is not None:
-        text = f"{report['matched_path_m']:.2f} of {report['true_path_m']:.2f} m"
-    return "of the true path compared", text
-
-
-def _loaded_row(report: dict[str, Any]) -> tuple[str, str]:
-    return "loaded map", loaded_map_words(report)
-
-
-def _relocalisations_row(report: dict[str, Any]) -> tuple[str, str]:
-    return "relocalisations", relocalisations_words(report)
-
-
-#: Keys that the table tells in words.
-_IN_WORDS: dict[str, Callable[[dict[str, Any]], tuple[str, str]]] = {
-    "ate_rmse_m": _error_row,
-    "matched_poses": _poses_row,
-    "matched_path_m": _path_row,
-    "loaded_map": _loaded_row,
-    "relocalisations": _relocalisations_row,
-}
 
 
 def _describe_adjustment(entry: dict[str, Any]) -> str:
@@ -156,21 +177,3 @@ def _describe_losses(report: dict[str, Any]) -> str:
         f"{times}, {frames}, {report['lost_seconds']:.1f} s in all, "
         f"{report['longest_loss_seconds']:.1f} s at the longest"
     )
-
-
-def report_table(report: dict[str, Any]) -> Table:
-    """The figures of report.json, for reading."""
-    title = escape(f"{report['sequence']} ({report['sensor']})")
-    table = Table(title=title, show_header=False)
-    table.add_column(justify="left")
-    table.add_column(justify="right")
-    for key, value in report.items():
-        for name, text in _rows_of(key, value, report):
-            table.add_row(escape(name), escape(text))
-    table.add_section()
-    for stage, numbers in report["milliseconds"].items():
-        table.add_row(
-            escape(f"{stage} [ms]"),
-            f"median {numbers['median']:.2f}  mean {numbers['mean']:.2f}  p99 {numbers['p99']:.2f}",
-        )
-    return table

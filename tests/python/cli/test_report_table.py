@@ -64,14 +64,14 @@ def test_errors_are_told_with_the_frames_that_they_are_of() -> None:
     """After a new map the errors are of the last one: 2 poses of a run of 10 frames."""
     figures = {"frames": 10, "tracked": 9, "matched_poses": 2, "matched_of_poses": 2}
     lengths = {"matched_path_m": 0.123, "true_path_m": 1.5, "ate_rmse_m": 0.00254}
+    lengths |= {"tracked_fraction": 0.9, "ate_alignment": "se3"}
     table = printed("k", **figures, **lengths)
-    assert line_with("ate", table) == "ate rmse m │ 0.0025 over 2 of 10 frames, the last map only"
-    assert (
-        line_with("poses", table) == "poses compared with the truth │ 2 of 2 poses of the last map"
-    )
-    assert line_with("path", table) == "of the true path compared │ 0.12 of 1.50 m"
+    told = "0.0025 m over 2 of 10 frames, the last map only; turned and shifted"
+    assert line_with("ATE", table) == f"error (ATE, RMSE) │ {told}"
+    assert line_with("tracked", table) == "tracked │ 9 of 10 frames (90.0 %)"
+    assert line_with("path", table) == "true path compared │ 0.12 of 1.50 m"
     whole = printed("k", **figures | {"tracked": 2}, **lengths)
-    assert line_with("ate", whole) == "ate rmse m │ 0.0025 over 2 of 10 frames"
+    assert "0.0025 m over 2 of 10 frames; turned" in line_with("ATE", whole)
 
 
 def test_a_loaded_map_is_told_in_words() -> None:
@@ -82,9 +82,18 @@ def test_a_loaded_map_is_told_in_words() -> None:
     line = line_with("relocalisations", table)
     assert line == "relocalisations │ 1, the first finding in the loaded map"
     assert line_with("relocalisations", printed("k", relocalisations=2)) == "relocalisations │ 2"
+    assert "relocalisations" not in printed("k", relocalisations=0)
 
 
 def test_times_have_their_unit() -> None:
     times = {"median": 1.0, "mean": 1.5, "p99": 2.0}
-    line = line_with("track", printed("k", milliseconds={"track": times}))
-    assert line == "track [ms] │ median 1.00 mean 1.50 p99 2.00"
+    table = printed("k", milliseconds={"track": times, "mapping": times, "loop.detect": times})
+    assert line_with("image", table) == "tracking an image │ median 1.0 ms, p99 2.0 ms"
+    assert line_with("keyframe", table) == "mapping a keyframe │ median 1.0 ms, p99 2.0 ms"
+    assert "loop.detect" not in table
+
+
+@pytest.mark.parametrize("key", ["skipped_frames", "dropped_frames", "weak_frames", "resets"])
+def test_what_did_not_happen_is_not_told(key: str) -> None:
+    assert printed("k", **{key: 0}) == printed("k")
+    assert printed("k", **{key: 3}).count("│ 3 ") == 1
