@@ -125,6 +125,32 @@ def batch(
     folder = named if output is None else path_of(output, "output")
     if folder is None:
         raise DatasetError("there is no folder for the results; give --output")
+    return run_jobs(
+        wanted,
+        folder,
+        resume=resume,
+        scheduler=scheduler,
+        workers=workers,
+        memory_limit=memory_limit,
+        report_pages=report_pages,
+        progress=progress,
+        stop=stop,
+    )
+
+
+def run_jobs(
+    wanted: list[Job],
+    folder: Path,
+    *,
+    resume: bool = False,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    memory_limit: str | None = None,
+    report_pages: bool = False,
+    progress: Progress | None = None,
+    stop: threading.Event | None = None,
+) -> BatchResult:
+    """Run jobs that are made already; see `batch`."""
     folder = folder.absolute()
     _prepare(folder, resume=resume)
     rows = {job.key: row for job in wanted if (row := read_row(folder, job)) is not None}

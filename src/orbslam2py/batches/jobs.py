@@ -228,6 +228,18 @@ def _options(values: Any) -> Iterator[tuple[tuple[str, Any], ...]]:
         yield tuple(zip(names, combination, strict=True))
 
 
+def options_of(values: Mapping[str, Any]) -> tuple[tuple[str, Any], ...]:
+    """Return one set of options, as a `Job` has them.
+
+    Raises
+    ------
+    SettingsError
+        For an unknown one.
+    """
+    _refuse_unknown(values, (*RUN_OPTIONS, *SYSTEM_OPTIONS), "option")
+    return tuple(sorted(values.items()))
+
+
 def _seeds(value: Any) -> list[int]:
     if is_whole(value):
         if value < 1:

@@ -13,7 +13,6 @@ from rich.console import Console
 from orbslam2py._files import describe_error
 from orbslam2py._version import __version__
 from orbslam2py.cli import (
-    batch,
     calibrate,
     demo,
     evaluate,
@@ -25,6 +24,8 @@ from orbslam2py.cli import (
     view,
     vocabulary,
 )
+from orbslam2py.cli.batches.batch import batch
+from orbslam2py.cli.batches.benchmark import benchmark
 from orbslam2py.cli.display import print_error, tell_repeated
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.run_arguments import RunCommand
@@ -71,7 +72,8 @@ def _options(
 
 
 app.command("run", cls=RunCommand)(run.run)
-app.command("batch")(batch.batch)
+app.command("batch")(batch)
+app.command("benchmark")(benchmark)
 app.command("demo")(demo.demo)
 app.command("synthesize")(synthesize.synthesize)
 app.command("view")(view.view)
