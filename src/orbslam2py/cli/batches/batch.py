@@ -50,6 +50,16 @@ def batch(
     report_pages: Annotated[
         bool, typer.Option("--report-pages", help="Write report.html for every run.")
     ] = False,
+    cache: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for sequences from elsewhere (s3://, https://, zip, tar), on each worker "
+            "[~/.cache/orbslam2py/sequences]."
+        ),
+    ] = None,
+    cache_size: Annotated[
+        str | None, typer.Option(help="Most that it takes [20GB].", metavar="SIZE")
+    ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
 ) -> None:
     """Run many sequences, settings and seeds on all cores or a cluster; write one table."""
@@ -63,6 +73,8 @@ def batch(
             workers=workers,
             memory_limit=memory_limit,
             report_pages=report_pages,
+            cache=cache,
+            cache_size=cache_size,
             progress=progress,
             stop=stop,
         )
