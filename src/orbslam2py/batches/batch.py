@@ -12,6 +12,7 @@ from typing import Any
 
 from orbslam2py._arguments import path_of
 from orbslam2py._files import atomic_write, reason_of
+from orbslam2py.batches.cache import DEFAULT_SIZE, Cache, bytes_of, default_folder
 from orbslam2py.batches.engine import open_workers, run_on
 from orbslam2py.batches.jobs import Job, make_jobs, read_jobs
 from orbslam2py.batches.summary import Group, summarise
@@ -69,6 +70,8 @@ def batch(
     workers: int | None = None,
     memory_limit: str | None = None,
     report_pages: bool = False,
+    cache: str | Path | None = None,
+    cache_size: str | None = None,
     progress: Progress | None = None,
     stop: threading.Event | None = None,
 ) -> BatchResult:
@@ -91,6 +94,11 @@ def batch(
         Of each worker that is started, such as ``4GB``.
     report_pages
         Write ``report.html`` for every run.
+    cache
+        Folder for sequences from elsewhere (``s3://``, ``https://``, zip and tar files), on each
+        worker's computer; by default one among the user's caches.
+    cache_size
+        Most that it takes, such as ``20GB``, which it is by default.
     progress
         Called after each run with its row, and how many of how many have ended.
     stop
@@ -125,12 +133,45 @@ def batch(
     folder = named if output is None else path_of(output, "output")
     if folder is None:
         raise DatasetError("there is no folder for the results; give --output")
+    return run_jobs(
+        wanted,
+        folder,
+        resume=resume,
+        scheduler=scheduler,
+        workers=workers,
+        memory_limit=memory_limit,
+        report_pages=report_pages,
+        cache=Cache(
+            default_folder() if cache is None else path_of(cache, "the cache").absolute(),
+            bytes_of(cache_size or DEFAULT_SIZE),
+        ),
+        progress=progress,
+        stop=stop,
+    )
+
+
+def run_jobs(
+    wanted: list[Job],
+    folder: Path,
+    *,
+    resume: bool = False,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    memory_limit: str | None = None,
+    report_pages: bool = False,
+    cache: Cache | None = None,
+    progress: Progress | None = None,
+    stop: threading.Event | None = None,
+) -> BatchResult:
+    """Run jobs that are made already; see `batch`."""
     folder = folder.absolute()
     _prepare(folder, resume=resume)
     rows = {job.key: row for job in wanted if (row := read_row(folder, job)) is not None}
     left = [job for job in wanted if job.key not in rows]
     stop = stop or threading.Event()
-    for job, row in _ended(left, folder, stop, scheduler, workers, memory_limit, page=report_pages):
+    for job, row in _ended(
+        left, folder, stop, scheduler, workers, memory_limit, page=report_pages, cache=cache
+    ):
         rows[job.key] = row
         if progress is not None:
             progress(row, len(rows), len(wanted))
@@ -150,6 +191,7 @@ def _ended(
     memory_limit: str | None,
     *,
     page: bool,
+    cache: Cache | None,
 ) -> Iterator[tuple[Job, dict[str, Any]]]:
     if not jobs:
         return
@@ -157,12 +199,12 @@ def _ended(
         for job in jobs:
             if stop.is_set():
                 return
-            yield job, run_job(job, str(folder), page=page)
+            yield job, run_job(job, str(folder), page=page, cache=cache)
         return
     if workers is not None:
         workers = min(workers, len(jobs))
     with open_workers(scheduler, workers, memory_limit) as client:
-        yield from run_on(client, jobs, folder, stop, page=page)
+        yield from run_on(client, jobs, folder, stop, page=page, cache=cache)
 
 
 def _prepare(folder: Path, *, resume: bool) -> None:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from orbslam2py._version import __version__
+from orbslam2py.batches.cache import Cache
 from orbslam2py.batches.jobs import Job
 from orbslam2py.batches.work import failed_row, run_job
 from orbslam2py.errors import DatasetError, SettingsError
@@ -106,7 +107,13 @@ def open_workers(
 
 
 def run_on(
-    client: Any, jobs: list[Job], output: Path, stop: threading.Event, *, page: bool
+    client: Any,
+    jobs: list[Job],
+    output: Path,
+    stop: threading.Event,
+    *,
+    page: bool,
+    cache: Cache | None = None,
 ) -> Iterator[tuple[Job, dict[str, Any]]]:
     """Run jobs, and yield each with its row as it ends.
 
@@ -122,6 +129,8 @@ def run_on(
         When it is set no more runs begin; those that run are waited for.
     page
         Write ``report.html`` for every run.
+    cache
+        Where sequences from elsewhere go, on each worker's computer.
     """
     waiting = iter(jobs)
     running: dict[Any, tuple[Job, int]] = {}
@@ -133,6 +142,7 @@ def run_on(
             job,
             str(output),
             page=page,
+            cache=cache,
             key=f"{job.key}-{job.fingerprint}-{attempt}-{id(running)}",
             pure=False,
         )

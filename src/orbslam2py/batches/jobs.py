@@ -18,6 +18,7 @@ from typing import Any
 import yaml
 
 from orbslam2py._arguments import cannot_open, is_whole, seed_of, shown
+from orbslam2py.batches.remote import is_remote, name_of, require_protocols
 from orbslam2py.batches.sweep import Sweep, read_sweep
 from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.runs.options import RunOptions
@@ -41,7 +42,7 @@ class Job:
     Attributes
     ----------
     path
-        The sequence.
+        The sequence: a folder or a file, an archive, or an address such as ``s3://bucket/desk``.
     name
         Its name in the table.
     sensor
@@ -199,7 +200,12 @@ def _sequences(entry: Any, folder: Path) -> Iterator[dict[str, Any]]:
         values = dict(entry)
     else:
         values = {"path": entry}
-    pattern = str(folder / str(values["path"]))
+    address = str(values["path"])
+    if is_remote(address):
+        require_protocols(address)
+        yield {**values, "path": address, "name": str(values.get("name") or name_of(address))}
+        return
+    pattern = str(folder / address)
     # Not Path.glob: patterns may be absolute.
     found = sorted(glob.glob(pattern)) if glob.has_magic(pattern) else [pattern]  # noqa: PTH207
     if not found:
@@ -226,6 +232,18 @@ def _options(values: Any) -> Iterator[tuple[tuple[str, Any], ...]]:
     names = sorted(values)
     for combination in itertools.product(*(_listed(values[name], keep=True) for name in names)):
         yield tuple(zip(names, combination, strict=True))
+
+
+def options_of(values: Mapping[str, Any]) -> tuple[tuple[str, Any], ...]:
+    """Return one set of options, as a `Job` has them.
+
+    Raises
+    ------
+    SettingsError
+        For an unknown one.
+    """
+    _refuse_unknown(values, (*RUN_OPTIONS, *SYSTEM_OPTIONS), "option")
+    return tuple(sorted(values.items()))
 
 
 def _seeds(value: Any) -> list[int]:

@@ -15,7 +15,9 @@ import cv2
 
 from orbslam2py._files import atomic_write, describe_error
 from orbslam2py._version import __version__
+from orbslam2py.batches.cache import DEFAULT_SIZE, Cache, bytes_of, default_folder
 from orbslam2py.batches.jobs import Job
+from orbslam2py.batches.remote import here
 from orbslam2py.batches.sweep import with_parameters
 from orbslam2py.datasets import open_input
 from orbslam2py.errors import DatasetError, OrbSlamError
@@ -35,7 +37,9 @@ _LEFT_OUT = (
 )
 
 
-def run_job(job: Job, output: str, *, threads: int = 1, page: bool = False) -> dict[str, Any]:
+def run_job(
+    job: Job, output: str, *, threads: int = 1, page: bool = False, cache: Cache | None = None
+) -> dict[str, Any]:
     """Make a run, leave its files in a folder of its own, and return its row of the table.
 
     Never raises for what is wrong with the run: the row says it.
@@ -50,6 +54,8 @@ def run_job(job: Job, output: str, *, threads: int = 1, page: bool = False) -> d
         Threads that OpenCV may use.
     page
         Write ``report.html`` as well.
+    cache
+        Where sequences from elsewhere go; the user's if None.
     """
     folder = Path(output) / "runs" / job.key
     cv2.setNumThreads(threads)
@@ -57,34 +63,40 @@ def run_job(job: Job, output: str, *, threads: int = 1, page: bool = False) -> d
     begin = time.perf_counter()
     row = _begun(job)
     try:
-        if not Path(job.path).exists():
-            raise DatasetError(
-                f"{job.path} does not exist on {platform.node()}; put the sequences where all "
-                "workers see them"
-            )
-        sequence = open_input(job.path, job.sensor, settings=job.settings, topics=job.topics)
-        if not hasattr(sequence, "timestamps"):
-            raise DatasetError(f"{job.path} is a camera; a batch runs recorded sequences")
-        if job.parameters:
-            changed = with_parameters(sequence.settings, job.parameters)
-            sequence = open_input(job.path, job.sensor, settings=changed, topics=job.topics)
-        row["sensor"] = str(sequence.sensor)
-        options = job.run_options(sequence.sensor)
-        done = run_sequence(
-            sequence, options, output=folder, force=True, report_page=page, stop=threading.Event()
-        )
-        row |= _figures(done.report)
-        row["state"] = "done"
-        if done.result.error is not None:
-            row |= {"state": "failed", "reason": _one_line(done.result.error)}
-        elif done.problems:
-            row |= {"state": "failed", "reason": "; ".join(done.problems)}
+        with here(job.path, cache or Cache(default_folder(), bytes_of(DEFAULT_SIZE))) as path:
+            _run(job, path, folder, row, page=page)
     except (OrbSlamError, OSError, MemoryError) as error:
         row |= {"state": "failed", "reason": _one_line(error)}
     row.setdefault("seconds", round(time.perf_counter() - begin, 3))
     row["peak_memory_mb"] = _peak_memory() or row.get("peak_memory_mb")
     write_row(folder, row)
     return row
+
+
+def _run(job: Job, path: Path, folder: Path, row: dict[str, Any], *, page: bool) -> None:
+    """Run what is at a path, and put the figures into the row."""
+    if not path.exists():
+        raise DatasetError(
+            f"{job.path} does not exist on {platform.node()}; put the sequences where all "
+            "workers see them"
+        )
+    sequence = open_input(path, job.sensor, settings=job.settings, topics=job.topics)
+    if not hasattr(sequence, "timestamps"):
+        raise DatasetError(f"{job.path} is a camera; a batch runs recorded sequences")
+    if job.parameters:
+        changed = with_parameters(sequence.settings, job.parameters)
+        sequence = open_input(path, job.sensor, settings=changed, topics=job.topics)
+    row["sensor"] = str(sequence.sensor)
+    options = job.run_options(sequence.sensor)
+    done = run_sequence(
+        sequence, options, output=folder, force=True, report_page=page, stop=threading.Event()
+    )
+    row |= _figures(done.report)
+    row["state"] = "done"
+    if done.result.error is not None:
+        row |= {"state": "failed", "reason": _one_line(done.result.error)}
+    elif done.problems:
+        row |= {"state": "failed", "reason": "; ".join(done.problems)}
 
 
 def failed_row(job: Job, reason: str) -> dict[str, Any]:

@@ -69,9 +69,14 @@ SUBCOMMANDS = {
         "run_arguments.RunCommand",
     ),
     "batch": Subcommand(
-        "batch",
+        "batches.batch",
         "batch",
         "Run many sequences, settings and seeds on all cores or a cluster; write one table.",
+    ),
+    "benchmark": Subcommand(
+        "batches.benchmark",
+        "benchmark",
+        "Run all sequences of TUM RGB-D, KITTI or EuRoC, beside figures of ORB-SLAM2 and 3.",
     ),
     "demo": Subcommand(
         "demo", "demo", "Track a camera once around a synthetic corridor: needs no data."

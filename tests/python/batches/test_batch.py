@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import shutil
 import sqlite3
@@ -18,42 +17,12 @@ from matplotlib.axes import Axes
 
 import orbslam2py as orb
 from orbslam2py.batches.sweep_picture import write_sweep_picture
-from orbslam2py.batches.work import MEASURED
-from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+from support.batches import jobs_of, make_sequences, reproducible, table
 
 
 @pytest.fixture(scope="module")
 def sequences(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("sequences")
-    for name, seed in (("one", 0), ("two", 1)):
-        options = SyntheticOptions(
-            world="corridor", sensor="rgbd", frames=8, size=(320, 240), seed=seed
-        )
-        SyntheticSequence(options).write(folder / name)
-    return folder
-
-
-def jobs_of(sequences: Path, **more: Any) -> dict[str, Any]:
-    options = {"deterministic": True, "max_frames": 6}
-    return {"sequences": [str(sequences / "*")], "options": options, "seeds": 2, **more}
-
-
-def table(folder: Path) -> list[dict[str, str]]:
-    with (folder / "results.csv").open(newline="") as stream:
-        return list(csv.DictReader(stream))
-
-
-def reproducible(folder: Path) -> bytes:
-    """The table without what was measured, as bytes."""
-    rows = [
-        ",".join(
-            f"{name}={value}"
-            for name, value in row.items()
-            if name not in MEASURED and not name.startswith("milliseconds.")
-        )
-        for row in table(folder)
-    ]
-    return "\n".join(rows).encode()
+    return make_sequences(tmp_path_factory.mktemp("sequences"))
 
 
 def test_table(sequences: Path, tmp_path: Path) -> None:

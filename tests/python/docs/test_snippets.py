@@ -41,6 +41,7 @@ NOT_RUN = {
 #: What is added to the examples of long commands.
 SHORTER = {
     "batch": "--workers 0",
+    "benchmark": "--workers 0",
     "demo": "--frames 12",
     "synthesize": "--frames 20 --size 320x240",
 }

@@ -4,19 +4,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from orbslam2py.batches import BatchResult, Spread
 from orbslam2py.batches import batch as run_batch
-from orbslam2py.cli.exit_codes import ExitCode
-from orbslam2py.cli.interrupts import StopOnInterrupt
-from orbslam2py.cli.messages import log_to
+from orbslam2py.cli.batches.watched_runs import exit_as_it_ended, watched_runs
 
 EXAMPLE = """
 **Example**
@@ -53,24 +50,21 @@ def batch(
     report_pages: Annotated[
         bool, typer.Option("--report-pages", help="Write report.html for every run.")
     ] = False,
+    cache: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for sequences from elsewhere (s3://, https://, zip, tar), on each worker "
+            "[~/.cache/orbslam2py/sequences]."
+        ),
+    ] = None,
+    cache_size: Annotated[
+        str | None, typer.Option(help="Most that it takes [20GB].", metavar="SIZE")
+    ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
 ) -> None:
     """Run many sequences, settings and seeds on all cores or a cluster; write one table."""
     console, errors = Console(quiet=quiet), Console(stderr=True)
-    log_to(errors, quiet=True)  # what single runs say is in their folders
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
-    with (
-        StopOnInterrupt() as interrupt,
-        Progress(*columns, TimeRemainingColumn(), console=console, transient=True) as bar,
-    ):
-        task = bar.add_task("Runs", total=None)
-
-        def progress(row: dict[str, Any], done: int, total: int) -> None:
-            if row["state"] != "done":
-                console.print(f"[red]failed[/] {escape(row['run'])}: {escape(str(row['reason']))}")
-            ending = "; waiting for those that run" if interrupt.event.is_set() else ""
-            bar.update(task, completed=done, total=total, description=f"Runs{ending}")
-
+    with watched_runs(console, errors) as (progress, stop):
         done = run_batch(
             jobs,
             output,
@@ -79,16 +73,14 @@ def batch(
             workers=workers,
             memory_limit=memory_limit,
             report_pages=report_pages,
+            cache=cache,
+            cache_size=cache_size,
             progress=progress,
-            stop=interrupt.event,
+            stop=stop,
         )
     console.print(_table(done))
     console.print(f"Results are in {escape(str(done.files[0]))}", highlight=False, soft_wrap=True)
-    if done.n_left:
-        errors.print(f"{done.n_left} runs are left; go on with --resume", highlight=False)
-        raise typer.Exit(ExitCode.INTERRUPTED)
-    if done.n_failed:
-        raise typer.Exit(ExitCode.FAILED)
+    exit_as_it_ended(done, errors)
 
 
 batch.__doc__ = f"{batch.__doc__}\n{EXAMPLE}"

@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Sequences that are not folders of this computer: archives, and whatever fsspec opens."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import re
+import shutil
+import tarfile
+import zipfile
+from collections.abc import Callable, Iterator
+from pathlib import Path, PurePosixPath
+from typing import IO, Any
+
+from orbslam2py.batches.cache import Cache
+from orbslam2py.errors import DatasetError, OrbSlamError, SettingsError
+
+_ADDRESS = re.compile(r"([A-Za-z][A-Za-z0-9+]*)(?:://|::)")
+_ARCHIVES = (".zip", ".tar", ".tar.gz", ".tgz", ".tar.bz2", ".tbz2", ".tar.xz", ".txz")
+#: What some archives hold beside the folder that is meant.
+_NOT_MEANT = ("__MACOSX",)
+
+
+def is_remote(path: str) -> bool:
+    """Tell whether a path is an address such as ``s3://bucket/desk``."""
+    return _ADDRESS.match(path) is not None
+
+
+def is_archive(path: str) -> bool:
+    """Tell whether a path is that of a zip or tar file, by its name."""
+    return path.lower().endswith(_ARCHIVES)
+
+
+def name_of(path: str) -> str:
+    """Return the name of the sequence at an address or in an archive."""
+    last = PurePosixPath(path.partition("::")[0].partition("?")[0].rstrip("/")).name
+    ending = next((end for end in _ARCHIVES if last.lower().endswith(end)), "")
+    return (last.removesuffix(last[-len(ending) :]) if ending else last).partition(".")[0]
+
+
+def require_protocols(address: str) -> None:
+    """See that fsspec is there and knows the protocols of an address.
+
+    Raises
+    ------
+    SettingsError
+        If it, or what it needs for the protocol, is not installed.
+    DatasetError
+        If there is no such protocol.
+    """
+    fsspec = _fsspec()
+    for part in address.split("::"):
+        protocol = part.partition("://")[0]
+        if protocol not in fsspec.available_protocols():
+            raise DatasetError(
+                f"{address}: there is no protocol {protocol}://; give one that fsspec knows, such "
+                "as s3://, gs:// or https://"
+            )
+        try:
+            fsspec.get_filesystem_class(protocol)
+        except ImportError as error:
+            raise SettingsError(
+                f"{protocol}:// needs a package that is not installed: {error}"
+            ) from error
+
+
+@contextlib.contextmanager
+def here(path: str, cache: Cache) -> Iterator[Path]:
+    """Have a sequence on this computer: in the cache, if it is elsewhere or in an archive.
+
+    Parameters
+    ----------
+    path
+        A folder, a file, an archive, or an address for fsspec; of a folder in an archive
+        ``zip://FOLDER::ADDRESS``.
+    cache
+        Where it goes.
+
+    Yields
+    ------
+    Path
+        Where it is; it stays there until the end of the ``with``.
+
+    Raises
+    ------
+    DatasetError
+        If there is nothing at the address, it cannot be read, or it does not fit.
+    SettingsError
+        If fsspec is needed and not installed.
+    """
+    if is_remote(path):
+        require_protocols(path)
+        with cache.holding(path, lambda folder, reserve: _download(path, folder, reserve)) as found:
+            yield _inside(found)
+    elif is_archive(path) and Path(path).is_file():
+        about = Path(path).stat()
+        address = f"{path} {about.st_size} {about.st_mtime_ns}"  # a changed one is another
+
+        def fetch(folder: Path, reserve: Callable[[int], None]) -> None:
+            _extract(Path(path), folder / name_of(path), reserve)
+
+        with cache.holding(address, fetch) as found:
+            yield _inside(found)
+    else:
+        yield Path(path)
+
+
+def _download(address: str, folder: Path, reserve: Callable[[int], None]) -> None:
+    fsspec = _fsspec()
+    last = PurePosixPath(address.partition("::")[0].partition("?")[0].rstrip("/")).name
+    target = folder / (last or "sequence")
+    try:
+        files, path = fsspec.core.url_to_fs(address)
+        if _is_file(address, last, files, path):
+            reserve(int(files.info(path).get("size") or 0))
+            files.get_file(path, str(target))
+        else:
+            _download_folder(files, path, target, reserve)
+    except FileNotFoundError as error:
+        # What reads the web calls every failure so, and names the true one as its cause.
+        if isinstance(error.__cause__, OSError):
+            raise DatasetError(
+                f"{address} cannot be reached; check the address and the network"
+            ) from error
+        raise DatasetError(f"{address} does not exist; correct the path of the sequence") from error
+    except OrbSlamError:
+        raise
+    except Exception as error:
+        # What systems of files raise is theirs; a full disk of the cache is told by who has it.
+        if isinstance(error, OSError) and error.errno:
+            raise
+        words = " ".join(str(error).split()) or type(error).__name__
+        raise DatasetError(f"{address} cannot be read: {words}; try again later") from error
+    if is_archive(last):
+        packed = target.rename(folder / ".archive")
+        _extract(packed, folder / name_of(address), reserve, packed.stat().st_size, address)
+        packed.unlink()
+
+
+def _is_file(address: str, last: str, files: Any, path: str) -> bool:
+    if is_archive(last):
+        return True
+    if address.startswith("http"):  # there it is told by reading it whole, which may be long
+        return "." in last and not address.endswith("/")
+    return bool(files.isfile(path))
+
+
+def _download_folder(files: Any, path: str, target: Path, reserve: Callable[[int], None]) -> None:
+    found = files.find(path, detail=True)
+    if not found:
+        raise FileNotFoundError(path)
+    known = sum(int(one.get("size") or 0) for one in found.values())
+    reserve(known)
+    got = 0
+    for name in found:
+        inner = PurePosixPath(name).relative_to(PurePosixPath(path))
+        if ".." in inner.parts:
+            continue  # a link of a page to what lies above
+        (target / inner).parent.mkdir(parents=True, exist_ok=True)
+        files.get_file(name, str(target / inner))
+        got += (target / inner).stat().st_size
+        if got > known:  # the web does not tell sizes beforehand
+            reserve(got)
+
+
+def _extract(
+    archive: Path,
+    folder: Path,
+    reserve: Callable[[int], None],
+    taken: int = 0,
+    name: str | None = None,
+) -> None:
+    """Unpack an archive; nothing in it is written elsewhere than in the folder."""
+    try:
+        if zipfile.is_zipfile(archive):
+            with zipfile.ZipFile(archive) as packed:
+                reserve(taken + sum(one.file_size for one in packed.infolist()))
+                for one in packed.infolist():
+                    if not one.is_dir():
+                        _write(packed.open(one), folder, one.filename)
+        else:
+            with tarfile.open(archive) as tar:
+                members = [one for one in tar.getmembers() if one.isfile()]
+                reserve(taken + sum(one.size for one in members))
+                for member in members:
+                    stream = tar.extractfile(member)
+                    assert stream is not None
+                    _write(stream, folder, member.name)
+    except (zipfile.BadZipFile, tarfile.TarError, EOFError) as error:
+        raise DatasetError(
+            f"{name or archive} is no whole archive; fetch or pack it again"
+        ) from error
+
+
+def _write(stream: IO[bytes], folder: Path, name: str) -> None:
+    inner = PurePosixPath(name)
+    if inner.is_absolute() or ".." in inner.parts:
+        raise DatasetError(f"the archive holds '{name}', which leads out of it; pack it again")
+    path = folder / inner
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with stream, path.open("wb") as target:
+        shutil.copyfileobj(stream, target, 1 << 20)
+
+
+def _inside(folder: Path) -> Path:
+    """Go down as long as there is one folder and nothing beside it."""
+    while True:
+        inner = [path for path in folder.iterdir() if path.name not in _NOT_MEANT]
+        if len(inner) != 1 or inner[0].name == "mav0":
+            return folder
+        folder = inner[0]
+        if not folder.is_dir():
+            return folder
+
+
+def _fsspec() -> Any:
+    try:
+        return importlib.import_module("fsspec")
+    except ImportError as error:
+        raise SettingsError(
+            "sequences from elsewhere are read through fsspec, which is not installed; install it: "
+            "pip install 'orbslam2py[remote]'"
+        ) from error

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""All sequences of a standard data set, each sensor, several seeds: a page and a table to paste."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from orbslam2py._arguments import is_whole, path_of, shown
+from orbslam2py._files import atomic_write
+from orbslam2py.batches.batch import BatchResult, Progress, run_jobs
+from orbslam2py.batches.jobs import Job, options_of
+from orbslam2py.batches.standard_sets.entries import Entry, entries_of
+from orbslam2py.batches.standard_sets.find import StandardSet, find_sequences
+from orbslam2py.batches.standard_sets.markdown import markdown_table
+from orbslam2py.batches.standard_sets.page import benchmark_page
+from orbslam2py.datasets import open_sequence
+from orbslam2py.errors import DatasetError, OrbSlamError, SettingsError
+from orbslam2py.settings import Sensor
+
+PAGE, TABLE = "benchmark.html", "benchmark.md"
+
+
+@dataclass(frozen=True)
+class BenchmarkResult:
+    """A benchmark that has ended.
+
+    Attributes
+    ----------
+    kind
+        The data set.
+    batch
+        The runs, and what is left of them.
+    page, table
+        The page, and the same in Markdown.
+    """
+
+    kind: StandardSet
+    batch: BatchResult
+    page: Path
+    table: Path
+
+    @property
+    def entries(self) -> list[Entry]:
+        """Runs of each sequence with each sensor, beside what papers tell."""
+        return entries_of(self.kind, self.batch.rows)
+
+
+def benchmark(
+    kind: StandardSet | str,
+    root: str | Path,
+    output: str | Path,
+    *,
+    sensors: Sequence[Sensor | str] | None = None,
+    seeds: int = 5,
+    options: Mapping[str, Any] | None = None,
+    resume: bool = False,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    memory_limit: str | None = None,
+    report_pages: bool = False,
+    progress: Progress | None = None,
+    stop: threading.Event | None = None,
+    command: str | None = None,
+) -> BenchmarkResult:
+    """Run all sequences of a standard data set and put the results beside published figures.
+
+    Parameters
+    ----------
+    kind
+        ``tum``, ``kitti`` or ``euroc``.
+    root
+        Folder that holds sequences, also in folders below it.
+    output
+        Folder for the results: those of `batch`, ``benchmark.html`` and ``benchmark.md``.
+    sensors
+        By default every one that a sequence has images for.
+    seeds
+        How many runs of each.
+    options
+        As in a job file, such as ``deterministic`` or ``max_frames``.
+    command
+        The line that started it, for the page.
+    resume, scheduler, workers, memory_limit, report_pages, progress, stop
+        As for `batch`.
+
+    Returns
+    -------
+    BenchmarkResult
+        Also if runs failed or were lost: the page says which.
+
+    Raises
+    ------
+    DatasetError
+        If there are no sequences, none has images for the sensors, or the folder cannot take
+        results.
+    SettingsError
+        If options make no sense.
+    OSError
+        If a file cannot be written.
+
+    Examples
+    --------
+    >>> done = orb.batches.benchmark("euroc", "euroc", "runs/euroc")  # doctest: +SKIP
+    >>> done.entries[0].spread("ate_rmse_m").median  # doctest: +SKIP
+    0.0361
+    """
+    kind = StandardSet.of(kind)
+    if not is_whole(seeds) or seeds < 1:
+        raise SettingsError(f"seeds is {shown(seeds)}; give how many runs of each")
+    root, folder = path_of(root, "the root"), path_of(output, "output")
+    found = find_sequences(kind, root)
+    jobs = _jobs(found, sensors, int(seeds), options or {})
+    if not jobs:
+        wanted = ", ".join(str(Sensor(sensor)) for sensor in sensors or ())
+        raise DatasetError(
+            f"none of the {len(found)} sequences in {root} has images for {wanted}; choose another "
+            "--sensor"
+        )
+    done = run_jobs(
+        jobs,
+        folder,
+        resume=resume,
+        scheduler=scheduler,
+        workers=workers,
+        memory_limit=memory_limit,
+        report_pages=report_pages,
+        progress=progress,
+        stop=stop,
+    )
+    entries = entries_of(kind, done.rows)
+    files = {
+        PAGE: benchmark_page(kind, entries, done, command),
+        TABLE: markdown_table(kind, entries),
+    }
+    for name, text in files.items():
+        with atomic_write(done.folder / name) as stream:
+            stream.write(text)
+    return BenchmarkResult(kind, done, done.folder / PAGE, done.folder / TABLE)
+
+
+def _jobs(
+    found: Mapping[str, Path],
+    sensors: Sequence[Sensor | str] | None,
+    seeds: int,
+    options: Mapping[str, Any],
+) -> list[Job]:
+    chosen = None if sensors is None else {Sensor(sensor) for sensor in sensors}
+    given = options_of(options)
+    jobs = []
+    for name, path in found.items():
+        for sensor in _sensors_of(path, chosen):
+            job = Job(str(path.absolute()), name, sensor, options=given)
+            job.run_options(Sensor.MONOCULAR)  # says now what would fail in every run
+            jobs += [Job(job.path, name, sensor, options=given, seed=seed) for seed in range(seeds)]
+    return jobs
+
+
+def _sensors_of(path: Path, chosen: set[Sensor] | None) -> Sequence[str | None]:
+    try:
+        there = getattr(open_sequence(path), "sensors", ())
+    except (OrbSlamError, OSError):
+        # Its runs fail, and their rows say why.
+        return [None] if chosen is None else sorted(map(str, chosen))
+    return sorted(str(sensor) for sensor in there if chosen is None or sensor in chosen)

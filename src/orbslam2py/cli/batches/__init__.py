@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``orbslam2py batch`` and ``benchmark``: many runs, one table."""

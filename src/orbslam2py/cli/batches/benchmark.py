@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``orbslam2py benchmark``: the sequences of a standard data set beside published figures."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from orbslam2py.batches.standard_sets import BenchmarkResult, StandardSet
+from orbslam2py.batches.standard_sets import benchmark as run_benchmark
+from orbslam2py.batches.standard_sets.markdown import (
+    SYSTEMS,
+    figures_of,
+    has_published,
+    published_text,
+    spread_text,
+)
+from orbslam2py.cli.batches.watched_runs import exit_as_it_ended, watched_runs
+from orbslam2py.settings import Sensor
+
+EXAMPLE = """
+**Example**
+
+    orbslam2py benchmark euroc datasets/euroc --output runs/euroc
+
+    orbslam2py benchmark kitti datasets/kitti --sensor stereo --seeds 3
+"""
+
+
+def benchmark(
+    kind: Annotated[StandardSet, typer.Argument(help="The data set.", show_default=False)],
+    root: Annotated[
+        Path, typer.Argument(help="Folder with its sequences, also in folders below it.")
+    ],
+    output: Annotated[
+        Path | None, typer.Option(help="Folder for the results [runs/benchmark-KIND].")
+    ] = None,
+    sensor: Annotated[
+        list[Sensor] | None,
+        typer.Option(help="Only this one; may be given several times [all there are images for]."),
+    ] = None,
+    seeds: Annotated[int, typer.Option(help="Runs of each.", min=1)] = 5,
+    deterministic: Annotated[
+        bool, typer.Option("--deterministic", help="The same result of a seed every time.")
+    ] = False,
+    max_frames: Annotated[
+        int | None, typer.Option(help="Only so many frames of each, for a trial.", min=1)
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on: what was finished is not run again.")
+    ] = False,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            help="A running Dask scheduler [workers on this computer].", metavar="tcp://HOST:PORT"
+        ),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            help="Workers to start [one a core]; 0: none, one run after the other.", min=0
+        ),
+    ] = None,
+    memory_limit: Annotated[
+        str | None, typer.Option(help="Of each worker, such as 4GB.", metavar="SIZE")
+    ] = None,
+    report_pages: Annotated[
+        bool, typer.Option("--report-pages", help="Write report.html for every run.")
+    ] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
+) -> None:
+    """Run all sequences of TUM RGB-D, KITTI or EuRoC, beside figures of ORB-SLAM2 and 3."""
+    console, errors = Console(quiet=quiet), Console(stderr=True)
+    options: dict[str, Any] = {"deterministic": True} if deterministic else {}
+    if max_frames is not None:
+        options["max_frames"] = max_frames
+    with watched_runs(console, errors) as (progress, stop):
+        done = run_benchmark(
+            kind,
+            root,
+            output or Path("runs") / f"benchmark-{kind}",
+            sensors=sensor or None,
+            seeds=seeds,
+            options=options,
+            resume=resume,
+            scheduler=scheduler,
+            workers=workers,
+            memory_limit=memory_limit,
+            report_pages=report_pages,
+            progress=progress,
+            stop=stop,
+            command=shlex.join(["orbslam2py", *sys.argv[1:]]),
+        )
+    console.print(_table(done))
+    for file in (done.page, done.table):
+        console.print(escape(str(file)), highlight=False, soft_wrap=True)
+    exit_as_it_ended(done.batch, errors)
+
+
+benchmark.__doc__ = f"{benchmark.__doc__}\n{EXAMPLE}"
+
+
+def _table(done: BenchmarkResult) -> Table:
+    entries, figures = done.entries, figures_of(done.kind)
+    table = Table(title=f"{done.kind.full_name}: {len(done.batch.rows)} runs")
+    table.add_column("sequence")
+    table.add_column("sensor")
+    columns = [
+        (figure, system)
+        for figure in figures
+        for system in ("", *(s for s in SYSTEMS if has_published(entries, s, figure)))
+    ]
+    for figure, system in columns:
+        title = f"{system} {figure.name}" if system else f"{figure.name} [{figure.unit}]"
+        table.add_column(escape(title), justify="right")
+    table.add_column("lost", justify="right")
+    for entry in entries:
+        cells = [
+            published_text(entry.of(system), figure)
+            if system
+            else spread_text(entry.spread(figure.key), figure.digits)
+            for figure, system in columns
+        ]
+        lost = f"{entry.n_lost} of {len(entry.rows)}" if entry.n_lost else ""
+        table.add_row(escape(entry.sequence), entry.sensor, *cells, lost)
+    return table

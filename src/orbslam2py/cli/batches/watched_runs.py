@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Many runs on one screen: how far they are, which failed, and what Ctrl-C means to them."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from orbslam2py.batches import BatchResult
+from orbslam2py.batches.batch import Progress as OnProgress
+from orbslam2py.cli.exit_codes import ExitCode
+from orbslam2py.cli.interrupts import StopOnInterrupt
+from orbslam2py.cli.messages import log_to
+
+
+@contextmanager
+def watched_runs(console: Console, errors: Console) -> Iterator[tuple[OnProgress, threading.Event]]:
+    """Show a bar while runs are made.
+
+    Parameters
+    ----------
+    console, errors
+        For what is said, and for what goes wrong.
+
+    Yields
+    ------
+    progress, stop
+        What to call after each run, and what Ctrl-C sets.
+    """
+    log_to(errors, quiet=True)  # what single runs say is in their folders
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    with (
+        StopOnInterrupt() as interrupt,
+        Progress(*columns, TimeRemainingColumn(), console=console, transient=True) as bar,
+    ):
+        task = bar.add_task("Runs", total=None)
+
+        def progress(row: dict[str, Any], done: int, total: int) -> None:
+            if row["state"] != "done":
+                console.print(f"[red]failed[/] {escape(row['run'])}: {escape(str(row['reason']))}")
+            ending = "; waiting for those that run" if interrupt.event.is_set() else ""
+            bar.update(task, completed=done, total=total, description=f"Runs{ending}")
+
+        yield progress, interrupt.event
+
+
+def exit_as_it_ended(done: BatchResult, errors: Console) -> None:
+    """End with the exit code of runs that are left or failed; do nothing if all is well."""
+    if done.n_left:
+        errors.print(f"{done.n_left} runs are left; go on with --resume", highlight=False)
+        raise typer.Exit(ExitCode.INTERRUPTED)
+    if done.n_failed:
+        raise typer.Exit(ExitCode.FAILED)

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``orbslam2py benchmark``: what it prints, and inputs that it refuses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from support.command_line import CommandLine
+from support.standard_sets import make_root
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make_root(tmp_path_factory.mktemp("data"), "tum", frames=4)
+
+
+def test_command(command: CommandLine, root: Path) -> None:
+    arguments = ("benchmark", "tum", root, "--sensor", "rgbd", "--seeds", "2", "--workers", "0")
+    done = command(*arguments, "--max-frames", "3")
+    assert done.code == 0, done.err
+    assert "TUM RGB-D: 2 runs" in done.out
+    assert "0.016" in done.out
+    folder = Path("runs/benchmark-tum")
+    page = (folder / "benchmark.html").read_text()
+    assert "orbslam2py benchmark tum" in page
+    assert str(folder / "benchmark.md") in done.out.replace("\n", "")
+    again = command(*arguments)
+    assert again.code == 2
+    assert "go on with --resume" in " ".join(again.err.split())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("tum", "nowhere"), "nowhere does not exist; give the folder that holds the sequences"),
+        (("tum", "notes.txt"), "notes.txt is no folder; give the folder"),
+        (("kitti", "empty"), "empty holds no sequence of KITTI odometry: looked 5 folders deep"),
+        (("kitti", "ROOT"), "but of TUM RGB-D: orbslam2py benchmark tum"),
+        (("tum", "ROOT", "--sensor", "stereo"), "has images for stereo; choose another --sensor"),
+        (("coco", "ROOT"), "'coco' is not one of"),
+        (("tum", "ROOT", "--seeds", "0"), "greater than or equal to 1"),
+    ],
+)
+def test_bad_input(
+    command: CommandLine, root: Path, arguments: tuple[str, ...], message: str
+) -> None:
+    Path("empty").mkdir()
+    Path("notes.txt").write_text("mine\n")
+    done = command("benchmark", *(str(root) if one == "ROOT" else one for one in arguments))
+    assert done.code == 2
+    assert message in " ".join(done.err.replace("\u2502", " ").split())
+    for noise in ("Traceback", "Errno", "Error("):
+        assert noise not in done.err
+    assert not Path("runs").exists()
