@@ -2,26 +2,35 @@
 """Build what the wheel is linked with, static and hidden, from Debian's source packages.
 
 ``build_libraries.py FOLDER`` takes the compiler in FOLDER/sysroot (fetch_toolchain.sh) and fills
-FOLDER/libraries. What is built, and how, stands in libraries.toml. A run that was interrupted goes on
-where it stood. FOLDER/libraries/notices/manifest.json says what was built from which version under which licence.
+FOLDER/libraries. What is built, and how, stands in libraries.toml. A run that was interrupted goes
+on where it stood. FOLDER/libraries/notices/manifest.json says what was built from which version,
+under which licence.
 """
 
 from __future__ import annotations
 
 import argparse
+import gzip
 import json
 import os
 import shutil
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 from typing import Any
+
+try:
+    import tomllib
+except ModuleNotFoundError:  # Python 3.10
+    from pip._vendor import tomli as tomllib  # type: ignore[no-redef]
 
 HERE = Path(__file__).parent
 
 #: Nothing is seen from outside; the linker leaves out what is not used.
-SECTIONS = "-fvisibility=hidden -fvisibility-inlines-hidden -ffunction-sections -fdata-sections"
+SECTIONS = {
+    "C": "-fvisibility=hidden -ffunction-sections -fdata-sections",
+    "CXX": "-fvisibility=hidden -fvisibility-inlines-hidden -ffunction-sections -fdata-sections",
+}
 
 COMMON = {
     "CMAKE_BUILD_TYPE": "Release",
@@ -78,7 +87,7 @@ def build(key: str, cmake: dict[str, Any], source: Path, folder: Path, jobs: int
         defines[name] = text.replace("SYSROOT", str(sysroot))
     for language in ("C", "CXX"):
         flags = f"CMAKE_{language}_FLAGS"
-        defines[flags] = f"{SECTIONS if language == 'CXX' else '-fvisibility=hidden'} {defines.get(flags, '')}"
+        defines[flags] = f"{SECTIONS[language]} {defines.get(flags, '')}"
         if ccache := shutil.which("ccache"):
             defines[f"CMAKE_{language}_COMPILER_LAUNCHER"] = ccache
     environment = os.environ | {
@@ -107,13 +116,12 @@ def version_of(library: dict[str, Any], folder: Path) -> str:
         (description,) = (folder / "sources").glob(f"{library['source']}_*.dsc")
         lines = description.read_text().splitlines()
         return next(line.split()[1] for line in lines if line.startswith("Version:"))
-    query = ["dpkg-query", "-W", "-f=${Version}"]
     if "in_sysroot" in library:
-        query += [f"--admindir={folder}/sysroot/var/lib/dpkg", library["in_sysroot"]]
-    else:
-        query += [library["installed"]]
-    done = subprocess.run(query, capture_output=True, text=True, check=False)
-    return done.stdout or "unknown"
+        log = folder / "sysroot/usr/share/doc" / library["in_sysroot"] / "changelog.Debian.gz"
+        with gzip.open(log, "rt") as lines:
+            return next(lines).split("(")[1].split(")")[0]
+    query = ["dpkg-query", "-W", "-f=${Version}", library["installed"]]
+    return subprocess.run(query, capture_output=True, text=True, check=True).stdout
 
 
 def write_manifest(libraries: dict[str, dict[str, Any]], folder: Path) -> None:
