@@ -3,7 +3,10 @@
 
 add_library(orbslam_options INTERFACE)
 target_compile_options(orbslam_options INTERFACE
-  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Werror)
+  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion)
+if(ORBSLAM2PY_WERROR)
+  target_compile_options(orbslam_options INTERFACE -Werror)
+endif()
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   # A portable baseline for every translation unit that sees Eigen types; the AVX2 kernels are
   # compiled with their own flags and include neither Eigen nor Ceres.

@@ -9,17 +9,14 @@ symbol besides the modules' entry points, more than 25 MB.
 from __future__ import annotations
 
 import argparse
-import io
 import json
 import re
+import subprocess
 import sys
+import tempfile
 import zipfile
 from pathlib import Path
 from typing import Any
-
-from elftools.elf.dynamic import DynamicSection
-from elftools.elf.elffile import ELFFile
-from elftools.elf.sections import SymbolTableSection
 
 MAX_BYTES = 25_000_000
 
@@ -56,21 +53,20 @@ NOTICES = ["LICENSE", "third_party_notes/README.md", "third_party_notes/pybind11
 
 def problems_of_binary(name: str, data: bytes) -> list[str]:
     """List what is wrong with an extension module."""
-    problems = []
-    elf = ELFFile(io.BytesIO(data))
-    for section in elf.iter_sections():
-        if isinstance(section, DynamicSection):
-            needed = {tag.needed for tag in section.iter_tags("DT_NEEDED")}
-            problems += [f"{name} needs {lib}" for lib in sorted(needed - SYSTEM_LIBRARIES)]
-        elif isinstance(section, SymbolTableSection) and section.name == ".dynsym":
-            shown = {
-                symbol.name
-                for symbol in section.iter_symbols()
-                if symbol["st_shndx"] != "SHN_UNDEF" and symbol["st_info"]["bind"] != "STB_LOCAL"
-            }
-            strangers = sorted(symbol for symbol in shown if not symbol.startswith("PyInit_"))
-            if strangers:
-                problems.append(f"{name} shows {len(strangers)} symbols, {strangers[0]} first")
+    with tempfile.NamedTemporaryFile(suffix=".so") as file:
+        file.write(data)
+        file.flush()
+        readelf = ["readelf", "--wide", "--dynamic", "--dyn-syms", file.name]
+        done = subprocess.run(readelf, capture_output=True, text=True, check=False)
+    if "NEEDED" not in done.stdout:
+        return [f"{name} is no library that needs libc"]
+    needed = set(re.findall(r"\(NEEDED\).*\[(.*)\]", done.stdout))
+    problems = [f"{name} needs {library}" for library in sorted(needed - SYSTEM_LIBRARIES)]
+    rows = [line.split() for line in done.stdout.splitlines() if re.match(r" +\d+: ", line)]
+    shown = {row[7] for row in rows if len(row) > 7 and row[4] != "LOCAL" and row[6] != "UND"}
+    strangers = sorted(symbol for symbol in shown if not symbol.startswith("PyInit_"))
+    if strangers:
+        problems.append(f"{name} shows {len(strangers)} symbols, {strangers[0]} first")
     problems += [f"{name} holds traces of {trace.decode()}" for trace in TRACES if trace in data]
     return problems
 

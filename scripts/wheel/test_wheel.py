@@ -96,13 +96,25 @@ def copy_tests(checkout: Path) -> None:
 def main() -> None:
     """Test a wheel in a bare tree."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("wheel", type=Path)
+    parser.add_argument(
+        "wheel", type=Path, help="or the folder of several: that of the suite's Python"
+    )
     parser.add_argument("--suite", choices=SUITES, default="bookworm")
     parser.add_argument("--folder", type=Path, default=PROJECT / "build/wheel")
     arguments = parser.parse_args()
+    wheel = arguments.wheel
+    if wheel.is_dir():
+        tag = f"cp{SUITES[arguments.suite].replace('.', '')}"
+        found = sorted(
+            wheel.glob(f"orbslam2py-*-{tag}-*manylinux*.whl"), key=lambda w: w.stat().st_mtime
+        )
+        if not found:
+            python = f"python{SUITES[arguments.suite]}"
+            sys.exit(f"{wheel} has no wheel for {tag}.\nBuild it: make wheel PYTHON={python}")
+        wheel = found[-1]
     tree = arguments.folder.resolve() / f"bare-{arguments.suite}"
     make_tree(arguments.suite, tree)
-    download(arguments.wheel, arguments.suite, tree / "srv/wheels")
+    download(wheel, arguments.suite, tree / "srv/wheels")
     copy_tests(tree / "srv/checkout")
     sys.exit(enter(tree, "sh", "/srv/checkout/scripts/wheel/bare_tree_tests.sh"))
 
