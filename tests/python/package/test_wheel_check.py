@@ -36,7 +36,7 @@ def module(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for visibility in ("hidden", "default"):
         source = folder / f"{visibility}.cpp"
         source.write_text(ENTRY.replace("VISIBILITY", visibility))
-        command = ["c++", "-shared", "-fPIC", source]
+        command = ["c++", "-shared", "-fPIC", "-Wl,--no-as-needed", source]
         subprocess.run([*command, "-o", source.with_suffix(".so")], check=True)
     traces = (folder / "hidden.so").read_bytes() + b"cholmod_analyze\0"
     (folder / "traces.so").write_bytes(traces)
