@@ -24,9 +24,9 @@ _INSTRUCTIONS = {
     "lahf_lm": "LAHF",
 }
 
-_FROM_SOURCE = (
-    "Install a wheel for this Python, or build from source: pip install --no-binary orbslam2py "
-    "orbslam2py, after the libraries named in the documentation under Installing."
+_REMEDY = (
+    "Install a wheel for this Python and machine, or build from source: README.md says how, under "
+    "Install."
 )
 
 
@@ -85,11 +85,11 @@ def load() -> ModuleType:
         names = sorted(path.name for path in folder.glob("_core.*.so"))
         python = f"{sys.implementation.name} {sys.version_info.major}.{sys.version_info.minor}"
         if any((folder / f"_core{suffix}").exists() for suffix in EXTENSION_SUFFIXES):
-            message = f"The compiled part of orbslam2py cannot be loaded: {error}.\n{_FROM_SOURCE}"
+            message = f"The compiled part of orbslam2py cannot be loaded: {error}.\n{_REMEDY}"
         else:
             there = f"there is {', '.join(names)}" if names else "there is none at all"
             message = (
                 f"The compiled part of orbslam2py is missing for {python} on {machine}: {there}.\n"
-                f"{_FROM_SOURCE}"
+                f"{_REMEDY}"
             )
         raise ImportError(message, name=NAME) from error

@@ -48,7 +48,7 @@ def test_a_missing_one_names_python_machine_and_remedy(copied: Path) -> None:
     first, second = done.stderr.strip().splitlines()
     assert f"missing for cpython {sys.version_info.major}.{sys.version_info.minor}" in first
     assert f"there is {other.name}" in first
-    assert second.startswith("Install a wheel for this Python, or build from source: pip install")
+    assert second.startswith("Install a wheel for this Python and machine, or build from source")
 
 
 def test_a_broken_one_says_what_the_loader_says(copied: Path) -> None:
