@@ -10,6 +10,7 @@ function(orbslam_cython_module NAME SOURCE)
   Python_add_library(${NAME} MODULE WITH_SOABI ${generated})
   # Generated code does not follow our warning rules.
   target_compile_options(${NAME} PRIVATE -O3 -w)
+  orbslam_entry_point_only(${NAME})
   get_filename_component(folder ${SOURCE} DIRECTORY)
   file(RELATIVE_PATH room ${PROJECT_SOURCE_DIR}/src ${folder})
   install(TARGETS ${NAME} DESTINATION ${room} COMPONENT python)

@@ -3,11 +3,21 @@
 
 add_library(orbslam_options INTERFACE)
 target_compile_options(orbslam_options INTERFACE
-  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Werror)
+  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion)
+if(ORBSLAM2PY_WERROR)
+  target_compile_options(orbslam_options INTERFACE -Werror)
+endif()
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   # A portable baseline for every translation unit that sees Eigen types; the AVX2 kernels are
   # compiled with their own flags and include neither Eigen nor Ceres.
-  target_compile_options(orbslam_options INTERFACE -march=x86-64-v2)
+  include(CheckCXXCompilerFlag)
+  check_cxx_compiler_flag(-march=x86-64-v2 ORBSLAM2PY_KNOWS_LEVELS)
+  if(ORBSLAM2PY_KNOWS_LEVELS)
+    target_compile_options(orbslam_options INTERFACE -march=x86-64-v2)
+  else() # the same by its parts, for compilers older than the name (GCC 10)
+    target_compile_options(orbslam_options INTERFACE
+      -march=x86-64 -mcx16 -msahf -mpopcnt -msse3 -mssse3 -msse4.1 -msse4.2)
+  endif()
 else()
   # Where fused multiply-add is part of the baseline, contraction would change results.
   target_compile_options(orbslam_options INTERFACE -ffp-contract=off)

@@ -13,9 +13,20 @@ along +z, x points right, y down. Lengths are metres, times seconds, angles radi
 camera alone cannot see metres: its unit of length is the median depth of the first view.
 """
 
+from typing import Any
+
 import lazy_loader
 
 # The names stand in __init__.pyi and are loaded on first use: the C++ extension imports
 # orbslam2py.errors while it is being loaded, and the command line wants to be in charge before
 # libraries are loaded.
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+_public_name, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+
+def __getattr__(name: str) -> Any:
+    """Give a public name, or the compiled part."""
+    if name == "_core":
+        from orbslam2py._extension import load  # noqa: PLC0415
+
+        return load()
+    return _public_name(name)

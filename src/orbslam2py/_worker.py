@@ -21,7 +21,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from typing import Generic, TypeVar
 
-from orbslam2py._core import StopFlag
+from orbslam2py import _core as core
 from orbslam2py.errors import StateError, WorkerError
 
 _log = logging.getLogger(__name__)
@@ -98,11 +98,11 @@ class Worker(Generic[Job]):
         self._error: BaseException | None = None
         self._thread: threading.Thread | None = None
         #: Raised when the running step should end early; lowered when a step begins.
-        self.interrupt_flag = StopFlag()
+        self.interrupt_flag = core.StopFlag()
         #: Raised when nobody wants the running step's result any more (reset, finish).
-        self.cancel_flag = StopFlag()
+        self.cancel_flag = core.StopFlag()
         #: Raised while jobs wait behind the running one.
-        self.waiting_flag = StopFlag()
+        self.waiting_flag = core.StopFlag()
 
     # ---- life cycle ------------------------------------------------------------------------------
     def start(self) -> None:

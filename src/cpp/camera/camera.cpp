@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/calib3d.hpp>
 #include <string>
 
 #include "base/errors.hpp"
@@ -77,15 +76,34 @@ bool RadialTangential::is_identity() const {
   return std::all_of(coefficients_.begin(), coefficients_.end(), [](double c) { return c == 0; });
 }
 
+// D. C. Brown, "Close-range camera calibration", 1971: the lens moves the point (x, y) of the
+// pinhole, at unit depth, to (x, y) * radial + tangential. What it was moved from is the fixed
+// point of the step below, and OpenCV searches it in the same way: the operations stand in the same
+// order, so that coordinates are those of its undistortPoints, to the bit.
 void RadialTangential::undistort(const Pinhole& pinhole, std::vector<float>& xy) const {
-  if (xy.empty() || is_identity()) return;
-  const cv::Matx33d k(pinhole.fx, 0, pinhole.cx, 0, pinhole.fy, pinhole.cy, 0, 0, 1);
-  const cv::Mat coefficients(1, 5, CV_64F, const_cast<double*>(coefficients_.data()));
-  const cv::Mat raw(static_cast<int>(xy.size() / 2), 1, CV_32FC2, xy.data());
-  cv::Mat undistorted;
-  cv::undistortPoints(raw, undistorted, k, coefficients, cv::noArray(), k,
-                      cv::TermCriteria(cv::TermCriteria::COUNT, kUndistortIterations, 0));
-  std::copy_n(undistorted.ptr<float>(), xy.size(), xy.begin());
+  if (is_identity()) return;
+  const auto [k1, k2, p1, p2, k3] = coefficients_;
+  const double inverse_fx = 1 / pinhole.fx, inverse_fy = 1 / pinhole.fy;
+  for (std::size_t i = 0; i + 1 < xy.size(); i += 2) {
+    const double seen_x = (xy[i] - pinhole.cx) * inverse_fx;
+    const double seen_y = (xy[i + 1] - pinhole.cy) * inverse_fy;
+    double x = seen_x, y = seen_y;
+    for (int iteration = 0; iteration < kUndistortIterations; ++iteration) {
+      const double r2 = x * x + y * y;
+      const double inverse_radial = 1 / (1 + ((k3 * r2 + k2) * r2 + k1) * r2);
+      if (inverse_radial < 0) {  // the model folds the image over out there: nothing fits
+        x = seen_x;
+        y = seen_y;
+        break;
+      }
+      const double tangential_x = 2 * p1 * x * y + p2 * (r2 + 2 * x * x);
+      const double tangential_y = p1 * (r2 + 2 * y * y) + 2 * p2 * x * y;
+      x = (seen_x - tangential_x) * inverse_radial;
+      y = (seen_y - tangential_y) * inverse_radial;
+    }
+    xy[i] = static_cast<float>(pinhole.fx * x + pinhole.cx);
+    xy[i + 1] = static_cast<float>(pinhole.fy * y + pinhole.cy);
+  }
 }
 
 Camera::Camera(const CameraOptions& options)

@@ -20,6 +20,11 @@ def main() -> None:
         run_app()
     except KeyboardInterrupt:
         sys.exit(ExitCode.INTERRUPTED)
+    except ImportError as error:
+        if error.name != "orbslam2py._core":
+            raise
+        print(error, file=sys.stderr)
+        sys.exit(ExitCode.FAILED)
 
 
 __all__ = ["main"]

@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Install a wheel on a bare machine and use it: a minimal Debian with Python and pip, nothing else.
+
+``test_wheel.py WHEEL --suite bookworm`` makes the tree with mmdebstrap, enters it by chroot, and
+runs bare_tree_tests.sh in it. Needs root. Where the machine does not allow it, it says so and ends
+with 77.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+PROJECT = HERE.parent.parent
+
+#: Debian's releases and their Python.
+SUITES = {"bookworm": "3.11", "trixie": "3.13"}
+SKIPPED = 77
+
+#: Other packages with OpenCV, each used in one process with ours: of each kind, oldest and newest.
+OTHER_OPENCV = [
+    "opencv-python==4.8.1.78",
+    "opencv-python-headless==4.10.0.84",
+    "opencv-contrib-python==4.13.0.92",
+    "opencv-python-headless==5.0.0.93",
+]
+#: For the Python tests inside.
+TEST_PACKAGES = ["pytest", "pytest-benchmark", "pytest-xdist", "hypothesis", "scipy", "rosbags"]
+
+
+def skip(reason: str) -> None:
+    """End without having tested, and say why."""
+    print(f"SKIPPED: {reason}.\nThe wheel was not tried on a bare machine.")
+    sys.exit(SKIPPED)
+
+
+def enter(tree: Path, *command: str) -> int:
+    """Run a command inside the tree; what is mounted for it goes with it."""
+    mounts = f"mount -t proc proc {tree}/proc && mount --bind /dev {tree}/dev"
+    inside = ["env", "-i", "PATH=/usr/bin:/bin:/usr/sbin:/sbin", "HOME=/root", "LANG=C.UTF-8"]
+    script = f'{mounts} && exec chroot {tree} "$@"'
+    unshare = ["unshare", "--mount", "--net", "sh", "-c", script, "sh"]
+    return subprocess.run([*unshare, *inside, *command], check=False).returncode
+
+
+def make_tree(suite: str, tree: Path) -> None:
+    """Make a minimal tree with Python and pip, once."""
+    if os.geteuid() != 0:
+        skip("chroot needs root")
+    if not (tree / "complete").exists():
+        if shutil.which("mmdebstrap") is None:
+            skip("mmdebstrap is missing (apt-get install mmdebstrap)")
+        shutil.rmtree(tree, ignore_errors=True)
+        mirror = os.environ.get("ORBSLAM2PY_DEBIAN_MIRROR", "http://deb.debian.org/debian")
+        packages = "--include=python3,python3-pip,python3-venv"
+        command = ["mmdebstrap", "--quiet", "--variant=minbase", packages, suite, tree, mirror]
+        if subprocess.run(command, check=False).returncode != 0:
+            skip(f"mmdebstrap could not make a tree of {suite}")
+        (tree / "complete").touch()
+    if enter(tree, "true") != 0:
+        skip("this machine does not allow mounts and chroot")
+
+
+def download(wheel: Path, suite: str, folder: Path) -> None:
+    """Fetch beforehand all that pip will install inside: the tree has no network."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for old in folder.glob("orbslam2py-*.whl"):
+        old.unlink()
+    shutil.copy(wheel, folder)
+    platforms = [f"manylinux_2_{minor}_x86_64" for minor in (31, 28, 27, 24, 17)]
+    platforms += ["manylinux2014_x86_64"]
+    pip = [sys.executable, "-m", "pip", "download", "-q", "--only-binary=:all:", "-d", folder]
+    pip += ["--python-version", SUITES[suite], "--find-links", folder]
+    pip += [f"--platform={platform}" for platform in platforms]
+    subprocess.run([*pip, wheel, *TEST_PACKAGES], check=True)
+    for other in OTHER_OPENCV:
+        subprocess.run([*pip, "--no-deps", other], check=True)
+    (folder / "opencv.txt").write_text("\n".join(OTHER_OPENCV) + "\n")
+
+
+def copy_tests(checkout: Path) -> None:
+    """Copy what the tests need, and no package beside them."""
+    shutil.rmtree(checkout, ignore_errors=True)
+    ignore = shutil.ignore_patterns("__pycache__", "*.so")
+    for name in ("tests", "benchmarks", "scripts"):
+        shutil.copytree(PROJECT / name, checkout / name, ignore=ignore)
+    for name in ("pyproject.toml", "README.md"):
+        shutil.copy(PROJECT / name, checkout)
+
+
+def main() -> None:
+    """Test a wheel in a bare tree."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument(
+        "wheel", type=Path, help="or the folder of several: that of the suite's Python"
+    )
+    parser.add_argument("--suite", choices=SUITES, default="bookworm")
+    parser.add_argument("--folder", type=Path, default=PROJECT / "build/wheel")
+    arguments = parser.parse_args()
+    wheel = arguments.wheel
+    if wheel.is_dir():
+        tag = f"cp{SUITES[arguments.suite].replace('.', '')}"
+        found = sorted(
+            wheel.glob(f"orbslam2py-*-{tag}-*manylinux*.whl"), key=lambda w: w.stat().st_mtime
+        )
+        if not found:
+            python = f"python{SUITES[arguments.suite]}"
+            sys.exit(f"{wheel} has no wheel for {tag}.\nBuild it: make wheel PYTHON={python}")
+        wheel = found[-1]
+    tree = arguments.folder.resolve() / f"bare-{arguments.suite}"
+    make_tree(arguments.suite, tree)
+    download(wheel, arguments.suite, tree / "srv/wheels")
+    copy_tests(tree / "srv/checkout")
+    sys.exit(enter(tree, "sh", "/srv/checkout/scripts/wheel/bare_tree_tests.sh"))
+
+
+if __name__ == "__main__":
+    main()

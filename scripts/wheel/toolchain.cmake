@@ -1,0 +1,12 @@
+# The compiler of an older Debian with that Debian's C library, run on this machine: what it makes
+# needs no younger C library than that one. The folder is made by fetch_toolchain.sh.
+set(ORBSLAM2PY_SYSROOT "$ENV{ORBSLAM2PY_SYSROOT}")
+if(NOT IS_DIRECTORY "${ORBSLAM2PY_SYSROOT}")
+  message(FATAL_ERROR "ORBSLAM2PY_SYSROOT names no folder: run scripts/wheel/fetch_toolchain.sh FOLDER")
+endif()
+file(GLOB compilers "${ORBSLAM2PY_SYSROOT}/usr/bin/g++-[0-9]*")
+list(GET compilers 0 CMAKE_CXX_COMPILER)
+string(REPLACE "g++" "gcc" CMAKE_C_COMPILER "${CMAKE_CXX_COMPILER}")
+set(CMAKE_SYSROOT "${ORBSLAM2PY_SYSROOT}")
+# Nothing of the machine's own libraries; what is needed is named by full paths.
+set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
