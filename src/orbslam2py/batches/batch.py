@@ -18,13 +18,11 @@ from orbslam2py.batches.jobs import Job, make_jobs, read_jobs
 from orbslam2py.batches.summary import Group, summarise
 from orbslam2py.batches.sweep_picture import write_sweep_picture
 from orbslam2py.batches.table import write_table
-from orbslam2py.batches.work import read_row, run_job
+from orbslam2py.batches.work import BATCH_FILE, read_row, run_job
 from orbslam2py.errors import DatasetError
 
 Progress = Callable[[dict[str, Any], int, int], None]
 
-#: Marks the folder of a batch.
-BATCH_FILE = "batch.json"
 #: Error against each parameter of a sweep.
 PICTURE = "sweep.png"
 

@@ -23,6 +23,8 @@ from orbslam2py.datasets import open_input
 from orbslam2py.errors import DatasetError, OrbSlamError
 from orbslam2py.runs.run import run_sequence
 
+#: Marks the folder of a batch.
+BATCH_FILE = "batch.json"
 #: Marks a folder whose run has ended, and holds its row of the table.
 ROW_FILE = "row.json"
 #: Figures that differ from run to run on one machine: they are last in the table.
@@ -62,6 +64,9 @@ def run_job(
     _forget_peak_memory()
     begin = time.perf_counter()
     row = _begun(job)
+    if not (Path(output) / BATCH_FILE).is_file():  # before it is run for nothing
+        where = f"{output} is not seen on {platform.node()}"
+        return row | {"reason": f"{where}; give an --output that all workers see"}
     try:
         with here(job.path, cache or Cache(default_folder(), bytes_of(DEFAULT_SIZE))) as path:
             _run(job, path, folder, row, page=page)

@@ -5,10 +5,11 @@ from __future__ import annotations
 
 import json
 import os
+import platform
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -49,11 +50,21 @@ class Cluster:
     def address(self) -> str:
         return str(json.loads(self._file.read_text())["address"])
 
-    def add_worker(self) -> None:
+    def add_worker(self, hidden: Path | None = None) -> None:
+        """Start a worker; one of a computer that does not have a folder, if one is named."""
+        around: list[str] = []
+        if hidden is not None:
+            around = ["unshare", "-m", "sh", "-c"]
+            around += ['mount -t tmpfs tmpfs "$0" && exec "$@"', str(hidden)]
+            try:
+                subprocess.run([*around, "true"], check=True, capture_output=True)
+            except (OSError, subprocess.CalledProcessError):
+                pytest.skip("file systems cannot be mounted here")
         self.workers.append(
             self._start(
                 *("worker", "--host", "127.0.0.1", "--nthreads", "1", "--no-nanny"),
                 *("--no-dashboard", "--local-directory", str(self._folder)),
+                around=around,
             )
         )
 
@@ -67,12 +78,16 @@ class Cluster:
         for log in self._logs:
             log.close()
 
-    def _start(self, what: str, *options: str) -> subprocess.Popen[bytes]:
+    def _start(
+        self, what: str, *options: str, around: Sequence[str] = ()
+    ) -> subprocess.Popen[bytes]:
         log = (self._folder / f"{what}{len(self._logs)}.log").open("wb")
         self._logs.append(log)
         command = [sys.executable, "-m", f"distributed.cli.dask_{what}"]
         return subprocess.Popen(
-            [*command, "--scheduler-file", str(self._file), *options], stdout=log, stderr=log
+            [*around, *command, "--scheduler-file", str(self._file), *options],
+            stdout=log,
+            stderr=log,
         )
 
 
@@ -132,6 +147,39 @@ def test_another_version_is_refused(
     monkeypatch.setattr(engine, "__version__", "9.9.9")
     with pytest.raises(orb.DatasetError, match=r"has orbslam2py .*, here it is 9\.9\.9; install"):
         orb.batch(jobs(tmp_path, 1), tmp_path / "out", scheduler=cluster.address)
+
+
+@pytest.mark.watchdog(120)
+def test_a_path_that_only_some_workers_see(cluster: Cluster, tmp_path: Path) -> None:
+    """Runs where it is not seen say so, and are made again where it is."""
+    document = jobs(tmp_path / "data", 4)
+    cluster.add_worker(hidden=tmp_path / "data")
+    folder = tmp_path / "out"
+    done = orb.batch(document, folder, scheduler=cluster.address)
+    assert done.n_failed == 4, cluster.log()
+    for row in done.rows:
+        assert row["reason"] == (
+            f"{tmp_path}/data/lap does not exist on {platform.node()}; put the sequences where all "
+            "workers see them"
+        )
+    cluster.workers[0].kill()
+    cluster.workers[0].wait()
+    cluster.add_worker()
+    again = orb.batch(document, folder, scheduler=cluster.address, resume=True)
+    assert again.n_failed == 0, cluster.log()
+
+
+@pytest.mark.watchdog(120)
+def test_results_where_the_batch_is_not(cluster: Cluster, tmp_path: Path) -> None:
+    """Nothing is run whose results would lie on the disk of another computer."""
+    (tmp_path / "results").mkdir()
+    cluster.add_worker(hidden=tmp_path / "results")
+    folder = tmp_path / "results/out"
+    done = orb.batch(jobs(tmp_path, 1), folder, scheduler=cluster.address)
+    assert [row["reason"] for row in done.rows] == [
+        f"{folder} is not seen on {platform.node()}; give an --output that all workers see"
+    ], cluster.log()
+    assert "is not seen on" in (folder / "results.csv").read_text()
 
 
 @pytest.mark.watchdog(120)

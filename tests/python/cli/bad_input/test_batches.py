@@ -45,6 +45,14 @@ def test_command(command: CommandLine, sequences: Path, tmp_path: Path) -> None:
     [
         (("none.yaml", "--output", "out"), "cannot open job file none.yaml"),
         (("jobs.yaml",), "there is no folder for the results; give --output"),
+        (
+            ("jobs.yaml", "--output", "out", "--cache-size", "much"),
+            "the size of the cache is 'much'; give one such as 20GB",
+        ),
+        (("typo.yaml", "--output", "out"), "unknown key 'sequence'; did you mean sequences?"),
+        (("nothing.yaml", "--output", "out"), "none_*; correct the pattern"),
+        (("twice.yaml", "--output", "out"), "two runs would have the folder one-seed0"),
+        (("far.yaml", "--output", "out"), "there is no protocol nfs9://; give one"),
         (("jobs.yaml", "--output", "jobs.yaml"), "jobs.yaml is a file; give the name of a folder"),
         (("jobs.yaml", "--output", "full"), "full is not empty and holds no batch"),
         (
@@ -62,10 +70,19 @@ def test_bad_input(
 ) -> None:
     monkeypatch.setattr("orbslam2py.batches.engine._PATIENCE", 0.5)
     Path("jobs.yaml").write_text(json.dumps(jobs_of(sequences)))
+    one = str(sequences / "one")
+    for name, document in (
+        ("typo", {"sequence": [one]}),
+        ("nothing", {"sequences": ["none_*"]}),
+        ("twice", {"sequences": [one, one]}),
+        ("far", {"sequences": ["nfs9://host/one"]}),
+    ):
+        Path(f"{name}.yaml").write_text(json.dumps(document))
     Path("full").mkdir()
     Path("full/notes.txt").write_text("mine\n")
     done = command("batch", *arguments)
     assert done.code == 2
     assert message in " ".join(done.err.split())
+    assert not Path("out/runs").exists()
     for noise in ("Traceback", "Errno", "Error(", "SettingsError"):
         assert noise not in done.err

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Batches that are ended from outside: Ctrl-C, a kill at any moment, a full disk."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import orbslam2py as orb
+from support.batches import jobs_of, make_sequences, reproducible, table
+
+N = 8
+
+
+@pytest.fixture(scope="module")
+def jobs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A job file of eight runs."""
+    folder = tmp_path_factory.mktemp("sequences")
+    document = jobs_of(
+        make_sequences(folder / "data"),
+        seeds=N // 2,
+        options={"deterministic": True, "max_frames": 3},
+    )
+    (folder / "jobs.yaml").write_text(json.dumps(document))
+    return folder / "jobs.yaml"
+
+
+@pytest.fixture(scope="module")
+def whole(jobs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same batch, undisturbed."""
+    folder = tmp_path_factory.mktemp("whole") / "out"
+    assert orb.batch(jobs, folder, workers=0).n_failed == 0
+    return folder
+
+
+def start(jobs: Path, output: Path, *options: str) -> subprocess.Popen[str]:
+    """Start the command in a group of its own, as a shell does."""
+    # Ctrl-C is ignored where the tests run in the background, and who is started inherits that.
+    code = (
+        "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
+        "from orbslam2py.cli import main; sys.argv[0] = 'orbslam2py'; main()"
+    )
+    return subprocess.Popen(
+        [sys.executable, "-c", code, "batch", str(jobs), "--output", str(output), *options],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def wait_for(condition: Callable[[], bool], process: subprocess.Popen[str]) -> None:
+    deadline = time.monotonic() + 60
+    while not condition():
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < deadline
+        time.sleep(0.01)  # for a condition
+
+
+def finished(folder: Path) -> list[Path]:
+    return sorted(folder.glob("runs/*/row.json"))
+
+
+@pytest.mark.watchdog(150)
+@pytest.mark.parametrize("workers", ["0", "2"])
+def test_interrupted(jobs: Path, whole: Path, tmp_path: Path, workers: str) -> None:
+    """Runs that are being made end and are saved; the rest is left for --resume."""
+    if workers != "0":
+        pytest.importorskip("distributed", reason="dask is an extra")
+    folder = tmp_path / "out"
+    process = start(jobs, folder, "--workers", workers)
+    wait_for(lambda: bool(finished(folder)), process)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal sends it
+    _, errors = process.communicate(timeout=100)
+    assert process.returncode == 130, errors
+    rows = table(folder)
+    assert 1 <= len(rows) < N
+    assert [row["state"] for row in rows] == ["done"] * len(rows)
+    assert len(finished(folder)) == len(rows), "what was begun was ended"
+    assert len(list((folder / "runs").iterdir())) == len(rows)
+    assert f"{N - len(rows)} runs are left; go on with --resume" in errors
+    assert "Traceback" not in errors
+    done = orb.batch(jobs, folder, workers=0, resume=True)
+    assert (len(done.rows), done.n_left) == (N, 0)
+    assert reproducible(folder) == reproducible(whole)
+
+
+@pytest.mark.watchdog(300)
+def test_killed_at_any_moment(jobs: Path, whole: Path, tmp_path: Path) -> None:
+    """Killed on the way and gone on with: the table of one that was not, to the byte."""
+    draws = random.Random(14)
+    first = tmp_path / "first"
+    process = start(jobs, first, "--workers", "0", "--quiet")
+    wait_for((first / "batch.json").exists, process)
+    begin = time.monotonic()
+    process.communicate(timeout=100)
+    lasts = time.monotonic() - begin
+    assert process.returncode == 0
+    for number in range(3):
+        folder = tmp_path / str(number)
+        process = start(jobs, folder, "--workers", "0", "--quiet")
+        wait_for((folder / "batch.json").exists, process)
+        try:
+            process.wait(draws.uniform(0, lasts))  # the moment
+        except subprocess.TimeoutExpired:
+            process.kill()
+        process.communicate()
+        kept = {path: path.stat().st_mtime_ns for path in finished(folder)}
+        done = orb.batch(jobs, folder, workers=0, resume=True)
+        assert (len(done.rows), done.n_failed, done.n_left) == (N, 0, 0)
+        assert {path: path.stat().st_mtime_ns for path in kept} == kept, "none was run again"
+        assert reproducible(folder) == reproducible(whole)
+        for row in done.rows:
+            for name in ("trajectory.txt", "points.ply", "keyframes.txt"):
+                file = f"runs/{row['run']}/{name}"
+                assert (folder / file).read_bytes() == (whole / file).read_bytes()
+
+
+@pytest.fixture
+def rescue(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """Folder that stands for the one of temporary files."""
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    return tmp_path / "temporary"
+
+
+@pytest.mark.watchdog(150)
+def test_full_disk(jobs: Path, whole: Path, tmp_path: Path, rescue: Path) -> None:
+    """Results that do not fit are kept elsewhere, and runs are made again where there is room."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=400k", "tmpfs", str(disk)]
+    try:
+        subprocess.run(mount, check=True, capture_output=True)
+    except (OSError, subprocess.CalledProcessError):
+        pytest.skip("file systems cannot be mounted here")
+    try:
+        with pytest.raises(OSError, match=r"cannot write .*results\.csv: No space left on device"):
+            orb.batch(jobs, disk / "out", workers=0)
+        assert any(rescue.iterdir())
+        subprocess.run(["mount", "-o", "remount,size=60m", str(disk)], check=True)
+        done = orb.batch(jobs, disk / "out", workers=0, resume=True)
+        assert (len(done.rows), done.n_failed) == (N, 0)
+        assert reproducible(disk / "out") == reproducible(whole)
+    finally:
+        subprocess.run(["umount", str(disk)], check=True)
