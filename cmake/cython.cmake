@@ -8,6 +8,7 @@ function(orbslam_cython_module NAME SOURCE)
     DEPENDS ${SOURCE}
     COMMENT "Cythonizing ${NAME}")
   Python_add_library(${NAME} MODULE WITH_SOABI ${generated})
+  target_include_directories(${NAME} PRIVATE ${PROJECT_SOURCE_DIR}/src/cpp)
   # Generated code does not follow our warning rules.
   target_compile_options(${NAME} PRIVATE -O3 -w)
   orbslam_entry_point_only(${NAME})

@@ -14,7 +14,7 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   check_cxx_compiler_flag(-march=x86-64-v2 ORBSLAM2PY_KNOWS_LEVELS)
   if(ORBSLAM2PY_KNOWS_LEVELS)
     target_compile_options(orbslam_options INTERFACE -march=x86-64-v2)
-  else() # the same by its parts, for compilers older than the name (GCC 10)
+  else() # the same by its parts, for compilers older than the name (GCC 9)
     target_compile_options(orbslam_options INTERFACE
       -march=x86-64 -mcx16 -msahf -mpopcnt -msse3 -mssse3 -msse4.1 -msse4.2)
   endif()

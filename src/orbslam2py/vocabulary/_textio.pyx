@@ -16,16 +16,14 @@ import numpy as np
 from orbslam2py.errors import VocabularyError
 
 cdef extern from "<charconv>" namespace "std" nogil:
-    cdef enum class chars_format "std::chars_format":
-        general
-    cdef cppclass from_chars_result:
-        const char* ptr
     cdef cppclass to_chars_result:
         char* ptr
-    # Independent of the locale, unlike strtod and printf.
-    from_chars_result from_chars(const char* first, const char* last, double& value)
-    to_chars_result to_chars(char* first, char* last, double value, chars_format format, int precision)
     to_chars_result to_chars_integer "std::to_chars"(char* first, char* last, unsigned int value)
+
+# Independent of the locale, unlike strtod and printf.
+cdef extern from "base/number_text.hpp" namespace "orbslam" nogil:
+    const char* read_number(const char* first, const char* last, double& value)
+    char* write_number(char* first, char* last, double value)
 
 cdef enum:
     BLOCK = 1 << 20
@@ -75,7 +73,7 @@ cdef bint scan_node(const char* at, const char* end, Columns* columns) noexcept 
     cdef size_t row = columns.count
     cdef int i
     cdef double weight = NAN  # stays so when the number is out of range; the tree's check finds it
-    cdef from_chars_result result
+    cdef const char* behind
     at = scan_integer(at, end, MOST_NODES, &value)
     if at == NULL:
         return False
@@ -92,8 +90,8 @@ cdef bint scan_node(const char* at, const char* end, Columns* columns) noexcept 
     at = skip_blanks(at, end)
     if at < end and at[0] == c"+":
         at += 1
-    result = from_chars(at, end, weight)
-    if result.ptr == at or skip_blanks(result.ptr, end) != end:
+    behind = read_number(at, end, weight)
+    if behind == at or skip_blanks(behind, end) != end:
         return False
     columns.weights[row] = weight
     columns.count += 1
@@ -281,7 +279,7 @@ cdef char* put_node(
     at = put_integer(at, is_word, c" ")
     for i in range(N_BYTES):
         at = put_integer(at, centre[i], c" ")
-    at = to_chars(at, at + 32, weight, chars_format.general, 17).ptr
+    at = write_number(at, at + 32, weight)
     at[0] = c"\n"
     return at + 1
 
