@@ -51,7 +51,7 @@ def demo(
         orbslam2py demo --viewer
     """
     look = ViewerOptions(viewer, viewer_port, viewer_host, viewer_exit)
-    options = SyntheticOptions(world="corridor", sensor=sensor, frames=frames, speed=1.4, noise=2)
+    options = SyntheticOptions(world="corridor", sensor=sensor, frames=frames, speed=2.8, noise=2)
     sequence = SyntheticSequence(options)
     # Results of an earlier demo are replaced, other files are not.
     force = output == DEFAULT_OUTPUT or (output / "report.json").is_file()
