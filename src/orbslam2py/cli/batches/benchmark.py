@@ -28,9 +28,9 @@ from orbslam2py.settings import Sensor
 EXAMPLE = """
 **Example**
 
-    orbslam2py benchmark euroc datasets/euroc --output runs/euroc
+    orbslam2py benchmark kitti dataset --output runs/kitti
 
-    orbslam2py benchmark kitti datasets/kitti --sensor stereo --seeds 3
+    orbslam2py benchmark kitti dataset --sensor stereo --seeds 3
 """
 
 
