@@ -19,6 +19,10 @@ from support.browser import Browser
 from support.data import shared_folder
 from support.standard_sets import make_root
 
+#: Cells whose text is wider than they are.
+OVERFLOWING = """[...document.querySelectorAll("td")].filter(
+  (cell) => cell.scrollWidth > cell.clientWidth + 1).map((cell) => cell.innerText)"""
+
 KINDS = ("tum", "kitti", "euroc")
 SENSORS = {"tum": ["mono", "rgbd"], "kitti": ["mono", "stereo"], "euroc": ["mono", "stereo"]}
 
@@ -77,7 +81,7 @@ def test_published_figures_stand_beside_ours(results: dict[str, BenchmarkResult]
     page = results["tum"].page.read_text()
     assert "Transactions on Robotics 33(5), 2017" in page
     for row in results["tum"].batch.rows:
-        assert row["run"] in page
+        assert row["run"].removeprefix("rgbd_dataset_") in page.replace("<wbr>", "")
 
 
 @pytest.mark.parametrize("width", [1440, 390])
@@ -94,6 +98,7 @@ def test_page_in_a_browser(results: dict[str, BenchmarkResult], width: int) -> N
             seen = "document.querySelectorAll('svg path.line.run0, svg path.line.run1').length"
             assert page.evaluate(seen) >= 4
             assert page.evaluate("document.querySelectorAll('#runs tbody tr').length") == 4
+            assert page.evaluate(OVERFLOWING) == [], "no name runs into the figures"
             page.close()
 
 
@@ -179,7 +184,13 @@ def test_a_sequence_that_cannot_be_opened_is_a_row(tmp_path: Path) -> None:
     done = benchmark("tum", root, tmp_path / "o", sensors=["rgbd"], seeds=1, workers=0)
     rows = {row["sequence"]: row for row in done.batch.rows}
     assert rows[broken.name]["state"] == "failed"
-    assert "rgb.txt:1: expected" in done.page.read_text()
+    page = done.page.read_text()
+    assert "rgb.txt:1: expected" in page[page.index("Why runs failed") :]
+    with Browser() as browser:  # a long reason leaves the figures where they are seen
+        tab = browser.open(done.page.as_uri(), width=1440)
+        seen = "(box => box.querySelector('table').offsetWidth <= box.clientWidth)"
+        assert tab.evaluate(f"{seen}(document.querySelector('#runs .wide'))")
+        assert tab.errors == []
     assert "rgbd_dataset_freiburg1_room |  |" in done.table.read_text()
 
 

@@ -41,7 +41,7 @@ NOT_RUN = {
 #: What is added to the examples of long commands.
 SHORTER = {
     "batch": "--workers 0",
-    "benchmark": "--workers 0",
+    "benchmark": "--workers 0 --max-frames 3 --seeds 1",
     "demo": "--frames 12",
     "synthesize": "--frames 20 --size 320x240",
 }

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from orbslam2py._arguments import number_of
@@ -18,7 +19,7 @@ from orbslam2py.batches.standard_sets.markdown import (
     published_text,
     spread_text,
 )
-from orbslam2py.batches.standard_sets.pictures import error_picture, paths_pictures
+from orbslam2py.batches.standard_sets.pictures import error_picture, paths_pictures, short_name
 from orbslam2py.runs.report_page.markup import Markup, element, join, section, table
 from orbslam2py.runs.report_page.page import whole_page
 from orbslam2py.runs.report_page.round_numbers import NONE
@@ -55,7 +56,10 @@ def benchmark_page(
     if paths:
         parts.append(section("paths", "Paths", element("div", *paths, class_="pair")))
         links.append(("paths", "Paths"))
-    parts += [section("runs", "All runs", _all_runs(kind, entries)), _repeat(entries, command)]
+    parts += [
+        section("runs", "All runs", _all_runs(kind, entries)),
+        _repeat(kind, entries, command),
+    ]
     links += [("runs", "All runs"), ("repeat", "Repeat")]
     n_sequences = len({entry.sequence for entry in entries})
     counts = f"{number_of(n_sequences, 'sequence')}, {number_of(len(done.rows), 'run')}"
@@ -94,7 +98,7 @@ def _medians(kind: StandardSet, entries: list[Entry]) -> Markup:
     head = [_heading(figure, system) for figure, system in columns]
     rows: Cells = []
     for entry in entries:
-        cells: list[str | Markup] = [entry.sequence]
+        cells: list[str | Markup] = [_breakable(entry.sequence)]
         for figure, system in columns:
             if system is None:
                 text = spread_text(entry.spread(figure.key), figure.digits) or NONE
@@ -130,29 +134,43 @@ def _all_runs(kind: StandardSet, entries: list[Entry]) -> Markup:
             part = f"{100 * part_in_path(row):.1f}" if row.get("frames") else NONE
             losses = NONE if row.get("lost") is None else str(row["lost"])
             rate = _number(row.get("frames_per_second"), 1)
-            rows.append([str(row["run"]), told, *values, part, losses, rate])
+            rows.append([_breakable(str(row["run"])), told, *values, part, losses, rate])
     note = f"Lost: the run failed, or less than {LEAST_PART:.0%} of the frames have a pose in the "
     note += "path that is judged, which is that of the last map. The error of a lost run is of "
     note += "what it has."
     shown = table(head, rows, class_="compared numbers")
-    return join(shown, element("p", note, class_="note"))
+    return join(shown, element("p", note, class_="note"), _failures(entries))
+
+
+def _breakable(name: str) -> Markup:
+    """Let a long name be broken where its words end."""
+    first, *words = re.split(r"(?<=[_-])", short_name(name))
+    return join(first, *(join(Markup("<wbr>"), word) for word in words))
 
 
 def _result(row: dict[str, Any]) -> Markup:
     if not is_lost(row):
         return element("span", "whole")
-    reason = row.get("reason")
     words = "failed" if row["state"] != "done" else "lost"
-    return element(
-        "span", element("i", class_="lost"), f" {words}", f": {reason}" if reason else None
-    )
+    return element("span", element("i", class_="lost"), f" {words}")
+
+
+def _failures(entries: list[Entry]) -> Markup | None:
+    """Why runs failed: below the table, whose columns are narrow."""
+    told = [
+        element("li", element("b", f"{row['run']}: "), str(row["reason"]))
+        for entry in entries
+        for row in entry.rows
+        if row["state"] != "done"
+    ]
+    return join(element("h3", "Why runs failed"), element("ul", *told)) if told else None
 
 
 def _number(value: float | None, digits: int) -> str:
     return NONE if value is None else f"{value:.{digits}f}"
 
 
-def _repeat(entries: list[Entry], command: str | None) -> Markup:
+def _repeat(kind: StandardSet, entries: list[Entry], command: str | None) -> Markup:
     """What repeats it, where it was run, and where published figures come from."""
     rows = [row for entry in entries for row in entry.rows]
     options = sorted({name for row in rows for name in row if name.startswith("option.")})
@@ -164,8 +182,9 @@ def _repeat(entries: list[Entry], command: str | None) -> Markup:
     told.append(["computers", ", ".join(_values(rows, "machine"))])
     sources = dict.fromkeys(one.source for entry in entries for one in entry.published)
     note = "ATE: RMSE of the positions after alignment by a rotation and a translation, for one "
-    note += "camera also a scale (Sturm et al., IROS 2012). t_rel, r_rel: mean over "
-    note += "segments of 100 to 800 m (Geiger et al., CVPR 2012). "
+    note += "camera also a scale (Sturm et al., IROS 2012). "
+    if kind is StandardSet.KITTI:
+        note += "t_rel, r_rel: mean over segments of 100 to 800 m (Geiger et al., CVPR 2012). "
     note += "Frames a second are of runs beside each other."
     return section(
         "repeat",

@@ -24,12 +24,18 @@ from orbslam2py.runs.timeline import gaps_in_time
 
 #: Height of the line of a sequence in the picture of errors [rem].
 _LINE = 2.4
+_LABEL = "position:absolute;left:.2rem;white-space:nowrap"
 #: Least length of the logarithmic axis: differences that say nothing look small on it.
 _DECADES = 1.0
 #: Most corners of a path: there are many in one page.
 _CORNERS = 500
 #: Colours of ours, of lost ones, and of the systems.
 _OURS, _LOST, _PUBLISHED = "run0", "lost", ("run1", "run2")
+
+
+def short_name(sequence: str) -> str:
+    """Leave out what all sequences of TUM RGB-D begin with."""
+    return sequence.removeprefix("rgbd_dataset_")
 
 
 def error_picture(kind: StandardSet, entries: list[Entry]) -> Markup | None:
@@ -93,7 +99,7 @@ def _figure(
         role="img", aria_label=f"Absolute error of every run of {kind.full_name}",
     )  # fmt: skip
     names = [
-        element("small", entry.sequence, style=f"position:absolute;left:.2rem;top:{_LINE * k}rem")
+        element("small", short_name(entry.sequence), style=f"{_LABEL};top:{_LINE * k:.1f}rem")
         for k, entry in enumerate(entries)
     ]
     below = [
@@ -154,7 +160,7 @@ def _paths(entry: Entry, folder: Path, name: str) -> Markup | None:
         if path is not None
     ]
     caption = element(
-        "figcaption", element("b", f"{entry.sequence}, {entry.sensor}"),
+        "figcaption", element("b", f"{short_name(entry.sequence)}, {entry.sensor}"),
         element("small", " from above" if view is FROM_ABOVE else " from behind"),
         element("span", *keys, class_="legend"),
     )  # fmt: skip

@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from orbslam2py._arguments import number_of
 from orbslam2py.batches.standard_sets import BenchmarkResult, StandardSet
 from orbslam2py.batches.standard_sets import benchmark as run_benchmark
 from orbslam2py.batches.standard_sets.markdown import (
@@ -28,9 +29,9 @@ from orbslam2py.settings import Sensor
 EXAMPLE = """
 **Example**
 
-    orbslam2py benchmark euroc datasets/euroc --output runs/euroc
+    orbslam2py benchmark kitti dataset --output runs/kitti
 
-    orbslam2py benchmark kitti datasets/kitti --sensor stereo --seeds 3
+    orbslam2py benchmark kitti dataset --sensor stereo --seeds 3
 """
 
 
@@ -108,26 +109,24 @@ benchmark.__doc__ = f"{benchmark.__doc__}\n{EXAMPLE}"
 
 
 def _table(done: BenchmarkResult) -> Table:
+    """A line a figure: narrow enough for a terminal with all systems beside each other."""
     entries, figures = done.entries, figures_of(done.kind)
-    table = Table(title=f"{done.kind.full_name}: {len(done.batch.rows)} runs")
-    table.add_column("sequence")
-    table.add_column("sensor")
-    columns = [
-        (figure, system)
-        for figure in figures
-        for system in ("", *(s for s in SYSTEMS if has_published(entries, s, figure)))
-    ]
-    for figure, system in columns:
-        title = f"{system} {figure.name}" if system else f"{figure.name} [{figure.unit}]"
-        table.add_column(escape(title), justify="right")
-    table.add_column("lost", justify="right")
+    systems = [s for s in SYSTEMS if any(has_published(entries, s, one) for one in figures)]
+    table = Table(title=f"{done.kind.full_name}: {number_of(len(done.batch.rows), 'run')}")
+    table.add_column("sequence", overflow="fold")
+    for name in ("sensor", "figure"):
+        table.add_column(name, no_wrap=True)
+    for name in ("orbslam2py", *systems, "lost"):
+        table.add_column(name, justify="right", no_wrap=name != "orbslam2py")
     for entry in entries:
-        cells = [
-            published_text(entry.of(system), figure)
-            if system
-            else spread_text(entry.spread(figure.key), figure.digits)
-            for figure, system in columns
-        ]
         lost = f"{entry.n_lost} of {len(entry.rows)}" if entry.n_lost else ""
-        table.add_row(escape(entry.sequence), entry.sensor, *cells, lost)
+        for number, figure in enumerate(figures):
+            first = (escape(entry.sequence), entry.sensor) if number == 0 else ("", "")
+            table.add_row(
+                *first,
+                escape(f"{figure.name} [{figure.unit}]"),
+                spread_text(entry.spread(figure.key), figure.digits),
+                *(published_text(entry.of(system), figure) for system in systems),
+                lost if number == 0 else "",
+            )
     return table
