@@ -112,9 +112,10 @@ def _medians(kind: StandardSet, entries: list[Entry]) -> Markup:
         rows.append(cells)
     shown = table(["sequence", *head, "lost"], rows, class_="compared numbers")
     note = (
-        "Ours: median (range) over the runs that were not lost. Published figures are as printed; "
+        "Ours: median (range) over the runs that were not lost. Published figures: look them up in "
+        "the paper before you quote them; an empty cell: none is given here; X: the paper marks the "
+        "sequence as lost."
     )
-    note += "an empty cell: none is known for certain; X: the paper marks the sequence as lost."
     return join(shown, element("p", note, class_="note"))
 
 

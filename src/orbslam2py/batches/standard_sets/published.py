@@ -47,7 +47,7 @@ class Published:
 
 
 def published_figures(kind: StandardSet | str, sequence: str, sensor: str) -> list[Published]:
-    """Return what papers tell of a sequence; nothing where that is not certain.
+    """Return what papers tell of a sequence; nothing where no figure is given.
 
     Parameters
     ----------
