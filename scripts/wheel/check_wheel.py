@@ -45,7 +45,7 @@ PERMISSIVE = {
 }
 
 #: Names that the code of libraries under the GPL or LGPL leaves in a binary.
-TRACES = [b"cholmod_", b"SuiteSparse", b"umfpack_", b"spqr_", b"fftw_", b"libgomp", b"avcodec_"]
+TRACES = [b"cholmod_", b"SuiteSparse_", b"umfpack_", b"spqr_", b"fftw_", b"libgomp", b"avcodec_"]
 
 #: What must be told in every wheel.
 NOTICES = ["LICENSE", "third_party_notes/README.md", "third_party_notes/pybind11.md"]

@@ -41,6 +41,18 @@ def reason_of(error: OSError) -> str:
     return os.strerror(error.errno) if error.errno else str(error)
 
 
+def printable_name(name: str) -> str:
+    """Spell a name of a file or folder for people, also where the locale is not that of its bytes.
+
+    Parameters
+    ----------
+    name
+        As Python gives it: bytes that the locale cannot read stand for themselves as surrogates,
+        which no font has and no page may hold.
+    """
+    return name.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
+
+
 def describe_error(error: BaseException) -> str:
     """Say what failed in words for people; of a file which, and why, without numbers."""
     if not isinstance(error, OSError):
@@ -165,7 +177,8 @@ def _open(path: str | os.PathLike[str], actual: Path, flags: int, binary: bool) 
         _raise_named(path, error)
     if binary:
         return os.fdopen(descriptor, "wb")
-    return os.fdopen(descriptor, "w", encoding="utf-8", newline="\n")
+    # Names of files may hold bytes that the locale cannot read; in text they stand as they are.
+    return os.fdopen(descriptor, "w", encoding="utf-8", errors="surrogateescape", newline="\n")
 
 
 def _report_as(path: str | os.PathLike[str], step: Callable[[], object]) -> None:

@@ -7,10 +7,12 @@ import os
 import sys
 
 from orbslam2py.cli.exit_codes import ExitCode
+from orbslam2py.cli.terminal_encoding import accept_all_letters
 
 
 def main() -> None:
     """Run the command line; errors a person can act on become one message and an exit code."""
+    accept_all_letters()
     try:
         # FFmpeg writes of broken videos by itself, beside the message.
         os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from orbslam2py._files import describe_error
+from orbslam2py._files import describe_error, printable_name
 from orbslam2py._version import __version__
 from orbslam2py.errors import OrbSlamError
 from orbslam2py.evaluation import Alignment, Evaluation, evaluate_trajectory
@@ -94,7 +94,7 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
     each_loss = losses.pop("losses")
     report: dict[str, Any] = {
         "version": __version__,
-        "sequence": result.sequence.name,
+        "sequence": printable_name(result.sequence.name),
         "layout": result.sequence.layout,
         "sensor": options.sensor.value,
         "settings": result.settings.to_yaml(),
