@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +33,37 @@ class FrameRecorder:
         self._lock = threading.Lock()
         self._doubted: core.TrackedFrame | None = None
         self._waiting: core.TrackedFrame | None = None
+        # Frames of a young map, whose poses are estimated again; None: those of no map.
+        self._young: list[tuple[core.TrackedFrame, bool]] | None = None
+
+    @property
+    def n_young(self) -> int:
+        """Frames that wait for `look_again`."""
+        return len(self._young or ())
+
+    def begin(self, earlier: Sequence[core.TrackedFrame]) -> None:
+        """Keep the first frames of a map, which `look_again` will give new poses to."""
+        with self._lock:
+            self._young = []
+            for frame in earlier:
+                self._append(frame, lost=False)
+
+    def look_again(
+        self, estimate: Callable[[Sequence[core.TrackedFrame]], list[core.TrackedFrame]]
+    ) -> None:
+        """Record the frames since `begin` anew, with the poses that are estimated for them."""
+        with self._lock:
+            self._settle()
+            young, self._young = self._young or [], None
+            frames = estimate([frame for frame, _ in young])
+            self._recorder.clear()
+            for frame, (_, lost) in zip(frames, young, strict=True):
+                self._append(frame, lost=lost)
+
+    def _append(self, frame: core.TrackedFrame, *, lost: bool) -> None:
+        self._recorder.record(self._map, frame, lost=lost)
+        if self._young is not None:
+            self._young.append((frame, lost))
 
     def doubt(self, frame: core.TrackedFrame) -> None:
         """Take back the pose of this frame, recorded next, if the one after it is lost."""
@@ -47,7 +79,7 @@ class FrameRecorder:
                 self._waiting.T_cw = frame.T_cw
                 self._waiting.share_anchor(frame)
             else:
-                self._recorder.record(self._map, frame, lost=lost)
+                self._append(frame, lost=lost)
             self._doubted = None
 
     def _settle(self, *, believed: bool = True) -> None:
@@ -57,7 +89,7 @@ class FrameRecorder:
             return
         if not believed:
             frame.T_cw = None
-        self._recorder.record(self._map, frame, lost=not believed)
+        self._append(frame, lost=not believed)
 
     def end_map(self) -> None:
         """Keep the trajectory of the map as it is now: it is about to be dropped."""
@@ -65,6 +97,7 @@ class FrameRecorder:
             self._settle()
             self._ended.append(self._present())
             self._recorder.clear()
+            self._young = None
 
     def trajectories(self) -> list[Trajectory]:
         """One trajectory a map, relative to its keyframe 0: those ended, then the present one."""

@@ -29,13 +29,14 @@ from orbslam2py.slam.evidence.judgement import EvidenceJudge
 from orbslam2py.slam.frame_recorder import FrameRecorder
 from orbslam2py.slam.front_end import FrontEnd
 from orbslam2py.slam.initialization import DepthInitializer, Initializer, MonocularInitializer
+from orbslam2py.slam.initialization.earlier_frames import EarlierFrames
 from orbslam2py.slam.keyframe_decision import KeyframeDecision
 from orbslam2py.slam.localization_mode import LocalizationSwitch
 from orbslam2py.slam.options import Setup, SystemOptions
 from orbslam2py.slam.pose_search import PoseSearch
 from orbslam2py.slam.records import Reason, TrackingOutcome, TrackingRecord, TrackingState
 from orbslam2py.slam.relocalization import Relocalizer
-from orbslam2py.slam.thresholds import TrackingThresholds
+from orbslam2py.slam.thresholds import InitializationThresholds, TrackingThresholds
 from orbslam2py.slam.tracking import Tracking
 from orbslam2py.slam.watched_frame import FrameWatcher, WatchedFrame, frame_features
 
@@ -93,6 +94,7 @@ class Pipeline:
         self.reset_requested = threading.Event()
         self.frame_watchers: tuple[FrameWatcher, ...] = ()
         self.n_resets = 0
+        self._limits = InitializationThresholds()
         self._start_failed = False
         self._keeps_frames = False
         self._next_frame_id = 0
@@ -138,6 +140,7 @@ class Pipeline:
         if self._waits_for_mapping:
             with timer("wait"):
                 self._wait_for_mapping()
+        self._look_again_at_start()
         state_before = tracking.state
         watchers = self.frame_watchers
         with timer("track"):
@@ -190,6 +193,13 @@ class Pipeline:
             # keyframes: on fast motion the map would end before the mapper is done.
             worker.wait_until_idle()
 
+    def _look_again_at_start(self) -> None:
+        """Once a single camera's map has settled, its first frames get better poses in it."""
+        n_young = self.recorder.n_young
+        settled = self.back_end.map.n_keyframes > self._limits.settled_map
+        if n_young > 0 and (settled or n_young >= self._limits.young_frames):
+            self.recorder.look_again(self.tracking.look_again)
+
     def _keep(self, frame: core.TrackedFrame, outcome: TrackingOutcome) -> None:
         if outcome.reset_needed:
             self._start_failed = outcome.estimate.reason is Reason.INITIAL_MAP_FAILED
@@ -199,8 +209,8 @@ class Pipeline:
                 _log.info("lost soon after initialization; starting a new map")
             self.reset_requested.set()
         elif outcome.state in (TrackingState.OK, TrackingState.LOST):
-            for earlier in outcome.earlier:
-                self.recorder.record(earlier, lost=False)
+            if outcome.earlier:
+                self.recorder.begin(outcome.earlier)
             self.recorder.record(frame, lost=outcome.state is TrackingState.LOST)
 
     def _record(
@@ -291,21 +301,27 @@ def _make_tracking(setup: Setup, back_end: BackEnd, seed: int) -> Tracking:
             TrackingThresholds(),
         )
 
+    def belief(searching: PoseSearch) -> Belief:
+        judge = EvidenceJudge(searching.motion_model_window, setup.settings.camera.fx)
+        return Belief(searching, judge, HarderSearch(searching, judge))
+
     initializer: Initializer
     if sensor is Sensor.MONOCULAR:
-        initializer = MonocularInitializer(slam_map, vocabulary, mapping, seed, search(None))
+        earlier = search(None)
+        initializer = MonocularInitializer(
+            slam_map, vocabulary, mapping, seed, EarlierFrames(earlier, belief(earlier))
+        )
     else:
         n_features = setup.settings.orb.n_features
         initializer = DepthInitializer(slam_map, vocabulary, mapping, n_features)
     searching = search(Relocalizer(slam_map, back_end.keyframe_index, seed))
-    judge = EvidenceJudge(searching.motion_model_window, setup.settings.camera.fx)
     return Tracking(
         slam_map,
         vocabulary,
         mapping,
         initializer=initializer,
         search=searching,
-        belief=Belief(searching, judge, HarderSearch(searching, judge)),
+        belief=belief(searching),
         keyframe_decision=KeyframeDecision(slam_map, mapping.worker, sensor, max_keyframe_interval),
         has_depth=sensor.has_depth,
     )

@@ -58,6 +58,11 @@ class InitializationThresholds:
     """So many frames are remembered, to be tracked in the map once it has begun ..."""
     followed_again: int = 20
     """... and so many of the last of them serve a new beginning, if the map came to nothing."""
+    settled_map: int = 10
+    """With more keyframes than this a map has settled: bundle adjustment has moved its first
+    points, and its first frames are looked at again ..."""
+    young_frames: int = 400
+    """... but no later than after so many of them."""
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ section V; Mur-Artal and Tardos, "ORB-SLAM2", 2017, section III. Step by step:
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Protocol
 
@@ -183,6 +184,10 @@ class Tracking:
     def feature_factor(self) -> int:
         """Features that a single camera's next image needs, in multiples of the settings'."""
         return self._initializer.feature_factor if self.initializing else 1
+
+    def look_again(self, frames: Sequence[core.TrackedFrame]) -> list[core.TrackedFrame]:
+        """Versions of the frames of the start, with their poses in the map as it is now."""
+        return self._initializer.look_again(frames)
 
     @property
     def motion(self) -> MotionModel:

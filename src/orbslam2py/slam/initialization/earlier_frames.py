@@ -1,12 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The frames before a single camera's map began, tracked in it."""
+"""The frames before a single camera's map began, tracked in it, and looked at again later.
+
+``docs/method/start.md#earlier-frames``.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+
+import numpy as np
 
 from orbslam2py import _core as core
+from orbslam2py.slam.evidence.belief import Belief
 from orbslam2py.slam.pose_search import PoseSearch
+from orbslam2py.slam.records import PoseEstimate, Verdict
 
 _PATIENCE = 5  # frames that may be missing between those that are found
 
@@ -18,10 +25,13 @@ class EarlierFrames:
     ----------
     search : PoseSearch, optional
         The ways to a pose; its own, not the tracker's. Without one no frame is tracked.
+    belief : Belief, optional
+        Whether enough speaks for a pose; of the same search, and there whenever that is.
     """
 
-    def __init__(self, search: PoseSearch | None) -> None:
+    def __init__(self, search: PoseSearch | None, belief: Belief | None) -> None:
         self._search = search
+        self._belief = belief
         self._tracked: tuple[core.TrackedFrame, ...] = ()
 
     def take(self) -> tuple[core.TrackedFrame, ...]:
@@ -50,15 +60,16 @@ class EarlierFrames:
         self, first: core.TrackedFrame, frames: Iterable[core.TrackedFrame]
     ) -> list[core.TrackedFrame]:
         """Track one frame after the other until several are not found."""
-        search = self._search
-        assert search is not None
+        search, belief = self._search, self._belief
+        assert search is not None and belief is not None
         search.reset()
+        belief.reset()
         search.reference_keyframe = first.reference_keyframe
         search.motion.remember(first)
         tracked: list[core.TrackedFrame] = []
         missed = 0
         for frame in frames:
-            if self._found(search, frame):
+            if self._found(search, belief, frame):
                 tracked.append(frame)
                 missed = 0
                 continue
@@ -70,17 +81,14 @@ class EarlierFrames:
             frame.T_cw = None
         return tracked
 
-    def _found(self, search: PoseSearch, frame: core.TrackedFrame) -> bool:
+    def _found(self, search: PoseSearch, belief: Belief, frame: core.TrackedFrame) -> bool:
         search.follow_map()
         estimate = search.by_motion_model(frame)
         if not estimate.found:
             frame.clear_associations()
             estimate = search.by_reference_keyframe(frame)
-        if estimate.found:
-            refined = search.in_local_map(frame, estimate)
-            search.settle(refined)
-            estimate = refined.estimate
-        if not estimate.found:
+        estimate = belief.refine(frame, estimate, lost=False)
+        if not estimate.found or not _is_strong(estimate):
             return False
         frame.discard_outliers()
         last = search.motion.last
@@ -89,3 +97,46 @@ class EarlierFrames:
         search.motion.velocity = frame.T_cw @ last.T_cw.inverse()
         search.motion.remember(frame)
         return True
+
+    def look_again(
+        self, frames: Sequence[core.TrackedFrame], slam_map: core.Map
+    ) -> list[core.TrackedFrame]:
+        """Versions of frames with their poses in the map as it is now.
+
+        What the first poses were estimated from were two views; meanwhile others have moved the
+        points, each in its own way, and added some. A frame that is no longer found keeps the pose
+        that follows its keyframe.
+        """
+        return [self._version(frame, slam_map) for frame in frames]
+
+    def _version(self, frame: core.TrackedFrame, slam_map: core.Map) -> core.TrackedFrame:
+        followed = _copy_of(frame)
+        if followed.T_cw is None:
+            return followed
+        core.follow_map(slam_map, followed)
+        keyframe = slam_map.living(followed.reference_keyframe)
+        is_keyframe = keyframe >= 0 and slam_map.keyframe_frame(keyframe).id == frame.id
+        if self._search is None or is_keyframe:
+            return followed
+        refined = self._search.in_local_map(_copy_of(followed), PoseEstimate())
+        if not refined.estimate.found:
+            return followed
+        refined.frame.discard_outliers()
+        return refined.frame
+
+
+def _copy_of(frame: core.TrackedFrame) -> core.TrackedFrame:
+    copy = core.TrackedFrame(frame.features)
+    copy.copy_associations(frame, np.ones(len(frame.features), bool))
+    copy.T_cw = frame.T_cw
+    copy.share_anchor(frame)
+    return copy
+
+
+def _is_strong(estimate: PoseEstimate) -> bool:
+    """Whether enough speaks for a pose that nobody waits for: left out, it costs one frame.
+
+    A second way to it is not enough. In a map of two views, where it ends, all ways can be
+    misled alike.
+    """
+    return estimate.evidence is not None and estimate.evidence.verdict is Verdict.STRONG

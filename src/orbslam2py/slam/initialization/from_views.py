@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 from collections import deque
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -23,7 +24,6 @@ from orbslam2py.slam.initialization.third_view import (
     placed_matches,
 )
 from orbslam2py.slam.local_mapping import LocalMapping
-from orbslam2py.slam.pose_search import PoseSearch
 from orbslam2py.slam.records import Reason
 from orbslam2py.slam.thresholds import InitializationThresholds
 from orbslam2py.slam.watched_frame import pixels_as_given
@@ -58,8 +58,8 @@ class MonocularInitializer:
         Takes the two first keyframes.
     seed : int
         Seed of the draws.
-    search : PoseSearch, optional
-        Finds the earlier frames in the map; without it they are left out.
+    earlier : EarlierFrames, optional
+        Tracks the earlier frames in the map; without it they are left out.
     thresholds : InitializationThresholds, optional
         Limits.
     """
@@ -70,7 +70,7 @@ class MonocularInitializer:
         vocabulary: core.Vocabulary,
         mapping: LocalMapping,
         seed: int,
-        search: PoseSearch | None = None,
+        earlier: EarlierFrames | None = None,
         thresholds: InitializationThresholds | None = None,
     ) -> None:
         self._map = slam_map
@@ -79,7 +79,7 @@ class MonocularInitializer:
         self._seed = seed
         self._limits = thresholds or InitializationThresholds()
         self._kept = KeptViews(self._limits)
-        self._earlier = EarlierFrames(search)
+        self._earlier = earlier or EarlierFrames(None, None)
         self.reset()
 
     def reset(self) -> None:
@@ -128,6 +128,10 @@ class MonocularInitializer:
     def take_earlier(self) -> tuple[core.TrackedFrame, ...]:
         """Frames before the one that began the map, with their poses in it, in order; once."""
         return self._earlier.take()
+
+    def look_again(self, frames: Sequence[core.TrackedFrame]) -> list[core.TrackedFrame]:
+        """Versions of the frames of the start, with their poses in the map as it is now."""
+        return self._earlier.look_again(frames, self._map)
 
     def try_initialize(self, frame: core.TrackedFrame) -> Reason:
         """Begin the map with this frame as second view; or say why not."""

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Frames before and right after the start of a single camera's map: no pose is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orbslam2py import System, open_sequence
+from orbslam2py import _core as core
+from orbslam2py._arrays import FloatArray
+from orbslam2py.evaluation import match_poses
+from orbslam2py.slam.frame_recorder import FrameRecorder
+from orbslam2py.slam.thresholds import InitializationThresholds
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+from orbslam2py.trajectory.rotations import rotation_angles
+
+pytestmark = pytest.mark.watchdog(120)
+
+
+def turns(T_wc: FloatArray) -> FloatArray:
+    """Degrees from each pose to the next."""
+    R = T_wc[:, :3, :3]
+    return np.degrees(rotation_angles(np.swapaxes(R[:-1], 1, 2) @ R[1:]))
+
+
+@pytest.mark.shared
+def test_a_frame_that_lies_beyond_the_map_is_left_out(shared_data: Path) -> None:
+    """A drone takes off: tracked backwards to there, frames were believed 18 degrees off."""
+    sequence = open_sequence(shared_data / "sequences" / "drone_semicircle", "mono")
+    with System(sequence.settings, "mono", deterministic=True) as system:
+        for i in range(40):
+            system.track_monocular(sequence.load(i).image, float(sequence.timestamps[i]))
+        path = system.trajectory()
+    assert len(path) >= 30
+    truth = sequence.ground_truth()
+    assert truth is not None
+    known = path.select(~path.lost)
+    seen, true = match_poses(known, truth)
+    assert len(seen) == len(known)
+    errors = turns(known.T_wc) - turns(truth.T_wc[true])
+    assert np.abs(errors[np.diff(known.indices) == 1]).max() < 1.0
+
+
+class Corridor:
+    """A walk along a corridor, and the recorded path after each image."""
+
+    def __init__(self, n: int) -> None:
+        self.sequence = SyntheticSequence(
+            SyntheticOptions(world="corridor", sensor="mono", size=(320, 240), noise=1, frames=n)
+        )
+        self.n_keyframes: list[int] = []
+        self.n_young: list[int] = []
+        with System(self.sequence.settings, "mono", deterministic=True) as system:
+            recorder = system.pipeline.recorder
+            for i in range(n):
+                system.track_monocular(self.sequence.load(i).image, i / 20)
+                self.n_keyframes.append(system.n_keyframes)
+                self.n_young.append(recorder.n_young)
+            self.path = system.trajectory()
+
+
+def test_the_frames_of_the_start_are_looked_at_once_the_map_has_settled() -> None:
+    walk = Corridor(60)
+    settled = InitializationThresholds().settled_map
+    begun = int(np.argmax(np.array(walk.n_young) > 0))
+    looked = next(i for i, n in enumerate(walk.n_keyframes) if n > settled) + 1
+    assert walk.n_young[looked - 1] == looked  # from the very first frame on
+    assert walk.n_young[looked:] == [0] * (60 - looked)
+    assert begun < looked - 5
+    assert list(walk.path.indices) == list(range(60))
+    assert not walk.path.lost.any()
+
+
+def test_poses_that_are_estimated_again_replace_the_first_ones() -> None:
+    sequence = SyntheticSequence(
+        SyntheticOptions(world="corridor", sensor="rgbd", size=(320, 240), frames=3)
+    )
+    seen: list[list[int]] = []
+
+    def moved(frames: Sequence[core.TrackedFrame]) -> list[core.TrackedFrame]:
+        seen.append([frame.id for frame in frames])
+        for frame in frames:
+            assert frame.T_cw is not None
+            frame.T_cw = core.Pose(np.array([0.0, 0, 0, 1]), np.array([0, 0, -1.0])) @ frame.T_cw
+        return list(frames)
+
+    with System(sequence.settings, "rgbd", deterministic=True) as system:
+        for i in range(3):
+            images = sequence.load(i)
+            system.track_rgbd(images.image, images.depth, i / 20)
+        slam_map = system.pipeline.back_end.map
+        frames = []
+        for i in range(3):
+            frame = core.TrackedFrame(slam_map.keyframe_frame(0))
+            frame.T_cw = core.Pose(np.array([0.0, 0, 0, 1]), np.array([0, 0, float(i)]))
+            core.anchor_frame(slam_map, frame, 0)
+            frames.append(frame)
+        recorder = FrameRecorder(slam_map)
+        recorder.begin(frames[:2])
+        recorder.record(frames[2], lost=True)
+        assert recorder.n_young == 3
+        before = recorder.trajectories()[0]
+        recorder.look_again(moved)
+        after = recorder.trajectories()[0]
+        assert recorder.n_young == 0
+    assert seen == [[0, 0, 0]]
+    assert list(after.lost) == [False, False, True]
+    assert after.positions[:, 2] == pytest.approx(before.positions[:, 2] + 1.0)
