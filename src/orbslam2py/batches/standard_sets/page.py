@@ -113,8 +113,8 @@ def _medians(kind: StandardSet, entries: list[Entry]) -> Markup:
     shown = table(["sequence", *head, "lost"], rows, class_="compared numbers")
     note = (
         "Ours: median (range) over the runs that were not lost. Published figures: look them up in "
-        "the paper before you quote them; an empty cell: none is given here; X: the paper marks the "
-        "sequence as lost."
+        "the paper before you quote them; an empty cell: none is given here; X: the paper marks "
+        "the sequence as lost."
     )
     return join(shown, element("p", note, class_="note"))
 
