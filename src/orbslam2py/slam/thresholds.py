@@ -61,7 +61,7 @@ class InitializationThresholds:
     settled_map: int = 10
     """With more keyframes than this a map has settled: bundle adjustment has moved its first
     points, and its first frames are looked at again ..."""
-    young_frames: int = 400
+    young_frames: int = 250
     """... but no later than after so many of them."""
 
 
