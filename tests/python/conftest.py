@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import gc
+import os
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,6 +13,14 @@ import pytest
 
 from support.data import shared_folder
 from support.watchdog import watchdog, worker_threads
+
+# Programs that are started in the background may be told to ignore Ctrl-C, and so is what they
+# start: tests press it.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+# As the command line does (test_plain_messages.py): OpenCV's FFmpeg reads it at the first video,
+# which another test may open.
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
 #: Files that take longest, and folders of such: with several workers they come first, so that no
 #: worker is left alone with one at the end (with ``--no-loadscope-reorder``).

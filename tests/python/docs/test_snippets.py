@@ -32,6 +32,7 @@ NOT_RUN = {
     "opens a browser",
     "needs another computer",
     "builds the checkout",
+    "builds Ceres and OpenCV",
     "takes a minute; another test runs it",
     "needs a camera",
     "needs photographs that are not part of the project",

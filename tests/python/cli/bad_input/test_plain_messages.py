@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -100,3 +103,16 @@ def test_files_that_are_no_sequence(
 )
 def test_errors_in_words(error: Exception, text: str) -> None:
     assert describe_error(error) == text
+
+
+def test_libraries_say_nothing_of_broken_videos(tmp_path: Path) -> None:
+    film = tmp_path / "film.mp4"
+    film.write_bytes(b"\0\0\0\x18ftypmp42\0\0\0\0mp42isom" + bytes(1000))
+    told = {name: value for name, value in os.environ.items() if name != "OPENCV_FFMPEG_LOGLEVEL"}
+    command = [sys.executable, "-m", "orbslam2py", "run", str(film), "--settings", "tum1"]
+    done = subprocess.run(
+        [*command, "--sensor", "mono"], env=told, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    (line,) = done.stderr.strip().splitlines()
+    assert "film.mp4 is no video that can be read" in line
