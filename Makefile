@@ -90,7 +90,7 @@ sanitize: build/.system-packages
 	@cmake --preset asan >/dev/null && cmake --build build/asan -j $(JOBS)
 	@ctest --test-dir build/asan --output-on-failure -j $(JOBS)
 	@cmake --preset tsan >/dev/null && cmake --build build/tsan -j $(JOBS) --target thread_driver
-	@build/tsan/tests/cpp/thread_driver --seconds 60
+	@build/tsan/tests/cpp/thread_driver --seconds 30
 
 # The whole system in threads, disturbed at random, under the thread sanitizer.
 STRESS_SECONDS ?= 600
