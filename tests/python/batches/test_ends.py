@@ -18,6 +18,7 @@ import pytest
 
 import orbslam2py as orb
 from support.batches import jobs_of, make_sequences, reproducible, table
+from support.small_disk import small_disk
 
 N = 8
 
@@ -137,14 +138,7 @@ def rescue(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
 @pytest.mark.watchdog(150)
 def test_full_disk(jobs: Path, whole: Path, tmp_path: Path, rescue: Path) -> None:
     """Results that do not fit are kept elsewhere, and runs are made again where there is room."""
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=400k", "tmpfs", str(disk)]
-    try:
-        subprocess.run(mount, check=True, capture_output=True)
-    except (OSError, subprocess.CalledProcessError):
-        pytest.skip("file systems cannot be mounted here")
-    try:
+    with small_disk(tmp_path / "disk", "400k") as disk:
         with pytest.raises(OSError, match=r"cannot write .*results\.csv: No space left on device"):
             orb.batch(jobs, disk / "out", workers=0)
         assert any(rescue.iterdir())
@@ -152,5 +146,3 @@ def test_full_disk(jobs: Path, whole: Path, tmp_path: Path, rescue: Path) -> Non
         done = orb.batch(jobs, disk / "out", workers=0, resume=True)
         assert (len(done.rows), done.n_failed) == (N, 0)
         assert reproducible(disk / "out") == reproducible(whole)
-    finally:
-        subprocess.run(["umount", str(disk)], check=True)

@@ -8,7 +8,6 @@ import http.server
 import io
 import os
 import shutil
-import subprocess
 import tarfile
 import threading
 import zipfile
@@ -23,6 +22,7 @@ from orbslam2py.batches import make_jobs
 from orbslam2py.batches.cache import Cache, bytes_of
 from orbslam2py.batches.remote import here, is_remote, name_of
 from support.batches import make_sequences, reproducible
+from support.small_disk import small_disk
 
 
 @pytest.fixture(scope="module")
@@ -198,21 +198,12 @@ def test_protocols(path: str, message: str) -> None:
 
 
 def test_full_disk(data: Path, tmp_path: Path) -> None:
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=300k", "tmpfs", str(disk)]
-    try:
-        subprocess.run(mount, check=True, capture_output=True)
-    except (OSError, subprocess.CalledProcessError):
-        pytest.skip("file systems cannot be mounted here")
-    try:
+    with small_disk(tmp_path / "disk", "300k") as disk:
         cache = Cache(disk / "cache", bytes_of("1GB"))
         message = r"cannot write to the cache .*/cache: No space left on device; make room, or give"
         with pytest.raises(orb.DatasetError, match=message), here(str(data / "one.tar.gz"), cache):
             pass
         assert not list((disk / "cache").glob("*.part"))
-    finally:
-        subprocess.run(["umount", str(disk)], check=True)
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import logging
 import os
-import subprocess
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -18,6 +17,7 @@ from orbslam2py.maps.map_rows import all_rows
 from orbslam2py.maps.map_writer import MapWriter
 from support import small_sequences
 from support.saved_maps import small_map
+from support.small_disk import small_disk
 
 
 @pytest.fixture
@@ -25,15 +25,8 @@ def disk(tmp_path: Path) -> Iterator[Path]:
     """A disk with room for four small maps."""
     save_map(small_map(), tmp_path / "size.orbmap")
     size = 4 * (tmp_path / "size.orbmap").stat().st_size
-    folder = tmp_path / "disk"
-    folder.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(folder)]
-    try:
-        subprocess.run(mount, check=True, capture_output=True)
-    except (OSError, subprocess.CalledProcessError):
-        pytest.skip("file systems cannot be mounted here")
-    yield folder
-    subprocess.run(["umount", str(folder)], check=True)
+    with small_disk(tmp_path / "disk", size) as folder:
+        yield folder
 
 
 def test_a_save_that_does_not_fit_leaves_the_file_that_was_there(disk: Path) -> None:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import logging
-import subprocess
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -27,6 +26,7 @@ from orbslam2py.recordings import output_file, video_file
 from orbslam2py.slam.records import FrameFeatures
 from orbslam2py.viewer import FrameView, Publisher, QueueState
 from support.files import names_in
+from support.small_disk import small_disk
 from support.small_sequences import SIZE, black, new_system, play, sequence, track
 from support.videos import read_video, share_of
 
@@ -281,16 +281,9 @@ def test_sizes_that_cannot_be_are_refused(tmp_path: Path, size: tuple[int, int])
 
 
 @pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", str(disk)]
-    try:
-        subprocess.run(mount, check=True, capture_output=True)
-    except (OSError, subprocess.CalledProcessError):
-        pytest.skip("file systems cannot be mounted here")
-    yield disk
-    subprocess.run(["umount", str(disk)], check=True)
+def full_disk(tmp_path: Path) -> Iterator[Path]:
+    with small_disk(tmp_path / "disk", "3m") as disk:
+        yield disk
 
 
 def noise(number: int) -> FrameView:
@@ -298,17 +291,17 @@ def noise(number: int) -> FrameView:
     return view(rng.integers(0, 255, (480, 640, 3), dtype=np.uint8), number)
 
 
-def test_a_disk_without_room_is_refused_at_once(small_disk: Path) -> None:
+def test_a_disk_without_room_is_refused_at_once(full_disk: Path) -> None:
     with pytest.raises(OutputFileError, match="the disk is full but for 32 MB"):
-        VideoWriter(small_disk / "a.avi")
-    assert names_in(small_disk) == []
+        VideoWriter(full_disk / "a.avi")
+    assert names_in(full_disk) == []
 
 
 def test_a_disk_that_becomes_full_keeps_what_was_shown(
-    small_disk: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    full_disk: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(output_file, "RESERVE", 3 * 2**19)
-    path = small_disk / "a.mp4"
+    path = full_disk / "a.mp4"
     n = 60
     with new_system(Sensor.STEREO, deterministic=True) as system, caplog.at_level(logging.WARNING):
         video = NoisyVideo(path)
@@ -319,23 +312,23 @@ def test_a_disk_that_becomes_full_keeps_what_was_shown(
     assert "the video stopped: cannot write the video" in warning
     assert "the disk is full" in warning
     assert "Errno" not in warning
-    assert names_in(small_disk) == ["a.mp4"]
+    assert names_in(full_disk) == ["a.mp4"]
     pictures, _ = read_video(path)
     assert 1 < len(pictures) == video.n_frames < n
 
 
 def test_a_disk_full_to_the_brim_leaves_no_half_file(
-    small_disk: Path, monkeypatch: pytest.MonkeyPatch
+    full_disk: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(output_file, "RESERVE", 0)
-    path = small_disk / "a.mp4"
+    path = full_disk / "a.mp4"
     path.write_text("old")
     video = VideoWriter(path)
     for number in range(60):
         video.on_frame(noise(number))
     with pytest.raises(OutputFileError, match="no whole file has come to the disk"):
         video.close()
-    assert names_in(small_disk) == ["a.mp4"]
+    assert names_in(full_disk) == ["a.mp4"]
     assert path.read_text() == "old"
 
 

@@ -13,7 +13,15 @@ from rich.table import Table
 
 from orbslam2py.batches import BatchResult, Spread
 from orbslam2py.batches import batch as run_batch
+from orbslam2py.cli.batches.arguments import (
+    MemoryLimitOption,
+    ReportPagesFlag,
+    ResumeFlag,
+    SchedulerOption,
+    WorkersOption,
+)
 from orbslam2py.cli.batches.watched_runs import exit_as_it_ended, watched_runs
+from orbslam2py.cli.run_options import QuietFlag
 
 EXAMPLE = """
 **Example**
@@ -29,27 +37,11 @@ def batch(
     output: Annotated[
         Path | None, typer.Option(help="Folder for the results [that of the job file].")
     ] = None,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Go on: what was finished is not run again.")
-    ] = False,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            help="A running Dask scheduler [workers on this computer].", metavar="tcp://HOST:PORT"
-        ),
-    ] = None,
-    workers: Annotated[
-        int | None,
-        typer.Option(
-            help="Workers to start [one a core]; 0: none, one run after the other.", min=0
-        ),
-    ] = None,
-    memory_limit: Annotated[
-        str | None, typer.Option(help="Of each worker, such as 4GB.", metavar="SIZE")
-    ] = None,
-    report_pages: Annotated[
-        bool, typer.Option("--report-pages", help="Write report.html for every run.")
-    ] = False,
+    resume: ResumeFlag = False,
+    scheduler: SchedulerOption = None,
+    workers: WorkersOption = None,
+    memory_limit: MemoryLimitOption = None,
+    report_pages: ReportPagesFlag = False,
     cache: Annotated[
         Path | None,
         typer.Option(
@@ -60,7 +52,7 @@ def batch(
     cache_size: Annotated[
         str | None, typer.Option(help="Most that it takes [20GB].", metavar="SIZE")
     ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
+    quiet: QuietFlag = False,
 ) -> None:
     """Run many sequences, settings and seeds on all cores or a cluster; write one table."""
     console, errors = Console(quiet=quiet), Console(stderr=True)

@@ -23,7 +23,15 @@ from orbslam2py.batches.standard_sets.markdown import (
     published_text,
     spread_text,
 )
+from orbslam2py.cli.batches.arguments import (
+    MemoryLimitOption,
+    ReportPagesFlag,
+    ResumeFlag,
+    SchedulerOption,
+    WorkersOption,
+)
 from orbslam2py.cli.batches.watched_runs import exit_as_it_ended, watched_runs
+from orbslam2py.cli.run_options import QuietFlag
 from orbslam2py.settings import Sensor
 
 EXAMPLE = """
@@ -54,28 +62,12 @@ def benchmark(
     max_frames: Annotated[
         int | None, typer.Option(help="Only so many frames of each, for a trial.", min=1)
     ] = None,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Go on: what was finished is not run again.")
-    ] = False,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            help="A running Dask scheduler [workers on this computer].", metavar="tcp://HOST:PORT"
-        ),
-    ] = None,
-    workers: Annotated[
-        int | None,
-        typer.Option(
-            help="Workers to start [one a core]; 0: none, one run after the other.", min=0
-        ),
-    ] = None,
-    memory_limit: Annotated[
-        str | None, typer.Option(help="Of each worker, such as 4GB.", metavar="SIZE")
-    ] = None,
-    report_pages: Annotated[
-        bool, typer.Option("--report-pages", help="Write report.html for every run.")
-    ] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
+    resume: ResumeFlag = False,
+    scheduler: SchedulerOption = None,
+    workers: WorkersOption = None,
+    memory_limit: MemoryLimitOption = None,
+    report_pages: ReportPagesFlag = False,
+    quiet: QuietFlag = False,
 ) -> None:
     """Run all sequences of TUM RGB-D, KITTI or EuRoC, beside figures of ORB-SLAM2 and 3."""
     console, errors = Console(quiet=quiet), Console(stderr=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import errno
 import os
-import subprocess
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +14,7 @@ import pytest
 from orbslam2py import _files
 from orbslam2py.trajectory import read_tum
 from support.command_line import RUN_FILES, CommandLine, Results
+from support.small_disk import small_disk
 from support.spoilt_runs import N, run
 
 pytestmark = pytest.mark.watchdog(40)
@@ -104,18 +104,9 @@ def test_disk_full_for_one_file(
 
 
 def test_real_full_disk(command: CommandLine, rgbd: Path, rescue: Path, tmp_path: Path) -> None:
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=16k", "tmpfs", str(disk)]
-    try:
-        subprocess.run(mount, check=True, capture_output=True)
-    except (OSError, subprocess.CalledProcessError):
-        pytest.skip("file systems cannot be mounted here")
-    try:
+    with small_disk(tmp_path / "disk", "16k") as disk:
         done = command("run", rgbd, "--sensor", "rgbd", "--output", disk)
         written = {path.name for path in disk.iterdir()}
-    finally:
-        subprocess.run(["umount", str(disk)], check=True)
     assert done.code == 1
     assert "No space left on device" in done.err
     kept = {path.name for path in next(rescue.iterdir()).iterdir()}
