@@ -69,8 +69,9 @@ class Belief:
             if first.found:
                 self._search.settle(refined)
             return estimate
-        evidence = replace(hypothesis.evidence, doubted=doubted)
-        return self._take(frame, replace(hypothesis, evidence=evidence))
+        if doubted:
+            hypothesis = replace(hypothesis, evidence=replace(hypothesis.evidence, doubted=True))
+        return self._take(frame, hypothesis)
 
     def _take(self, frame: core.TrackedFrame, hypothesis: Hypothesis) -> PoseEstimate:
         refined, evidence = hypothesis.refined, hypothesis.evidence

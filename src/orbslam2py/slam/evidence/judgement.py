@@ -9,8 +9,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from orbslam2py import _core as core
 from orbslam2py.slam.pose_search import MotionModel, RefinedPose
 from orbslam2py.slam.records import Evidence, PoseMethod, Verdict
@@ -76,22 +74,34 @@ class EvidenceJudge:
         figures = _figures(refined)
         usual = self._usual or figures
         turn, move = _changes(frame, motion)
-        evidence = Evidence(
-            verdict=Verdict.STRONG,
+        found_to_usual = _ratio(figures.found, usual.found)
+        inliers_to_usual = _ratio(estimate.n_inliers, usual.n_inliers)
+        deviation_to_usual = _ratio(figures.deviation, usual.deviation)
+        limits = self.limits
+        verdict = Verdict.STRONG
+        if inliers_to_usual < limits.refused_share and estimate.n_inliers < limits.refused_inliers:
+            verdict = Verdict.REFUSED
+        elif (
+            max(inliers_to_usual, found_to_usual) < limits.weak_share
+            or spread.cells <= limits.weak_cells
+            or deviation_to_usual > limits.weak_deviation
+        ):
+            verdict = Verdict.WEAK
+        return Evidence(
+            verdict=verdict,
             method=method,
             doubted=False,
             confirmed=False,
             n_predicted=refined.n_predicted,
             found=figures.found,
-            found_to_usual=_ratio(figures.found, usual.found),
-            inliers_to_usual=_ratio(estimate.n_inliers, usual.n_inliers),
+            found_to_usual=found_to_usual,
+            inliers_to_usual=inliers_to_usual,
             n_cells=spread.cells,
             n_octaves=spread.octaves,
-            deviation_to_usual=_ratio(figures.deviation, usual.deviation),
+            deviation_to_usual=deviation_to_usual,
             turn_change=turn,
             move_change=move,
         )
-        return replace(evidence, verdict=self._verdict(evidence, estimate.n_inliers))
 
     def fell_suddenly(self, evidence: Evidence) -> bool:
         """Whether the pose has to be searched by other ways before it is believed."""
@@ -131,19 +141,6 @@ class EvidenceJudge:
         """How far a turn moves the image, in search windows of the motion model."""
         return self._focal_length * math.radians(degrees) / self._window
 
-    def _verdict(self, evidence: Evidence, n_inliers: int) -> Verdict:
-        limits = self.limits
-        share = evidence.inliers_to_usual
-        if share < limits.refused_share and n_inliers < limits.refused_inliers:
-            return Verdict.REFUSED
-        if (
-            max(share, evidence.found_to_usual) < limits.weak_share
-            or evidence.n_cells <= limits.weak_cells
-            or evidence.deviation_to_usual > limits.weak_deviation
-        ):
-            return Verdict.WEAK
-        return Verdict.STRONG
-
 
 def _figures(refined: RefinedPose) -> UsualFigures:
     estimate = refined.estimate
@@ -160,7 +157,8 @@ def _position_deviation(refined: RefinedPose) -> float:
     covariance = refined.estimate.covariance
     if covariance is None:
         return 0.0
-    return math.sqrt(max(0.0, float(np.trace(covariance[3:, 3:]))))
+    # Three numbers: NumPy's functions take longer than what they do here, and in each frame.
+    return math.sqrt(max(0.0, float(covariance[3, 3] + covariance[4, 4] + covariance[5, 5])))
 
 
 def _ratio(value: float, usual: float) -> float:
@@ -179,7 +177,5 @@ def _changes(frame: core.TrackedFrame, motion: MotionModel) -> tuple[float, floa
 
 def difference(T_aw: core.Pose, T_bw: core.Pose) -> tuple[float, float]:
     """Degrees and metres between two poses of one camera."""
-    turn = (T_aw @ T_bw.inverse()).log()[:3]
-    return math.degrees(float(np.linalg.norm(turn))), float(
-        np.linalg.norm(T_aw.center - T_bw.center)
-    )
+    turn = (T_aw @ T_bw.inverse()).log()[:3].tolist()
+    return math.degrees(math.hypot(*turn)), math.dist(T_aw.center.tolist(), T_bw.center.tolist())
