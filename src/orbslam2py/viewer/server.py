@@ -10,6 +10,7 @@ import logging
 import os
 import socket
 import sys
+import threading
 import warnings
 import webbrowser
 from collections.abc import Iterator
@@ -28,6 +29,8 @@ LOOPBACK = "127.0.0.1"
 DEFAULT_PORT = 8080
 #: Ports after the first one that are tried.
 _TRIES = 100
+#: Seconds for browsers to be told that it ends.
+_GOODBYE = 0.3
 
 
 def start_server(host: str = LOOPBACK, port: int | None = None) -> viser.ViserServer:
@@ -68,8 +71,15 @@ def start_server(host: str = LOOPBACK, port: int | None = None) -> viser.ViserSe
 
 def stop_server(server: viser.ViserServer) -> None:
     """End it; the pages in browsers stay as they are."""
-    with _quiet():
-        server.stop()
+
+    def stop() -> None:
+        with _quiet():
+            server.stop()
+
+    # It waits seconds for the goodbye of every browser that was ever there, also of closed ones.
+    stopping = threading.Thread(target=stop, name="viewer stop", daemon=True)
+    stopping.start()
+    stopping.join(_GOODBYE)
 
 
 def address_of(server: viser.ViserServer) -> str:

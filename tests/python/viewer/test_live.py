@@ -216,3 +216,14 @@ def test_a_page_left_open_over_the_end_stays(browser: Browser) -> None:
         assert system.pipeline.frame_watchers == ()
     page.wait_for("document.body.innerText.includes('Whole map')", 50)
     page.close()
+
+
+def test_it_ends_by_itself_while_browsers_look(browser: Browser) -> None:
+    with new_system(Sensor.RGBD, wait_for_mapping=True) as system:
+        viewer = Viewer(system, port=0, open_browser=False)
+        page = open_viewer(browser, viewer.address)
+        play(system, 2)
+        process = viewer._view._companion._process
+        viewer.close()
+        assert process.returncode == 0  # and was not killed for taking its time
+    page.close()

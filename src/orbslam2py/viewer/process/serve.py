@@ -161,7 +161,8 @@ def _serve(parent: Parent, page: LivePage) -> None:
         name, *arguments = parent.messages.get()
         if name == "stop":
             page.stop()
-            return
+            # Threads that serve browsers may wait for them, and there is nothing left to be saved.
+            os._exit(0)
         try:
             calls[name](*arguments)
         except Exception as error:
