@@ -10,8 +10,9 @@ import errno
 import math
 import numbers
 import os
+from enum import Enum
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +22,8 @@ from orbslam2py.errors import DatasetError, OrbSlamError, SettingsError, StateEr
 #: Seeds are unsigned 64-bit numbers in the core.
 LARGEST_SEED = 2**64 - 1
 _LONGEST = 60
+
+_Member = TypeVar("_Member", bound=Enum)
 
 
 def shown(value: object) -> str:
@@ -55,6 +58,46 @@ def choice_of(value: Any, what: str) -> bool:
     if not isinstance(value, bool | np.bool_):
         raise SettingsError(f"{what} is {shown(value)}; give True or False")
     return bool(value)
+
+
+def member_of(
+    names: type[_Member], value: object, what: str, error: type[OrbSlamError] = DatasetError
+) -> _Member:
+    """Take a member of an enumeration whose values are names, or the name of one.
+
+    Parameters
+    ----------
+    names
+        The enumeration.
+    value
+        What was given.
+    what
+        What it is called.
+    error
+        Raised for anything else, with all names.
+    """
+    if isinstance(value, str) and value in {one.value for one in names}:
+        return names(value)
+    choice = ", ".join(str(one.value) for one in names)
+    raise error(f"{what} is {shown(value)}; give one of {choice}")
+
+
+def index_of(value: Any, length: int) -> int:
+    """Take the place of a frame in a sequence.
+
+    Raises
+    ------
+    DatasetError
+        For anything but a whole number.
+    IndexError
+        If there is no such frame.
+    """
+    known = f"give a whole number from 0 to {length - 1}"
+    if not is_whole(value):
+        raise DatasetError(f"the index of the frame is {shown(value)}; {known}")
+    if not 0 <= value < length:
+        raise IndexError(f"there is no frame {value} among {length}; {known}")
+    return int(value)
 
 
 def finite_number(

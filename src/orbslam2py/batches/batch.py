@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -11,14 +10,14 @@ from pathlib import Path
 from typing import Any
 
 from orbslam2py._arguments import path_of
-from orbslam2py._files import atomic_write, reason_of
 from orbslam2py.batches.cache import DEFAULT_SIZE, Cache, bytes_of, default_folder
 from orbslam2py.batches.engine import open_workers, run_on
 from orbslam2py.batches.jobs import Job, make_jobs, read_jobs
+from orbslam2py.batches.results import Results
 from orbslam2py.batches.summary import Group, summarise
 from orbslam2py.batches.sweep_picture import write_sweep_picture
 from orbslam2py.batches.table import write_table
-from orbslam2py.batches.work import BATCH_FILE, read_row, run_job
+from orbslam2py.batches.work import run_job
 from orbslam2py.errors import DatasetError
 
 Progress = Callable[[dict[str, Any], int, int], None]
@@ -34,7 +33,7 @@ class BatchResult:
     Attributes
     ----------
     folder
-        Where the table is, and a folder with the runs.
+        Where the table is, and a folder with the runs; its address if it is elsewhere.
     rows
         What is in the table, a dictionary a run.
     n_left
@@ -43,10 +42,10 @@ class BatchResult:
         The files of the table, and the picture of a sweep.
     """
 
-    folder: Path
+    folder: Path | str
     rows: list[dict[str, Any]]
     n_left: int
-    files: list[Path]
+    files: list[Path] | list[str]
 
     @property
     def groups(self) -> list[Group]:
@@ -80,7 +79,8 @@ def batch(
     jobs
         A job file (YAML), or a dictionary with the same keys.
     output
-        Folder for the results; by default the ``output`` that the jobs name.
+        Folder for the results, or an address for fsspec such as ``s3://bucket/night``; by default
+        the ``output`` that the jobs name.
     resume
         Go on in a folder that has results: what was finished is not run again.
     scheduler
@@ -125,15 +125,15 @@ def batch(
     """
     if isinstance(jobs, Mapping):
         wanted = make_jobs(jobs)
-        named = None if jobs.get("output") is None else Path(str(jobs["output"]))
+        named = jobs.get("output")
     else:
         wanted, named = read_jobs(path_of(jobs, "the job file"))
-    folder = named if output is None else path_of(output, "output")
-    if folder is None:
+    place = named if output is None else output
+    if place is None:
         raise DatasetError("there is no folder for the results; give --output")
     return run_jobs(
         wanted,
-        folder,
+        place,
         resume=resume,
         scheduler=scheduler,
         workers=workers,
@@ -150,7 +150,7 @@ def batch(
 
 def run_jobs(
     wanted: list[Job],
-    folder: Path,
+    place: str | Path,
     *,
     resume: bool = False,
     scheduler: str | None = None,
@@ -162,27 +162,32 @@ def run_jobs(
     stop: threading.Event | None = None,
 ) -> BatchResult:
     """Run jobs that are made already; see `batch`."""
-    folder = folder.absolute()
-    _prepare(folder, resume=resume)
-    rows = {job.key: row for job in wanted if (row := read_row(folder, job)) is not None}
+    results = Results.at(place)
+    results.begin(resume=resume)
+    rows = results.rows_of(wanted)
     left = [job for job in wanted if job.key not in rows]
     stop = stop or threading.Event()
     for job, row in _ended(
-        left, folder, stop, scheduler, workers, memory_limit, page=report_pages, cache=cache
+        left, results, stop, scheduler, workers, memory_limit, page=report_pages, cache=cache
     ):
         rows[job.key] = row
         if progress is not None:
             progress(row, len(rows), len(wanted))
     table = [rows[job.key] for job in wanted if job.key in rows]
-    files = write_table(folder, table)
-    if write_sweep_picture(folder / PICTURE, table):
-        files.append(folder / PICTURE)
-    return BatchResult(folder, table, len(wanted) - len(table), files)
+    with results.table() as folder:
+        files = write_table(folder, table)
+        if write_sweep_picture(folder / PICTURE, table):
+            files.append(folder / PICTURE)
+    n_left = len(wanted) - len(table)
+    if results.folder is not None:
+        return BatchResult(results.folder, table, n_left, files)
+    addresses = [f"{results.address}/{file.name}" for file in files]
+    return BatchResult(results.address, table, n_left, addresses)
 
 
 def _ended(
     jobs: list[Job],
-    folder: Path,
+    results: Results,
     stop: threading.Event,
     scheduler: str | None,
     workers: int | None,
@@ -197,31 +202,10 @@ def _ended(
         for job in jobs:
             if stop.is_set():
                 return
-            yield job, run_job(job, str(folder), page=page, cache=cache)
+            if (row := run_job(job, results, page=page, cache=cache)) is not None:
+                yield job, row
         return
     if workers is not None:
         workers = min(workers, len(jobs))
     with open_workers(scheduler, workers, memory_limit) as client:
-        yield from run_on(client, jobs, folder, stop, page=page, cache=cache)
-
-
-def _prepare(folder: Path, *, resume: bool) -> None:
-    """Make the folder of a batch, or see that it is one that may be gone on with."""
-    if folder.exists() and not folder.is_dir():
-        raise DatasetError(f"{folder} is a file; give the name of a folder")
-    is_batch = (folder / BATCH_FILE).is_file()
-    if folder.is_dir() and any(folder.iterdir()):
-        if not is_batch:
-            raise DatasetError(f"{folder} is not empty and holds no batch; give another folder")
-        if not resume:
-            raise DatasetError(
-                f"{folder} holds a batch already; go on with --resume, or give another folder"
-            )
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with atomic_write(folder / BATCH_FILE) as stream:
-            json.dump({"what": "runs of orbslam2py batch"}, stream)
-    except OSError as error:
-        raise DatasetError(
-            f"cannot write to {folder}: {reason_of(error)}; give another folder"
-        ) from error
+        yield from run_on(client, jobs, results, stop, page=page, cache=cache)

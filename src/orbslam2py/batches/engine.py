@@ -5,24 +5,31 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import itertools
 import os
 import queue
+import secrets
 import signal
+import sys
 import threading
+import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 from orbslam2py._version import __version__
 from orbslam2py.batches.cache import Cache
 from orbslam2py.batches.jobs import Job
+from orbslam2py.batches.results import Results
 from orbslam2py.batches.work import failed_row, run_job
 from orbslam2py.errors import DatasetError, SettingsError
 
 #: So many runs a worker are handed out at once: no worker waits, and none has a long queue.
 _AHEAD = 2
-#: A run whose worker ended is tried again so often.
+#: A run whose worker failed otherwise than by ending is tried again so often.
 _RETRIES = 2
+#: Dask counts the end of a worker against all runs that wait there, and gives such up; only the run
+#: itself knows how often it was begun (`work.run_job`), so that this is but an end to all.
+_MOST_DEATHS = 20
 _PATIENCE = 10.0
 #: Seconds after which it is looked at whether the batch is to be stopped.
 _LOOK_AROUND = 0.5
@@ -88,8 +95,9 @@ def open_workers(
     limits = dict.fromkeys(_THREAD_LIMITS, "1")
     with dask.config.set(
         {
-            "distributed.scheduler.allowed-failures": _RETRIES,
+            "distributed.scheduler.allowed-failures": _MOST_DEATHS,
             "distributed.nanny.pre-spawn-environ": limits,
+            "distributed.worker.profile.enabled": False,  # it looks at all threads every 10 ms
         }
     ):
         cluster = distributed.LocalCluster(
@@ -109,7 +117,7 @@ def open_workers(
 def run_on(
     client: Any,
     jobs: list[Job],
-    output: Path,
+    results: Results,
     stop: threading.Event,
     *,
     page: bool,
@@ -123,93 +131,123 @@ def run_on(
         From `open_workers`.
     jobs
         What to run.
-    output
-        Folder of the batch, which all workers see.
+    results
+        The place of the batch, which all workers see.
     stop
         When it is set no more runs begin; those that run are waited for.
     page
         Write ``report.html`` for every run.
     cache
         Where sequences from elsewhere go, on each worker's computer.
+
+    Raises
+    ------
+    DatasetError
+        If the scheduler is lost on the way.
     """
     waiting = iter(jobs)
-    running: dict[Any, tuple[Job, int]] = {}
-    ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
-
-    def submit(job: Job, attempt: int) -> None:
-        future = client.submit(
-            run_job,
-            job,
-            str(output),
-            page=page,
-            cache=cache,
-            key=f"{job.key}-{job.fingerprint}-{attempt}-{id(running)}",
-            pure=False,
-        )
-        running[future] = (job, attempt)
-        future.add_done_callback(ended.put)
-
-    def feed() -> None:
-        while not stop.is_set() and len(running) < _AHEAD * _n_workers(client):
+    runs = _Handed(client, results, page=page, cache=cache)
+    stopped = False
+    while True:
+        if stop.is_set() and not stopped:
+            stopped = True
+            results.forbid_beginning()  # those that wait at a worker see it
+            runs.take_back()
+        while not stopped and runs.n < _AHEAD * runs.n_at_once():
             job = next(waiting, None)
             if job is None:
-                return
-            submit(job, 0)
-
-    feed()
-    while running:
-        future = _next_ended(ended, client, stop, running)
-        if future is None:
-            feed()
-            continue
-        if future not in running:
-            continue  # it was cancelled
-        job, attempt = running.pop(future)
-        error = future.exception() if future.status == "error" else None
-        if future.status in ("cancelled", "lost"):
-            error = RuntimeError("the scheduler lost the run")
-        if error is None:
-            yield job, future.result()
-        elif attempt < _RETRIES and not stop.is_set():
-            submit(job, attempt + 1)
-        else:
-            yield job, failed_row(job, _reason(error, attempt + 1))
-        future.release()
-        feed()
+                break
+            runs.hand_over(job)
+        if not runs.n:
+            break
+        ended = runs.next_ended()
+        if ended is not None:
+            yield ended
+    if stopped:
+        results.allow_beginning()
 
 
-def _next_ended(
-    ended: queue.SimpleQueue[Any],
-    client: Any,
-    stop: threading.Event,
-    running: dict[Any, tuple[Job, int]],
-) -> Any:
-    """Wait for a run that has ended; None now and then, to look at `stop` and at the workers."""
-    with contextlib.suppress(queue.Empty):
-        return ended.get(timeout=_LOOK_AROUND)
-    if stop.is_set():
-        waiting = [future for future in running if not _is_processing(client, future)]
-        for future in waiting:
-            del running[future]
+class _Handed:
+    """Runs that the scheduler has."""
+
+    def __init__(self, client: Any, results: Results, **more: Any) -> None:
+        self._client = client
+        self._results = results
+        self._more = {**more, "session": secrets.token_hex(4)}
+        self._running: dict[Any, tuple[Job, int]] = {}
+        self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._n_at_once = 1
+        self._counted = -_LOOK_AROUND
+
+    @property
+    def n(self) -> int:
+        return len(self._running)
+
+    def n_at_once(self) -> int:
+        """How many runs the workers make at once, as they come and go."""
+        if time.monotonic() >= self._counted + _LOOK_AROUND:
+            with contextlib.suppress(OSError):  # the scheduler may come back
+                self._n_at_once = max(1, sum(self._client.nthreads().values()))
+            self._counted = time.monotonic()
+        return self._n_at_once
+
+    def hand_over(self, job: Job, attempt: int = 0) -> None:
+        # The first part alone names a group of runs, which the scheduler keeps its books about.
+        name = f"{job.key}-{job.fingerprint}-{attempt}-{self._more['session']}"
+        future = self._client.submit(
+            run_job, job, self._results, **self._more, key=("run", name), pure=False
+        )
+        self._running[future] = (job, attempt)
+        future.add_done_callback(self._ended.put)
+
+    def take_back(self) -> None:
+        """Cancel those that no worker has."""
+        at_workers = set(itertools.chain.from_iterable(self._client.processing().values()))
+        for future in [one for one in self._running if one.key not in at_workers]:
+            del self._running[future]
             future.cancel()
-    return None
+
+    def next_ended(self) -> tuple[Job, dict[str, Any]] | None:
+        """Wait for a run that has ended; None now and then, and for one that is to be run again."""
+        try:
+            future = self._ended.get(timeout=_LOOK_AROUND)
+        except queue.Empty:
+            self._require_scheduler()
+            return None
+        if future not in self._running:
+            return None  # it was taken back
+        job, attempt = self._running.pop(future)
+        try:
+            row = future.result()
+        except Exception as error:  # whatever ended it on the worker, or the worker itself
+            self._require_scheduler()
+            if attempt < (_RETRIES if _is_an_error_of_the_run(error) else _MOST_DEATHS):
+                self.hand_over(job, attempt + 1)
+                return None
+            return job, failed_row(job, _reason(error))
+        finally:
+            future.release()
+        return None if row is None else (job, {sys.intern(name): row[name] for name in row})
+
+    def _require_scheduler(self) -> None:
+        if self._client.status in ("closing", "closed"):
+            raise DatasetError(
+                "the scheduler was lost; start it again, and go on with --resume: what was "
+                "finished is kept"
+            )
 
 
-def _is_processing(client: Any, future: Any) -> bool:
-    processing = client.processing()
-    return any(future.key in keys for keys in processing.values())
+def _is_an_error_of_the_run(error: Exception) -> bool:
+    """Whether the run itself failed, rather than its worker or the way to it."""
+    return type(error).__module__.partition(".")[0] not in ("distributed", "concurrent", "asyncio")
 
 
-def _n_workers(client: Any) -> int:
-    return max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
-
-
-def _reason(error: BaseException, attempts: int) -> str:
+def _reason(error: Exception) -> str:
     name = type(error).__name__
     if name == "KilledWorker":
         return (
-            f"its worker ended {attempts} times while it ran: it was killed, or had too little "
-            "memory; give more with --memory-limit, or run it alone"
+            "its workers ended again and again before it began: they were killed, or have too "
+            "little memory; give more with --memory-limit"
         )
     return f"the worker failed: {' '.join(str(error).split()) or name}"
 

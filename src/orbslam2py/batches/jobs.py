@@ -103,7 +103,7 @@ class Job:
         )
 
 
-def read_jobs(path: Path) -> tuple[list[Job], Path | None]:
+def read_jobs(path: Path) -> tuple[list[Job], Path | str | None]:
     """Read a job file.
 
     Parameters
@@ -114,7 +114,7 @@ def read_jobs(path: Path) -> tuple[list[Job], Path | None]:
     Returns
     -------
     jobs, output
-        The runs in their order, and the folder for the results if the file names one.
+        The runs in their order, and the folder or address for the results if the file names one.
 
     Raises
     ------
@@ -139,7 +139,9 @@ def read_jobs(path: Path) -> tuple[list[Job], Path | None]:
     except (SettingsError, DatasetError) as error:
         raise type(error)(f"{path}: {error}") from error
     output = document.get("output")
-    return jobs, None if output is None else path.parent / str(output)
+    if output is None or is_remote(str(output)):
+        return jobs, output
+    return jobs, path.parent / str(output)
 
 
 def make_jobs(document: Mapping[str, Any], folder: Path | None = None) -> list[Job]:

@@ -7,8 +7,6 @@ import statistics
 from pathlib import Path
 from typing import Any
 
-from matplotlib.figure import Figure
-
 from orbslam2py._files import atomic_write
 
 _PREFIX = "sweep."
@@ -40,6 +38,8 @@ def write_sweep_picture(path: Path, rows: list[dict[str, Any]]) -> bool:
     OSError
         If the file cannot be written.
     """
+    from matplotlib.figure import Figure  # noqa: PLC0415 (who sweeps nothing does not wait for it)
+
     keys = sorted({name for row in rows for name in row if name.startswith(_PREFIX)})
     if not keys:
         return False

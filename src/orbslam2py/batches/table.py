@@ -22,14 +22,15 @@ _FIRST = ("run", "sequence", "sensor", "settings", "seed", "state", "reason", "t
 def columns_of(rows: Iterable[dict[str, Any]]) -> list[str]:
     """Return the columns of all rows: what they are of, the figures, and last what was measured."""
     names = {name for row in rows for name in row}
-    measured = [name for name in sorted(names) if _is_measured(name)]
+    measured = [name for name in sorted(names) if is_measured(name)]
     first = [name for name in _FIRST if name in names]
     swept = sorted(name for name in names if name.startswith(("option.", "sweep.")))
     known = {*measured, *first, *swept}
     return [*first[:5], *swept, *first[5:], *sorted(names - known), *measured]
 
 
-def _is_measured(name: str) -> bool:
+def is_measured(name: str) -> bool:
+    """Whether a column is of what was measured, which differs between runs of the same bytes."""
     return name in MEASURED or name.startswith("milliseconds.")
 
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import platform
 import threading
@@ -13,24 +12,23 @@ from typing import Any
 
 import cv2
 
-from orbslam2py._files import atomic_write, describe_error
+from orbslam2py._files import describe_error
 from orbslam2py._version import __version__
 from orbslam2py.batches.cache import DEFAULT_SIZE, Cache, bytes_of, default_folder
 from orbslam2py.batches.jobs import Job
 from orbslam2py.batches.remote import here
+from orbslam2py.batches.results import Results
 from orbslam2py.batches.sweep import with_parameters
 from orbslam2py.datasets import open_input
 from orbslam2py.errors import DatasetError, OrbSlamError
 from orbslam2py.runs.run import run_sequence
 
-#: Marks the folder of a batch.
-BATCH_FILE = "batch.json"
-#: Marks a folder whose run has ended, and holds its row of the table.
-ROW_FILE = "row.json"
+#: A run whose worker ended while it was made is begun so often.
+_MOST_BEGINNINGS = 3
 #: Figures that differ from run to run on one machine: they are last in the table.
 MEASURED = (
     *("seconds", "frames_per_second", "slam_frames_per_second", "peak_memory_mb"),
-    *("started", "machine", "worker"),
+    *("job_seconds", "started", "machine", "worker"),
 )
 #: Entries of a report that say nothing of the result, or are more than a figure.
 _LEFT_OUT = (
@@ -40,8 +38,14 @@ _LEFT_OUT = (
 
 
 def run_job(
-    job: Job, output: str, *, threads: int = 1, page: bool = False, cache: Cache | None = None
-) -> dict[str, Any]:
+    job: Job,
+    results: Results,
+    *,
+    threads: int = 1,
+    page: bool = False,
+    cache: Cache | None = None,
+    session: str | None = None,
+) -> dict[str, Any] | None:
     """Make a run, leave its files in a folder of its own, and return its row of the table.
 
     Never raises for what is wrong with the run: the row says it.
@@ -50,31 +54,47 @@ def run_job(
     ----------
     job
         What to run.
-    output
-        Folder of the batch.
+    results
+        The place of the batch.
     threads
         Threads that OpenCV may use.
     page
         Write ``report.html`` as well.
     cache
         Where sequences from elsewhere go; the user's if None.
+    session
+        Tells runs that were begun by this batch from those that an earlier one began.
+
+    Returns
+    -------
+    dict or None
+        None if the batch is being stopped: the run was not begun.
     """
-    folder = Path(output) / "runs" / job.key
     cv2.setNumThreads(threads)
     _forget_peak_memory()
     begin = time.perf_counter()
     row = _begun(job)
-    if not (Path(output) / BATCH_FILE).is_file():  # before it is run for nothing
-        where = f"{output} is not seen on {platform.node()}"
-        return row | {"reason": f"{where}; give an --output that all workers see"}
     try:
-        with here(job.path, cache or Cache(default_folder(), bytes_of(DEFAULT_SIZE))) as path:
-            _run(job, path, folder, row, page=page)
+        if not results.is_there():  # before it is run for nothing
+            where = f"{results.address} is not seen on {platform.node()}"
+            return row | {"reason": f"{where}; give an --output that all workers see"}
+        if not results.may_begin():
+            return None
+        if session and results.count_beginning(job.key, session) > _MOST_BEGINNINGS:
+            row["reason"] = (
+                f"its worker ended {_MOST_BEGINNINGS} times while it ran: it was killed, or had "
+                "too little memory; give more with --memory-limit, or run it alone"
+            )
+        else:
+            cache = cache or Cache(default_folder(), bytes_of(DEFAULT_SIZE))
+            with here(job.path, cache) as path, results.of_run(job.key) as folder:
+                _run(job, path, folder, row, page=page)
     except (OrbSlamError, OSError, MemoryError) as error:
         row |= {"state": "failed", "reason": _one_line(error)}
-    row.setdefault("seconds", round(time.perf_counter() - begin, 3))
+    row["job_seconds"] = round(time.perf_counter() - begin, 3)
+    row.setdefault("seconds", row["job_seconds"])
     row["peak_memory_mb"] = _peak_memory() or row.get("peak_memory_mb")
-    write_row(folder, row)
+    _mark_as_ended(results, job, row)
     return row
 
 
@@ -109,24 +129,12 @@ def failed_row(job: Job, reason: str) -> dict[str, Any]:
     return _begun(job) | {"state": "failed", "reason": reason}
 
 
-def write_row(folder: Path, row: dict[str, Any]) -> None:
-    """Mark a folder as finished; a disk that takes nothing more is not the run's failure alone."""
+def _mark_as_ended(results: Results, job: Job, row: dict[str, Any]) -> None:
+    """Keep the row; a disk that takes nothing more is not the run's failure alone."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with atomic_write(folder / ROW_FILE) as stream:
-            json.dump(row, stream, indent=2)
-    except OSError as error:
+        results.write_row(job.key, row)
+    except (OrbSlamError, OSError) as error:
         row |= {"state": "failed", "reason": _one_line(error)}
-
-
-def read_row(output: Path, job: Job) -> dict[str, Any] | None:
-    """Return the row of a job that was finished before; None if it has to be run."""
-    try:
-        row = json.loads((output / "runs" / job.key / ROW_FILE).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-    finished = isinstance(row, dict) and row.get("state") == "done"
-    return row if finished and row.get("fingerprint") == job.fingerprint else None
 
 
 def _begun(job: Job) -> dict[str, Any]:

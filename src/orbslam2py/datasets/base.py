@@ -222,9 +222,11 @@ class Sequence(Source, Protocol):
         Raises
         ------
         DatasetError
-            If a file is missing.
+            If a file is missing, or the index is no whole number.
         ImageError
             If a file is no readable image of the right type.
+        IndexError
+            If there is no such frame.
         """
         ...
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from orbslam2py._arguments import index_of
 from orbslam2py.datasets.base import Images, Stamps
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.image_folder import image_files
@@ -180,7 +181,7 @@ class DepthFolders(RecordedSequence):
 
     def load(self, index: int, /) -> Images:
         """Read the images of a frame; see `datasets.base.Sequence.load`."""
-        image_path, *depth_path = self._files(index)
+        image_path, *depth_path = self._files(index_of(index, len(self)))
         image = read_image(image_path, rgb=self.settings.camera.rgb)
         return Images(image, depth=read_depth(depth_path[0])) if depth_path else Images(image)
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from orbslam2py._arguments import index_of
 from orbslam2py._arrays import ByteArray
 from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py._text_lines import content_lines
@@ -123,7 +124,7 @@ class EurocSequence(RecordedSequence):
 
     def load(self, index: int, /) -> Images:
         """Read and rectify the images of a frame; see `datasets.base.Sequence.load`."""
-        paths = self._files(index)
+        paths = self._files(index_of(index, len(self)))
         raw = [self._read(path) for path in paths]
         if self.sensor is Sensor.MONOCULAR:
             return Images(raw[0])

@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from orbslam2py._arguments import index_of
 from orbslam2py._arrays import FloatArray
 from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.datasets.base import Images
@@ -110,7 +111,7 @@ class ImageFolder(FramesInOrder, UnposedSource):
 
     def timestamp_text(self, index: int, /) -> str:
         """Return the time of a frame in seconds, with all digits of the source."""
-        return self._stamps.texts[index]
+        return self._stamps.texts[index_of(index, len(self))]
 
     def default_settings(self) -> Settings:
         """Return the settings: an image folder has no others."""
@@ -122,4 +123,4 @@ class ImageFolder(FramesInOrder, UnposedSource):
 
     def load(self, index: int, /) -> Images:
         """Read the image of a frame; see `datasets.base.Sequence.load`."""
-        return Images(self._ordered(read_image(self.paths[index], rgb=False)))
+        return Images(self._ordered(read_image(self.paths[index_of(index, len(self))], rgb=False)))

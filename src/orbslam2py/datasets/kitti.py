@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from orbslam2py._arguments import index_of
 from orbslam2py._arrays import FloatArray
 from orbslam2py._text_lines import content_lines, number_of
 from orbslam2py.datasets.base import Images, Layout, Stamps, require_frames
@@ -118,8 +119,7 @@ class KittiSequence(RecordedSequence):
         return tuple(self._path(camera, index) for camera in cameras)
 
     def _path(self, camera: int, index: int) -> Path:
-        if not 0 <= index < len(self):
-            raise IndexError(f"frame {index} of {len(self)}")
+        index = index_of(index, len(self))
         folder = self.folder / f"image_{camera}"
         path = folder / f"{index:06d}.png"
         if not path.is_file() and path.with_suffix(".jpg").is_file():

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from orbslam2py._arguments import index_of
 from orbslam2py._arrays import FloatArray
 from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.datasets.base import (
@@ -96,7 +97,7 @@ class RecordedSequence(FramesInOrder, ABC):
 
     def timestamp_text(self, index: int, /) -> str:
         """Return the time of a frame in seconds, with all digits of the source."""
-        return self._stamps.texts[index]
+        return self._stamps.texts[index_of(index, len(self))]
 
     def require_images(self) -> None:
         """See that at least one of the first frames has its images.

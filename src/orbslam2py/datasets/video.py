@@ -11,6 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from orbslam2py._arguments import index_of
 from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.datasets.base import Images, Stamps
@@ -216,7 +217,7 @@ class VideoSequence(FramesInOrder, UnposedSource):
 
     def timestamp_text(self, index: int, /) -> str:
         """Return the time of a frame in seconds."""
-        return self._stamps.texts[index]
+        return self._stamps.texts[index_of(index, len(self))]
 
     def default_settings(self) -> Settings:
         """Return the settings: a video has no others."""
@@ -224,7 +225,7 @@ class VideoSequence(FramesInOrder, UnposedSource):
 
     def load(self, index: int, /) -> Images:
         """Decode a frame; see `datasets.base.Sequence.load`. Fast only in order."""
-        return Images(self._ordered(self._reader.read(index)))
+        return Images(self._ordered(self._reader.read(index_of(index, len(self)))))
 
     def _own_stamps(self, seconds: FloatArray) -> Stamps:
         if np.isfinite(seconds).all() and (np.diff(seconds) > 0).all():

@@ -8,9 +8,8 @@ from enum import Enum
 
 import numpy as np
 
-from orbslam2py._arguments import shown
+from orbslam2py._arguments import member_of
 from orbslam2py._arrays import FloatArray, IntArray
-from orbslam2py.errors import DatasetError
 from orbslam2py.trajectory import MAX_DIFFERENCE, Similarity, align, associate
 
 #: Lengths that differ by more than this factor are those of one camera, not of a wrong baseline.
@@ -39,11 +38,7 @@ class Alignment(str, Enum):
         DatasetError
             Listing the names, if there is none like that.
         """
-        try:
-            return cls(value)
-        except ValueError:
-            names = ", ".join(alignment.value for alignment in cls)
-            raise DatasetError(f"{shown(value)} is no alignment; give one of {names}") from None
+        return member_of(cls, value, "the alignment")
 
     @property
     def fewest_poses(self) -> int:

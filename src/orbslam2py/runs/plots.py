@@ -34,6 +34,9 @@ _GRID = hexadecimal(palette.PAPER_GRID)
 _ERRORS = [hexadecimal(colour) for colour in palette.PAPER_ERRORS]
 #: Width by height of the view from above.
 _SHAPE = 1.85
+#: Room for words around the axes, in parts of the picture. Measuring the words instead would take
+#: longer than drawing them.
+_MARGINS = {"left": 0.09, "right": 0.98, "bottom": 0.065, "top": 0.92, "hspace": 0.2}
 
 
 def draw_trajectory(
@@ -93,10 +96,10 @@ def draw_trajectory(
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
     from matplotlib.figure import Figure  # noqa: PLC0415
 
-    figure = Figure(figsize=(10, 8), dpi=110, layout="constrained")
+    figure = Figure(figsize=(10, 8), dpi=110)
     FigureCanvasAgg(figure)
-    above, below = figure.subplots(2, 1, height_ratios=[3.2, 1])
-    figure.suptitle(f"{title}\n{subtitle}" if subtitle else title, fontsize=11)
+    above, below = figure.subplots(2, 1, height_ratios=[3.2, 1], gridspec_kw=_MARGINS)
+    figure.suptitle(f"{title}\n{subtitle}" if subtitle else title, fontsize=11, y=0.99, va="top")
 
     estimate = _Path(seconds, positions, gaps_in_time(seconds) if gaps is None else gaps)
     true = None if truth is None else _Path(*truth, gaps_in_time(truth[0]))
@@ -231,7 +234,7 @@ def _draw_errors(axes: Axes, view: View, estimate: _Path, errors: FloatArray, un
     lines.set_clim(0.0, float(np.nanmax(errors)) or 1.0)
     lines.set_capstyle("round")
     axes.add_collection(lines, autolim=False)
-    bar = axes.figure.colorbar(lines, ax=axes, shrink=0.85, pad=0.01)
+    bar = axes.figure.colorbar(lines, ax=axes, shrink=0.85, fraction=0.08, pad=0.01)
     bar.set_label(f"estimate: distance to the ground truth [{unit}]")
 
 

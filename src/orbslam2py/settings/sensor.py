@@ -3,12 +3,23 @@
 
 from __future__ import annotations
 
-from enum import Enum
+from enum import Enum, EnumMeta
+from typing import Any
 
+from orbslam2py._arguments import shown
 from orbslam2py.errors import SettingsError
 
 
-class Sensor(str, Enum):
+class _NamedByText(EnumMeta):
+    """Refuses what is no text before Python compares it with each member, as arrays cannot be."""
+
+    def __call__(cls, value: Any, *more: Any, **named: Any) -> Any:
+        if not isinstance(value, str):
+            raise _unknown(value)
+        return super().__call__(value, *more, **named)
+
+
+class Sensor(str, Enum, metaclass=_NamedByText):
     """What delivers the images; the values are the names used on the command line."""
 
     MONOCULAR = "mono"
@@ -22,7 +33,7 @@ class Sensor(str, Enum):
         for sensor in cls:
             if text in (sensor.value, sensor.name.lower()):
                 return sensor
-        raise SettingsError(f"no sensor {value!r}; there are: {', '.join(map(str, cls))}")
+        raise _unknown(value)
 
     @property
     def has_depth(self) -> bool:
@@ -31,3 +42,8 @@ class Sensor(str, Enum):
 
     def __str__(self) -> str:
         return self.value
+
+
+def _unknown(value: object) -> SettingsError:
+    names = ", ".join(map(str, Sensor))
+    return SettingsError(f"the sensor is {shown(value)}; give one of {names}")

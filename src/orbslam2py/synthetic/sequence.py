@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbslam2py import _core as core
-from orbslam2py._arguments import shown
+from orbslam2py._arguments import index_of, shown
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
 from orbslam2py.datasets import FramesInOrder, Images, Layout
 from orbslam2py.errors import SettingsError
@@ -101,7 +101,7 @@ class SyntheticSequence(FramesInOrder):
 
     def timestamp_text(self, index: int, /) -> str:
         """Return the time of a frame in seconds, with nine decimals."""
-        nanoseconds = int(self.nanoseconds[index])
+        nanoseconds = int(self.nanoseconds[index_of(index, len(self))])
         return f"{nanoseconds // 10**9}.{nanoseconds % 10**9:09d}"
 
     @property
@@ -187,8 +187,7 @@ class SyntheticSequence(FramesInOrder):
         IndexError
             If there is no such frame.
         """
-        if not 0 <= index < len(self):
-            raise IndexError(f"frame {index} of {len(self)}")
+        index = index_of(index, len(self))
         return self._T_wc_at(float(self.timestamps[index]))
 
     def _T_wc_at(self, seconds: float) -> FloatArray:
@@ -210,8 +209,7 @@ class SyntheticSequence(FramesInOrder):
         IndexError
             If there is no such frame.
         """
-        if not 0 <= index < len(self):
-            raise IndexError(f"frame {index} of {len(self)}")
+        index = index_of(index, len(self))
         return self._hand_rows(float(self.timestamps[index])) > 0
 
     def _hand_rows(self, seconds: float) -> int:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from orbslam2py._arguments import is_whole, shown
+from orbslam2py._arguments import is_whole, member_of, shown
 from orbslam2py._files import atomic_write
 from orbslam2py.errors import DatasetError
 from orbslam2py.trajectory.rotations import quaternions_from_rotations
@@ -50,10 +50,7 @@ class TrajectoryFormat(str, Enum):
         DatasetError
             Listing the names, if there is none like that.
         """
-        if isinstance(value, str) and value in {one.value for one in cls}:
-            return cls(value)
-        names = ", ".join(one.value for one in cls)
-        raise DatasetError(f"the format of the trajectory is {shown(value)}; give one of {names}")
+        return member_of(cls, value, "the format of the trajectory")
 
     def __str__(self) -> str:
         return self.value

@@ -7,6 +7,7 @@ import json
 import shutil
 import sqlite3
 import threading
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ import pytest
 from matplotlib.axes import Axes
 
 import orbslam2py as orb
+from orbslam2py import batches
 from orbslam2py.batches.sweep_picture import write_sweep_picture
 from support.batches import jobs_of, make_sequences, reproducible, table
 
@@ -25,42 +27,58 @@ def sequences(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return make_sequences(tmp_path_factory.mktemp("sequences"))
 
 
-def test_table(sequences: Path, tmp_path: Path) -> None:
+@dataclass
+class Whole:
+    """A batch in this process that nothing disturbed."""
+
+    done: batches.BatchResult
+    seen: list[tuple[int, int]]
+
+    @property
+    def folder(self) -> Path:
+        return Path(self.done.folder)
+
+
+@pytest.fixture(scope="module")
+def whole(sequences: Path, tmp_path_factory: pytest.TempPathFactory) -> Whole:
     seen: list[tuple[int, int]] = []
     done = orb.batch(
         jobs_of(sequences),
-        tmp_path / "out",
+        tmp_path_factory.mktemp("whole") / "out",
         workers=0,
         progress=lambda row, n, total: seen.append((n, total)),
     )
-    assert seen == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    return Whole(done, seen)
+
+
+def test_table(whole: Whole) -> None:
+    done, folder = whole.done, whole.folder
+    assert whole.seen == [(1, 4), (2, 4), (3, 4), (4, 4)]
     assert (len(done.rows), done.n_failed, done.n_left) == (4, 0, 0)
-    rows = table(tmp_path / "out")
+    rows = table(folder)
     assert [row["run"] for row in rows] == sorted(row["run"] for row in rows)
     first = rows[0]
     assert first["sequence"] == "one"
     assert (first["state"], first["tracked"], first["option.max_frames"]) == ("done", "6", "6")
-    report = json.loads((tmp_path / "out/runs" / first["run"] / "report.json").read_text())
+    report = json.loads((folder / "runs" / first["run"] / "report.json").read_text())
     assert float(first["ate_rmse_m"]) == report["ate_rmse_m"]
     assert first["version"] == orb.__version__
     assert float(first["peak_memory_mb"]) > 10
-    with sqlite3.connect(tmp_path / "out/results.sqlite") as database:
+    with sqlite3.connect(folder / "results.sqlite") as database:
         found = database.execute("SELECT run, tracked, ate_rmse_m FROM results ORDER BY run")
         assert [list(map(str, row)) for row in found] == [
             [row["run"], row["tracked"], row["ate_rmse_m"]] for row in rows
         ]
     parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is an extra")
-    assert parquet.read_table(tmp_path / "out/results.parquet").num_rows == 4
+    assert parquet.read_table(folder / "results.parquet").num_rows == 4
     group = done.groups[0]
     assert (group.n_runs, group.n_failed) == (2, 0)
     assert group.ate_rmse_m is not None
     assert group.ate_rmse_m.least <= group.ate_rmse_m.median <= group.ate_rmse_m.most
 
 
-def test_resume(sequences: Path, tmp_path: Path) -> None:
+def test_resume(sequences: Path, whole: Whole, tmp_path: Path) -> None:
     """Stopped after two runs, with a half one: the same table as without a stop."""
-    whole = tmp_path / "whole"
-    orb.batch(jobs_of(sequences), whole, workers=0)
     folder, stop = tmp_path / "stopped", threading.Event()
     done = orb.batch(
         jobs_of(sequences),
@@ -88,10 +106,10 @@ def test_resume(sequences: Path, tmp_path: Path) -> None:
     assert finished not in ran
     assert (folder / "runs" / finished / "row.json").stat().st_mtime_ns == before
     assert resumed.n_left == 0
-    assert reproducible(folder) == reproducible(whole)
+    assert reproducible(folder) == reproducible(whole.folder)
     for row in resumed.rows:
         name = f"runs/{row['run']}/trajectory.txt"
-        assert (folder / name).read_bytes() == (whole / name).read_bytes()
+        assert (folder / name).read_bytes() == (whole.folder / name).read_bytes()
 
 
 def test_a_changed_job_is_run_again(sequences: Path, tmp_path: Path) -> None:
@@ -164,15 +182,14 @@ def test_runs_without_a_result_are_in_the_picture(
     assert not (tmp_path / "none.png").exists()
 
 
-def test_two_workers(sequences: Path, tmp_path: Path) -> None:
+def test_two_workers(sequences: Path, whole: Whole, tmp_path: Path) -> None:
     """In processes of their own: the same bytes as in this one."""
     pytest.importorskip("distributed", reason="dask is an extra")
-    orb.batch(jobs_of(sequences), tmp_path / "here", workers=0)
     done = orb.batch(jobs_of(sequences), tmp_path / "there", workers=2)
     assert (len(done.rows), done.n_failed) == (4, 0)
-    assert reproducible(tmp_path / "here") == reproducible(tmp_path / "there")
+    assert reproducible(whole.folder) == reproducible(tmp_path / "there")
     for row in done.rows:
         for name in ("trajectory.txt", "points.ply"):
             file = Path("runs") / row["run"] / name
-            here, there = (tmp_path / where / file for where in ("here", "there"))
-            assert here.read_bytes() == there.read_bytes()
+            there = tmp_path / "there" / file
+            assert (whole.folder / file).read_bytes() == there.read_bytes()

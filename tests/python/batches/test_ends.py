@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
 import random
 import signal
@@ -12,12 +13,13 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 import orbslam2py as orb
-from support.batches import jobs_of, make_sequences, reproducible, table
+from support.batches import jobs_of, make_batch, make_sequences, reproducible, table
 from support.small_disk import small_disk
 
 N = 8
@@ -36,12 +38,21 @@ def jobs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "jobs.yaml"
 
 
-@pytest.fixture(scope="module")
-def whole(jobs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+@dataclass(frozen=True)
+class Whole:
     """The same batch, undisturbed."""
+
+    folder: Path
+    seconds: float
+    table: bytes
+
+
+@pytest.fixture(scope="module")
+def whole(jobs: Path, tmp_path_factory: pytest.TempPathFactory) -> Whole:
     folder = tmp_path_factory.mktemp("whole") / "out"
+    begin = time.monotonic()
     assert orb.batch(jobs, folder, workers=0).n_failed == 0
-    return folder
+    return Whole(folder, time.monotonic() - begin, reproducible(folder))
 
 
 def start(jobs: Path, output: Path, *options: str) -> subprocess.Popen[str]:
@@ -60,10 +71,10 @@ def start(jobs: Path, output: Path, *options: str) -> subprocess.Popen[str]:
     )
 
 
-def wait_for(condition: Callable[[], bool], process: subprocess.Popen[str]) -> None:
+def wait_for(condition: Callable[[], bool], is_running: Callable[[], bool]) -> None:
     deadline = time.monotonic() + 60
     while not condition():
-        assert process.poll() is None, process.communicate()
+        assert is_running()
         assert time.monotonic() < deadline
         time.sleep(0.01)  # for a condition
 
@@ -74,13 +85,13 @@ def finished(folder: Path) -> list[Path]:
 
 @pytest.mark.watchdog(150)
 @pytest.mark.parametrize("workers", ["0", "2"])
-def test_interrupted(jobs: Path, whole: Path, tmp_path: Path, workers: str) -> None:
+def test_interrupted(jobs: Path, whole: Whole, tmp_path: Path, workers: str) -> None:
     """Runs that are being made end and are saved; the rest is left for --resume."""
     if workers != "0":
         pytest.importorskip("distributed", reason="dask is an extra")
     folder = tmp_path / "out"
     process = start(jobs, folder, "--workers", workers)
-    wait_for(lambda: bool(finished(folder)), process)
+    wait_for(lambda: bool(finished(folder)), lambda: process.poll() is None)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal sends it
     _, errors = process.communicate(timeout=100)
     assert process.returncode == 130, errors
@@ -93,38 +104,34 @@ def test_interrupted(jobs: Path, whole: Path, tmp_path: Path, workers: str) -> N
     assert "Traceback" not in errors
     done = orb.batch(jobs, folder, workers=0, resume=True)
     assert (len(done.rows), done.n_left) == (N, 0)
-    assert reproducible(folder) == reproducible(whole)
+    assert reproducible(folder) == whole.table
 
 
 @pytest.mark.watchdog(300)
-def test_killed_at_any_moment(jobs: Path, whole: Path, tmp_path: Path) -> None:
+def test_killed_at_any_moment(jobs: Path, whole: Whole, tmp_path: Path) -> None:
     """Killed on the way and gone on with: the table of one that was not, to the byte."""
     draws = random.Random(14)
-    first = tmp_path / "first"
-    process = start(jobs, first, "--workers", "0", "--quiet")
-    wait_for((first / "batch.json").exists, process)
-    begin = time.monotonic()
-    process.communicate(timeout=100)
-    lasts = time.monotonic() - begin
-    assert process.returncode == 0
+    # Processes that have loaded the package before they are told what to do.
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([make_batch.__module__])
     for number in range(3):
         folder = tmp_path / str(number)
-        process = start(jobs, folder, "--workers", "0", "--quiet")
-        wait_for((folder / "batch.json").exists, process)
-        try:
-            process.wait(draws.uniform(0, lasts))  # the moment
-        except subprocess.TimeoutExpired:
-            process.kill()
-        process.communicate()
+        process = context.Process(target=make_batch, args=(jobs, folder))
+        process.start()
+        wait_for((folder / "batch.json").exists, process.is_alive)
+        process.join(draws.uniform(0, whole.seconds))  # the moment
+        process.kill()
+        process.join()
+        process.close()
         kept = {path: path.stat().st_mtime_ns for path in finished(folder)}
         done = orb.batch(jobs, folder, workers=0, resume=True)
         assert (len(done.rows), done.n_failed, done.n_left) == (N, 0, 0)
         assert {path: path.stat().st_mtime_ns for path in kept} == kept, "none was run again"
-        assert reproducible(folder) == reproducible(whole)
+        assert reproducible(folder) == whole.table
         for row in done.rows:
             for name in ("trajectory.txt", "points.ply", "keyframes.txt"):
                 file = f"runs/{row['run']}/{name}"
-                assert (folder / file).read_bytes() == (whole / file).read_bytes()
+                assert (folder / file).read_bytes() == (whole.folder / file).read_bytes()
 
 
 @pytest.fixture
@@ -136,7 +143,7 @@ def rescue(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
 
 
 @pytest.mark.watchdog(150)
-def test_full_disk(jobs: Path, whole: Path, tmp_path: Path, rescue: Path) -> None:
+def test_full_disk(jobs: Path, whole: Whole, tmp_path: Path, rescue: Path) -> None:
     """Results that do not fit are kept elsewhere, and runs are made again where there is room."""
     with small_disk(tmp_path / "disk", "400k") as disk:
         with pytest.raises(OSError, match=r"cannot write .*results\.csv: No space left on device"):
@@ -145,4 +152,4 @@ def test_full_disk(jobs: Path, whole: Path, tmp_path: Path, rescue: Path) -> Non
         subprocess.run(["mount", "-o", "remount,size=60m", str(disk)], check=True)
         done = orb.batch(jobs, disk / "out", workers=0, resume=True)
         assert (len(done.rows), done.n_failed) == (N, 0)
-        assert reproducible(disk / "out") == reproducible(whole)
+        assert reproducible(disk / "out") == whole.table

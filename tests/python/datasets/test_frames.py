@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -38,22 +39,45 @@ def test_recorded_sequence_in_a_loop(tum: Path) -> None:
     assert len(list(sequence)) == 3, "a second loop begins anew"
 
 
-def test_every_sequence_can_be_looped_over(
-    kitti: Path, euroc: Path, folder: Path, video: Path, tmp_path: Path
-) -> None:
+@pytest.fixture
+def every_kind(
+    tum: Path, kitti: Path, euroc: Path, folder: Path, video: Path, tmp_path: Path
+) -> list[Any]:
+    """A sequence of each kind, the folder of images last."""
     save(tmp_path / "mask.png", mask_image())
     images = ImageFolder(folder, settings="tum1")
     options = SyntheticOptions(world="room", sensor="mono", frames=3, size=(64, 64))
-    for sequence in (
-        *(open_sequence(kitti), open_sequence(euroc), images),
+    return [
+        *(open_sequence(tum), open_sequence(kitti), open_sequence(euroc)),
         *(VideoSequence(video, settings="tum1"), MaskedSequence(images, tmp_path / "mask.png")),
-        SyntheticSequence(options),
-    ):
+        *(SyntheticSequence(options), images),
+    ]
+
+
+def test_every_sequence_can_be_looped_over(every_kind: list[Any]) -> None:
+    for sequence in every_kind:
         first, second = islice(sequence, 2)
         assert isinstance(first, Frame)
         assert (first.index, second.index) == (0, 1)
         assert first.timestamp < second.timestamp
+    images = every_kind[-1]
     assert [number_of(frame.images.image[..., ::-1]) for frame in images] == list(range(1, 13))
+
+
+def test_frames_that_there_are_not(every_kind: list[Any]) -> None:
+    for sequence in every_kind:
+        n = len(sequence)
+        for call in (sequence.load, sequence.timestamp_text):
+            for wrong in ("x", None, 1.0, np.zeros(3), [0], True):
+                with pytest.raises(
+                    DatasetError, match=r"the index of the frame is .*; give a whole"
+                ):
+                    call(wrong)
+            for outside in (-1, n):
+                message = f"there is no frame {outside} among {n}; give a whole number from 0 to"
+                with pytest.raises(IndexError, match=message):
+                    call(outside)
+            call(np.int64(n - 1))
 
 
 def test_a_bad_image_ends_the_loop(kitti: Path) -> None:
@@ -94,7 +118,9 @@ def test_settings_for_another_sensor_than_asked_for(tum: Path) -> None:
 
 def test_names_that_are_none(tum: Path, kitti: Path) -> None:
     for path in (tum, kitti):
-        with pytest.raises(SettingsError, match="no sensor 'lidar'; there are: mono, stereo, rgbd"):
+        with pytest.raises(
+            SettingsError, match="the sensor is 'lidar'; give one of mono, stereo, rgbd"
+        ):
             open_sequence(path, "lidar")
     with pytest.raises(DatasetError, match="no layout 'rosbag'; there are: tum, kitti, euroc"):
         open_sequence(tum, layout="rosbag")

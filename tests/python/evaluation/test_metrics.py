@@ -223,7 +223,7 @@ def test_noise_is_no_unit() -> None:
 
 
 def test_alignment_that_does_not_exist() -> None:
-    with pytest.raises(DatasetError, match="'sim2' is no alignment; give one of se3, sim3"):
+    with pytest.raises(DatasetError, match="the alignment is 'sim2'; give one of se3, sim3"):
         evaluate_trajectory(wander(5), wander(5), "sim2")
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import orbslam2py as orb
-from orbslam2py import calibration, datasets, evaluation, maps, runs, settings, synthetic
+from orbslam2py import batches, calibration, datasets, evaluation, maps, runs, settings, synthetic
 from orbslam2py import trajectory as paths
 from orbslam2py import vocabulary as words
 from orbslam2py.errors import OrbSlamError
@@ -128,6 +128,10 @@ CALLS: dict[str, tuple[Call, set[str]]] = {
         lambda x: runs.SystemOptions(full_adjustment_time_limit=x),
         {"None", "fraction"},
     ),
+    "sensor": (orb.Sensor, set()),
+    "alignment": (evaluation.Alignment.of, set()),
+    "format": (paths.TrajectoryFormat.of, set()),
+    "standard set": (batches.StandardSet.of, set()),
     "world: frames": (lambda x: synthetic.SyntheticOptions(frames=x), {"None"}),
     "world: seed": (lambda x: synthetic.SyntheticOptions(seed=x), set()),
     "world: size": (lambda x: synthetic.SyntheticOptions(size=x), {"None"}),

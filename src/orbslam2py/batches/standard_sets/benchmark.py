@@ -111,7 +111,7 @@ def benchmark(
     kind = StandardSet.of(kind)
     if not is_whole(seeds) or seeds < 1:
         raise SettingsError(f"seeds is {shown(seeds)}; give how many runs of each")
-    root, folder = path_of(root, "the root"), path_of(output, "output")
+    root, folder = path_of(root, "the root"), path_of(output, "output").absolute()
     found = find_sequences(kind, root)
     jobs = _jobs(found, sensors, int(seeds), options or {})
     if not jobs:
@@ -137,9 +137,9 @@ def benchmark(
         TABLE: markdown_table(kind, entries),
     }
     for name, text in files.items():
-        with atomic_write(done.folder / name) as stream:
+        with atomic_write(folder / name) as stream:
             stream.write(text)
-    return BenchmarkResult(kind, done, done.folder / PAGE, done.folder / TABLE)
+    return BenchmarkResult(kind, done, folder / PAGE, folder / TABLE)
 
 
 def _jobs(

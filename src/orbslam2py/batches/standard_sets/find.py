@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from enum import Enum
 from pathlib import Path
 
-from orbslam2py._arguments import shown
+from orbslam2py._arguments import member_of
 from orbslam2py._files import reason_of
 from orbslam2py.datasets import Layout, recognise
 from orbslam2py.datasets.recognise import has_layout
@@ -37,13 +37,7 @@ class StandardSet(str, Enum):
         DatasetError
             Listing the names, if there is none like that.
         """
-        try:
-            return cls(value)
-        except ValueError:
-            names = ", ".join(one.value for one in cls)
-            raise DatasetError(
-                f"{shown(value)} is no standard data set; there are {names}"
-            ) from None
+        return member_of(cls, value, "the standard data set")
 
     @property
     def full_name(self) -> str:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import Any
 
 from orbslam2py._arguments import number_of
@@ -52,7 +53,7 @@ def benchmark_page(
         name = sensor or "unopened"
         parts.append(section(name, title, _medians(kind, mine), error_picture(kind, mine)))
         links.append((name, title))
-    paths = paths_pictures(entries, done.folder)
+    paths = paths_pictures(entries, Path(done.folder))
     if paths:
         parts.append(section("paths", "Paths", element("div", *paths, class_="pair")))
         links.append(("paths", "Paths"))

@@ -35,7 +35,12 @@ EXAMPLE = """
 def batch(
     jobs: Annotated[Path, typer.Argument(help="Job file (YAML): sequences, options, seeds.")],
     output: Annotated[
-        Path | None, typer.Option(help="Folder for the results [that of the job file].")
+        str | None,
+        typer.Option(
+            help="Folder for the results, or an address such as s3://bucket/night [that of the job "
+            "file].",
+            metavar="PLACE",
+        ),
     ] = None,
     resume: ResumeFlag = False,
     scheduler: SchedulerOption = None,

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orbslam2py._arguments import index_of
 from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py.datasets.bags.bag import Bag, Message, Topic
 from orbslam2py.datasets.bags.calibration import CameraInfo, settings_of_camera, settings_of_pair
@@ -140,12 +141,11 @@ class BagSequence(FramesInOrder):
 
     def timestamp_text(self, index: int, /) -> str:
         """Return the time of a frame in seconds, with nine decimals."""
-        return self._stamps.texts[index]
+        return self._stamps.texts[index_of(index, len(self))]
 
     def load(self, index: int, /) -> Images:
         """Read (and rectify) the images of a frame; see `datasets.base.Sequence.load`."""
-        if not 0 <= index < len(self):
-            raise IndexError(f"frame {index} of {len(self)}")
+        index = index_of(index, len(self))
         left, *others = (messages[index] for messages in self._messages)
         image = self._image(self.topics.left, left, 0)
         if self.topics.right is not None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from orbslam2py._arguments import index_of
 from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py._text_lines import content_lines, number_of
 from orbslam2py.datasets.base import Images, Stamps, require_frames
@@ -65,6 +66,7 @@ class DepthSequence(RecordedSequence):
 
     def load(self, index: int, /) -> Images:
         """Read the images of a frame; see `datasets.base.Sequence.load`."""
+        index = index_of(index, len(self))
         image: ByteArray = read_image(self._images[index], rgb=self.settings.camera.rgb)
         if self.sensor is not Sensor.RGBD:
             return Images(image)
