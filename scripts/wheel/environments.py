@@ -36,9 +36,10 @@ def oldest(python: str) -> list[str]:
         if match is None:
             raise ValueError(f"{dependency} in pyproject.toml has no lower bound")
         name, bound = match.groups()
-        # Of opencv's packages a version has a fourth number that counts the builds.
-        pattern = "=={}.*" if name.startswith("opencv") and bound.count(".") < 3 else "=={}"
-        constraints.append(name + pattern.format(OLDEST_WHEELS[python].get(name, bound)))
+        version = OLDEST_WHEELS[python].get(name, bound)
+        # Of OpenCV's packages a version has a fourth number that counts the builds.
+        builds = ".*" if name.startswith("opencv") and version.count(".") < 3 else ""
+        constraints.append(f"{name}=={version}{builds}")
     return constraints
 
 

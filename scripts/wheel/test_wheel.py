@@ -76,7 +76,7 @@ def download(wheel: Path, suite: str, folder: Path) -> None:
     python = SUITES[suite]
     platforms = [f"manylinux_2_{minor}_x86_64" for minor in (36, 35, 34, 31, 28, 27, 24, 17)]
     platforms += ["manylinux2014_x86_64"]
-    pip = [sys.executable, "-m", "pip", "download", "-q", "--only-binary=:all:"]
+    pip = [sys.executable, "-m", "pip", "download", "-qq", "--only-binary=:all:"]
     pip += ["--disable-pip-version-check", "--python-version", python]
     pip += [f"--platform={platform}" for platform in platforms]
     shutil.rmtree(folder, ignore_errors=True)
