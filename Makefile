@@ -5,8 +5,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= $(shell nproc)
 
-.PHONY: demo test bench lint types stubs docs format sanitize stress fuzz-maps tidy wheel test-wheel install clean \
-  test-cpp test-python help
+.PHONY: demo test bench lint types stubs docs format sanitize stress fuzz-maps tidy wheel test-wheel compare-wheel \
+  install clean test-cpp test-python help
 
 help:
 	@echo "make demo      install what is needed, run the demonstration"
@@ -18,6 +18,7 @@ help:
 	@echo "make fuzz-maps 20 000 spoilt map files under the address and undefined-behaviour sanitizers"
 	@echo "make wheel     build dist/*.whl, which needs nothing of the system, and check it"
 	@echo "make test-wheel  install the wheel on a bare Debian (chroot, needs root) and use it"
+	@echo "make compare-wheel  the wheel's results beside those of the package built from source"
 	@echo "make format    apply clang-format and ruff"
 
 # ---- environment ---------------------------------------------------------------------------------
@@ -130,6 +131,9 @@ wheel:
 WHEEL_SUITE ?= bookworm
 test-wheel:
 	@$(PYTHON) scripts/wheel/test_wheel.py dist --suite $(WHEEL_SUITE) || [ $$? -eq 77 ] # 77: not possible here
+
+compare-wheel: install
+	@$(BIN)/python scripts/wheel/compare_builds.py dist
 
 format: $(VENV)/.requirements
 	@$(BIN)/ruff check --fix-only src tests examples benchmarks scripts

@@ -1,6 +1,6 @@
 #!/bin/sh
 # What test_wheel.py runs inside a bare tree, as root: /srv/wheels has the wheel and what it depends on,
-# /srv/checkout the Python tests. Nothing is fetched.
+# a folder for each choice of versions, /srv/checkout the Python tests. Nothing is fetched.
 set -eu
 said() { printf '\n== %s\n' "$*"; }
 fails() { printf 'FAILED: %s\n' "$*"; exit 1; }
@@ -9,20 +9,44 @@ said "A bare $(. /etc/os-release; echo "$PRETTY_NAME") with $(python3 --version)
 for tool in c++ gcc clang cmake; do
   command -v "$tool" >/dev/null && fails "$tool is there: not a bare tree"
 done
-export PIP_NO_INDEX=1 PIP_FIND_LINKS=/srv/wheels PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_ROOT_USER_ACTION=ignore
-
-said "Installing, without downloads"
-rm -rf /opt/venv /srv/runs && mkdir -p /srv/runs
-python3 -m venv /opt/venv
-start=$(date +%s.%N)
-/opt/venv/bin/python -m pip install -q orbslam2py
-python3 -c "import sys; print(f'pip install: {float(sys.argv[2]) - float(sys.argv[1]):.1f} s')" "$start" "$(date +%s.%N)"
-export PATH=/opt/venv/bin:$PATH
+export PIP_NO_INDEX=1 PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_ROOT_USER_ACTION=ignore
+system_path=$PATH
+rm -rf /opt/* /srv/runs
+mkdir -p /srv/runs
 cd /srv/runs
 
+# install_into ENVIRONMENT: as a user does, into a new environment, which is then the one in use
+install_into() {
+  export PIP_FIND_LINKS=/srv/wheels/$1 PATH=$system_path
+  python3 -m venv "/opt/$1"
+  start=$(date +%s.%N)
+  "/opt/$1/bin/python" -m pip install -q -c "/srv/wheels/$1/constraints.txt" orbslam2py
+  python3 -c "import sys; print(f'pip install: {float(sys.argv[2]) - float(sys.argv[1]):.1f} s')" "$start" "$(date +%s.%N)"
+  export PATH=/opt/$1/bin:$system_path
+  python -m pip list --format=freeze | grep -iE '^(numpy|opencv|typer|rich|matplotlib|pillow|pyyaml|lazy.loader)' | xargs
+}
+
+# demonstration FOLDER
+demonstration() {
+  orbslam2py demo --output "$1" >"$1.log" 2>&1 || { tail -20 "$1.log"; fails "the demo"; }
+  test -s "$1/trajectory.txt" || fails "the demo left no trajectory"
+}
+
+# tests_without_build: those of the checkout that need nothing but the installed package
+tests_without_build() {
+  python -m pip install -q -c "$PIP_FIND_LINKS/constraints.txt" pytest pytest-benchmark pytest-xdist hypothesis scipy rosbags
+  (
+    cd /srv/checkout
+    python -m pytest -q -p no:cacheprovider -m "not shared" tests/python/core tests/python/settings \
+      tests/python/trajectory tests/python/vocabulary tests/python/evaluation
+  ) || fails "the tests"
+}
+
+said "Installing, without downloads"
+install_into newest
+
 said "The demonstration"
-orbslam2py demo --output demo >demo.log 2>&1 || { tail -20 demo.log; fails "the demo"; }
-test -s demo/trajectory.txt || fails "the demo left no trajectory"
+demonstration demo
 tail -3 demo.log
 
 said "A sequence, deterministic, twice, in a path with a space and other letters, not in UTF-8"
@@ -37,7 +61,7 @@ mkdir -p "Ordner mit Ä 日本"
   cmp one/trajectory.txt two/trajectory.txt
 ) || fails "the sequence"
 cp "Ordner mit Ä 日本/one/trajectory.txt" stereo.txt
-wc -l stereo.txt
+sha256sum stereo.txt
 
 said "A user who can write neither to a home nor to site-packages"
 mkdir -p nobody && chown nobody nobody
@@ -53,15 +77,26 @@ said "Beside another OpenCV in one process"
 for name in $(cat /srv/wheels/opencv.txt); do
   target=/opt/cv/$name
   rm -rf "$target"
-  python -m pip install -q --no-deps --target "$target" "$name" || fails "installing $name"
+  python -m pip install -q --no-deps --find-links /srv/wheels/opencv --target "$target" "$name" || fails "installing $name"
   for first in cv2 orbslam2py; do
     PYTHONPATH=$target python /srv/checkout/scripts/wheel/beside_opencv.py "$first" "$target" || fails "$name, $first first"
   done
 done
 
 said "Tests that need no build"
-python -m pip install -q pytest pytest-benchmark pytest-xdist hypothesis scipy rosbags
-cd /srv/checkout
-python -m pytest -q -p no:cacheprovider -m "not shared" tests/python/core tests/python/settings \
-  tests/python/trajectory tests/python/vocabulary tests/python/evaluation
+tests_without_build
+
+for environment in $(cat /srv/wheels/environments.txt); do
+  [ "$environment" = newest ] && continue
+  said "With other versions of what it depends on: $environment"
+  install_into "$environment"
+  for command in "" run evaluate synthesize settings vocabulary; do
+    orbslam2py $command --help >help.log 2>&1 || { tail -5 help.log; fails "the help of $command"; }
+  done
+  demonstration "demo-$environment"
+  orbslam2py run "Ordner mit Ä 日本/corridor" --sensor stereo --deterministic --output "run-$environment" >run.log 2>&1 ||
+    { tail -20 run.log; fails "the sequence"; }
+  cmp "run-$environment/trajectory.txt" stereo.txt || fails "another path than with the newest versions"
+  tests_without_build
+done
 said "The wheel works here."

@@ -6,21 +6,19 @@
 
 from __future__ import annotations
 
+import importlib
 import sys
 from pathlib import Path
 
 import numpy as np
 
 first, folder = sys.argv[1], Path(sys.argv[2])
-if first == "cv2":
-    import cv2
-
-    from orbslam2py import _core
-else:
-    import cv2
-
-    from orbslam2py import _core
-
+names = ["cv2", "orbslam2py._core"]
+cv2, _core = (
+    # The statement would be put in alphabetical order by tools that tidy imports.
+    {name: importlib.import_module(name) for name in sorted(names, key=lambda n: first not in n)}[n]
+    for n in names
+)
 assert Path(cv2.__file__).is_relative_to(folder), cv2.__file__
 
 image = np.random.default_rng(0).integers(0, 256, (240, 320, 3), dtype=np.uint8)

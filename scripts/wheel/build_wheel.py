@@ -9,6 +9,7 @@ stood.
 from __future__ import annotations
 
 import argparse
+import filecmp
 import json
 import os
 import shlex
@@ -45,15 +46,34 @@ def tools_of(folder: Path) -> Path:
     return tools / "bin/python"
 
 
+def take_changes(unpacked: Path, source: Path) -> None:
+    """Make a folder the same as another, touching no file that is.
+
+    All times in the archive are the same, so that a file that has changed would not be compiled
+    again; if all were new, everything would.
+    """
+    wanted = {path.relative_to(unpacked) for path in unpacked.rglob("*") if path.is_file()}
+    for path in [path for path in source.rglob("*") if path.is_file()]:
+        if path.relative_to(source) not in wanted:
+            path.unlink()
+    for name in sorted(wanted):
+        new, old = unpacked / name, source / name
+        if not old.exists() or not filecmp.cmp(new, old, shallow=False):
+            old.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(new, old)
+
+
 def unpack_sdist(python: Path, folder: Path, output: Path) -> Path:
     """Make the source distribution; the wheel is built from nothing but it."""
     command = [python, "-m", "build", "--no-isolation", "--sdist", "--outdir", output, PROJECT]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    source = folder / "package"
-    shutil.rmtree(source, ignore_errors=True)
-    source.mkdir()
+    source, unpacked = folder / "package", folder / "unpacked"
+    shutil.rmtree(unpacked, ignore_errors=True)
+    unpacked.mkdir()
     sdist = max(output.glob("orbslam2py-*.tar.gz"), key=lambda path: path.stat().st_mtime)
-    subprocess.run(["tar", "xzf", sdist, "-C", source, "--strip-components=1"], check=True)
+    subprocess.run(["tar", "xzf", sdist, "-C", unpacked, "--strip-components=1"], check=True)
+    take_changes(unpacked, source)
+    shutil.rmtree(unpacked)
     return source
 
 

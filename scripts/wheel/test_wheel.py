@@ -15,6 +15,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from environments import environments
+
 HERE = Path(__file__).resolve().parent
 PROJECT = HERE.parent.parent
 
@@ -67,19 +69,27 @@ def make_tree(suite: str, tree: Path) -> None:
 
 
 def download(wheel: Path, suite: str, folder: Path) -> None:
-    """Fetch beforehand all that pip will install inside: the tree has no network."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for old in folder.glob("orbslam2py-*.whl"):
-        old.unlink()
-    shutil.copy(wheel, folder)
-    platforms = [f"manylinux_2_{minor}_x86_64" for minor in (31, 28, 27, 24, 17)]
+    """Fetch beforehand all that pip will install inside: the tree has no network.
+
+    A folder of wheels for each environment, one for the other OpenCVs.
+    """
+    python = SUITES[suite]
+    platforms = [f"manylinux_2_{minor}_x86_64" for minor in (36, 35, 34, 31, 28, 27, 24, 17)]
     platforms += ["manylinux2014_x86_64"]
-    pip = [sys.executable, "-m", "pip", "download", "-q", "--only-binary=:all:", "-d", folder]
-    pip += ["--python-version", SUITES[suite], "--find-links", folder]
+    pip = [sys.executable, "-m", "pip", "download", "-qq", "--only-binary=:all:"]
+    pip += ["--disable-pip-version-check", "--python-version", python]
     pip += [f"--platform={platform}" for platform in platforms]
-    subprocess.run([*pip, wheel, *TEST_PACKAGES], check=True)
+    shutil.rmtree(folder, ignore_errors=True)
+    tried = environments(python)
+    for name, constraints in tried.items():
+        target = folder / name
+        target.mkdir(parents=True)
+        (target / "constraints.txt").write_text("\n".join(constraints) + "\n")
+        limits = ["--constraint", target / "constraints.txt", "--dest", target]
+        subprocess.run([*pip, *limits, wheel, *TEST_PACKAGES], check=True)
+    (folder / "environments.txt").write_text("\n".join(tried) + "\n")
     for other in OTHER_OPENCV:
-        subprocess.run([*pip, "--no-deps", other], check=True)
+        subprocess.run([*pip, "--no-deps", "--dest", folder / "opencv", other], check=True)
     (folder / "opencv.txt").write_text("\n".join(OTHER_OPENCV) + "\n")
 
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bindings/arrays.hpp"
 
+#include <algorithm>
+#include <limits>
 #include <string>
 
 #include "base/errors.hpp"
@@ -36,6 +38,28 @@ cv::Mat view_uint8(const py::array& array, const char* what) {
 
 cv::Mat view_float32(const py::array& array, const char* what) {
   return view(array, what, py::dtype::of<float>(), CV_32FC1);
+}
+
+std::size_t rows_of(const py::array& array, py::ssize_t columns, const char* name) {
+  const bool fits =
+      columns == 0 ? array.ndim() == 1 : array.ndim() == 2 && array.shape(1) == columns;
+  if (!fits) {
+    const std::string shape = columns == 0 ? "(n,)" : "(n, " + std::to_string(columns) + ")";
+    throw py::value_error(std::string(name) + " must have the shape " + shape);
+  }
+  return static_cast<std::size_t>(array.shape(0));
+}
+
+std::vector<MapPointId> to_point_ids(const IdArray& array) {
+  if (array.ndim() != 1) throw py::value_error("point ids must be a 1-D array of int64");
+  std::vector<MapPointId> ids(static_cast<std::size_t>(array.size()));
+  std::transform(array.data(), array.data() + array.size(), ids.begin(),
+                 [](std::int64_t id) { return MapPointId(id); });
+  return ids;
+}
+
+Pinhole pinhole_of(const Eigen::Vector4d& intrinsics) {
+  return {intrinsics[0], intrinsics[1], intrinsics[2], intrinsics[3]};
 }
 
 }  // namespace orbslam::bindings

@@ -9,10 +9,24 @@
 #include <vector>
 
 #include "base/ids.hpp"
+#include "camera/camera.hpp"
 
 namespace orbslam::bindings {
 
 namespace py = pybind11;
+
+/// An argument: an array of the items, converted and copied if it is not one.
+template <class Item>
+using Input = py::array_t<Item, py::array::c_style | py::array::forcecast>;
+using IdArray = Input<std::int64_t>;
+
+/// Rows of an (n, columns) array; columns 0: of an (n,) array. Raises ValueError naming it.
+std::size_t rows_of(const py::array& array, py::ssize_t columns, const char* name);
+
+std::vector<MapPointId> to_point_ids(const IdArray& array);
+
+/// From fx, fy, cx, cy.
+Pinhole pinhole_of(const Eigen::Vector4d& intrinsics);
 
 /// A new NumPy array of the given shape holding a copy of `count` items.
 template <class Item>

@@ -128,7 +128,8 @@ Tangent vectors are (6,) float64: rotation (radians) first, then translation; th
           }));
 }
 
-py::array_t<float> table(const ScalePyramid& scales, float (ScalePyramid::*entry)(int) const) {
+py::array_t<float> scale_table(const ScalePyramid& scales,
+                               float (ScalePyramid::*entry)(int) const) {
   std::vector<float> values;
   for (int level = 0; level < scales.levels(); ++level) values.push_back((scales.*entry)(level));
   return to_array(values);
@@ -153,18 +154,18 @@ void bind_scale_pyramid(py::module_& module) {
       .def_property_readonly("original_coordinates", &ScalePyramid::original_coordinates,
                              "Whether keypoints of coarse levels lie where the original puts them.")
       .def_property_readonly(
-          "scale", [](const ScalePyramid& s) { return table(s, &ScalePyramid::scale); },
+          "scale", [](const ScalePyramid& s) { return scale_table(s, &ScalePyramid::scale); },
           "Size of a pixel of each level in level-0 pixels, (levels,) float32.")
       .def_property_readonly(
           "inverse_scale",
-          [](const ScalePyramid& s) { return table(s, &ScalePyramid::inverse_scale); },
+          [](const ScalePyramid& s) { return scale_table(s, &ScalePyramid::inverse_scale); },
           "Its reciprocal, (levels,) float32.")
       .def_property_readonly(
-          "sigma2", [](const ScalePyramid& s) { return table(s, &ScalePyramid::sigma2); },
+          "sigma2", [](const ScalePyramid& s) { return scale_table(s, &ScalePyramid::sigma2); },
           "Variance of a keypoint of each level in level-0 pixels^2, (levels,) float32.")
       .def_property_readonly(
           "inverse_sigma2",
-          [](const ScalePyramid& s) { return table(s, &ScalePyramid::inverse_sigma2); },
+          [](const ScalePyramid& s) { return scale_table(s, &ScalePyramid::inverse_sigma2); },
           "Its reciprocal, (levels,) float32.")
       .def(
           "level_size",

@@ -52,7 +52,7 @@ void flat_property(py::class_<CameraOptions>& options, const char* name, Part Ca
       [=](CameraOptions& o, Value v) { o.*part.*value = v; }, doc);
 }
 
-void bind_options(py::module_& module) {
+void bind_camera_options(py::module_& module) {
   py::class_<CameraOptions> options(module, "CameraOptions", "What a Camera is made from.");
   options
       .def(py::init([](double fx, double fy, double cx, double cy, int width, int height,
@@ -83,7 +83,7 @@ void bind_options(py::module_& module) {
 void bind_camera(py::module_& module) {
   bind_pinhole(module);
 
-  bind_options(module);
+  bind_camera_options(module);
 
   py::class_<Camera, std::shared_ptr<Camera>>(
       module, "Camera", "A calibrated camera: pinhole, lens, (virtual) right camera, bounds.")

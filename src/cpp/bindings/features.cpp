@@ -82,7 +82,7 @@ struct SharedExtractor {
   }
 };
 
-void bind_options(py::module_& module) {
+void bind_orb_options(py::module_& module) {
   py::class_<OrbOptions>(module, "OrbOptions", "Parameters of the ORB extractor.")
       .def(py::init([](int n_features, float scale_factor, int n_levels, int initial_threshold,
                        int minimum_threshold, bool original_coordinates) {
@@ -207,7 +207,7 @@ py::array_t<std::int32_t> hamming_matrix(const Bytes& a, const Bytes& b) {
 }  // namespace
 
 void bind_features(py::module_& module) {
-  bind_options(module);
+  bind_orb_options(module);
   bind_extraction(module);
   bind_extractor(module);
   module.def("hamming_distances", &hamming_distances, py::arg("a"), py::arg("b"),

@@ -17,16 +17,6 @@ namespace orbslam::bindings {
 namespace {
 
 using namespace py::literals;
-template <class Item>
-using Input = py::array_t<Item, py::array::c_style | py::array::forcecast>;
-
-std::size_t rows_of(const py::array& array, py::ssize_t columns, const char* name) {
-  if (array.ndim() != 2 || array.shape(1) != columns) {
-    throw py::value_error(std::string(name) + " must have the shape (n, " +
-                          std::to_string(columns) + ")");
-  }
-  return static_cast<std::size_t>(array.shape(0));
-}
 
 std::vector<Eigen::Vector2f> positions_of(const Input<float>& array, const char* name) {
   std::vector<Eigen::Vector2f> positions(rows_of(array, 2, name));
@@ -42,10 +32,6 @@ std::vector<EightPairs> samples_of(const Input<std::int32_t>& array) {
     std::copy_n(array.data() + 8 * i, 8, samples[i].begin());
   }
   return samples;
-}
-
-Pinhole pinhole_of(const Eigen::Vector4d& intrinsics) {
-  return {intrinsics[0], intrinsics[1], intrinsics[2], intrinsics[3]};
 }
 
 void bind_two_view_types(py::module_& module) {

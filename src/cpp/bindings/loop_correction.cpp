@@ -11,7 +11,6 @@ namespace orbslam::bindings {
 namespace {
 
 using namespace py::literals;
-using Release = py::call_guard<py::gil_scoped_release>;
 
 void bind_results(py::module_& module) {
   py::class_<PoseGraphSummary>(module, "PoseGraphSummary", "What optimize_essential_graph did.")

@@ -12,7 +12,6 @@ namespace orbslam::bindings {
 namespace {
 
 using namespace py::literals;
-using Release = py::call_guard<py::gil_scoped_release>;
 
 void bind_detection(py::module_& module) {
   py::class_<LoopConsistency>(

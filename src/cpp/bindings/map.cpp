@@ -23,8 +23,6 @@ void bind_map_changes(py::module_& module);    // map_changes.cpp
 namespace {
 
 using namespace py::literals;
-using Release = py::call_guard<py::gil_scoped_release>;
-using IdArray = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
 
 /// Points under probation. A class of its own, so that no list is converted per call.
 struct RecentPoints {
@@ -54,14 +52,6 @@ auto writer(Result (Map::*method)(Args...)) {
     const auto lock = map.write_lock();
     return (map.*method)(args...);
   };
-}
-
-std::vector<MapPointId> to_point_ids(const IdArray& array) {
-  if (array.ndim() != 1) throw py::value_error("point ids must be a 1-D array of int64");
-  std::vector<MapPointId> ids(static_cast<std::size_t>(array.size()));
-  std::transform(array.data(), array.data() + array.size(), ids.begin(),
-                 [](std::int64_t id) { return MapPointId(id); });
-  return ids;
 }
 
 py::array_t<double> vectors(const std::vector<Eigen::Vector3d>& values) {

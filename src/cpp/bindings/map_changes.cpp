@@ -14,7 +14,6 @@ void bind_map_changes(py::module_& module);
 namespace {
 
 using namespace py::literals;
-using Release = py::call_guard<py::gil_scoped_release>;
 
 using PairArray = py::array_t<std::int64_t>;
 

@@ -147,10 +147,10 @@ void put_the_rest(py::dict& arrays, MapContents&& contents) {
   arrays["loop_edges"] = owned<std::int64_t>(std::move(contents.loop_edges), {2});
 }
 
-using IdArray = py::array_t<std::int64_t, py::array::c_style>;
+using ContiguousIds = py::array_t<std::int64_t, py::array::c_style>;
 
-py::dict map_contents(const Map& map, const IdArray& known, std::uint64_t keyframe_stamp,
-                      std::uint64_t point_stamp, const IdArray& incomplete_pages) {
+py::dict map_contents(const Map& map, const ContiguousIds& known, std::uint64_t keyframe_stamp,
+                      std::uint64_t point_stamp, const ContiguousIds& incomplete_pages) {
   MapContents contents;
   const ContentsKnown before{
       keyframe_stamp,

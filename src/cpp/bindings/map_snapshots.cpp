@@ -14,7 +14,6 @@ void bind_map_snapshots(py::module_& module);
 namespace {
 
 using namespace py::literals;
-using Release = py::call_guard<py::gil_scoped_release>;
 
 template <class Row, class Item = typename Row::value_type>
 py::array_t<Item> rows(const std::vector<Row>& values) {

@@ -15,18 +15,8 @@ namespace orbslam::bindings {
 namespace {
 
 using namespace py::literals;
-using Release = py::call_guard<py::gil_scoped_release>;
-using IdArray = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
 using PositionArray = py::array_t<float, py::array::c_style | py::array::forcecast>;
 using FeaturePairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
-
-std::vector<MapPointId> to_point_ids(const IdArray& array) {
-  if (array.ndim() != 1) throw py::value_error("point ids must be a 1-D array of int64");
-  std::vector<MapPointId> ids(static_cast<std::size_t>(array.size()));
-  if (!ids.empty())
-    std::memcpy(static_cast<void*>(ids.data()), array.data(), ids.size() * sizeof(MapPointId));
-  return ids;
-}
 
 py::array_t<std::int64_t> to_pair_array(const FeaturePairs& pairs) {
   py::array_t<std::int64_t> array({static_cast<py::ssize_t>(pairs.size()), py::ssize_t{2}});

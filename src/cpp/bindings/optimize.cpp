@@ -19,29 +19,11 @@ namespace orbslam::bindings {
 namespace {
 
 using namespace py::literals;
-template <class Item>
-using Input = py::array_t<Item, py::array::c_style | py::array::forcecast>;
-
-/// Rows of an (n, columns) array; columns 0: of an (n,) array. Raises ValueError naming it.
-template <class Item>
-std::size_t rows_of(const Input<Item>& array, py::ssize_t columns, const char* name) {
-  const bool fits =
-      columns == 0 ? array.ndim() == 1 : array.ndim() == 2 && array.shape(1) == columns;
-  if (!fits) {
-    const std::string shape = columns == 0 ? "(n,)" : "(n, " + std::to_string(columns) + ")";
-    throw py::value_error(std::string(name) + " must have the shape " + shape);
-  }
-  return static_cast<std::size_t>(array.shape(0));
-}
 
 void check_rows(std::size_t rows, std::size_t wanted, const char* name) {
   if (rows == wanted) return;
   throw py::value_error(std::string(name) + " has " + std::to_string(rows) + " rows, expected " +
                         std::to_string(wanted));
-}
-
-Pinhole pinhole_of(const Eigen::Vector4d& intrinsics) {
-  return {intrinsics[0], intrinsics[1], intrinsics[2], intrinsics[3]};
 }
 
 std::vector<PoseObservation> pose_observations(const Input<double>& points,

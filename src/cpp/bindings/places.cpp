@@ -58,7 +58,7 @@ std::shared_ptr<Vocabulary> from_table(int branching, int depth, Scoring scoring
   return unconst(Vocabulary::from_rows(branching, depth, scoring, weighting, rows));
 }
 
-py::tuple table(const Vocabulary& vocabulary) {
+py::tuple node_table(const Vocabulary& vocabulary) {
   NodeTable columns;
   {
     const py::gil_scoped_release unlocked;
@@ -212,7 +212,7 @@ void bind_vocabulary_class(py::module_& module) {
                   "From columns in text order, without the root: row i is node i + 1. parents (n,) "
                   "uint32, is_word (n,) uint8, centres (n, 32) uint8, weights (n,) float64. Raises "
                   "VocabularyError naming the first bad node.")
-      .def("table", &table, "The columns (parents, is_word, centres, weights) of from_table.")
+      .def("table", &node_table, "The columns (parents, is_word, centres, weights) of from_table.")
       .def(
           "save",
           [](const Vocabulary& v, const std::string& path, std::optional<std::string> comment,

@@ -6,13 +6,12 @@
 #include <cmath>
 #include <random>
 
+#include "support/random_numbers.hpp"
+
 namespace orbslam {
 namespace {
 
-/// Uniform in [-limit, limit], the same on every platform.
-double draw(std::mt19937_64& generator, double limit) {
-  return limit * (static_cast<double>(generator() >> 11) * 0x1p-52 - 1.0);
-}
+using testing::draw;
 
 Vector6d random_tangent(std::mt19937_64& generator, double angle) {
   Eigen::Vector3d axis;
@@ -37,12 +36,13 @@ Eigen::Matrix4d series_exp(const Vector6d& xi) {
   return sum;
 }
 
-constexpr double angles[] = {0, 1e-12, 1e-9, 1e-7, 9e-5, 1.1e-4, 9e-4, 1.1e-3, 0.1, 1, 2, 3, 3.14};
+constexpr double rotation_angles[] = {0,      1e-12, 1e-9, 1e-7, 9e-5, 1.1e-4, 9e-4,
+                                      1.1e-3, 0.1,   1,    2,    3,    3.14};
 
 // OD-113: also for tiny angles.
 TEST(Pose, ExpAgreesWithThePowerSeries) {
   std::mt19937_64 generator(1);
-  for (const double angle : angles) {
+  for (const double angle : rotation_angles) {
     const Vector6d xi = random_tangent(generator, angle);
     EXPECT_TRUE(Pose::exp(xi).matrix().isApprox(series_exp(xi), 1e-11)) << angle;
   }
@@ -50,7 +50,7 @@ TEST(Pose, ExpAgreesWithThePowerSeries) {
 
 TEST(Pose, LogInvertsExp) {
   std::mt19937_64 generator(2);
-  for (const double angle : angles) {
+  for (const double angle : rotation_angles) {
     for (int repeat = 0; repeat < 10; ++repeat) {
       const Vector6d xi = random_tangent(generator, angle);
       EXPECT_LT((Pose::exp(xi).log() - xi).norm(), 1e-9) << angle;

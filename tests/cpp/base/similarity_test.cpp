@@ -8,13 +8,12 @@
 #include <random>
 #include <stdexcept>
 
+#include "support/random_numbers.hpp"
+
 namespace orbslam {
 namespace {
 
-/// Uniform in [-limit, limit], the same on every platform.
-double draw(std::mt19937_64& generator, double limit) {
-  return limit * (static_cast<double>(generator() >> 11) * 0x1p-52 - 1.0);
-}
+using testing::draw;
 
 Vector7d random_tangent(std::mt19937_64& generator, double angle, double sigma) {
   Eigen::Vector3d axis;

@@ -10,7 +10,7 @@ namespace orbslam {
 namespace {
 
 /// Keypoints at the given pixels of an image of 80 x 60: cells of 10 pixels.
-TrackedFrame frame_at(const std::vector<std::pair<float, float>>& pixels) {
+TrackedFrame tracked_frame_at(const std::vector<std::pair<float, float>>& pixels) {
   CameraOptions options;
   options.pinhole = {50, 50, 40, 30};
   options.image_size = {80, 60};
@@ -28,7 +28,7 @@ TrackedFrame frame_at(const std::vector<std::pair<float, float>>& pixels) {
 }
 
 TEST(InlierSpread, CountsCellsAndOctavesOfDepth) {
-  TrackedFrame frame = frame_at({{1, 1}, {2, 8}, {79, 59}, {45, 25}, {5, 55}});
+  TrackedFrame frame = tracked_frame_at({{1, 1}, {2, 8}, {79, 59}, {45, 25}, {5, 55}});
   frame.T_cw = Pose(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 0, 1));
   frame.associate(0, MapPointId(0), {0, 0, 1.0});    // z = 2
   frame.associate(1, MapPointId(1), {0, 0, 2.5});    // 3.5: the same cell and octave
@@ -40,7 +40,7 @@ TEST(InlierSpread, CountsCellsAndOctavesOfDepth) {
 }
 
 TEST(InlierSpread, LeavesOutliersOut) {
-  TrackedFrame frame = frame_at({{1, 1}, {79, 59}});
+  TrackedFrame frame = tracked_frame_at({{1, 1}, {79, 59}});
   frame.T_cw = Pose();
   frame.associate(0, MapPointId(0), {0, 0, 2});
   frame.associate(1, MapPointId(1), {0, 0, 9});
@@ -52,7 +52,7 @@ TEST(InlierSpread, LeavesOutliersOut) {
 }
 
 TEST(CountStaying, LeavesOutWhatATurnTakesOutOfView) {
-  TrackedFrame frame = frame_at({{10, 30}, {40, 30}, {70, 30}, {40, 50}});
+  TrackedFrame frame = tracked_frame_at({{10, 30}, {40, 30}, {70, 30}, {40, 50}});
   frame.T_cw = Pose();
   // At depth 2, where the keypoints lie: x = (u - 40) / 50 * 2.
   frame.associate(0, MapPointId(0), {-1.2, 0, 2});
@@ -71,7 +71,7 @@ TEST(CountStaying, LeavesOutWhatATurnTakesOutOfView) {
 }
 
 TEST(InlierSpread, NeedsAPose) {
-  const TrackedFrame frame = frame_at({{1, 1}});
+  const TrackedFrame frame = tracked_frame_at({{1, 1}});
   EXPECT_THROW(spread_of_inliers(frame), StateError);
 }
 

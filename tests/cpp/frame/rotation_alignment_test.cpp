@@ -38,7 +38,7 @@ Eigen::Matrix3d turn(double yaw, double pitch, double roll) {
       .toRotationMatrix();
 }
 
-class RotationAlignment : public testing::TestWithParam<std::array<double, 3>> {};
+class RotationAlignment : public ::testing::TestWithParam<std::array<double, 3>> {};
 
 TEST_P(RotationAlignment, FindsATurnWithinATenthOfAPatch) {
   const auto [yaw, pitch, roll] = GetParam();
@@ -54,9 +54,9 @@ TEST_P(RotationAlignment, FindsATurnWithinATenthOfAPatch) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Turns, RotationAlignment,
-                         testing::Values(std::array{0.0, 0.0, 0.0}, std::array{4.0, 0.0, 0.0},
-                                         std::array{-8.0, 1.0, 0.0}, std::array{12.0, 0.0, 0.0},
-                                         std::array{0.0, 5.0, 0.0}, std::array{2.0, -3.0, 3.0}));
+                         ::testing::Values(std::array{0.0, 0.0, 0.0}, std::array{4.0, 0.0, 0.0},
+                                           std::array{-8.0, 1.0, 0.0}, std::array{12.0, 0.0, 0.0},
+                                           std::array{0.0, 5.0, 0.0}, std::array{2.0, -3.0, 3.0}));
 
 TEST(RotationAlignmentRefuses, WhatSaysNothing) {
   const SmallImage some = shrink_image(look(Eigen::Matrix3d::Identity()));

@@ -17,8 +17,8 @@ using testing::make_two_view_scene;
 using testing::SceneShape;
 using testing::TwoViewScene;
 
-struct NormalizedScene {
-  explicit NormalizedScene(const TwoViewScene& scene)
+struct FundamentalScene {
+  explicit FundamentalScene(const TwoViewScene& scene)
       : pairs(gather_pairs(scene.initial, scene.current, scene.matches)) {
     normalize(scene.initial, normalization_1);
     normalize(scene.current, normalization_2);
@@ -33,7 +33,7 @@ struct NormalizedScene {
 TEST(FitFundamental, IsTheOneOfTheMotion) {
   const Pose T_21 = testing::sideways_motion();
   const auto scene = make_two_view_scene(SceneShape::general, T_21, 60, 0, 1);
-  const NormalizedScene data(scene);
+  const FundamentalScene data(scene);
   const Eigen::Matrix3d F_21 = fit_fundamental(data.pairs, {0, 7, 14, 21, 28, 35, 42, 49},
                                                data.normalization_1, data.normalization_2);
   Eigen::Matrix3d K;
@@ -48,7 +48,7 @@ TEST(FitFundamental, IsTheOneOfTheMotion) {
 TEST(BestFundamental, ScoreCountsLineDistancesInBothDirections) {
   const auto scene =
       make_two_view_scene(SceneShape::general, testing::sideways_motion(), 200, 1, 2, 0.2);
-  const NormalizedScene data(scene);
+  const FundamentalScene data(scene);
   const double sigma = 1.5;
   const ScoredModel best = data.best(draw_samples(200, 50, 3), sigma);
   double score = 0;
@@ -81,7 +81,7 @@ TEST(BestFundamental, MatchesTheReferencePerSample) {
       scene.current.emplace_back(uv_2.at(i, 0), uv_2.at(i, 1));
       scene.matches.push_back(static_cast<int>(i));
     }
-    const NormalizedScene data(scene);
+    const FundamentalScene data(scene);
     const auto sets = testing::golden<int>(set, "out_sets");
     const auto scores = testing::golden<double>(set, "out_scores_F");
     int different = 0;

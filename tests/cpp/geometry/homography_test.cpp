@@ -15,8 +15,8 @@ using testing::make_two_view_scene;
 using testing::SceneShape;
 using testing::TwoViewScene;
 
-struct NormalizedScene {
-  explicit NormalizedScene(const TwoViewScene& scene)
+struct HomographyScene {
+  explicit HomographyScene(const TwoViewScene& scene)
       : pairs(gather_pairs(scene.initial, scene.current, scene.matches)) {
     normalize(scene.initial, normalization_1);
     normalize(scene.current, normalization_2);
@@ -30,7 +30,7 @@ struct NormalizedScene {
 
 TEST(FitHomography, MapsThePairsOfAPlane) {
   const auto scene = make_two_view_scene(SceneShape::planar, testing::sideways_motion(), 60, 0, 1);
-  const NormalizedScene data(scene);
+  const HomographyScene data(scene);
   const Eigen::Matrix3d H_21 = fit_homography(data.pairs, {0, 7, 14, 21, 28, 35, 42, 49},
                                               data.normalization_1, data.normalization_2);
   for (std::size_t i = 0; i < scene.initial.size(); ++i) {
@@ -42,7 +42,7 @@ TEST(FitHomography, MapsThePairsOfAPlane) {
 TEST(BestHomography, ScoreCountsWhatIsLeftOfTheGateInBothDirections) {
   const auto scene =
       make_two_view_scene(SceneShape::planar, testing::sideways_motion(), 200, 1, 2, 0.2);
-  const NormalizedScene data(scene);
+  const HomographyScene data(scene);
   const double sigma = 1.5;
   const ScoredModel best = data.best(draw_samples(200, 50, 3), sigma);
   double score = 0;
@@ -68,7 +68,7 @@ TEST(BestHomography, ScoreCountsWhatIsLeftOfTheGateInBothDirections) {
 }
 
 TEST(BestHomography, KeepsTheFirstOfEqualScoresAndTheHighest) {
-  const NormalizedScene data(
+  const HomographyScene data(
       make_two_view_scene(SceneShape::planar, testing::sideways_motion(), 100, 1, 4, 0.4));
   const auto samples = draw_samples(100, 40, 5);
   const ScoredModel best = data.best(samples);
@@ -88,7 +88,7 @@ TEST(BestHomography, MatchesTheReferencePerSample) {
       scene.current.emplace_back(uv_2.at(i, 0), uv_2.at(i, 1));
       scene.matches.push_back(static_cast<int>(i));
     }
-    const NormalizedScene data(scene);
+    const HomographyScene data(scene);
     const auto sets = testing::golden<int>(set, "out_sets");
     const auto scores = testing::golden<double>(set, "out_scores_H");
     int different = 0;

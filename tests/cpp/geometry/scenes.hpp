@@ -9,12 +9,9 @@
 #include "base/pose.hpp"
 #include "camera/camera.hpp"
 #include "support/npy.hpp"
+#include "support/random_numbers.hpp"
 
 namespace orbslam::testing {
-
-inline double uniform(std::mt19937_64& random, double low, double high) {
-  return low + (high - low) * static_cast<double>(random() >> 11) * 0x1.0p-53;
-}
 
 inline double normal(std::mt19937_64& random) {
   const double radius = std::sqrt(-2 * std::log(uniform(random, 1e-12, 1)));

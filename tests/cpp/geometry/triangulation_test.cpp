@@ -7,12 +7,12 @@
 #include <limits>
 #include <random>
 
+#include "support/random_numbers.hpp"
+
 namespace orbslam {
 namespace {
 
-double uniform(std::mt19937_64& random, double low, double high) {
-  return low + (high - low) * static_cast<double>(random() >> 11) * 0x1.0p-53;
-}
+using testing::uniform;
 
 Pose random_pose(std::mt19937_64& random, double size) {
   Vector6d xi;

@@ -15,7 +15,7 @@ using namespace testing;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-using Pair = std::pair<std::int64_t, std::int64_t>;
+using IdPair = std::pair<std::int64_t, std::int64_t>;
 
 /// Keyframes 0 .. 7; each shares 20 points with the one before it. 7 sees what 1 saw.
 class EssentialGraph : public ::testing::Test {
@@ -37,14 +37,14 @@ class EssentialGraph : public ::testing::Test {
     builder.map.update_connections(kf(b));
   }
   void build() { build_essential_graph(builder.map, group, correction); }
-  std::vector<Pair> pairs() const {
-    std::vector<Pair> found;
+  std::vector<IdPair> pairs() const {
+    std::vector<IdPair> found;
     for (const PoseGraph::Edge& edge : correction.graph.edges) {
       found.emplace_back(correction.keyframes[edge.i].value, correction.keyframes[edge.j].value);
     }
     return found;
   }
-  std::vector<Pair> with_tree(std::vector<Pair> pairs) const {
+  std::vector<IdPair> with_tree(std::vector<IdPair> pairs) const {
     for (std::int64_t k = 1; k < 8; ++k) pairs.emplace_back(k, k - 1);
     return pairs;
   }
@@ -146,7 +146,7 @@ TEST_F(EssentialGraph, DeadAndUnpublishedKeyframesAreNoVertices) {
   ASSERT_TRUE(builder.erase_keyframe(kf(3)));
   build();
   EXPECT_EQ(correction.keyframes, kfs({0, 1, 2, 4, 5, 6, 7}));
-  EXPECT_THAT(pairs(), ::testing::Contains(Pair(4, 2)));  // the tree closes over the gap
+  EXPECT_THAT(pairs(), ::testing::Contains(IdPair(4, 2)));  // the tree closes over the gap
   EXPECT_EQ(vertex_of(correction.keyframes, waiting), -1);
 }
 

@@ -164,8 +164,8 @@ std::string violations(const Map& map) {
   return text;
 }
 
-struct SmallMap : MapBuilder {
-  SmallMap() {
+struct MapWithLoop : MapBuilder {
+  MapWithLoop() {
     for (int i = 0; i < 4; ++i) add_keyframe(true, 60);
     add_points(20, kfs({0, 1, 2}));
     add_points(16, kfs({1, 2, 3}));
@@ -176,7 +176,7 @@ struct SmallMap : MapBuilder {
 };
 
 TEST(StoredMap, ComesBackBitByBit) {
-  SmallMap small;
+  MapWithLoop small;
   Map restored;
   WrittenMap(small.map).restore(restored);
   EXPECT_EQ(violations(restored), "");
@@ -189,7 +189,7 @@ TEST(StoredMap, ComesBackBitByBit) {
 }
 
 TEST(StoredMap, IdsGoOnWhereTheyEnded) {
-  SmallMap small;
+  MapWithLoop small;
   Map restored;
   WrittenMap(small.map).restore(restored);
   EXPECT_EQ(restored.add_keyframe(small.map.find(kf(0))->frame, Pose()), kf(4));
@@ -197,12 +197,12 @@ TEST(StoredMap, IdsGoOnWhereTheyEnded) {
 }
 
 TEST(StoredMap, GoesIntoAnEmptyMapOnly) {
-  SmallMap small;
+  MapWithLoop small;
   EXPECT_THROW(WrittenMap(small.map).restore(small.map), StateError);
 }
 
 TEST(StoredMap, UnprocessedKeyframesAndWhatOnlyTheySeeAreLeftOut) {
-  SmallMap small;
+  MapWithLoop small;
   const KeyFrameId late = small.add_keyframe(false);
   small.add_point({late});
   const auto shared = small.add_point({kf(0), late});
@@ -232,7 +232,7 @@ TEST(StoredMap, WhateverWasDoneToAMapItComesBack) {
 /// Numbers in a file are never trusted: every spoilt map is refused or is a sound one. The
 /// sanitizers watch what happens on the way.
 TEST(StoredMap, SpoiltOnesAreRefusedOrSound) {
-  const SmallMap small;
+  const MapWithLoop small;
   std::mt19937_64 random(7);
   const auto below = [&](std::size_t n) { return static_cast<std::size_t>(random() % n); };
   int n_refused = 0, n_restored = 0;

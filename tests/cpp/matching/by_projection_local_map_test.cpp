@@ -20,7 +20,7 @@ using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 using namespace testing;
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 FrustumView view_of(const MapPoint& seen) {
   TrackedFrame frame(make_synthetic_frame(0, {}));
@@ -69,12 +69,12 @@ TEST(ProjectInto, BordersBelongToTheImage) {
 // OD-36: a depth of 0 or NaN fails.
 TEST(ProjectInto, NothingBehindOrNowhere) {
   for (const Eigen::Vector3d& bad :
-       {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(0, 0, -5), Eigen::Vector3d(0, 0, kNan),
-        Eigen::Vector3d(kNan, 0, 5), Eigen::Vector3d(0, 0, HUGE_VAL)}) {
+       {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(0, 0, -5), Eigen::Vector3d(0, 0, kUnknown),
+        Eigen::Vector3d(kUnknown, 0, 5), Eigen::Vector3d(0, 0, HUGE_VAL)}) {
     EXPECT_FALSE(view_of(point(0, bad, Descriptor())).visible) << bad.transpose();
   }
   MapPoint directionless = point_ahead(5, 1, 100);
-  directionless.mean_direction = {kNan, 0, 0};
+  directionless.mean_direction = {kUnknown, 0, 0};
   EXPECT_FALSE(view_of(directionless).visible);
 }
 

@@ -23,7 +23,7 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 // One point straight ahead, 5 m away, seen by the last frame at (320, 240) on level 3, and a
 // current frame with the given features.
 struct OnePoint {
-  explicit OnePoint(const std::vector<FeatureSpec>& features, FeatureSpec seen = feature(3))
+  explicit OnePoint(const std::vector<FeatureSpec>& features, const FeatureSpec& seen = feature(3))
       : last(make_synthetic_frame(0, {seen})), current(make_synthetic_frame(1, features)) {
     last.T_cw = Pose();
     current.T_cw = Pose();

@@ -26,7 +26,7 @@ std::vector<Eigen::Vector2f> positions_of(const Frame& frame) {
   return positions;
 }
 
-FeatureSpec feature(float u, float v, int bits, std::int32_t level = 0, float angle = 0) {
+FeatureSpec corner(float u, float v, int bits, std::int32_t level = 0, float angle = 0) {
   FeatureSpec spec;
   spec.u = u;
   spec.v = v;
@@ -36,8 +36,8 @@ FeatureSpec feature(float u, float v, int bits, std::int32_t level = 0, float an
   return spec;
 }
 
-std::vector<int> match(const std::vector<FeatureSpec>& initial,
-                       const std::vector<FeatureSpec>& current) {
+std::vector<int> match_first_level(const std::vector<FeatureSpec>& initial,
+                                   const std::vector<FeatureSpec>& current) {
   const auto frame_1 = make_synthetic_frame(0, initial);
   const auto frame_2 = make_synthetic_frame(1, current);
   auto previous = positions_of(*frame_1);
@@ -45,44 +45,47 @@ std::vector<int> match(const std::vector<FeatureSpec>& initial,
 }
 
 TEST(MatchForInitialization, TheBetterOfTwoWinsWhateverTheOrder) {
-  const FeatureSpec good = feature(200, 200, 98), worse = feature(210, 200, 90);
-  const std::vector<FeatureSpec> current{feature(205, 205, 100)};
-  EXPECT_THAT(match({good, worse}, current), ElementsAre(0, -1));
-  EXPECT_THAT(match({worse, good}, current), ElementsAre(-1, 0));
+  const FeatureSpec good = corner(200, 200, 98), worse = corner(210, 200, 90);
+  const std::vector<FeatureSpec> current{corner(205, 205, 100)};
+  EXPECT_THAT(match_first_level({good, worse}, current), ElementsAre(0, -1));
+  EXPECT_THAT(match_first_level({worse, good}, current), ElementsAre(-1, 0));
 }
 
 TEST(MatchForInitialization, OfEquallyGoodOnesTheFirstStays) {
-  const FeatureSpec one = feature(200, 200, 95), two = feature(210, 200, 95);
-  EXPECT_THAT(match({one, two}, {feature(205, 205, 100)}), ElementsAre(0, -1));
+  const FeatureSpec one = corner(200, 200, 95), two = corner(210, 200, 95);
+  EXPECT_THAT(match_first_level({one, two}, {corner(205, 205, 100)}), ElementsAre(0, -1));
 }
 
 TEST(MatchForInitialization, OnlyLevelZeroOnBothSides) {
-  EXPECT_THAT(match({feature(200, 200, 50, 1)}, {feature(200, 200, 50)}), ElementsAre(-1));
-  EXPECT_THAT(match({feature(200, 200, 50)}, {feature(200, 200, 50, 1)}), ElementsAre(-1));
+  EXPECT_THAT(match_first_level({corner(200, 200, 50, 1)}, {corner(200, 200, 50)}),
+              ElementsAre(-1));
+  EXPECT_THAT(match_first_level({corner(200, 200, 50)}, {corner(200, 200, 50, 1)}),
+              ElementsAre(-1));
 }
 
 TEST(MatchForInitialization, DescriptorLimitIsFiftyInclusive) {
-  EXPECT_THAT(match({feature(200, 200, 0)}, {feature(200, 200, 50)}), ElementsAre(0));
-  EXPECT_THAT(match({feature(200, 200, 0)}, {feature(200, 200, 51)}), ElementsAre(-1));
+  EXPECT_THAT(match_first_level({corner(200, 200, 0)}, {corner(200, 200, 50)}), ElementsAre(0));
+  EXPECT_THAT(match_first_level({corner(200, 200, 0)}, {corner(200, 200, 51)}), ElementsAre(-1));
 }
 
 TEST(MatchForInitialization, RatioIsStrict) {
   // 9 of 10 bits: exactly the ratio 0.9, which does not pass; 8 of 10 does.
-  EXPECT_THAT(match({feature(200, 200, 0)}, {feature(205, 200, 9), feature(195, 200, 10)}),
+  EXPECT_THAT(match_first_level({corner(200, 200, 0)}, {corner(205, 200, 9), corner(195, 200, 10)}),
               ElementsAre(-1));
-  EXPECT_THAT(match({feature(200, 200, 0)}, {feature(205, 200, 8), feature(195, 200, 10)}),
+  EXPECT_THAT(match_first_level({corner(200, 200, 0)}, {corner(205, 200, 8), corner(195, 200, 10)}),
               ElementsAre(0));
 }
 
 TEST(MatchForInitialization, WindowIsASquareAroundThePreviousPosition) {
-  EXPECT_THAT(match({feature(200, 200, 0)}, {feature(299.5F, 299.5F, 3)}), ElementsAre(0));
-  EXPECT_THAT(match({feature(200, 200, 0)}, {feature(300, 200, 3)}), ElementsAre(-1));
+  EXPECT_THAT(match_first_level({corner(200, 200, 0)}, {corner(299.5F, 299.5F, 3)}),
+              ElementsAre(0));
+  EXPECT_THAT(match_first_level({corner(200, 200, 0)}, {corner(300, 200, 3)}), ElementsAre(-1));
 }
 
 TEST(MatchForInitialization, SearchFollowsMatchedPositions) {
-  const auto initial = make_synthetic_frame(0, {feature(100, 100, 20), feature(400, 300, 200)});
-  const auto second = make_synthetic_frame(1, {feature(180, 100, 20)});
-  const auto third = make_synthetic_frame(2, {feature(260, 100, 20)});
+  const auto initial = make_synthetic_frame(0, {corner(100, 100, 20), corner(400, 300, 200)});
+  const auto second = make_synthetic_frame(1, {corner(180, 100, 20)});
+  const auto third = make_synthetic_frame(2, {corner(260, 100, 20)});
   auto previous = positions_of(*initial);
   EXPECT_THAT(match_for_initialization(*initial, *second, previous, 100, 0.9F), ElementsAre(0, -1));
   EXPECT_EQ(previous[0], Eigen::Vector2f(180, 100));
@@ -94,7 +97,7 @@ TEST(MatchForInitialization, RotationMustAgreeWithTheMajority) {
   std::mt19937_64 random(3);
   std::vector<FeatureSpec> initial, current;
   for (int i = 0; i < 40; ++i) {
-    FeatureSpec spec = feature(60.0F + 12.0F * static_cast<float>(i), 240, 0);
+    FeatureSpec spec = corner(60.0F + 12.0F * static_cast<float>(i), 240, 0);
     spec.descriptor = testing::random_descriptor(random);
     current.push_back(spec);
     spec.angle = i == 17 ? 200.0F : 100.0F;
@@ -112,15 +115,15 @@ TEST(MatchForInitialization, RotationMustAgreeWithTheMajority) {
 }
 
 TEST(MatchForInitialization, EmptyFramesAndWrongSizes) {
-  EXPECT_THAT(match({}, {}), ::testing::IsEmpty());
-  EXPECT_THAT(match({feature(1, 1, 0)}, {}), Each(-1));
-  const auto frame = make_synthetic_frame(0, {feature(1, 1, 0)});
+  EXPECT_THAT(match_first_level({}, {}), ::testing::IsEmpty());
+  EXPECT_THAT(match_first_level({corner(1, 1, 0)}, {}), Each(-1));
+  const auto frame = make_synthetic_frame(0, {corner(1, 1, 0)});
   std::vector<Eigen::Vector2f> previous;
   EXPECT_THROW(match_for_initialization(*frame, *frame, previous, 100, 0.9F), StateError);
 }
 
 TEST(MatchForInitialization, NonFinitePreviousPositionsMatchNothing) {
-  const auto frame = make_synthetic_frame(0, {feature(10, 10, 0)});
+  const auto frame = make_synthetic_frame(0, {corner(10, 10, 0)});
   std::vector<Eigen::Vector2f> previous{{std::nanf(""), 10}};
   EXPECT_THAT(match_for_initialization(*frame, *frame, previous, 100, 0.9F), ElementsAre(-1));
 }
@@ -197,41 +200,41 @@ std::vector<int> match_all_levels(const std::vector<FeatureSpec>& first,
 }
 
 TEST(MatchViews, WhatComesNearerIsFoundOnAHigherLevel) {
-  EXPECT_THAT(match_all_levels({feature(200, 200, 50, 1)}, {feature(205, 200, 50, 3)}),
+  EXPECT_THAT(match_all_levels({corner(200, 200, 50, 1)}, {corner(205, 200, 50, 3)}),
               ElementsAre(0));
-  EXPECT_THAT(match_all_levels({feature(200, 200, 50, 1)}, {feature(205, 200, 50, 4)}),
+  EXPECT_THAT(match_all_levels({corner(200, 200, 50, 1)}, {corner(205, 200, 50, 4)}),
               ElementsAre(-1));
 }
 
 TEST(MatchViews, CoarseKeypointsAreLeftOut) {
-  EXPECT_THAT(match_all_levels({feature(200, 200, 50, 4)}, {feature(200, 200, 50, 4)}),
+  EXPECT_THAT(match_all_levels({corner(200, 200, 50, 4)}, {corner(200, 200, 50, 4)}),
               ElementsAre(-1));
 }
 
 TEST(MatchViews, TheSameCornerOnAnotherLevelDoesNotCompete) {
   EXPECT_THAT(
-      match_all_levels({feature(200, 200, 50)}, {feature(205, 200, 50), feature(206, 200, 51, 1)}),
+      match_all_levels({corner(200, 200, 50)}, {corner(205, 200, 50), corner(206, 200, 51, 1)}),
       ElementsAre(0));
   EXPECT_THAT(
-      match_all_levels({feature(200, 200, 50)}, {feature(205, 200, 55), feature(225, 200, 45)}),
+      match_all_levels({corner(200, 200, 50)}, {corner(205, 200, 55), corner(225, 200, 45)}),
       ElementsAre(-1));
 }
 
 TEST(MatchViews, SearchesAroundTheExpectedPosition) {
   ViewMatchOptions narrow;
   narrow.window = 10;
-  const std::vector<FeatureSpec> current{feature(260, 200, 50)};
-  EXPECT_THAT(match_all_levels({feature(200, 200, 50)}, current, 0, narrow), ElementsAre(-1));
-  EXPECT_THAT(match_all_levels({feature(200, 200, 50)}, current, 55, narrow), ElementsAre(0));
+  const std::vector<FeatureSpec> current{corner(260, 200, 50)};
+  EXPECT_THAT(match_all_levels({corner(200, 200, 50)}, current, 0, narrow), ElementsAre(-1));
+  EXPECT_THAT(match_all_levels({corner(200, 200, 50)}, current, 55, narrow), ElementsAre(0));
 }
 
 TEST(MatchViews, TheBetterOfTwoWins) {
-  const FeatureSpec good = feature(200, 200, 98), worse = feature(210, 200, 90);
-  EXPECT_THAT(match_all_levels({worse, good}, {feature(205, 205, 100)}), ElementsAre(-1, 0));
+  const FeatureSpec good = corner(200, 200, 98), worse = corner(210, 200, 90);
+  EXPECT_THAT(match_all_levels({worse, good}, {corner(205, 205, 100)}), ElementsAre(-1, 0));
 }
 
 TEST(MatchViews, AsksForOnePositionPerKeypoint) {
-  const auto frame = make_synthetic_frame(0, {feature(200, 200, 50)});
+  const auto frame = make_synthetic_frame(0, {corner(200, 200, 50)});
   EXPECT_THROW(match_views(*frame, *frame, {}, {}), StateError);
 }
 

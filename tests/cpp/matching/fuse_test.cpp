@@ -114,9 +114,9 @@ TEST(FusePoints, KeyFramesExcludeTheirUpperBounds) {
 }
 
 TEST(FusePoints, PointsBehindTheCameraOrNowhere) {
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   for (const Eigen::Vector3d& bad :
-       {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(0, 0, -5), Eigen::Vector3d(0, kNan, 5)}) {
+       {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(0, 0, -5), Eigen::Vector3d(0, nan, 5)}) {
     Target target({feature(0)});
     target.map.set_position(target.point, bad);
     EXPECT_EQ(target.fuse(), 0);
@@ -191,7 +191,7 @@ TEST(FusePoints, DeadPointsAndKeyFrames) {
 
 // ---- neighbours ------------------------------------------------------------------------------
 
-constexpr std::size_t kShared = 60;
+constexpr std::size_t kSharedPoints = 60;
 
 // Keyframes in a row that share a few points and have points of their own for everything else.
 std::vector<KeyFrameId> add_row_with_duplicates(Scene& scene, const std::vector<double>& xs) {
@@ -201,7 +201,7 @@ std::vector<KeyFrameId> add_row_with_duplicates(Scene& scene, const std::vector<
   for (const double x : xs) {
     options.seed = ids.size() + 1;
     ids.push_back(scene.add_keyframe(at(x), options));
-    scene.forget(kShared, scene.points.size());
+    scene.forget(kSharedPoints, scene.points.size());
     scene.observe_all(ids.back());
   }
   return ids;
@@ -250,14 +250,14 @@ TEST(FuseWithNeighbours, ObservationsAreAddedBothWays) {
   const KeyFrameId a = scene.add_keyframe(at(0));
   const KeyFrameId b = scene.add_keyframe(at(0.2));
   scene.observe(a, 0, 300);
-  scene.observe(b, 0, kShared);
+  scene.observe(b, 0, kSharedPoints);
   scene.observe(b, 300, 500);
   fuse_with_neighbours(scene.map, b, 10);
   const auto points_a = points_by_cloud(scene, a), points_b = points_by_cloud(scene, b);
   std::size_t forward = 0, backward = 0;
   for (std::size_t i = 0; i < 500; ++i) {
     if (!points_a[i].valid() || points_a[i] != points_b[i]) continue;
-    (i < 300 ? backward : forward) += i >= kShared;
+    (i < 300 ? backward : forward) += i >= kSharedPoints;
   }
   EXPECT_GT(forward, 80U);
   EXPECT_GT(backward, 80U);

@@ -13,7 +13,7 @@ namespace {
 using namespace testing;
 
 // One point seen by two cameras; everything about the second sight can be changed.
-struct Pair {
+struct FramePair {
   Eigen::Vector3d point{0.5, 0.2, 5};
   Pose T_1w, T_2w = at(1);
   double depth_1 = -1, depth_2 = -1;  // as measured; negative: none
@@ -42,7 +42,7 @@ struct Pair {
 };
 
 TEST(PairTriangulation, FindsTheTruePointFromTwoRays) {
-  const Pair pair;
+  const FramePair pair;
   const auto found = pair.triangulate();
   ASSERT_TRUE(found);
   EXPECT_LT((*found - pair.point).norm(), 1e-4);
@@ -50,7 +50,7 @@ TEST(PairTriangulation, FindsTheTruePointFromTwoRays) {
 
 TEST(PairTriangulation, SingleCamerasNeedParallax) {
   // cos 0.9998 is 0.02 rad: 0.1 m at 5 m.
-  Pair pair;
+  FramePair pair;
   pair.point = {0, 0, 5};
   pair.T_2w = at(0.099);
   EXPECT_FALSE(pair.accepted());
@@ -59,7 +59,7 @@ TEST(PairTriangulation, SingleCamerasNeedParallax) {
 }
 
 TEST(PairTriangulation, WideRaysAreBetterThanMeasuredDepth) {
-  Pair pair;
+  FramePair pair;
   pair.depth_1 = 5.02;
   pair.depth_2 = 5.03;
   const auto found = pair.triangulate();
@@ -68,7 +68,7 @@ TEST(PairTriangulation, WideRaysAreBetterThanMeasuredDepth) {
 }
 
 TEST(PairTriangulation, MeasuredDepthIsBetterThanNarrowRays) {
-  Pair pair;
+  FramePair pair;
   pair.T_2w = at(0.05);  // half the baseline of the rig
   pair.depth_1 = 5.02;
   auto found = pair.triangulate();
@@ -84,7 +84,7 @@ TEST(PairTriangulation, MeasuredDepthIsBetterThanNarrowRays) {
 
 // OD-88: both parallaxes are asked, not only the first.
 TEST(PairTriangulation, OfTwoDepthsTheNearerDecides) {
-  Pair pair;
+  FramePair pair;
   pair.T_2w = at(0, 0, 0.3);  // moved towards the point
   pair.depth_1 = 5.02;
   pair.depth_2 = 4.71;
@@ -100,7 +100,7 @@ TEST(PairTriangulation, OfTwoDepthsTheNearerDecides) {
 }
 
 TEST(PairTriangulation, DepthWithoutParallaxAtAll) {
-  Pair pair;
+  FramePair pair;
   pair.T_2w = Pose();
   EXPECT_FALSE(pair.accepted());
   pair.depth_1 = pair.depth_2 = 5;  // equally good: the first is taken
@@ -108,14 +108,14 @@ TEST(PairTriangulation, DepthWithoutParallaxAtAll) {
 }
 
 TEST(PairTriangulation, RaysThatMeetBehindTheCameras) {
-  Pair pair;
+  FramePair pair;
   pair.point = {0.5, 0, -5};
   EXPECT_FALSE(pair.accepted());
 }
 
 TEST(PairTriangulation, ReprojectionGateWithoutDepth) {
   // sqrt(5.991) = 2.4477 pixels on level 0, 1.2 times as much on level 1.
-  Pair pair;
+  FramePair pair;
   pair.T_2w = at(0.02);
   pair.depth_1 = 5;
   for (const std::int32_t level : {0, 1}) {
@@ -130,7 +130,7 @@ TEST(PairTriangulation, ReprojectionGateWithoutDepth) {
 
 TEST(PairTriangulation, ReprojectionGateWithDepth) {
   // The first depth decides; the second contradicts it by `error` pixels in the right image.
-  Pair pair;
+  FramePair pair;
   pair.T_2w = at(0.02);
   pair.depth_1 = 5;
   for (const double sign : {-0.001, 0.001}) {
@@ -142,7 +142,7 @@ TEST(PairTriangulation, ReprojectionGateWithDepth) {
 
 // OD-89: the second right column is not judged with the first camera's baseline.
 TEST(PairTriangulation, EachCameraHasItsOwnBaseline) {
-  Pair pair;
+  FramePair pair;
   pair.camera_2 = synthetic_camera(80);
   pair.depth_1 = pair.depth_2 = 5;
   EXPECT_TRUE(pair.accepted());
@@ -150,7 +150,7 @@ TEST(PairTriangulation, EachCameraHasItsOwnBaseline) {
 
 TEST(PairTriangulation, LevelsMustAgreeWithDistances) {
   // Equal distances: 1.8 lies between three and four levels of 1.2.
-  Pair pair;
+  FramePair pair;
   pair.point = {0.5, 0, 5};
   for (const std::int32_t difference : {0, 1, 2, 3, 4}) {
     pair.level_1 = difference;
@@ -172,7 +172,7 @@ TEST(PairTriangulation, LevelsMustAgreeWithDistances) {
 TEST(PairTriangulation, RandomPerfectPairsAreFoundWhereTheyAre) {
   std::mt19937_64 random(5);
   for (int i = 0; i < 500; ++i) {
-    Pair pair;
+    FramePair pair;
     pair.point = {uniform(random, -2, 2), uniform(random, -2, 2), uniform(random, 3, 8)};
     pair.T_2w = small_motion(random, 0.1, 0.3) * at(0.5);
     if (random() % 2) pair.depth_1 = (pair.T_1w * pair.point).z();

@@ -9,13 +9,12 @@
 
 #include "optimize/bundle_point.hpp"
 #include "optimize/gates.hpp"
+#include "support/random_numbers.hpp"
 
 namespace orbslam {
 namespace {
 
-double uniform(std::mt19937_64& random, double low, double high) {
-  return low + (high - low) * static_cast<double>(random() >> 11) * 0x1.0p-53;
-}
+using testing::uniform;
 
 /// One observation away from the chart's origin, with everything a cost function reads.
 struct Scene {

@@ -15,9 +15,12 @@
 #include "optimize/pose_graph_residuals.hpp"
 #include "optimize/pose_kernels.hpp"
 #include "optimize/sim3_residuals.hpp"
+#include "support/random_numbers.hpp"
 
 namespace orbslam {
 namespace {
+
+using testing::uniform;
 
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using Blocks = std::vector<Eigen::VectorXd>;
@@ -80,10 +83,6 @@ Differentiable ceres_function(std::string name, const ceres::CostFunction& cost,
                                       jacobians == nullptr ? nullptr : pointers.data()));
             return residuals;
           }};
-}
-
-double uniform(std::mt19937_64& random, double low, double high) {
-  return low + (high - low) * static_cast<double>(random() >> 11) * 0x1.0p-53;
 }
 
 Eigen::VectorXd random_vector(std::mt19937_64& random, Eigen::Index n, double size) {

@@ -122,7 +122,7 @@ TEST(OptimizePoseGraph, FixedVerticesAndScalesStay) {
 
 /// The residual by Eigen's logarithm of 4x4 matrices, which is [[omega]x + sigma I, upsilon; 0, 0],
 /// to be differentiated numerically.
-struct OracleResidual {
+struct OracleOfLogarithms {
   Similarity S_ji, S_iw, S_jw;
   bool fix_scale;
 
@@ -153,8 +153,8 @@ std::pair<std::vector<Similarity>, double> solve_with_oracle(const PoseGraph& gr
   ceres::NumericDiffOptions steps;
   steps.relative_step_size = 1e-5;
   for (const PoseGraph::Edge& e : graph.edges) {
-    auto* cost = new ceres::DynamicNumericDiffCostFunction<OracleResidual, ceres::CENTRAL>(
-        new OracleResidual{e.S_ji, graph.S_iw[e.i], graph.S_iw[e.j], fix_scale},
+    auto* cost = new ceres::DynamicNumericDiffCostFunction<OracleOfLogarithms, ceres::CENTRAL>(
+        new OracleOfLogarithms{e.S_ji, graph.S_iw[e.i], graph.S_iw[e.j], fix_scale},
         ceres::TAKE_OWNERSHIP, steps);
     cost->AddParameterBlock(n);
     cost->AddParameterBlock(n);

@@ -9,12 +9,9 @@
 #include <vector>
 
 #include "optimize/pose_graph.hpp"
+#include "support/random_numbers.hpp"
 
 namespace orbslam::testing {
-
-inline double uniform(std::mt19937_64& random, double low, double high) {
-  return low + (high - low) * static_cast<double>(random() >> 11) * 0x1.0p-53;
-}
 
 inline Vector7d random_tangent(std::mt19937_64& random, double rotation, double translation,
                                double log_scale) {

@@ -10,19 +10,17 @@
 #include <random>
 
 #include "golden.hpp"
+#include "support/random_numbers.hpp"
 
 namespace orbslam {
 namespace {
 
 using testing::golden_pose_problem;
 using testing::PoseProblem;
-
-double uniform(std::mt19937_64& random, double low, double high) {
-  return low + (high - low) * static_cast<double>(random() >> 11) * 0x1.0p-53;
-}
+using testing::uniform;
 
 /// The same residuals written independently, for automatic differentiation.
-struct OracleResidual {
+struct OracleOfProjections {
   PoseObservation o;
   Pinhole k;
   double bf;
@@ -58,8 +56,8 @@ PoseEstimate solve_with_ceres(const PoseProblem& problem) {
       const PoseObservation& o = problem.observations[i];
       const double gate = o.has_depth ? 7.815 : 5.991;
       ceres_problem.AddResidualBlock(
-          new ceres::AutoDiffCostFunction<OracleResidual, 3, 6>(
-              new OracleResidual{o, problem.pinhole, problem.bf, problem.T_cw_initial}),
+          new ceres::AutoDiffCostFunction<OracleOfProjections, 3, 6>(
+              new OracleOfProjections{o, problem.pinhole, problem.bf, problem.T_cw_initial}),
           round < 3 ? new ceres::HuberLoss(std::sqrt(gate)) : nullptr, xi);
     }
     ceres::Solver::Options options;
@@ -78,8 +76,8 @@ PoseEstimate solve_with_ceres(const PoseProblem& problem) {
     estimate.n_inliers = 0;
     for (std::size_t i = 0; i < problem.observations.size(); ++i) {
       double residual[3];
-      OracleResidual{problem.observations[i], problem.pinhole, problem.bf, problem.T_cw_initial}(
-          xi, residual);
+      OracleOfProjections{problem.observations[i], problem.pinhole, problem.bf,
+                          problem.T_cw_initial}(xi, residual);
       const double squared =
           residual[0] * residual[0] + residual[1] * residual[1] + residual[2] * residual[2];
       const bool front = (estimate.T_cw * problem.observations[i].position).z() > 0;
@@ -95,7 +93,8 @@ double distance(const Pose& a, const Pose& b) {
   return (a.matrix() - b.matrix()).cwiseAbs().maxCoeff();
 }
 
-PoseProblem random_problem(std::uint64_t seed, std::size_t n, double outliers, bool with_depth) {
+PoseProblem random_pose_problem(std::uint64_t seed, std::size_t n, double outliers,
+                                bool with_depth) {
   std::mt19937_64 random(seed);
   PoseProblem problem;
   problem.pinhole = {500, 510, 320, 240};
@@ -151,7 +150,7 @@ INSTANTIATE_TEST_SUITE_P(Sets, PoseOptimizationGolden,
 TEST(PoseOptimization, AgreesWithCeresOnRandomProblems) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     // Odd numbers of both kinds exercise the padding.
-    const PoseProblem problem = random_problem(seed, 101 + seed, 0.15, seed % 2 == 0);
+    const PoseProblem problem = random_pose_problem(seed, 101 + seed, 0.15, seed % 2 == 0);
     const PoseEstimate ours = solve(problem), oracle = solve_with_ceres(problem);
     EXPECT_LT(distance(ours.T_cw, oracle.T_cw), 1e-6) << "seed " << seed;
     EXPECT_EQ(ours.outlier, oracle.outlier) << "seed " << seed;
@@ -159,7 +158,7 @@ TEST(PoseOptimization, AgreesWithCeresOnRandomProblems) {
 }
 
 TEST(PoseOptimization, TooFewObservationsLeaveThePoseAlone) {
-  PoseProblem problem = random_problem(1, 2, 0, false);
+  PoseProblem problem = random_pose_problem(1, 2, 0, false);
   const PoseEstimate estimate = solve(problem);
   EXPECT_EQ(distance(estimate.T_cw, problem.T_cw_initial), 0);
   EXPECT_EQ(estimate.n_inliers, 0);
@@ -170,7 +169,7 @@ TEST(PoseOptimization, TooFewObservationsLeaveThePoseAlone) {
 }
 
 TEST(PoseOptimization, FewObservationsGetOneRound) {
-  const PoseProblem problem = random_problem(2, 9, 0, true);
+  const PoseProblem problem = random_pose_problem(2, 9, 0, true);
   const PoseEstimate estimate = solve(problem);
   EXPECT_GE(estimate.n_inliers, 7);
   EXPECT_LE(estimate.iterations, 10);
@@ -178,7 +177,7 @@ TEST(PoseOptimization, FewObservationsGetOneRound) {
 
 // OD-110: points must lie in front of the camera.
 TEST(PoseOptimization, PointsBehindTheCameraAreOutliers) {
-  PoseProblem problem = random_problem(3, 60, 0, true);
+  PoseProblem problem = random_pose_problem(3, 60, 0, true);
   const Pose T_wc = problem.T_cw_initial.inverse();
   for (std::size_t i = 0; i < 5; ++i) {
     PoseObservation o = problem.observations[i];
@@ -192,7 +191,7 @@ TEST(PoseOptimization, PointsBehindTheCameraAreOutliers) {
 }
 
 TEST(PoseOptimization, BrokenNumbersTakeNoPart) {
-  PoseProblem problem = random_problem(4, 50, 0, true);
+  PoseProblem problem = random_pose_problem(4, 50, 0, true);
   const PoseEstimate clean = solve(problem);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   PoseObservation o = problem.observations[0];
@@ -213,7 +212,7 @@ TEST(PoseOptimization, BrokenNumbersTakeNoPart) {
 
 // OD-111: no further rounds with less than 3 inliers.
 TEST(PoseOptimization, HopelessProblemEndsWithoutInliers) {
-  PoseProblem problem = random_problem(5, 30, 0, false);
+  PoseProblem problem = random_pose_problem(5, 30, 0, false);
   std::mt19937_64 random(9);
   for (PoseObservation& o : problem.observations) {
     o.u = uniform(random, 0, 640);
@@ -227,9 +226,9 @@ TEST(PoseOptimization, HopelessProblemEndsWithoutInliers) {
 }
 
 TEST(PoseOptimization, RepeatsBitByBit) {
-  const PoseProblem problem = random_problem(6, 333, 0.2, true);
+  const PoseProblem problem = random_pose_problem(6, 333, 0.2, true);
   const PoseEstimate a = solve(problem);
-  solve(random_problem(8, 700, 0.1, false));  // leaves other numbers in the workspace
+  solve(random_pose_problem(8, 700, 0.1, false));  // leaves other numbers in the workspace
   const PoseEstimate b = solve(problem);
   EXPECT_EQ(a.T_cw.matrix(), b.T_cw.matrix());
   EXPECT_EQ(a.covariance, b.covariance);
@@ -240,7 +239,7 @@ TEST(PoseOptimization, CovarianceIsThatOfRepeatedMeasurements) {
   // Same scene, fresh noise: the scatter of the estimates must be what one estimate predicts.
   const int n_runs = 300;
   Matrix6d scatter = Matrix6d::Zero(), predicted = Matrix6d::Zero();
-  PoseProblem problem = random_problem(10, 80, 0, true);
+  PoseProblem problem = random_pose_problem(10, 80, 0, true);
   const Pose truth = solve(problem).T_cw;
   std::mt19937_64 random(11);
   for (int run = 0; run < n_runs; ++run) {

@@ -7,12 +7,9 @@
 #include <vector>
 
 #include "optimize/bundle_adjustment.hpp"
+#include "support/random_numbers.hpp"
 
 namespace orbslam::testing {
-
-inline double uniform(std::mt19937_64& random, double low, double high) {
-  return low + (high - low) * static_cast<double>(random() >> 11) * 0x1.0p-53;
-}
 
 /// Cameras in a row that look at a box of points; poses and points are disturbed.
 inline BundleProblem random_bundle(std::uint64_t seed, std::size_t n_cameras, std::size_t n_points,

@@ -10,13 +10,12 @@
 
 #include "golden.hpp"
 #include "optimize/sim3_residuals.hpp"
+#include "support/random_numbers.hpp"
 
 namespace orbslam {
 namespace {
 
-double uniform(std::mt19937_64& random, double low, double high) {
-  return low + (high - low) * static_cast<double>(random() >> 11) * 0x1.0p-53;
-}
+using testing::uniform;
 
 struct SimilarityProblem {
   Similarity S_12_true, S_12_initial;
@@ -37,7 +36,8 @@ Vector7d random_tangent(std::mt19937_64& random, double size) {
 
 /// Points 1 to 10 m before camera 1; `noise` [pixels] on the keypoints, and outliers far off in
 /// one of the images.
-SimilarityProblem random_problem(std::uint64_t seed, std::size_t n, double noise, double outliers) {
+SimilarityProblem random_sim3_problem(std::uint64_t seed, std::size_t n, double noise,
+                                      double outliers) {
   std::mt19937_64 random(seed);
   SimilarityProblem problem;
   problem.S_12_true = Similarity::exp(random_tangent(random, 0.3));
@@ -61,7 +61,7 @@ SimilarityProblem random_problem(std::uint64_t seed, std::size_t n, double noise
   return problem;
 }
 
-double distance(const Similarity& a, const Similarity& b) {
+double difference(const Similarity& a, const Similarity& b) {
   return (a.matrix() - b.matrix()).cwiseAbs().maxCoeff();
 }
 
@@ -93,15 +93,15 @@ TEST(Sim3Residuals, DepthIsThatOfTheProjectedPoint) {
 
 TEST(OptimizeSimilarity, RecoversTheTruth) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
-    const SimilarityProblem problem = random_problem(seed, 60, 0, 0.2);
+    const SimilarityProblem problem = random_sim3_problem(seed, 60, 0, 0.2);
     const SimilarityEstimate estimate = problem.solve();
-    EXPECT_LT(distance(estimate.S_12, problem.S_12_true), 1e-6) << seed;
+    EXPECT_LT(difference(estimate.S_12, problem.S_12_true), 1e-6) << seed;
     EXPECT_EQ(estimate.outlier, problem.outlier) << seed;
   }
 }
 
 TEST(OptimizeSimilarity, OutliersAreThoseBeyondTheGateInEitherImage) {
-  const SimilarityProblem problem = random_problem(3, 100, 2.5, 0.2);
+  const SimilarityProblem problem = random_sim3_problem(3, 100, 2.5, 0.2);
   const SimilarityEstimate estimate = problem.solve();
   int inliers = 0;
   for (std::size_t i = 0; i < problem.matches.size(); ++i) {
@@ -121,7 +121,7 @@ TEST(OptimizeSimilarity, OutliersAreThoseBeyondTheGateInEitherImage) {
 }
 
 TEST(OptimizeSimilarity, NoSmallMotionReducesTheError) {
-  const SimilarityProblem problem = random_problem(4, 80, 1, 0);
+  const SimilarityProblem problem = random_sim3_problem(4, 80, 1, 0);
   const std::vector<std::uint8_t> none(80, 0);
   const auto cost = [&](const Similarity& S_12) { return cost_without(problem, none, S_12); };
   for (const bool fix_scale : {false, true}) {
@@ -142,25 +142,25 @@ TEST(OptimizeSimilarity, NoSmallMotionReducesTheError) {
 }
 
 TEST(OptimizeSimilarity, FixedScaleDoesNotMove) {
-  const SimilarityProblem problem = random_problem(5, 60, 1, 0);
+  const SimilarityProblem problem = random_sim3_problem(5, 60, 1, 0);
   const SimilarityEstimate fixed = problem.solve({10, true});
   EXPECT_EQ(fixed.S_12.scale(), problem.S_12_initial.scale());
-  EXPECT_GT(distance(fixed.S_12, problem.S_12_initial), 1e-4);
+  EXPECT_GT(difference(fixed.S_12, problem.S_12_initial), 1e-4);
   EXPECT_NE(problem.solve().S_12.scale(), problem.S_12_initial.scale());
 }
 
 TEST(OptimizeSimilarity, TooFewMatchesChangeNothing) {
   for (const std::size_t n : {0U, 1U, 9U}) {
-    const SimilarityProblem problem = random_problem(6, n, 0, 0);
+    const SimilarityProblem problem = random_sim3_problem(6, n, 0, 0);
     const SimilarityEstimate estimate = problem.solve();
     EXPECT_EQ(estimate.n_inliers, 0);
-    EXPECT_EQ(distance(estimate.S_12, problem.S_12_initial), 0);
+    EXPECT_EQ(difference(estimate.S_12, problem.S_12_initial), 0);
   }
-  EXPECT_EQ(random_problem(6, 10, 0, 0).solve().n_inliers, 10);
+  EXPECT_EQ(random_sim3_problem(6, 10, 0, 0).solve().n_inliers, 10);
 }
 
 TEST(OptimizeSimilarity, PointsBehindACameraAndBrokenNumbersAreOutliers) {
-  SimilarityProblem problem = random_problem(7, 60, 0, 0);
+  SimilarityProblem problem = random_sim3_problem(7, 60, 0, 0);
   // Mirrored through both cameras' centres, both pixels stay right without being seen.
   const Similarity S_21 = problem.S_12_true.inverse();
   for (std::size_t i = 0; i < 3; ++i) {
@@ -171,12 +171,12 @@ TEST(OptimizeSimilarity, PointsBehindACameraAndBrokenNumbersAreOutliers) {
   problem.matches[3].point_1.x() = std::numeric_limits<double>::quiet_NaN();
   problem.matches[4].pixel_2.y() = std::numeric_limits<double>::infinity();
   const SimilarityEstimate estimate = problem.solve();
-  EXPECT_LT(distance(estimate.S_12, problem.S_12_true), 1e-6);
+  EXPECT_LT(difference(estimate.S_12, problem.S_12_true), 1e-6);
   for (std::size_t i = 0; i < 60; ++i) EXPECT_EQ(estimate.outlier[i], i < 5 ? 1 : 0) << i;
 }
 
 TEST(OptimizeSimilarity, RefusesBadGates) {
-  EXPECT_THROW(random_problem(8, 20, 0, 0).solve({0, false}), std::invalid_argument);
+  EXPECT_THROW(random_sim3_problem(8, 20, 0, 0).solve({0, false}), std::invalid_argument);
 }
 
 SimilarityProblem golden_problem() {

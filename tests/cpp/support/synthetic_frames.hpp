@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "frame/frame.hpp"
+#include "support/random_numbers.hpp"
 
 /// Frames without images: keypoints, depths and descriptors are given or projected from points.
 /// Header only; link orbslam_frame.
@@ -39,18 +40,6 @@ inline std::shared_ptr<const ScalePyramid> synthetic_scales() {
   return scales;
 }
 
-/// Uniform in [0, 1), the same on every platform.
-inline double uniform(std::mt19937_64& random) {
-  return static_cast<double>(random() >> 11) * 0x1.0p-53;
-}
-inline double uniform(std::mt19937_64& random, double low, double high) {
-  return low + (high - low) * uniform(random);
-}
-/// Uniform in 0 .. n - 1 (n small against 2^64).
-inline std::size_t uniform_index(std::mt19937_64& random, std::size_t n) {
-  return static_cast<std::size_t>(random() % n);
-}
-
 inline Descriptor random_descriptor(std::mt19937_64& random) {
   Descriptor descriptor;
   for (auto& word : descriptor.words) word = random();
@@ -58,8 +47,8 @@ inline Descriptor random_descriptor(std::mt19937_64& random) {
 }
 
 /// The descriptor with exactly `n` different bits flipped, n <= 256.
-inline Descriptor flip_bits(Descriptor descriptor, int n, std::mt19937_64& random) {
-  Descriptor flipped{};
+inline Descriptor flip_bits(const Descriptor& original, int n, std::mt19937_64& random) {
+  Descriptor descriptor = original, flipped{};
   while (n > 0) {
     const std::size_t bit = uniform_index(random, 256);
     const std::uint64_t mask = std::uint64_t{1} << (bit % 64);
