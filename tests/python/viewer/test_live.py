@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -48,8 +49,8 @@ def browser() -> Iterator[Browser]:
         yield browser
 
 
-@pytest.fixture
-def show(browser: Browser) -> Iterator[Show]:
+@contextmanager
+def _a_show(browser: Browser) -> Iterator[Show]:
     with (
         new_system(Sensor.RGBD, wait_for_mapping=True) as system,
         Viewer(
@@ -63,45 +64,58 @@ def show(browser: Browser) -> Iterator[Show]:
         page.close()
 
 
-def test_image_map_cameras_and_figures_are_seen(show: Show, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def steady(browser: Browser) -> Iterator[Show]:
+    """One for all tests that look, and leave everything as it was."""
+    with _a_show(browser) as show:
+        yield show
+
+
+@pytest.fixture
+def show(browser: Browser) -> Iterator[Show]:
+    with _a_show(browser) as show:
+        yield show
+
+
+def test_image_map_cameras_and_figures_are_seen(steady: Show, tmp_path: Path) -> None:
     def complete(seen: np.ndarray) -> bool:
         middle = map_part(seen)
         points, cameras = amount(middle, LOCAL_POINTS), amount(middle, KEYFRAME, 40)
         return points > 300 and cameras > 60 and amount(middle, MAPPED, tolerance=65) > 40
 
-    seen = wait_until_seen(show.page, complete, "points, keyframes and camera")
+    seen = wait_until_seen(steady.page, complete, "points, keyframes and camera")
     left = seen[:, :430]
     assert amount(left, MAPPED, 40) > 300  # keypoints in the image
     image = left[80:380, 20:400]
     assert image.std() > 30  # a picture, and no grey rectangle
-    for text in ("SLAM", f"{show.system.n_keyframes} keyframes", "from the ground truth"):
-        show.page.wait_for(f"document.body.innerText.includes('{text}')", 50)
+    for text in ("SLAM", f"{steady.system.n_keyframes} keyframes", "from the ground truth"):
+        steady.page.wait_for(f"document.body.innerText.includes('{text}')", 50)
     plots = "document.querySelectorAll('.uplot canvas').length"
-    assert show.page.evaluate(plots) == 2
+    assert steady.page.evaluate(plots) == 2
     # The drawing library of the page speaks of itself, and of graphics that are drawn in software.
-    own = [text for text in show.page.errors if "THREE.Clock" not in text and "WebGL" not in text]
+    own = [text for text in steady.page.errors if "THREE.Clock" not in text and "WebGL" not in text]
     assert own == []
 
 
-def test_nothing_is_asked_of_other_computers(show: Show) -> None:
-    wait_until_seen(show.page, lambda seen: amount(map_part(seen), LOCAL_POINTS) > 300, "points")
-    own = show.viewer.address.removeprefix("http://")
-    for request in show.page.requests:
+def test_nothing_is_asked_of_other_computers(steady: Show) -> None:
+    wait_until_seen(steady.page, lambda seen: amount(map_part(seen), LOCAL_POINTS) > 300, "points")
+    own = steady.viewer.address.removeprefix("http://")
+    for request in steady.page.requests:
         assert request.startswith(("data:", f"blob:http://{own}/", f"http://{own}", f"ws://{own}"))
     assert own.startswith("127.0.0.1:")
 
 
-def test_layers_are_switched_off_and_on(show: Show) -> None:
+def test_layers_are_switched_off_and_on(steady: Show) -> None:
     def shown(seen: np.ndarray) -> bool:
         return amount(map_part(seen), LOCAL_POINTS) > 300
 
-    wait_until_seen(show.page, shown, "local points")
-    click_on(show.page, "Points of the local map")
+    wait_until_seen(steady.page, shown, "local points")
+    click_on(steady.page, "Points of the local map")
     wait_until_seen(
-        show.page, lambda seen: amount(map_part(seen), LOCAL_POINTS) < 20, "no local points"
+        steady.page, lambda seen: amount(map_part(seen), LOCAL_POINTS) < 20, "no local points"
     )
-    click_on(show.page, "Points of the local map")
-    wait_until_seen(show.page, shown, "local points again")
+    click_on(steady.page, "Points of the local map")
+    wait_until_seen(steady.page, shown, "local points again")
 
 
 def test_localization_mode_is_switched(show: Show) -> None:
@@ -129,19 +143,19 @@ def test_reset_begins_a_new_map_and_the_page_goes_on(show: Show) -> None:
     wait_until_seen(show.page, lambda seen: amount(map_part(seen), LOCAL_POINTS) > 100, "points")
 
 
-def test_optimize_is_told(show: Show) -> None:
-    click_on(show.page, "Optimize")
-    wait_until(lambda: len(show.system.full_adjustments) == 1, "a full adjustment")
-    show.page.wait_for("document.body.innerText.includes('Optimized: ')", 50)
+def test_optimize_is_told(steady: Show) -> None:
+    click_on(steady.page, "Optimize")
+    wait_until(lambda: len(steady.system.full_adjustments) == 1, "a full adjustment")
+    steady.page.wait_for("document.body.innerText.includes('Optimized: ')", 50)
 
 
-def test_the_map_is_saved(show: Show, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_map_is_saved(steady: Show, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    click_on(show.page, "Save map")
-    show.page.wait_for("document.body.innerText.includes('The map is in ')", 50)
+    click_on(steady.page, "Save map")
+    steady.page.wait_for("document.body.innerText.includes('The map is in ')", 50)
     saved = list(tmp_path.glob("map-*.orbmap"))
     assert len(saved) == 1
-    assert len(load_map(saved[0]).contents.keyframes.ids) == show.system.n_keyframes
+    assert len(load_map(saved[0]).contents.keyframes.ids) == steady.system.n_keyframes
 
 
 def test_stop_is_told_to_the_loop_that_reads_images(show: Show) -> None:
@@ -188,10 +202,12 @@ def _click_on_a_keyframe(page: Page) -> bool:
     return True
 
 
-def test_a_keyframe_that_is_clicked_is_shown(show: Show) -> None:
-    wait_until_seen(show.page, lambda seen: amount(map_part(seen), KEYFRAME, 40) > 60, "keyframes")
-    wait_until(lambda: _click_on_a_keyframe(show.page), "a keyframe's panel", 150)
-    assert "matched to the map then" in show.page.evaluate("document.body.innerText")
+def test_a_keyframe_that_is_clicked_is_shown(steady: Show) -> None:
+    wait_until_seen(
+        steady.page, lambda seen: amount(map_part(seen), KEYFRAME, 40) > 60, "keyframes"
+    )
+    wait_until(lambda: _click_on_a_keyframe(steady.page), "a keyframe's panel", 150)
+    assert "matched to the map then" in steady.page.evaluate("document.body.innerText")
 
 
 def test_browsers_that_reload_or_are_killed_change_nothing(show: Show) -> None:
