@@ -18,10 +18,11 @@ FRAME: Any = SimpleNamespace()
 
 
 class FakeMap:
-    """Keyframes 0 to 99; neighbours of each are those right before it."""
+    """Keyframes 0 to 99; neighbours of each are those right before it, or there are none."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, neighbours: bool = False) -> None:
         self.dead: set[int] = set()
+        self._neighbours = neighbours
 
     def has_keyframe(self, keyframe: int) -> bool:
         return keyframe not in self.dead
@@ -30,7 +31,8 @@ class FakeMap:
         return -1 if keyframe in self.dead else keyframe
 
     def best_neighbours(self, keyframe: int, n: int) -> np.ndarray:
-        return np.arange(keyframe - 1, keyframe - 1 - n, -1)
+        first = max(0, keyframe - n) if self._neighbours else keyframe
+        return np.arange(first, keyframe)[::-1]
 
     def keyframe_ids(self) -> np.ndarray:
         return np.arange(100)
@@ -115,7 +117,7 @@ def test_a_reset_forgets_the_frames_before(fake: FakeCore) -> None:
 
 def test_the_number_is_bounded_and_all_are_reached_in_the_end(fake: FakeCore) -> None:
     fake.found = {k: 1.0 - k / 100 for k in range(40)}
-    chosen, place = places(FakeMap()), lost_at(80)
+    chosen, place = places(FakeMap(neighbours=True)), lost_at(80)
     reached: set[int] = set()
     for failures in range(20):
         tried = chosen.of(FRAME, place, failures)
@@ -127,7 +129,15 @@ def test_the_number_is_bounded_and_all_are_reached_in_the_end(fake: FakeCore) ->
 
 
 def test_the_place_of_loss_is_searched_without_any_word(fake: FakeCore) -> None:
-    assert places(FakeMap()).of(FRAME, lost_at(80), 0)[:2] == [80, 79]
+    assert places(FakeMap(neighbours=True)).of(FRAME, lost_at(80), 0)[:2] == [80, 79]
+
+
+def test_few_places_bring_their_neighbours_in_turns(fake: FakeCore) -> None:
+    fake.found = {20: 0.5, 50: 0.3}
+    chosen = places(FakeMap(neighbours=True))
+    assert chosen.of(FRAME, None, 0) == [20, 50, 19, 49, 18, 48, 17, 47]
+    reached = {k for failures in range(6) for k in chosen.of(FRAME, None, failures)}
+    assert reached == {20, 50, *range(10, 20), *range(40, 50)}
 
 
 def test_a_place_that_died_names_nothing(fake: FakeCore) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import deque
 
 from orbslam2py import _core as core
@@ -56,7 +57,10 @@ class CandidatePlaces:
             Ids, the likeliest first, each once.
         """
         limits = self._limits
-        by_words = _taken(self._by_words(frame), limits.word_candidates, failures)
+        named = self._by_words(frame)
+        if len(named) < limits.word_candidates:
+            named += self._around(named)
+        by_words = _taken(named, limits.word_candidates, failures)
         near = [] if place is None else place.keyframes(self._map, limits)
         by_place = _taken(near, limits.near_candidates, failures)
         return list(dict.fromkeys(by_words + by_place))
@@ -75,6 +79,18 @@ class CandidatePlaces:
                 scores[keyframe] = scores.get(keyframe, 0.0) + score
         living = [keyframe for keyframe in scores if self._map.has_keyframe(keyframe)]
         return sorted(living, key=lambda keyframe: (-scores[keyframe], keyframe))
+
+    def _around(self, places: list[int]) -> list[int]:
+        """Other keyframes of these places, those first that share most with the one named.
+
+        A place is named by the keyframe whose words are most alike; the camera may be much nearer
+        to another one.
+        """
+        n = self._limits.covisible_keyframes
+        neighbours = [self._map.best_neighbours(keyframe, n).tolist() for keyframe in places]
+        in_turns = itertools.chain.from_iterable(itertools.zip_longest(*neighbours))
+        named = {None, *places}
+        return [keyframe for keyframe in dict.fromkeys(in_turns) if keyframe not in named]
 
 
 def _taken(ranked: list[int], most: int, failures: int) -> list[int]:
