@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,7 @@ import pytest
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.trajectory import read_tum
 from support.command_line import RUN_FILES, Results
+from support.forked import Forked
 
 pytestmark = pytest.mark.watchdog(60)
 
@@ -48,8 +50,8 @@ def interrupting(*arguments, **named):
 setattr(owner, name, interrupting)
 signal.signal(signal.SIGINT, signal.default_int_handler)
 sys.argv = ["orbslam2py", *arguments]
-print("ready", flush=True)
 from orbslam2py.cli import main
+print("ready", flush=True)
 main()
 """
 
@@ -65,12 +67,29 @@ def lap(original: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(original, tmp_path / "lap"))
 
 
+@pytest.fixture(scope="module")
+def forked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Forked]:
+    made = Forked(tmp_path_factory.mktemp("forked"))
+    yield made
+    made.close()
+
+
+RUN = ["run", "lap", "--sensor", "rgbd", "--output", "r"]
+
+
+def run(
+    forked: Forked, folder: Path, module: str, name: str, n: int, times: int, *options: str
+) -> tuple[int, str]:
+    """The same as `start` and `finish`, but with the package loaded before."""
+    ended = forked.run(_DRIVER, [module, name, str(n), str(times), *RUN, *options], folder)
+    return ended.code, without_faults(ended.err)
+
+
 def start(
     folder: Path, module: str, name: str, n: int, times: int, *options: str
 ) -> subprocess.Popen[str]:
-    arguments = ["run", "lap", "--sensor", "rgbd", "--output", "r", *options]
     return subprocess.Popen(
-        [sys.executable, "-c", _DRIVER, module, name, str(n), str(times), *arguments],
+        [sys.executable, "-c", _DRIVER, module, name, str(n), str(times), *RUN, *options],
         cwd=folder,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -84,9 +103,13 @@ def finish(process: subprocess.Popen[str]) -> tuple[int, str]:
     finally:
         process.kill()
         process.wait()
+    return process.returncode, without_faults(err)
+
+
+def without_faults(err: str) -> str:
     assert "Traceback" not in err, err
     assert "terminate" not in err, err
-    return process.returncode, err
+    return err
 
 
 MOMENTS = [
@@ -106,8 +129,10 @@ MOMENTS = [
 @pytest.mark.parametrize(
     ("module", "name", "n", "options"), MOMENTS, ids=[moment[1] for moment in MOMENTS]
 )
-def test_once(lap: Path, module: str, name: str, n: int, options: tuple[str, ...]) -> None:
-    code, err = finish(start(lap.parent, module, name, n, 1, *options))
+def test_once(
+    lap: Path, forked: Forked, module: str, name: str, n: int, options: tuple[str, ...]
+) -> None:
+    code, err = run(forked, lap.parent, module, name, n, 1, *options)
     assert code == 130, err
     results = Results(lap.parent / "r")
     assert {path.name for path in results.folder.iterdir()} == RUN_FILES
@@ -125,10 +150,8 @@ def test_once(lap: Path, module: str, name: str, n: int, options: tuple[str, ...
         assert len(rows) <= 11, "the run ends with the present frame"
 
 
-def test_while_the_vocabulary_is_loaded(lap: Path) -> None:
-    code, err = finish(
-        start(lap.parent, "orbslam2py.vocabulary.vocabulary", "load_vocabulary", 1, 1)
-    )
+def test_while_the_vocabulary_is_loaded(lap: Path, forked: Forked) -> None:
+    code, err = run(forked, lap.parent, "orbslam2py.cli.run_and_show", "load_vocabulary", 1, 1)
     assert (code, err) == (130, "")
     assert not (lap.parent / "r").exists(), "nothing was computed"
 
@@ -170,8 +193,9 @@ def test_while_an_image_does_not_come(lap: Path) -> None:
     assert {path.name for path in (lap.parent / "r").iterdir()} == RUN_FILES
 
 
-def test_twice_while_writing_gives_up(lap: Path) -> None:
-    code, _ = finish(start(lap.parent, "orbslam2py.runs.run_picture", "draw_trajectory", 1, 2))
+def test_twice_while_writing_gives_up(lap: Path, forked: Forked) -> None:
+    place = "orbslam2py.runs.run_picture"
+    code, _ = run(forked, lap.parent, place, "draw_trajectory", 1, 2)
     assert code == 130
     names = {path.name for path in (lap.parent / "r").iterdir()}
     assert "trajectory.txt" in names
@@ -199,7 +223,7 @@ def test_ignored_in_the_background(lap: Path) -> None:
         "print('ready', flush=True)\n"
         "os.execv(sys.executable, [sys.executable, '-m', 'orbslam2py', *sys.argv[1:]])\n"
     )
-    arguments = ["run", "lap", "--sensor", "rgbd", "--output", "r", "--realtime", "--quiet"]
+    arguments = [*RUN, "--realtime", "--quiet"]
     process = subprocess.Popen(
         [sys.executable, "-c", code, *arguments],
         cwd=lap.parent,
