@@ -33,12 +33,15 @@ from .slam.events import KeyframeAdded as KeyframeAdded
 from .slam.events import LoopClosed as LoopClosed
 from .slam.events import MapChangeCause as MapChangeCause
 from .slam.events import MapChanged as MapChanged
+from .slam.events import MapsMerged as MapsMerged
+from .slam.events import MapStarted as MapStarted
 from .slam.events import Relocalized as Relocalized
 from .slam.events import TrackingLost as TrackingLost
 from .slam.full_bundle_adjustment import FullAdjustmentRecord as FullAdjustmentRecord
 from .slam.full_bundle_adjustment import optimize_map as optimize_map
 from .slam.records import Evidence as Evidence
 from .slam.records import FrameFeatures as FrameFeatures
+from .slam.records import MapSummary as MapSummary
 from .slam.records import PoseMethod as PoseMethod
 from .slam.records import Reason as Reason
 from .slam.records import TrackingRecord as TrackingRecord
