@@ -38,6 +38,8 @@ class FrameRecorder:
         # Frames of a young map, whose poses are estimated again; None: those of no map.
         self._young: list[tuple[core.TrackedFrame, bool]] | None = None
         self._young_map = -1
+        # The youngest map that a frame was recorded in.
+        self._last_map = 0
 
     @property
     def n_young(self) -> int:
@@ -69,6 +71,7 @@ class FrameRecorder:
 
     def _append(self, frame: core.TrackedFrame, *, lost: bool) -> None:
         self._recorder.record(self._map, frame, lost=lost)
+        self._last_map = max(self._last_map, frame.map_index)
         if not lost and frame.map_index != self._young_map:
             self._young = None
         if self._young is not None:
@@ -125,7 +128,8 @@ class FrameRecorder:
         with self._lock:
             self._settle()
             found = self._ended | {index: self._present(index) for index in self._living()}
-        return [found.get(index, _NO_POSES) for index in range(max(found) + 1)]
+        last = max(*found, self._last_map)
+        return [found.get(index, _NO_POSES) for index in range(last + 1)]
 
     def _living(self) -> list[int]:
         return sorted({*self._map.maps, self._map.active_map})
