@@ -47,6 +47,7 @@ from .slam.records import Reason as Reason
 from .slam.records import TrackingRecord as TrackingRecord
 from .slam.records import TrackingState as TrackingState
 from .slam.records import Verdict as Verdict
+from .slam.saved_map_merging import merge_maps as merge_maps
 from .slam.system import System as System
 from .trajectory import Trajectory as Trajectory
 from .viewer import Publisher as Publisher

@@ -32,7 +32,6 @@ LoopCorrection plan_loop_correction(const Map& map, const Loop& loop, bool fix_s
   std::optional<Seam> seam = draft_seam(map, loop, fix_scale);
   if (!seam || seam->near_map != seam->far_map) return correction;
   correction.epoch = seam->epoch;
-  correction.map = seam->near_map;
   build_essential_graph(map, seam->group, correction);
   if (correction.keyframes.empty()) return correction;
   correction.fusions = seam->draft.take_fusions();

@@ -22,7 +22,7 @@ from orbslam2py.errors import StateError
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.events import LoopClosed, MapsMerged
 from orbslam2py.slam.full_bundle_adjustment import FullBundleAdjustment
-from orbslam2py.slam.map_merging import MapMerging
+from orbslam2py.slam.merging import MapMerging
 from orbslam2py.slam.options import SystemOptions
 from orbslam2py.slam.thresholds import LoopThresholds
 

@@ -12,6 +12,7 @@ namespace orbslam {
 namespace {
 
 using namespace testing;
+using ::testing::ElementsAre;
 
 /// A lap cut in two without drift, the second part in a world that a known similarity leads to.
 RingOptions two_maps(bool monocular) {

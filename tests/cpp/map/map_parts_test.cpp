@@ -13,6 +13,7 @@ namespace orbslam {
 namespace {
 
 using namespace testing;
+using ::testing::ElementsAre;
 
 /// Keyframes 0 to 3 in map 0, 4 to 6 in map 1, tied by points.
 struct TwoMaps : MapBuilder {

@@ -64,6 +64,7 @@ NAMES = {
     "export_points",
     "export_trajectory",
     "load_vocabulary",
+    "merge_maps",
     "batch",
     "open_sequence",
     "optimize_map",
