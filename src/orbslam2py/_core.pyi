@@ -13,7 +13,7 @@ from orbslam2py.errors import SettingsError
 from orbslam2py.errors import StateError
 from orbslam2py.errors import VocabularyError
 import typing
-__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'ChangedIds', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FullBundleCommit', 'FullBundleOptions', 'FullBundleResult', 'GatheredBundle', 'ImageBounds', 'ImageError', 'ImageRotation', 'InlierSpread', 'KeyFrameIndex', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapChanges', 'MapFileError', 'MapFollower', 'MapRestorer', 'MapSnapshot', 'MapStamp', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewMotion', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'align_rotation', 'anchor_frame', 'apply_loop_correction', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'changed_since', 'check_invariants', 'check_map_contents', 'choose_loop', 'commit_full_bundle', 'corridor_way', 'count_map_points', 'count_sightings', 'count_staying', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'describe', 'direct_index_of', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'full_bundle_adjustment', 'fundamental_matrix', 'fuse_points', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'keep_small_image', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'map_contents', 'match_for_initialization', 'match_for_triangulation', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'match_views', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'plan_loop_correction', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'refresh_associations', 'render', 'room_T_wc', 'sample_colours', 'seed_of', 'select_local_map', 'sharpness', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'snapshot_points', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'spread_of_inliers', 'stamp_of', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'verify_loop_candidate', 'words_of']
+__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'ChangedIds', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FullBundleCommit', 'FullBundleOptions', 'FullBundleResult', 'GatheredBundle', 'ImageBounds', 'ImageError', 'ImageRotation', 'InlierSpread', 'KeyFrameIndex', 'KeyFramePoses', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapChanges', 'MapFileError', 'MapFollower', 'MapMerge', 'MapMergeResult', 'MapRestorer', 'MapSnapshot', 'MapStamp', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewMotion', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'align_rotation', 'anchor_frame', 'apply_loop_correction', 'apply_map_merge', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'changed_since', 'check_invariants', 'check_map_contents', 'choose_loop', 'choose_merge', 'commit_full_bundle', 'corridor_way', 'count_map_points', 'count_sightings', 'count_staying', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'describe', 'direct_index_of', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'full_bundle_adjustment', 'fundamental_matrix', 'fuse_points', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'keep_small_image', 'keyframes_of_seam', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'map_contents', 'match_for_initialization', 'match_for_triangulation', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'match_views', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'plan_loop_correction', 'plan_map_merge', 'poses_of_map', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'refresh_associations', 'render', 'room_T_wc', 'sample_colours', 'seed_of', 'select_local_map', 'sharpness', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'snapshot_points', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'spread_from_seam', 'spread_of_inliers', 'stamp_of', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'verify_loop_candidate', 'words_of']
 class Pose:
     """
     Rigid transform. `T_ab` maps coordinates of frame b into frame a.
@@ -587,6 +587,11 @@ class TrackedFrame:
         Id of the frame.
         """
     @property
+    def map_index(self) -> int:
+        """
+        The map that the pose belongs to; -1: none.
+        """
+    @property
     def map_points(self) -> numpy.typing.NDArray[numpy.int64]:
         """
         (n,) int64, ids of the associated map points, -1: none.
@@ -669,6 +674,14 @@ class Map:
         """
         An empty map.
         """
+    def activate_map(self, map: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        New keyframes belong to this map. Raises StateError if it holds none.
+        """
+    def activate_map_of(self, keyframe: int) -> int:
+        """
+        The same for the map of a keyframe, living or culled; its number.
+        """
     def add_keyframe(self, frame: Frame, T_cw: Pose) -> int:
         """
         A new, unpublished keyframe with empty slots; its id.
@@ -688,6 +701,11 @@ class Map:
     def begin_lease(self, id: int) -> None:
         """
         Protect a keyframe from erase_keyframe(); counted.
+        """
+    def begin_map(self) -> int:
+        """
+        The next keyframe begins a map, which becomes the active one; its number. Nothing
+        changes while the active one has no keyframe.
         """
     def best_neighbours(self, id: int, n: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
         """
@@ -713,6 +731,10 @@ class Map:
         """
         Remove a keyframe. False, and only marked, while leases or loop edges protect it.
         """
+    def erase_map(self, map: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        Drop a map with all that belongs to it; its keyframes: (n,) int64.
+        """
     def erase_observation(self, point: int, keyframe: int) -> None:
         """
         Remove an observation; the point dies at a weighted count of 2 or less.
@@ -729,13 +751,18 @@ class Map:
         """
         Whether the point is alive.
         """
+    def join_maps(self, child: int, parent: int) -> None:
+        """
+        All of the map of one keyframe belongs to that of the other one from now on.
+        """
     def keyframe_frame(self, id: int) -> Frame:
         """
         What a living keyframe saw: keypoints, descriptors, depths, colours, words.
         """
-    def keyframe_ids(self) -> numpy.typing.NDArray[numpy.int64]:
+    def keyframe_ids(self, map: typing.SupportsInt | typing.SupportsIndex = -1) -> numpy.typing.NDArray[numpy.int64]:
         """
-        Ids of all living keyframes, ascending, unpublished ones included: (n,) int64.
+        Ids of the living keyframes of a map (-1: of all), ascending, unpublished ones
+        included: (n,) int64.
         """
     def keyframe_points(self, id: int) -> numpy.typing.NDArray[numpy.int64]:
         """
@@ -753,6 +780,22 @@ class Map:
         """
         The keyframe itself, or the nearest of its ancestors that lives; -1 if unknown.
         """
+    def map_of(self, keyframe: int) -> int:
+        """
+        The map of a keyframe, living or culled; -1 if unknown.
+        """
+    def map_of_point(self, point: int) -> int:
+        """
+        The map of a living point, or of its successor; -1 if it died.
+        """
+    def n_keyframes_of(self, map: typing.SupportsInt | typing.SupportsIndex) -> int:
+        """
+        Number of published keyframes of a map.
+        """
+    def n_points_of(self, map: typing.SupportsInt | typing.SupportsIndex) -> int:
+        """
+        Number of living points of a map.
+        """
     def neighbours(self, id: int) -> numpy.typing.NDArray[numpy.int64]:
         """
         Covisible keyframes by descending number of shared points: (n,) int64.
@@ -767,7 +810,7 @@ class Map:
         """
     def parent(self, id: int) -> int:
         """
-        Parent in the spanning tree, -1 for keyframe 0.
+        Parent in the spanning tree, -1 for a root.
         """
     def point_ids(self) -> numpy.typing.NDArray[numpy.int64]:
         """
@@ -788,6 +831,10 @@ class Map:
     def resolve(self, id: int) -> int:
         """
         The living point that replaced this one (or the point itself); -1 when it died.
+        """
+    def root(self, map: typing.SupportsInt | typing.SupportsIndex) -> int:
+        """
+        The first keyframe of a map, -1 without keyframes; it never dies.
         """
     def set_parent(self, child: int, parent: int) -> None:
         """
@@ -814,6 +861,11 @@ class Map:
         Number of points that two keyframes share.
         """
     @property
+    def active_map(self) -> int:
+        """
+        The map that new keyframes belong to; the others rest.
+        """
+    @property
     def big_change_index(self) -> int:
         """
         Grows when poses or points moved as a whole.
@@ -821,7 +873,7 @@ class Map:
     @property
     def epoch(self) -> int:
         """
-        Which map it is: 0 for the first; clear() begins the next, and its ids restart.
+        Grows with clear(), after which ids restart.
         """
     @property
     def geometry_version(self) -> int:
@@ -829,9 +881,14 @@ class Map:
         Grows with every change of a pose or a position.
         """
     @property
+    def maps(self) -> list[int]:
+        """
+        The maps that hold keyframes, ascending: the oldest first.
+        """
+    @property
     def n_keyframes(self) -> int:
         """
-        Number of published keyframes.
+        Number of published keyframes, of all maps.
         """
     @property
     def n_points(self) -> int:
@@ -942,7 +999,7 @@ class KeyFrameSnapshot:
     @property
     def parents(self) -> numpy.typing.NDArray[numpy.int64]:
         """
-        (n,) int64, -1 for keyframe 0.
+        (n,) int64, -1 for the root.
         """
     @property
     def timestamps(self) -> numpy.typing.NDArray[numpy.float64]:
@@ -1033,7 +1090,7 @@ class RecordedTrajectory:
     @property
     def T_wc(self) -> numpy.typing.NDArray[numpy.float64]:
         """
-        (n, 4, 4) float64, camera to the frame of keyframe 0.
+        (n, 4, 4) float64, camera to the frame of the map's root.
         """
     @property
     def frames(self) -> numpy.typing.NDArray[numpy.int64]:
@@ -1064,19 +1121,24 @@ class TrajectoryRecorder:
         """
         Forget all frames.
         """
+    def drop(self, map: Map, which: typing.SupportsInt | typing.SupportsIndex) -> None:
+        """
+        Forget the frames of one map, which is about to be dropped.
+        """
     def entries(self) -> dict:
         """
         All frames relative to their reference keyframes: arrays timestamps (n,) [s], frames
         (n,) ids, keyframes (n,) ids or -1, T_cr (n, 7): x, y, z, w of a unit quaternion, then
         the translation at the keyframe's first scale; lost (n,).
         """
-    def rebuild(self, map: Map) -> RecordedTrajectory:
+    def rebuild(self, map: Map, which: typing.SupportsInt | typing.SupportsIndex = -1) -> RecordedTrajectory:
         """
-        All poses from the present keyframe poses, anchored at keyframe 0.
+        All poses in a map (-1: the active one) from the present keyframe poses, anchored at
+        its root.
         """
     def record(self, map: Map, frame: TrackedFrame, lost: bool) -> None:
         """
-        Append a frame; without a pose it repeats the last relative pose.
+        Append a frame, or record it anew; without a pose it repeats the relative pose before.
         """
     @property
     def n_bytes(self) -> int:
@@ -1093,11 +1155,6 @@ class MapChanges:
         (n, 2) int64, all pairs, the lower id first; None if they are as before.
         """
     @property
-    def epoch(self) -> int:
-        """
-        Which map it is, as Map.epoch.
-        """
-    @property
     def keyframes_removed(self) -> numpy.typing.NDArray[numpy.int64]:
         """
         (n,) int64, of those told before.
@@ -1111,6 +1168,11 @@ class MapChanges:
     def loop_edges(self) -> numpy.typing.NDArray[numpy.int64] | None:
         """
         (n, 2) int64, all pairs, the lower id first; None if they are as before.
+        """
+    @property
+    def map(self) -> int:
+        """
+        Which map it is.
         """
     @property
     def points_removed(self) -> numpy.typing.NDArray[numpy.int64]:
@@ -1136,9 +1198,10 @@ class MapFollower:
     """
     Tells what has changed in a map since last time.
     """
-    def __init__(self, map: Map, least_weight: typing.SupportsInt | typing.SupportsIndex = 100) -> None:
+    def __init__(self, map: Map, least_weight: typing.SupportsInt | typing.SupportsIndex = 100, which: typing.SupportsInt | typing.SupportsIndex = -1) -> None:
         """
-        `least_weight`: shared points of two keyframes whose covisibility is told.
+        `least_weight`: shared points of two keyframes whose covisibility is told. `which`: the
+        map that is followed; -1: the active one, whichever that is.
         """
     def update(self) -> MapChanges:
         """
@@ -2590,6 +2653,72 @@ class LoopCorrection:
         """
         Points that move along.
         """
+class MapMerge:
+    """
+    What joining two maps does, worked out on copies.
+    """
+    @property
+    def S_km(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]:
+        """
+        (4, 4) float64 similarity: world of the moved map to that of the kept one.
+        """
+    @property
+    def kept(self) -> int:
+        """
+        The older map; -1: they cannot be joined.
+        """
+    @property
+    def moved(self) -> int:
+        """
+        The younger one, which moves into its world.
+        """
+    @property
+    def n_fusions(self) -> int:
+        """
+        Points to be replaced by points of the far side, or to be seen by more keyframes.
+        """
+class MapMergeResult:
+    """
+    What apply_map_merge did.
+    """
+    @property
+    def applied(self) -> bool:
+        """
+        False: the map was cleared meanwhile, or an end has died.
+        """
+    @property
+    def kept(self) -> int:
+        ...
+    @property
+    def moved(self) -> int:
+        ...
+    @property
+    def n_fused(self) -> int:
+        """
+        Points replaced or seen by more.
+        """
+    @property
+    def n_moved_keyframes(self) -> int:
+        ...
+    @property
+    def n_moved_points(self) -> int:
+        ...
+    @property
+    def scale(self) -> float:
+        """
+        By which lengths of the moved map were multiplied.
+        """
+class KeyFramePoses:
+    """
+    Where every keyframe of a map is.
+    """
+    def __len__(self) -> int:
+        ...
+    @property
+    def ids(self) -> numpy.typing.NDArray[numpy.int64]:
+        """
+        (n,) int64.
+        """
 class Rectangle:
     """
     A textured rectangle: origin + a u_axis + b v_axis, a in [0, width], b in [0, height]; world frame, metres. Both sides are visible.
@@ -2729,6 +2858,11 @@ def apply_loop_correction(map: Map, correction: LoopCorrection) -> LoopCorrectio
     or after it. Counts as a big change. Keyframes that are not in the graph (the tracker may
     just have inserted one) follow the keyframe before them. Returns a LoopCorrectionResult.
     """
+def apply_map_merge(map: Map, merge: MapMerge) -> MapMergeResult:
+    """
+    Carry it out in one write section, which counts as a big change. Returns a
+    MapMergeResult.
+    """
 def assess_drift(map: Map, loop: Loop, fix_scale: bool) -> LoopDrift:
     """
     Compare a loop's correction with what drift can explain. Returns a LoopDrift.
@@ -2764,6 +2898,12 @@ def choose_loop(map: Map, loops: collections.abc.Sequence[Loop], fix_scale: bool
 
     None when there is none, or when plausible ones put the keyframe at different
     places. Raises ValueError when the loops are of different keyframes.
+    """
+def choose_merge(map: Map, loops: collections.abc.Sequence[Loop], fix_scale: bool) -> Loop | None:
+    """
+    Among places that one keyframe shows in other maps, that with most matches.
+
+    None when there is none, or when two are in different maps or contradict each other.
     """
 def commit_full_bundle(map: Map, bundle: GatheredBundle) -> FullBundleCommit:
     """
@@ -2880,9 +3020,10 @@ def fuse_with_neighbours(map: Map, current: int, n_neighbours: typing.SupportsIn
     Fuse a keyframe's points with those of its first and second neighbours, both ways;
     refresh its points and connections. Returns the number of changes.
     """
-def gather_full_bundle(map: Map) -> GatheredBundle:
+def gather_full_bundle(map: Map, which: typing.SupportsInt | typing.SupportsIndex = -1) -> GatheredBundle:
     """
-    Copy all keyframes that points tie to each other, and these points.
+    Copy all keyframes of a map (-1: the active one) that points tie to each other, and
+    these points.
 
     First of three steps, between which the map may change. Takes the read lock.
     """
@@ -2910,6 +3051,10 @@ def keep_small_image(frame: Frame, grey: numpy.ndarray) -> None:
     """
     Keeps a new frame's image (h, w) uint8, shrunk to some 1500 pixels, for align_rotation().
     Raises ImageError for anything but a grey image.
+    """
+def keyframes_of_seam(map: Map, current: int) -> numpy.typing.NDArray[numpy.int64]:
+    """
+    The keyframe and its neighbours, ascending: (n,) int64.
     """
 def local_bundle_adjustment(map: Map, keyframe: int, abort: StopFlag | None = None, monocular: bool = False, n_threads: typing.SupportsInt | typing.SupportsIndex = 1, solver: str = 'blocks') -> LocalBundleResult:
     """
@@ -3051,6 +3196,17 @@ def plan_loop_correction(map: Map, loop: Loop, fix_scale: bool) -> LoopCorrectio
     rest until apply_loop_correction() is through. Raises ValueError when the loop's matches
     are not one per keypoint. Returns a LoopCorrection.
     """
+def plan_map_merge(map: Map, loop: Loop, fix_scale: bool) -> MapMerge:
+    """
+    Work out how two maps become one: the younger one moves into the older one's world.
+
+    `loop`: of keyframes of both. The map is not changed. Local mapping must rest until
+    apply_map_merge() is through. Returns a MapMerge.
+    """
+def poses_of_map(map: Map, which: typing.SupportsInt | typing.SupportsIndex) -> KeyFramePoses:
+    """
+    Copy the poses of the published keyframes of a map.
+    """
 def process_new_keyframe(map: Map, id: int, recent: RecentPoints) -> None:
     """
     Add the observations of matched points, connect and publish the keyframe.
@@ -3106,25 +3262,26 @@ def similarity(a: WordVector, b: WordVector) -> float:
     """
     L1 score of two word vectors, 0 (disjoint) to 1 (identical).
     """
-def snapshot_edges(map: Map, min_weight: typing.SupportsInt | typing.SupportsIndex = 15) -> EdgeSnapshot:
+def snapshot_edges(map: Map, min_weight: typing.SupportsInt | typing.SupportsIndex = 15, which: typing.SupportsInt | typing.SupportsIndex = -1) -> EdgeSnapshot:
     """
-    Copy the covisibility edges with at least `min_weight` shared points.
+    Copy the covisibility edges with at least `min_weight` shared points, of a map (-1: the
+    active one).
     """
-def snapshot_keyframes(map: Map) -> KeyFrameSnapshot:
+def snapshot_keyframes(map: Map, which: typing.SupportsInt | typing.SupportsIndex = -1) -> KeyFrameSnapshot:
     """
-    Copy ids, poses, time stamps and parents of the keyframes.
+    Copy ids, poses, time stamps and parents of the keyframes, of a map (-1: the active one).
     """
-def snapshot_map(map: Map) -> MapSnapshot:
+def snapshot_map(map: Map, which: typing.SupportsInt | typing.SupportsIndex = -1) -> MapSnapshot:
     """
-    Copy keyframes, loop edges and points in one consistent view.
+    Copy keyframes, loop edges and points in one consistent view, of a map (-1: the active one).
     """
-def snapshot_observations(map: Map) -> ObservationSnapshot:
+def snapshot_observations(map: Map, which: typing.SupportsInt | typing.SupportsIndex = -1) -> ObservationSnapshot:
     """
-    Copy who observes what, as compressed rows.
+    Copy who observes what, as compressed rows, of a map (-1: the active one).
     """
-def snapshot_points(map: Map) -> PointSnapshot:
+def snapshot_points(map: Map, which: typing.SupportsInt | typing.SupportsIndex = -1) -> PointSnapshot:
     """
-    Copy ids, positions and observation counts of the points.
+    Copy ids, positions and observation counts of the points, of a map (-1: the active one).
     """
 def solve_bundle(T_cw: collections.abc.Sequence[Pose], fixed: collections.abc.Sequence[bool], intrinsics: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 1]"], bf: typing.SupportsFloat | typing.SupportsIndex, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], camera_index: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], point_index: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], inverse_sigma2: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], options: BundleOptions = ..., abort: StopFlag | None = None) -> tuple:
     """
@@ -3149,6 +3306,11 @@ def solve_full_bundle(bundle: GatheredBundle, options: FullBundleOptions = ..., 
 
     `abort`: a StopFlag polled once per iteration, or None; what an aborted run has reached
     is not committed. Results that are worse or not finite are not either.
+    """
+def spread_from_seam(map: Map, before: KeyFramePoses, seam: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], fix_scale: bool, abort: StopFlag | None = None) -> bool:
+    """
+    Spread what an adjustment of the seam has moved over the rest of the map, by a pose graph
+    with the relative poses of `before`. Returns whether anything was moved.
     """
 def spread_of_inliers(frame: TrackedFrame) -> InlierSpread:
     """

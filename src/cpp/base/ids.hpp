@@ -34,6 +34,11 @@ using MapPointId = Id<struct MapPointTag>;
 inline constexpr MapPointId kFirstTemporaryPoint{std::int64_t{1} << 62};
 constexpr bool is_temporary(MapPointId id) { return id >= kFirstTemporaryPoint; }
 
+/// Which map a keyframe belongs to: maps are numbered in the order in which they begin, over the
+/// whole life of a store, also across clear().
+using MapIndex = std::int64_t;
+inline constexpr MapIndex kNoMap = -1;
+
 /// Frames are numbered by the tracker: every image consumes exactly one id, so differences of
 /// frame ids serve as a clock (keyframe spacing, grace period after a relocalization).
 using FrameId = std::int64_t;

@@ -224,6 +224,9 @@ void bind_tracked_frame(py::module_& module) {
           [](TrackedFrame& t, const TrackedFrame& other) { t.anchor = other.anchor; },
           py::arg("other"), "The pose was predicted from that of another frame.")
       .def_property_readonly(
+          "map_index", [](const TrackedFrame& t) { return t.anchor.map; },
+          "The map that the pose belongs to; -1: none.")
+      .def_property_readonly(
           "big_change", [](const TrackedFrame& t) { return t.anchor.big_change; },
           "Map.big_change_index of the map that the pose belongs to.")
       .def_property_readonly(

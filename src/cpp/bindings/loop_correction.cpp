@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "loops/loop_correction.hpp"
 
+#include <pybind11/eigen.h>
 #include <pybind11/stl.h>
 
 #include "bindings/arrays.hpp"
 #include "bindings/bindings.hpp"
 #include "bindings/stop_flag.hpp"
+#include "loops/map_merge.hpp"
 
 namespace orbslam::bindings {
 namespace {
@@ -74,11 +76,70 @@ void bind_correction(py::module_& module) {
       "just have inserted one) follow the keyframe before them. Returns a LoopCorrectionResult.");
 }
 
+void bind_merge(py::module_& module) {
+  py::class_<MapMerge>(module, "MapMerge", "What joining two maps does, worked out on copies.")
+      .def_readonly("kept", &MapMerge::kept, "The older map; -1: they cannot be joined.")
+      .def_readonly("moved", &MapMerge::moved, "The younger one, which moves into its world.")
+      .def_property_readonly(
+          "S_km", [](const MapMerge& merge) { return merge.S_km.matrix(); },
+          "(4, 4) float64 similarity: world of the moved map to that of the kept one.")
+      .def_property_readonly(
+          "n_fusions", [](const MapMerge& merge) { return merge.fusions.size(); },
+          "Points to be replaced by points of the far side, or to be seen by more keyframes.");
+  py::class_<MapMergeResult>(module, "MapMergeResult", "What apply_map_merge did.")
+      .def_readonly("applied", &MapMergeResult::applied,
+                    "False: the map was cleared meanwhile, or an end has died.")
+      .def_readonly("kept", &MapMergeResult::kept)
+      .def_readonly("moved", &MapMergeResult::moved)
+      .def_readonly("n_moved_keyframes", &MapMergeResult::n_moved_keyframes)
+      .def_readonly("n_moved_points", &MapMergeResult::n_moved_points)
+      .def_readonly("n_fused", &MapMergeResult::n_fused, "Points replaced or seen by more.")
+      .def_readonly("scale", &MapMergeResult::scale,
+                    "By which lengths of the moved map were multiplied.");
+  py::class_<KeyFramePoses>(module, "KeyFramePoses", "Where every keyframe of a map is.")
+      .def("__len__", [](const KeyFramePoses& self) { return self.ids.size(); })
+      .def_property_readonly(
+          "ids", [](const KeyFramePoses& self) { return to_array(self.ids); }, "(n,) int64.");
+  module.def(
+      "plan_map_merge", &plan_map_merge, "map"_a, "loop"_a, "fix_scale"_a, Release(),
+      "Work out how two maps become one: the younger one moves into the older one's world.\n\n"
+      "`loop`: of keyframes of both. The map is not changed. Local mapping must rest until\n"
+      "apply_map_merge() is through. Returns a MapMerge.");
+  module.def("apply_map_merge", &apply_map_merge, "map"_a, "merge"_a, Release(),
+             "Carry it out in one write section, which counts as a big change. Returns a\n"
+             "MapMergeResult.");
+  module.def(
+      "keyframes_of_seam",
+      [](const Map& map, KeyFrameId current) {
+        std::vector<KeyFrameId> seam;
+        {
+          const py::gil_scoped_release release;
+          seam = keyframes_of_seam(map, current);
+        }
+        return to_array(seam);
+      },
+      "map"_a, "current"_a, "The keyframe and its neighbours, ascending: (n,) int64.");
+  module.def("poses_of_map", &poses_of_map, "map"_a, "which"_a, Release(),
+             "Copy the poses of the published keyframes of a map.");
+  module.def(
+      "spread_from_seam",
+      [](Map& map, const KeyFramePoses& before, const std::vector<std::int64_t>& seam,
+         bool fix_scale, const std::shared_ptr<StopFlag>& abort) {
+        std::vector<KeyFrameId> members;
+        for (const std::int64_t id : seam) members.emplace_back(id);
+        return spread_from_seam(map, before, members, fix_scale, flag_of(abort));
+      },
+      "map"_a, "before"_a, "seam"_a, "fix_scale"_a, "abort"_a = py::none(), Release(),
+      "Spread what an adjustment of the seam has moved over the rest of the map, by a pose graph\n"
+      "with the relative poses of `before`. Returns whether anything was moved.");
+}
+
 }  // namespace
 
 void bind_loop_correction(py::module_& module) {
   bind_results(module);
   bind_correction(module);
+  bind_merge(module);
 }
 
 }  // namespace orbslam::bindings

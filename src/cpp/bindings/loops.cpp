@@ -110,6 +110,10 @@ void bind_choice(py::module_& module) {
              "The plausible loop with most matches among loops of one keyframe.\n\n"
              "None when there is none, or when plausible ones put the keyframe at different\n"
              "places. Raises ValueError when the loops are of different keyframes.");
+  module.def(
+      "choose_merge", &choose_merge, "map"_a, "loops"_a, "fix_scale"_a, Release(),
+      "Among places that one keyframe shows in other maps, that with most matches.\n\n"
+      "None when there is none, or when two are in different maps or contradict each other.");
 }
 
 }  // namespace

@@ -76,12 +76,10 @@ using MapClass = py::class_<Map, std::shared_ptr<Map>>;
 
 void bind_queries(MapClass& map) {
   map.def_property_readonly("n_keyframes", py::cpp_function(reader(&Map::n_keyframes), Release()),
-                            "Number of published keyframes.")
+                            "Number of published keyframes, of all maps.")
       .def_property_readonly("n_points", py::cpp_function(reader(&Map::n_points), Release()),
                              "Number of living points.")
-      .def_property_readonly("epoch", &Map::epoch,
-                             "Which map it is: 0 for the first; clear() begins the next, and its "
-                             "ids restart.")
+      .def_property_readonly("epoch", &Map::epoch, "Grows with clear(), after which ids restart.")
       .def_property_readonly("big_change_index", &Map::big_change_index,
                              "Grows when poses or points moved as a whole.")
       .def_property_readonly("structure_version", &Map::structure_version,
@@ -90,10 +88,18 @@ void bind_queries(MapClass& map) {
                              "Grows with every change of a pose or a position.")
       .def(
           "keyframe_ids",
-          [](const Map& self) {
-            return to_array(reading(self, [&] { return self.keyframe_ids(); }));
+          [](const Map& self, MapIndex which) {
+            return to_array(reading(self, [&] {
+              std::vector<KeyFrameId> ids = self.keyframe_ids();
+              if (which == kNoMap) return ids;
+              const auto is_other = [&](KeyFrameId id) { return self.find(id)->map != which; };
+              ids.erase(std::remove_if(ids.begin(), ids.end(), is_other), ids.end());
+              return ids;
+            }));
           },
-          "Ids of all living keyframes, ascending, unpublished ones included: (n,) int64.")
+          "map"_a = kNoMap,
+          "Ids of the living keyframes of a map (-1: of all), ascending, unpublished ones\n"
+          "included: (n,) int64.")
       .def(
           "point_ids",
           [](const Map& self) { return to_array(reading(self, [&] { return self.point_ids(); })); },
@@ -145,7 +151,7 @@ void bind_queries(MapClass& map) {
             const auto lock = self.read_lock();
             return living(self, id).parent;
           },
-          "id"_a, Release(), "Parent in the spanning tree, -1 for keyframe 0.")
+          "id"_a, Release(), "Parent in the spanning tree, -1 for a root.")
       .def(
           "neighbours",
           [](const Map& self, KeyFrameId id) {
@@ -182,6 +188,69 @@ void bind_queries(MapClass& map) {
           "id"_a, Release(), "Weighted number of observations (2 with depth, else 1) of a point.")
       .def("content_hash", &content_hash, Release(),
            "64-bit hash over poses, points and observations: equal for equal maps.");
+}
+
+void bind_parts(MapClass& map) {
+  map.def_property_readonly("active_map", &Map::active_map,
+                            "The map that new keyframes belong to; the others rest.")
+      .def_property_readonly("maps", py::cpp_function(reader(&Map::maps), Release()),
+                             "The maps that hold keyframes, ascending: the oldest first.")
+      .def(
+          "map_of",
+          [](const Map& self, KeyFrameId id) {
+            const auto lock = self.read_lock();
+            return self.map_of(id);
+          },
+          "keyframe"_a, Release(), "The map of a keyframe, living or culled; -1 if unknown.")
+      .def(
+          "map_of_point",
+          [](const Map& self, MapPointId id) {
+            const auto lock = self.read_lock();
+            return self.map_of(id);
+          },
+          "point"_a, Release(), "The map of a living point, or of its successor; -1 if it died.")
+      .def("root", reader(&Map::root), "map"_a, Release(),
+           "The first keyframe of a map, -1 without keyframes; it never dies.")
+      .def("n_keyframes_of", reader(&Map::n_keyframes_of), "map"_a, Release(),
+           "Number of published keyframes of a map.")
+      .def(
+          "n_points_of",
+          [](const Map& self, MapIndex which) {
+            const auto lock = self.read_lock();
+            std::size_t n = 0;
+            self.for_each_point([&](const MapPoint& p) { n += self.is_in(p, which) ? 1 : 0; });
+            return n;
+          },
+          "map"_a, Release(), "Number of living points of a map.")
+      .def("begin_map", writer(&Map::begin_map), Release(),
+           "The next keyframe begins a map, which becomes the active one; its number. Nothing\n"
+           "changes while the active one has no keyframe.")
+      .def("activate_map", writer(&Map::activate_map), "map"_a, Release(),
+           "New keyframes belong to this map. Raises StateError if it holds none.")
+      .def(
+          "activate_map_of",
+          [](Map& self, KeyFrameId id) {
+            const auto lock = self.write_lock();
+            const MapIndex found = self.map_of(id);
+            self.activate_map(found);
+            return found;
+          },
+          "keyframe"_a, Release(),
+          "The same for the map of a keyframe, living or culled; its number.")
+      .def(
+          "erase_map",
+          [](Map& self, MapIndex which) {
+            std::vector<KeyFrameId> died;
+            {
+              const py::gil_scoped_release release;
+              const auto lock = self.write_lock();
+              died = self.erase_map(which);
+            }
+            return to_array(died);
+          },
+          "map"_a, "Drop a map with all that belongs to it; its keyframes: (n,) int64.")
+      .def("join_maps", writer(&Map::join_maps), "child"_a, "parent"_a, Release(),
+           "All of the map of one keyframe belongs to that of the other one from now on.");
 }
 
 void bind_changes(MapClass& map) {
@@ -366,6 +435,7 @@ void bind_map(py::module_& module) {
                "Owner of keyframes and points. Every method locks the map while it runs.");
   map.def(py::init<>(), "An empty map.");
   bind_queries(map);
+  bind_parts(map);
   bind_changes(map);
   bind_points(module);
   bind_local_map(module);

@@ -24,7 +24,7 @@ std::optional<PairArray> pairs(const std::optional<KeyFramePairs>& values) {
 
 void bind_follower(py::module_& module) {
   py::class_<MapChanges>(module, "MapChanges", "What turns an earlier map into a later one.")
-      .def_readonly("epoch", &MapChanges::epoch, "Which map it is, as Map.epoch.")
+      .def_readonly("map", &MapChanges::map, "Which map it is.")
       .def_readonly("restarted", &MapChanges::restarted, "Everything told before is void.")
       .def_readonly("keyframes_set", &MapChanges::keyframes_set, "New and changed keyframes.")
       .def_property_readonly(
@@ -45,11 +45,14 @@ void bind_follower(py::module_& module) {
           "spanning_tree", [](const MapChanges& self) { return pairs(self.spanning_tree); },
           "(n, 2) int64, all pairs of keyframe and parent; None if they are as before.");
   py::class_<MapFollower>(module, "MapFollower", "Tells what has changed in a map since last time.")
-      .def(py::init([](const std::shared_ptr<Map>& map, int least_weight) {
-             return std::make_unique<MapFollower>(map, least_weight);
+      .def(py::init([](const std::shared_ptr<Map>& map, int least_weight, MapIndex which) {
+             return std::make_unique<MapFollower>(map, least_weight, which);
            }),
            "map"_a.none(false), "least_weight"_a = static_cast<int>(Map::kEssentialWeight),
-           "`least_weight`: shared points of two keyframes whose covisibility is told.")
+           "which"_a = kNoMap,
+           "`least_weight`: shared points of two keyframes whose covisibility is told. `which`: "
+           "the\n"
+           "map that is followed; -1: the active one, whichever that is.")
       .def("update", &MapFollower::update, Release(),
            "All changes since the last call, in one consistent view.");
 }

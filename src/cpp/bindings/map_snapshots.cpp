@@ -41,7 +41,7 @@ void bind_snapshots(py::module_& module) {
           "(n,) float64, seconds.")
       .def_property_readonly(
           "parents", [](const KeyFrameSnapshot& self) { return to_array(self.parents); },
-          "(n,) int64, -1 for keyframe 0.");
+          "(n,) int64, -1 for the root.");
   py::class_<EdgeSnapshot>(module, "EdgeSnapshot", "Covisibility edges a < b.")
       .def_property_readonly(
           "a", [](const EdgeSnapshot& self) { return to_array(self.a); }, "(n,) int64.")
@@ -88,17 +88,23 @@ void bind_snapshots(py::module_& module) {
             return edges;
           },
           "(n, 2) int64, ids of the keyframes that a closed loop connects, the lower one first.");
-  module.def("snapshot_map", &snapshot_map, "map"_a, Release(),
-             "Copy keyframes, loop edges and points in one consistent view.");
-  module.def("snapshot_keyframes", &snapshot_keyframes, "map"_a, Release(),
-             "Copy ids, poses, time stamps and parents of the keyframes.");
-  module.def("snapshot_edges", &snapshot_edges, "map"_a,
-             "min_weight"_a = static_cast<int>(Map::kCovisibilityThreshold), Release(),
-             "Copy the covisibility edges with at least `min_weight` shared points.");
-  module.def("snapshot_points", &snapshot_points, "map"_a, Release(),
-             "Copy ids, positions and observation counts of the points.");
-  module.def("snapshot_observations", &snapshot_observations, "map"_a, Release(),
-             "Copy who observes what, as compressed rows.");
+  module.def("snapshot_map", &snapshot_map, "map"_a, "which"_a = kNoMap, Release(),
+             "Copy keyframes, loop edges and points in one consistent view, of a map (-1: the "
+             "active one).");
+  module.def(
+      "snapshot_keyframes", &snapshot_keyframes, "map"_a, "which"_a = kNoMap, Release(),
+      "Copy ids, poses, time stamps and parents of the keyframes, of a map (-1: the active one).");
+  module.def(
+      "snapshot_edges", &snapshot_edges, "map"_a,
+      "min_weight"_a = static_cast<int>(Map::kCovisibilityThreshold), "which"_a = kNoMap, Release(),
+      "Copy the covisibility edges with at least `min_weight` shared points, of a map (-1: the\n"
+      "active one).");
+  module.def(
+      "snapshot_points", &snapshot_points, "map"_a, "which"_a = kNoMap, Release(),
+      "Copy ids, positions and observation counts of the points, of a map (-1: the active one).");
+  module.def("snapshot_observations", &snapshot_observations, "map"_a, "which"_a = kNoMap,
+             Release(),
+             "Copy who observes what, as compressed rows, of a map (-1: the active one).");
 }
 
 void bind_trajectory(py::module_& module) {
@@ -109,7 +115,7 @@ void bind_trajectory(py::module_& module) {
           "(n,) float64, seconds.")
       .def_property_readonly(
           "T_wc", [](const Trajectory& self) { return matrices(self.T_wc); },
-          "(n, 4, 4) float64, camera to the frame of keyframe 0.")
+          "(n, 4, 4) float64, camera to the frame of the map's root.")
       .def_property_readonly(
           "lost", [](const Trajectory& self) { return flags(self.lost); },
           "(n,) bool: tracking was lost, the pose repeats the last known one.")
@@ -121,9 +127,12 @@ void bind_trajectory(py::module_& module) {
       .def(py::init<>(), "Nothing recorded.")
       .def("__len__", &TrajectoryRecorder::size)
       .def("record", &TrajectoryRecorder::record, "map"_a, "frame"_a, "lost"_a, Release(),
-           "Append a frame; without a pose it repeats the last relative pose.")
-      .def("rebuild", &TrajectoryRecorder::rebuild, "map"_a, Release(),
-           "All poses from the present keyframe poses, anchored at keyframe 0.")
+           "Append a frame, or record it anew; without a pose it repeats the relative pose before.")
+      .def("rebuild", &TrajectoryRecorder::rebuild, "map"_a, "which"_a = kNoMap, Release(),
+           "All poses in a map (-1: the active one) from the present keyframe poses, anchored at\n"
+           "its root.")
+      .def("drop", &TrajectoryRecorder::drop, "map"_a, "which"_a, Release(),
+           "Forget the frames of one map, which is about to be dropped.")
       .def(
           "entries",
           [](const TrajectoryRecorder& self) {

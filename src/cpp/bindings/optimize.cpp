@@ -256,9 +256,10 @@ void bind_full_bundle_steps(py::module_& module) {
                     "Keyframes that were not in the bundle and moved with their parents.")
       .def_readonly("n_followed_points", &FullBundleCommit::n_followed_points,
                     "Points that were not in the bundle and moved with their reference keyframe.");
-  module.def("gather_full_bundle", &gather_full_bundle, "map"_a,
+  module.def("gather_full_bundle", &gather_full_bundle, "map"_a, "which"_a = kNoMap,
              py::call_guard<py::gil_scoped_release>(),
-             "Copy all keyframes that points tie to each other, and these points.\n\n"
+             "Copy all keyframes of a map (-1: the active one) that points tie to each other, and\n"
+             "these points.\n\n"
              "First of three steps, between which the map may change. Takes the read lock.");
   module.def(
       "solve_full_bundle",

@@ -65,6 +65,7 @@ struct Anchor {
   Pose T_kw;
   double scale = 1;              ///< KeyFrame::scale
   std::uint64_t big_change = 0;  ///< Map::big_change_index()
+  MapIndex map = kNoMap;         ///< KeyFrame::map of it
 };
 
 /// A frame in the tracker's hands: pose and associations, which change while it is tracked.

@@ -19,12 +19,14 @@ struct GraphSource {
 
 using Members = std::unordered_map<KeyFrameId, std::size_t>;
 
-GraphSource copy_source(const Map& map, const Members& members,
+GraphSource copy_source(const Map& map, LoopCorrection& correction, const Members& members,
                         std::vector<KeyFrameId>& keyframes) {
   GraphSource source;
   const auto lock = map.read_lock();
+  const MapIndex which = map.map_of(correction.loop.current);
+  correction.map = which;
   map.for_each_keyframe([&](const KeyFrame& keyframe) {
-    if (!keyframe.published) return;
+    if (!keyframe.published || keyframe.map != which) return;
     const KeyFrameId id = keyframe.id;
     keyframes.push_back(id);
     source.T_cw.push_back(keyframe.T_cw);
@@ -101,7 +103,7 @@ void build_essential_graph(const Map& map, const CorrectedGroup& group,
   Members members;
   for (const KeyFrameId id : group.keyframes) members.emplace(id, members.size());
   std::vector<KeyFrameId> keyframes;
-  GraphSource source = copy_source(map, members, keyframes);
+  GraphSource source = copy_source(map, correction, members, keyframes);
   const std::ptrdiff_t matched = vertex_of(keyframes, correction.loop.matched);
   if (matched < 0 || vertex_of(keyframes, correction.loop.current) < 0) return;
   add_covisible_of_group(group, members, source.covisible);

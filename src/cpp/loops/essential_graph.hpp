@@ -21,12 +21,12 @@ struct CorrectedGroup {
 };
 
 /// Vertices, measurements and fixed vertex of a correction (Mur-Artal et al. 2015, section VII-D).
-/// Vertices are all published keyframes, those of the group at their corrected places. Edges are
-/// the loop and its strong new links, as the corrected group says that they are; then the spanning
-/// tree, earlier loops and strong covisibility, as the map says. Strong are Map::kEssentialWeight
-/// shared points. One edge per pair, the first of these. The far end of the loop is fixed. Leaves
-/// the graph empty when an end of the loop is dead or unpublished. Takes the read lock. See
-/// docs/method/loops.md#essential-graph.
+/// Vertices are all published keyframes of the map, those of the group at their corrected places.
+/// Edges are the loop and its strong new links, as the corrected group says that they are; then the
+/// spanning tree, earlier loops and strong covisibility, as the map says. Strong are
+/// Map::kEssentialWeight shared points. One edge per pair, the first of these. The far end of the
+/// loop is fixed. Leaves the graph empty when an end of the loop is dead or unpublished. Takes the
+/// read lock. See docs/method/loops.md#essential-graph.
 void build_essential_graph(const Map& map, const CorrectedGroup& group, LoopCorrection& correction);
 
 /// Where an id is among ascending ones, or -1.

@@ -165,4 +165,29 @@ std::vector<SharedPoints> FusionDraft::shared_points() const {
   return shared;
 }
 
+int carry_out(const std::vector<LoopCorrection::Fusion>& fusions, Map& map,
+              std::vector<MapPointId>& added) {
+  int n_fused = 0;
+  for (const LoopCorrection::Fusion& fusion : fusions) {
+    const MapPointId survivor = map.resolve(fusion.point);
+    const MapPoint* point = map.find(survivor);
+    if (!point) continue;
+    if (fusion.replaced.valid()) {
+      const MapPointId replaced = map.resolve(fusion.replaced);
+      if (!replaced.valid() || replaced == survivor) continue;
+      map.replace_point(replaced, survivor);
+    } else {
+      const KeyFrame* keyframe = map.find(fusion.keyframe);
+      if (!keyframe || map.find(keyframe->map_points[fusion.keypoint]) ||
+          point->observation_of(fusion.keyframe)) {
+        continue;
+      }
+      map.add_observation(survivor, fusion.keyframe, fusion.keypoint);
+      added.push_back(survivor);
+    }
+    ++n_fused;
+  }
+  return n_fused;
+}
+
 }  // namespace orbslam

@@ -164,4 +164,23 @@ std::optional<Loop> choose_loop(const Map& map, const std::vector<Loop>& loops, 
   return **best;
 }
 
+std::optional<Loop> choose_merge(const Map& map, const std::vector<Loop>& loops, bool fix_scale) {
+  if (loops.empty()) return std::nullopt;
+  {
+    const auto lock = map.read_lock();
+    const MapIndex other = map.map_of(loops.front().matched);
+    for (const Loop& loop : loops) {
+      if (map.map_of(loop.matched) != other) return std::nullopt;
+    }
+  }
+  // Places and lengths are those of the other map.
+  const Surroundings around(map, loops.front().matched);
+  for (std::size_t i = 0; i < loops.size(); ++i) {
+    for (std::size_t j = i + 1; j < loops.size(); ++j) {
+      if (contradict(loops[i], loops[j], around, fix_scale)) return std::nullopt;
+    }
+  }
+  return *std::min_element(loops.begin(), loops.end(), stronger);
+}
+
 }  // namespace orbslam

@@ -54,4 +54,9 @@ LoopDrift assess_drift(const Map& map, const Loop& loop, bool fix_scale);
 /// docs/method/loops.md#choice.
 std::optional<Loop> choose_loop(const Map& map, const std::vector<Loop>& loops, bool fix_scale);
 
+/// The same among places that one keyframe shows in other maps: no drift has to explain them.
+/// Nothing when two of them are in different maps, or contradict each other. Takes the read lock
+/// while it copies. See docs/method/several_maps.md#choice.
+std::optional<Loop> choose_merge(const Map& map, const std::vector<Loop>& loops, bool fix_scale);
+
 }  // namespace orbslam

@@ -19,6 +19,7 @@ namespace orbslam {
 struct LoopCorrection {
   Loop loop;
   std::uint64_t epoch = 0;
+  MapIndex map = kNoMap;  ///< in which both ends are
   bool fix_scale = false;
 
   /// Changes of structure, to be carried out in this order.
@@ -38,7 +39,7 @@ struct LoopCorrection {
   PoseGraph graph;
   std::vector<Similarity> uncorrected;  ///< of each vertex: where it is in the map
 
-  /// All points, ascending, and the vertex that carries each along.
+  /// All points of the map, ascending, and the vertex that carries each along.
   std::vector<std::pair<MapPointId, std::uint32_t>> carried;
 };
 

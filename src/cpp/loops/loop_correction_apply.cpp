@@ -12,32 +12,8 @@ namespace {
 
 bool is_applicable(const Map& map, const LoopCorrection& correction) {
   return !correction.keyframes.empty() && map.epoch() == correction.epoch &&
-         map.find(correction.loop.current) && map.find(correction.loop.matched);
-}
-
-/// Returns the number of changes. Points that gained an observation are appended to `added`.
-int fuse(Map& map, const LoopCorrection& correction, std::vector<MapPointId>& added) {
-  int n_fused = 0;
-  for (const LoopCorrection::Fusion& fusion : correction.fusions) {
-    const MapPointId survivor = map.resolve(fusion.point);
-    const MapPoint* point = map.find(survivor);
-    if (!point) continue;
-    if (fusion.replaced.valid()) {
-      const MapPointId replaced = map.resolve(fusion.replaced);
-      if (!replaced.valid() || replaced == survivor) continue;
-      map.replace_point(replaced, survivor);
-    } else {
-      const KeyFrame* keyframe = map.find(fusion.keyframe);
-      if (!keyframe || map.find(keyframe->map_points[fusion.keypoint]) ||
-          point->observation_of(fusion.keyframe)) {
-        continue;
-      }
-      map.add_observation(survivor, fusion.keyframe, fusion.keypoint);
-      added.push_back(survivor);
-    }
-    ++n_fused;
-  }
-  return n_fused;
+         map.find(correction.loop.current) && map.find(correction.loop.matched) &&
+         map.find(correction.loop.current)->map == correction.map;
 }
 
 }  // namespace
@@ -50,11 +26,12 @@ PreparedCorrection::PreparedCorrection(const Map& map, const LoopCorrection& cor
     world_.push_back(correction.graph.S_iw[k].inverse() * correction.uncorrected[k]);
   }
   map.for_each_keyframe([&](const KeyFrame& keyframe) {
-    move_keyframe(keyframe, rewrite_);
+    if (keyframe.map == correction.map) move_keyframe(keyframe, rewrite_);
     last_ = keyframe.id;
   });
   auto planned = correction.carried.begin();  // both ascend
   map.for_each_point([&](const MapPoint& point) {
+    if (!map.is_in(point, correction.map)) return;
     while (planned != correction.carried.end() && planned->first < point.id) ++planned;
     const bool was_planned = planned != correction.carried.end() && planned->first == point.id;
     move_point(point, was_planned ? world_[planned->second] : world_at(point.reference_keyframe),
@@ -82,7 +59,7 @@ void PreparedCorrection::move_point(const MapPoint& point, const Similarity& wor
 MapRewrite PreparedCorrection::newcomers(const Map& map) const {
   MapRewrite rewrite;
   map.for_each_keyframe([&](const KeyFrame& keyframe) {
-    if (keyframe.id <= last_) return;
+    if (keyframe.id <= last_ || keyframe.map != correction_.map) return;
     move_keyframe(keyframe, rewrite);
     for (const MapPointId id : keyframe.map_points) {
       const MapPoint* point = map.find(id);
@@ -100,7 +77,7 @@ LoopCorrectionResult PreparedCorrection::commit(Map& map) const {
   const ScaledPose before = map.scaled_pose(current);
   const MapRewrite late = newcomers(map);
   std::vector<MapPointId> added;
-  result.n_fused = fuse(map, correction_, added);
+  result.n_fused = carry_out(correction_.fusions, map, added);
   rewrite_.apply(map);
   late.apply(map);
   std::sort(added.begin(), added.end());

@@ -7,7 +7,7 @@ namespace orbslam {
 
 Anchor anchor_at(const Map& map, KeyFrameId keyframe) {
   const ScaledPose pose = map.scaled_pose(keyframe);
-  return {keyframe, pose.T_cw, pose.scale, map.big_change_index()};
+  return {keyframe, pose.T_cw, pose.scale, map.big_change_index(), map.map_of(keyframe)};
 }
 
 void anchor_frame(const Map& map, TrackedFrame& frame, KeyFrameId keyframe) {

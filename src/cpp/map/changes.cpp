@@ -107,8 +107,8 @@ struct MapFollower::Pending {
   }
 };
 
-MapFollower::MapFollower(std::shared_ptr<const Map> map, int least_weight)
-    : map_(std::move(map)), least_weight_(least_weight) {}
+MapFollower::MapFollower(std::shared_ptr<const Map> map, int least_weight, MapIndex which)
+    : map_(std::move(map)), least_weight_(least_weight), which_(which) {}
 
 MapChanges MapFollower::update() {
   const std::lock_guard<std::mutex> one_at_a_time(mutex_);
@@ -142,11 +142,13 @@ void MapFollower::restart(Pending& pending) {
 /// One section. Tells whether all has been seen, so that what was told is the map of this moment.
 bool MapFollower::look(Pending& pending, int budget) {
   const auto lock = map_->read_lock();
-  if (map_->epoch() != epoch_) {
+  const MapIndex wanted = which_ == kNoMap ? map_->active_map() : which_;
+  if (map_->epoch() != epoch_ || wanted != followed_) {
     restart(pending);
     epoch_ = map_->epoch();
+    followed_ = wanted;
   }
-  pending.changes.epoch = epoch_;
+  pending.changes.map = followed_;
   const auto look_at_pages = [&](const auto& table, Known& known, auto&& look_at_page) {
     known.seen.resize(table.n_pages(), 0);
     known.told.resize(table.n_pages() * table.kPageSize, false);
@@ -169,7 +171,7 @@ int MapFollower::look_at_keyframes(std::size_t page, Pending& pending) {
   KeyFrameSnapshot& set = pending.changes.keyframes_set;
   const auto tell = [&](KeyFrameId id, const KeyFrame* keyframe) {
     std::vector<bool>::reference told = keyframes_.told[index_of(id)];
-    if (!keyframe) {
+    if (!keyframe || keyframe->map != followed_) {
       if (!told) return;
       told = false;
       pending.keyframes_dead.push_back(id);
@@ -209,7 +211,7 @@ int MapFollower::look_at_points(std::size_t page, Pending& pending) {
   PointSnapshot& set = pending.changes.points_set;
   const auto tell = [&](MapPointId id, const MapPoint* point) {
     std::vector<bool>::reference told = points_.told[index_of(id)];
-    if (!point) {
+    if (!point || !map_->is_in(*point, followed_)) {
       if (!told) return;
       told = false;
       pending.points_dead.push_back(id);

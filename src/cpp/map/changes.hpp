@@ -19,8 +19,8 @@ using KeyFramePairs = std::vector<KeyFramePair>;
 /// everything if `restarted`, drop what was removed, take over what is set. Ids ascend. What is set
 /// may also be as it was before.
 struct MapChanges {
-  std::uint64_t epoch = 0;  ///< of the map
-  bool restarted = false;   ///< the first look, or the map was cleared, and ids begin anew
+  MapIndex map = 0;        ///< which one it is
+  bool restarted = false;  ///< the first look, or another map than before, whose ids may begin anew
   KeyFrameSnapshot keyframes_set;
   std::vector<KeyFrameId> keyframes_removed;  ///< of those given before
   PointSnapshot points_set;
@@ -37,8 +37,10 @@ struct MapChanges {
 /// moment. May be used from any thread. See docs/method/map.md#changes.
 class MapFollower {
  public:
-  /// `least_weight`: shared points of two keyframes whose covisibility is told.
-  explicit MapFollower(std::shared_ptr<const Map> map, int least_weight = Map::kEssentialWeight);
+  /// `least_weight`: shared points of two keyframes whose covisibility is told. `which`: the map
+  /// that is followed; kNoMap: the active one, whichever that is.
+  explicit MapFollower(std::shared_ptr<const Map> map, int least_weight = Map::kEssentialWeight,
+                       MapIndex which = kNoMap);
 
   MapChanges update();
 
@@ -62,9 +64,11 @@ class MapFollower {
 
   std::shared_ptr<const Map> map_;
   int least_weight_;
+  MapIndex which_;
   std::mutex mutex_;
   bool complete_ = false;  ///< what was told is all that there was
   std::uint64_t epoch_ = 0;
+  MapIndex followed_ = kNoMap;
   Known keyframes_, points_;
   std::map<KeyFrameId, Links> links_;
   bool links_changed_ = false;

@@ -31,10 +31,14 @@ class Hash {
 
 std::uint64_t content_hash(const Map& map) {
   Hash hash;
+  MapIndex first = kNoMap;
   const auto lock = map.read_lock();
   map.for_each_keyframe([&](const KeyFrame& keyframe) {
     hash.add(keyframe.id.value);
     hash.add(keyframe.parent.value);
+    // One map alone has the same hash whatever its number.
+    if (first == kNoMap) first = keyframe.map;
+    if (keyframe.map != first) hash.add(keyframe.map - first);
     const Eigen::Quaterniond& q = keyframe.T_cw.rotation();
     for (const double x : {q.w(), q.x(), q.y(), q.z()}) hash.add(x);
     hash.add(keyframe.T_cw.translation());

@@ -56,7 +56,7 @@ void list_cameras(MapContents& contents) {
 KeyFrameId published_parent(const Map& map, const KeyFrame& keyframe) {
   KeyFrameId parent = keyframe.parent;
   while (parent.valid() && !is_published(map, parent)) parent = map.find(parent)->parent;
-  return parent.valid() || keyframe.id.value == 0 ? parent : KeyFrameId(0);
+  return parent.valid() || map.is_root(keyframe) ? parent : map.root(keyframe.map);
 }
 
 void copy_keyframes(const Map& map, MapContents& contents) {
@@ -203,8 +203,9 @@ std::vector<ArchivedPose> MapContentsAccess::archived(const Map& map) {
 
 ArchivedPose MapContentsAccess::relative_to_root(const Map& map, KeyFrameId id) {
   const ScaledPose pose = map.scaled_pose(id);
-  const ScaledPose root = map.scaled_pose(KeyFrameId(0));
-  return {id, KeyFrameId(0), pose.T_cw * root.T_cw.inverse(), pose.scale, root.scale};
+  const KeyFrameId root_id = map.root(map.map_of(id));
+  const ScaledPose root = map.scaled_pose(root_id);
+  return {id, root_id, pose.T_cw * root.T_cw.inverse(), pose.scale, root.scale};
 }
 
 MapContents take_contents(const Map& map, const ContentsKnown& known) {

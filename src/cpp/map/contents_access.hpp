@@ -22,7 +22,7 @@ class MapContentsAccess {
   static MapPointId next_point(const Map& map) { return map.next_point_; }
   /// Ascending ids.
   static std::vector<ArchivedPose> archived(const Map& map);
-  /// The same for one culled keyframe, relative to keyframe 0.
+  /// The same for one culled keyframe, relative to the root of its map.
   static ArchivedPose relative_to_root(const Map& map, KeyFrameId id);
 
   // Filling an empty map. Nothing is checked: see check_stored_map().
@@ -33,7 +33,8 @@ class MapContentsAccess {
   static MapPoint& add(Map& map, std::unique_ptr<MapPoint> point);
   static void add(Map& map, const ArchivedPose& removed);
   static void set_weight(Map& map, KeyFrameId a, KeyFrameId b, int weight);
-  /// Children of all keyframes, and their neighbours by weight.
+  /// Children of all keyframes, and their neighbours by weight. Keyframes without a parent are the
+  /// roots of maps, numbered from the active one on; that with most keyframes becomes active.
   static void finish(Map& map);
 };
 

@@ -85,10 +85,11 @@ std::vector<KeyFrameId> cull_keyframes(Map& map, KeyFrameId current, bool only_c
     if (const KeyFrame* keyframe = map.find(current)) neighbours = keyframe->neighbours;
   }
   for (const KeyFrameId id : neighbours) {
-    if (id.value == 0) continue;
     {
       // Most are needed; finding that out must not keep readers waiting.
       const auto lock = map.read_lock();
+      const KeyFrame* neighbour = map.find(id);
+      if (neighbour && map.is_root(*neighbour)) continue;
       if (!is_redundant(map, id, only_close)) continue;
     }
     const auto lock = map.write_lock();

@@ -2,6 +2,7 @@
 #include "map/invariants.hpp"
 
 #include <algorithm>
+#include <map>
 
 namespace orbslam {
 namespace {
@@ -15,9 +16,12 @@ class Checker {
 
   std::vector<std::string> run() {
     std::size_t n_published = 0;
+    std::map<MapIndex, std::size_t> n_of_map;
     map_.for_each_point([this](const MapPoint& point) { check_point(point); });
     map_.for_each_keyframe([&](const KeyFrame& keyframe) {
       n_published += keyframe.published ? 1 : 0;
+      n_of_map[keyframe.map] += keyframe.published ? 1 : 0;
+      check_map(keyframe);
       check_slots(keyframe);
       check_covisibility(keyframe);
       check_tree(keyframe);
@@ -29,6 +33,7 @@ class Checker {
       return std::to_string(n_published) + " keyframes are published but the map counts " +
              std::to_string(map_.n_keyframes());
     });
+    check_maps(n_of_map);
     return std::move(violations_);
   }
 
@@ -38,8 +43,44 @@ class Checker {
     if (!holds) violations_.push_back(sentence());
   }
 
+  static std::string name_of_map(MapIndex map) { return "map " + std::to_string(map); }
+
+  void check_maps(const std::map<MapIndex, std::size_t>& n_of_map) {
+    const std::vector<MapIndex> maps = map_.maps();
+    for (const MapIndex index : maps) {
+      const auto counted = n_of_map.find(index);
+      require(counted != n_of_map.end() && counted->second == map_.n_keyframes_of(index), [&] {
+        return name_of_map(index) + " has no keyframes, or counts " +
+               std::to_string(map_.n_keyframes_of(index)) + " published ones, which is wrong";
+      });
+    }
+    const bool holds = map_.root(map_.active_map()).valid();
+    require(holds || maps.empty() || maps.back() < map_.active_map(),
+            [&] { return name_of_map(map_.active_map()) + " is active and has no keyframes"; });
+  }
+
+  /// The keyframe and whatever it is tied to are of one map, which has a root.
+  void check_map(const KeyFrame& keyframe) {
+    const KeyFrame* root = map_.find(map_.root(keyframe.map));
+    require(root && root->map == keyframe.map, [&] {
+      return name(keyframe.id) + " belongs to " + name_of_map(keyframe.map) +
+             ", which has no living root";
+    });
+    const auto require_same = [&](KeyFrameId other) {
+      const KeyFrame* tied = map_.find(other);
+      require(!tied || tied->map == keyframe.map, [&] {
+        return name(keyframe.id) + " of " + name_of_map(keyframe.map) + " is tied to " +
+               name(other) + " of another map";
+      });
+    };
+    require_same(keyframe.parent);
+    for (const auto& entry : keyframe.weights) require_same(entry.first);
+    for (const KeyFrameId other : keyframe.loop_edges) require_same(other);
+  }
+
   void check_point(const MapPoint& point) {
     int count = 0;
+    MapIndex map = kNoMap;
     KeyFrameId previous;
     for (const Observation& observation : point.observations) {
       count += observation.has_depth ? 2 : 1;
@@ -52,6 +93,9 @@ class Checker {
         return name(point.id) + " is observed by dead " + name(observation.keyframe);
       });
       if (!observer) continue;
+      require(map == kNoMap || map == observer->map,
+              [&] { return name(point.id) + " is observed in two maps"; });
+      map = observer->map;
       const bool holds = observation.index < observer->map_points.size() &&
                          observer->map_points[observation.index] == point.id;
       require(holds, [&] {
@@ -121,7 +165,7 @@ class Checker {
       });
     }
     if (!keyframe.parent.valid()) {
-      require(keyframe.id.value == 0 || !keyframe.published,
+      require(map_.is_root(keyframe) || !keyframe.published,
               [&] { return name(keyframe.id) + " has no parent"; });
       return;
     }

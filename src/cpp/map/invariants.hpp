@@ -15,10 +15,12 @@ namespace orbslam {
 /// - the slots of a published keyframe hold only living points that are observed there;
 /// - covisibility weights are positive and mutual, both ends live; KeyFrame::neighbours is their
 ///   sorted view;
-/// - parents and children name each other and live; every published keyframe but keyframe 0 has a
-///   parent, and none is above itself;
+/// - parents and children name each other and live; every published keyframe but the roots of maps
+///   has a parent, and none is above itself;
 /// - loop edges are mutual, both ends live;
-/// - the map counts as many published keyframes as there are;
+/// - every keyframe belongs to a map whose root lives and belongs to it; observers of a point,
+///   neighbours, parents and loop edges are of one map; one map is active;
+/// - the map counts as many published keyframes as there are, in all and of each map;
 /// - with `require_words`, every keyframe carries words.
 ///
 /// Returns one sentence per violation (none: the map is consistent). Takes the read lock. See

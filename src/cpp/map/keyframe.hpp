@@ -18,6 +18,7 @@ namespace orbslam {
 struct KeyFrame {
   KeyFrameId id;
   std::shared_ptr<const Frame> frame;
+  MapIndex map = 0;  ///< the map that it belongs to; its world is that of T_cw
   Pose T_cw;
   /// By how much lengths around the keyframe have been multiplied since it was made: loops closed
   /// with a single camera take out a drift of scale. Lengths kept outside the map (the poses of
@@ -31,7 +32,7 @@ struct KeyFrame {
   /// by descending weight, ties by lower id.
   std::vector<KeyFrameId> neighbours;
 
-  KeyFrameId parent;  ///< spanning tree; invalid for keyframe 0 and before publication
+  KeyFrameId parent;                ///< spanning tree; invalid for roots and before publication
   bool provisional_parent = false;  ///< there was no neighbour yet; the first one replaces it
   std::set<KeyFrameId> children;
   std::set<KeyFrameId> loop_edges;

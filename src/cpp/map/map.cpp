@@ -66,6 +66,9 @@ KeyFrameId Map::add_keyframe(std::shared_ptr<const Frame> frame, const Pose& T_c
   added->map_points.resize(frame->size());
   added->frame = std::move(frame);
   added->T_cw = T_cw;
+  added->map = active_map();
+  Part& part = parts_.at(added->map);
+  if (!part.root.valid()) part.root = id;
   keyframes_.insert(id, std::move(added));
   ++next_keyframe_.value;
   forget_old_replacements();
@@ -79,14 +82,19 @@ void Map::publish(KeyFrameId id) {
   published.published = true;
   keyframes_.touch(id);
   ++n_published_;
+  ++parts_.at(published.map).n_published;
   ++structure_version_;
-  if (published.parent.valid() || id.value == 0) return;
+  if (published.parent.valid() || is_root(published)) return;
 
-  // Keyframe 0 never dies, so there is always somebody to hang under.
+  // The root never dies, so there is always somebody to hang under.
+  const KeyFrameId root_id = root(published.map);
   KeyFrameId before(id.value - 1);
-  for (; before.value > 0; --before.value) {
+  for (; before > root_id; --before.value) {
     const KeyFrame* candidate = find(before);
-    if (candidate && candidate->published && !is_in_subtree(before, id)) break;
+    if (candidate && candidate->published && candidate->map == published.map &&
+        !is_in_subtree(before, id)) {
+      break;
+    }
   }
   link(published, before);
   published.provisional_parent = true;
@@ -170,6 +178,8 @@ void Map::clear() {
   next_keyframe_ = KeyFrameId(0);
   next_point_ = MapPointId(0);
   n_published_ = 0;
+  parts_ = {{++last_map_, {}}};
+  active_map_ = last_map_;
   big_change_index_ = 0;
   ++epoch_;
   ++structure_version_;

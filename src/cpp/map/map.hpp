@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -24,6 +25,11 @@ struct ScaledPose {
 };
 
 /// Owner of keyframes and map points, the covisibility graph and the spanning tree.
+///
+/// It holds any number of maps, each in a world of its own, that share ids. Every keyframe, and
+/// with it every point, belongs to one of them; observations, covisibility, loop edges and the
+/// spanning tree never cross between two. One map is active: new keyframes belong to it. The others
+/// rest.
 ///
 /// Locking: the methods below do not lock. Callers hold `read_lock()` for const methods and
 /// `write_lock()` for the others, in sections that neither solve, nor extract, nor match more
@@ -62,7 +68,7 @@ class Map {
   /// Published and unpublished keyframes, ascending.
   std::vector<KeyFrameId> keyframe_ids() const;
   std::vector<MapPointId> point_ids() const;
-  std::size_t n_keyframes() const { return n_published_; }  ///< published ones only
+  std::size_t n_keyframes() const { return n_published_; }  ///< of all maps, published ones only
   std::size_t n_points() const { return points_.size(); }
   template <class Visitor>
   void for_each_keyframe(Visitor&& visit) const {
@@ -80,12 +86,41 @@ class Map {
   const IdTable<KeyFrameId, KeyFrame>& keyframe_table() const { return keyframes_; }
   const IdTable<MapPointId, MapPoint>& point_table() const { return points_; }
 
+  // ---- several maps ----------------------------------------------------------------------------
+  /// The one that new keyframes belong to. Needs no lock.
+  MapIndex active_map() const { return active_map_.load(); }
+  /// Those that hold keyframes, ascending: the oldest first.
+  std::vector<MapIndex> maps() const;
+  /// The map of a keyframe, living or culled; kNoMap for an unknown one.
+  MapIndex map_of(KeyFrameId id) const;
+  /// The map of a living point, or of what has replaced it; kNoMap for a dead one.
+  MapIndex map_of(MapPointId id) const;
+  /// Whether a point belongs to a map.
+  bool is_in(const MapPoint& point, MapIndex map) const;
+  /// The first keyframe of a map, root of its spanning tree; never dies. Invalid for a map without
+  /// keyframes.
+  KeyFrameId root(MapIndex map) const;
+  bool is_root(const KeyFrame& keyframe) const { return root(keyframe.map) == keyframe.id; }
+  std::size_t n_keyframes_of(MapIndex map) const;  ///< published ones only
+  /// The next keyframe begins a map beside the present ones, which becomes the active one. Nothing
+  /// changes while the active one has no keyframe. Returns the active map.
+  MapIndex begin_map();
+  /// Throws StateError for a map without keyframes.
+  void activate_map(MapIndex map);
+  /// Drops a map with all that belongs to it; the youngest of the others becomes active if it was.
+  /// Returns its keyframes, for those who keep an index of keyframes.
+  std::vector<KeyFrameId> erase_map(MapIndex map);
+  /// Everything of one map belongs to another one from now on, whose world it is in already. Its
+  /// spanning tree hangs with `child` under `parent`. Throws StateError when these are not a living
+  /// keyframe of each.
+  void join_maps(KeyFrameId child, KeyFrameId parent);
+
   // ---- keyframes -------------------------------------------------------------------------------
   /// A new keyframe with empty slots, not yet published. The frame must be described (words) if a
   /// vocabulary is in use; nobody changes it afterwards.
   KeyFrameId add_keyframe(std::shared_ptr<const Frame> frame, const Pose& T_cw);
   /// Makes the keyframe part of the keyframe set (idempotent). A keyframe that has no parent yet
-  /// hangs provisionally under the published keyframe before it, so that the tree spans all.
+  /// hangs provisionally under the published keyframe before it, so that the tree spans its map.
   void publish(KeyFrameId id);
   /// Notes that process_new_keyframe() is through with the keyframe.
   void mark_processed(KeyFrameId id) { changing(id).processed = true; }
@@ -99,7 +134,7 @@ class Map {
   /// Removes a keyframe: neighbours forget it, its points lose the observation (and may die), its
   /// children find new parents among the neighbours they share most points with, and its pose
   /// relative to the parent is archived for trajectories. Returns false, and only marks it, while
-  /// leases or loop edges protect it. Keyframe 0 never dies and dead ones do not die again
+  /// leases or loop edges protect it. Roots never die and dead ones do not die again
   /// (returns false).
   bool erase_keyframe(KeyFrameId id);
 
@@ -111,7 +146,7 @@ class Map {
   bool end_lease(KeyFrameId id);
   /// Adds the edge on both keyframes; both are protected for ever.
   void add_loop_edge(KeyFrameId a, KeyFrameId b);
-  /// Throws StateError when that would make a cycle or give keyframe 0 a parent.
+  /// Throws StateError when that would make a cycle or give a root a parent.
   void set_parent(KeyFrameId child, KeyFrameId parent);
 
   /// Pose of a keyframe, living or culled: a culled one is expressed through its archived pose
@@ -172,7 +207,8 @@ class Map {
   int weight(KeyFrameId a, KeyFrameId b) const;
 
   // ---- the map as a whole ----------------------------------------------------------------------
-  /// Drops everything and starts a new epoch: ids restart, work begun before must not commit.
+  /// Drops everything and starts a new epoch and a new map: ids restart, work begun before must not
+  /// commit.
   /// The big-change index restarts too; the versions go on growing.
   void clear();
   std::uint64_t epoch() const { return epoch_.load(); }
@@ -184,6 +220,10 @@ class Map {
   std::uint64_t geometry_version() const { return geometry_version_.load(); }
 
  private:
+  struct Part {
+    KeyFrameId root;
+    std::size_t n_published = 0;
+  };
   struct ArchivedKeyFrame {
     KeyFrameId parent;
     Pose T_kp;                           ///< maps the parent's camera frame to the dead keyframe's
@@ -208,6 +248,7 @@ class Map {
   void forget_covisibility(KeyFrame& dying);
 
   bool is_in_subtree(KeyFrameId id, KeyFrameId root) const;
+  void make_root_of_tree(KeyFrame& keyframe);
   void link(KeyFrame& child, KeyFrameId parent);
   void choose_parent(KeyFrame& keyframe);
   void adopt_children(KeyFrame& dying, KeyFrameId grandparent);
@@ -224,6 +265,9 @@ class Map {
   KeyFrameId next_keyframe_{0};
   MapPointId next_point_{0};
   std::size_t n_published_ = 0;
+  std::map<MapIndex, Part> parts_{{0, {}}};  // the active one is among them
+  MapIndex last_map_ = 0;
+  std::atomic<MapIndex> active_map_{0};
   std::atomic<std::uint64_t> epoch_{0}, big_change_index_{0};
   std::atomic<std::uint64_t> structure_version_{0}, geometry_version_{0};
 };

@@ -80,7 +80,7 @@ void Map::update_connections(KeyFrameId id) {
     keyframes_.touch(id);
     ++structure_version_;
   }
-  if (id.value != 0 && (!updated.parent.valid() || updated.provisional_parent)) {
+  if (!is_root(updated) && (!updated.parent.valid() || updated.provisional_parent)) {
     choose_parent(updated);
   }
 }

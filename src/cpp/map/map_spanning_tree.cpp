@@ -27,7 +27,10 @@ void Map::link(KeyFrame& child, KeyFrameId parent) {
 void Map::set_parent(KeyFrameId child, KeyFrameId parent) {
   KeyFrame& moved = keyframe(child);
   keyframe(parent);
-  if (child.value == 0) throw StateError("keyframe 0 is the root of the spanning tree");
+  if (is_root(moved)) {
+    throw StateError("keyframe " + std::to_string(child.value) +
+                     " is the root of the spanning tree");
+  }
   if (is_in_subtree(parent, child)) {
     throw StateError("keyframe " + std::to_string(parent.value) +
                      " is in the subtree of keyframe " + std::to_string(child.value) +
@@ -85,7 +88,7 @@ void Map::adopt_children(KeyFrame& dying, KeyFrameId grandparent) {
 
 bool Map::erase_keyframe(KeyFrameId id) {
   KeyFrame* dying = keyframes_.find(id);
-  if (!dying || id.value == 0) return false;
+  if (!dying || is_root(*dying)) return false;
   if (dying->leases > 0 || !dying->loop_edges.empty()) {
     dying->to_be_erased = true;
     return false;
@@ -95,14 +98,17 @@ bool Map::erase_keyframe(KeyFrameId id) {
   for (std::size_t i = 0; i < dying->map_points.size(); ++i) {
     erase_observation(dying->map_points[i], id);
   }
-  // Keyframe 0 stands in for the parent of a keyframe that dies before it was processed.
-  const KeyFrameId grandparent = dying->parent.valid() ? dying->parent : KeyFrameId(0);
+  // The root stands in for the parent of a keyframe that dies before it was processed.
+  const KeyFrameId grandparent = dying->parent.valid() ? dying->parent : root(dying->map);
   KeyFrame& parent = keyframe(grandparent);
   adopt_children(*dying, grandparent);
   parent.children.erase(id);
   archive_.emplace(id, ArchivedKeyFrame{grandparent, dying->T_cw * parent.T_cw.inverse(),
                                         dying->scale, parent.scale});
-  if (dying->published) --n_published_;
+  if (dying->published) {
+    --n_published_;
+    --parts_.at(dying->map).n_published;
+  }
   keyframes_.erase(id);
   ++structure_version_;
   return true;

@@ -4,9 +4,14 @@
 namespace orbslam {
 namespace {
 
-void copy_keyframes(const Map& map, KeyFrameSnapshot& snapshot) {
+/// The caller holds a lock.
+MapIndex chosen(const Map& map, MapIndex which) {
+  return which == kNoMap ? map.active_map() : which;
+}
+
+void copy_keyframes(const Map& map, MapIndex which, KeyFrameSnapshot& snapshot) {
   map.for_each_keyframe([&](const KeyFrame& keyframe) {
-    if (!keyframe.published) return;
+    if (!keyframe.published || keyframe.map != which) return;
     snapshot.ids.push_back(keyframe.id);
     snapshot.T_wc.push_back(row_major(keyframe.T_cw.inverse()));
     snapshot.timestamps.push_back(keyframe.frame->timestamp);
@@ -14,11 +19,12 @@ void copy_keyframes(const Map& map, KeyFrameSnapshot& snapshot) {
   });
 }
 
-void copy_points(const Map& map, PointSnapshot& snapshot) {
+void copy_points(const Map& map, MapIndex which, PointSnapshot& snapshot) {
   snapshot.ids.reserve(map.n_points());
   snapshot.positions.reserve(map.n_points());
   snapshot.observation_counts.reserve(map.n_points());
   map.for_each_point([&](const MapPoint& point) {
+    if (!map.is_in(point, which)) return;
     const Eigen::Vector3d& p = point.position;
     snapshot.ids.push_back(point.id);
     snapshot.positions.push_back({p.x(), p.y(), p.z()});
@@ -34,18 +40,19 @@ Matrix4 row_major(const Pose& pose) {
   return matrix;
 }
 
-KeyFrameSnapshot snapshot_keyframes(const Map& map) {
+KeyFrameSnapshot snapshot_keyframes(const Map& map, MapIndex which) {
   KeyFrameSnapshot snapshot;
   const auto lock = map.read_lock();
-  copy_keyframes(map, snapshot);
+  copy_keyframes(map, chosen(map, which), snapshot);
   return snapshot;
 }
 
-EdgeSnapshot snapshot_edges(const Map& map, int min_weight) {
+EdgeSnapshot snapshot_edges(const Map& map, int min_weight, MapIndex which) {
   EdgeSnapshot snapshot;
   const auto lock = map.read_lock();
+  which = chosen(map, which);
   map.for_each_keyframe([&](const KeyFrame& keyframe) {
-    if (!keyframe.published) return;
+    if (!keyframe.published || keyframe.map != which) return;
     for (const auto& [other, weight] : keyframe.weights) {
       if (other < keyframe.id || weight < min_weight || !map.find(other)->published) continue;
       snapshot.a.push_back(keyframe.id);
@@ -56,19 +63,21 @@ EdgeSnapshot snapshot_edges(const Map& map, int min_weight) {
   return snapshot;
 }
 
-PointSnapshot snapshot_points(const Map& map) {
+PointSnapshot snapshot_points(const Map& map, MapIndex which) {
   PointSnapshot snapshot;
   const auto lock = map.read_lock();
-  copy_points(map, snapshot);
+  copy_points(map, chosen(map, which), snapshot);
   return snapshot;
 }
 
-MapSnapshot snapshot_map(const Map& map) {
+MapSnapshot snapshot_map(const Map& map, MapIndex which) {
   MapSnapshot snapshot;
   const auto lock = map.read_lock();
-  copy_keyframes(map, snapshot.keyframes);
-  copy_points(map, snapshot.points);
+  which = chosen(map, which);
+  copy_keyframes(map, which, snapshot.keyframes);
+  copy_points(map, which, snapshot.points);
   map.for_each_keyframe([&](const KeyFrame& keyframe) {
+    if (keyframe.map != which) return;
     for (const KeyFrameId other : keyframe.loop_edges) {
       if (other < keyframe.id) continue;
       snapshot.loop_a.push_back(keyframe.id);
@@ -78,11 +87,13 @@ MapSnapshot snapshot_map(const Map& map) {
   return snapshot;
 }
 
-ObservationSnapshot snapshot_observations(const Map& map) {
+ObservationSnapshot snapshot_observations(const Map& map, MapIndex which) {
   ObservationSnapshot snapshot;
   const auto lock = map.read_lock();
   snapshot.offsets.push_back(0);
+  which = chosen(map, which);
   map.for_each_point([&](const MapPoint& point) {
+    if (!map.is_in(point, which)) return;
     snapshot.ids.push_back(point.id);
     for (const Observation& observation : point.observations) {
       snapshot.keyframes.push_back(observation.keyframe);

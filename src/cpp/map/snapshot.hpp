@@ -18,7 +18,7 @@ struct KeyFrameSnapshot {
   std::vector<KeyFrameId> ids;
   std::vector<Matrix4> T_wc;        ///< camera to world
   std::vector<double> timestamps;   ///< seconds
-  std::vector<KeyFrameId> parents;  ///< spanning tree; invalid for keyframe 0
+  std::vector<KeyFrameId> parents;  ///< spanning tree; invalid for the root
 };
 
 /// Covisibility edges a[i] < b[i], by ascending (a, b).
@@ -51,17 +51,19 @@ struct MapSnapshot {
 };
 
 // Copies for viewers, exporters and users; each is one consistent view and takes the read lock. See
-// docs/method/map.md#keyframes.
+// docs/method/map.md#keyframes. They are of one map, whose world the poses and positions are in:
+// `which`, or the active one if that is kNoMap.
 
 /// The published keyframes.
-KeyFrameSnapshot snapshot_keyframes(const Map& map);
+KeyFrameSnapshot snapshot_keyframes(const Map& map, MapIndex which = kNoMap);
 /// Edges between published keyframes with weight >= min_weight.
-EdgeSnapshot snapshot_edges(const Map& map, int min_weight = Map::kCovisibilityThreshold);
-/// All points.
-PointSnapshot snapshot_points(const Map& map);
-/// The observations of all points, those by unpublished keyframes included.
-ObservationSnapshot snapshot_observations(const Map& map);
+EdgeSnapshot snapshot_edges(const Map& map, int min_weight = Map::kCovisibilityThreshold,
+                            MapIndex which = kNoMap);
+/// The points.
+PointSnapshot snapshot_points(const Map& map, MapIndex which = kNoMap);
+/// The observations of the points, those by unpublished keyframes included.
+ObservationSnapshot snapshot_observations(const Map& map, MapIndex which = kNoMap);
 /// Keyframes, loop edges and points together.
-MapSnapshot snapshot_map(const Map& map);
+MapSnapshot snapshot_map(const Map& map, MapIndex which = kNoMap);
 
 }  // namespace orbslam

@@ -107,6 +107,28 @@ void MapContentsAccess::finish(Map& map) {
     if (keyframe.parent.valid()) map.keyframe(keyframe.parent).children.insert(id);
     Map::sort_neighbours(keyframe);
   }
+  std::map<MapIndex, Map::Part> parts;
+  MapIndex next = map.active_map();
+  for (const KeyFrameId id : map.keyframe_ids()) {
+    if (!map.keyframe(id).parent.valid()) parts.emplace(next++, Map::Part{id, 0});
+  }
+  std::vector<const KeyFrame*> below;
+  for (auto& [index, part] : parts) {
+    below.assign(1, &map.keyframe(part.root));
+    for (std::size_t i = 0; i < below.size(); ++i) {
+      map.keyframe(below[i]->id).map = index;
+      for (const KeyFrameId child : below[i]->children) below.push_back(map.find(child));
+    }
+    part.n_published = below.size();
+  }
+  const auto largest = std::max_element(
+      parts.begin(), parts.end(),
+      [](const auto& a, const auto& b) { return a.second.n_published < b.second.n_published; });
+  if (largest != parts.end()) {
+    map.active_map_ = largest->first;
+    map.last_map_ = next - 1;
+    map.parts_ = std::move(parts);
+  }
   ++map.structure_version_;
   ++map.geometry_version_;
 }

@@ -74,16 +74,21 @@ void check_cameras(const StoredMap& stored) {
 
 class KeyFrameCheck {
  public:
-  explicit KeyFrameCheck(const StoredMap& stored) : stored_(stored), rows_(stored.keyframes) {}
+  explicit KeyFrameCheck(const StoredMap& stored)
+      : stored_(stored), rows_(stored.keyframes), roots_(rows_.ids.size, 0) {}
 
-  void run() {
+  /// Per keyframe the row of the root above it: which map it belongs to.
+  std::vector<std::size_t> run() {
     check_next(rows_.ids.size, stored_.next_keyframe, kFewKeyframeIds, "keyframe");
     check_ids(rows_.ids, stored_.next_keyframe, "keyframe");
     if (rows_.ids.size == 0) refuse("there is no keyframe");
-    if (rows_.ids[0] != 0) refuse("keyframe 0, the root of the spanning tree, is missing");
+    if (rows_.ids[0] != 0 && rows_.parent[0] != -1) {
+      refuse("keyframe 0, the root of the spanning tree, is missing");
+    }
     check_offsets();
     for (std::size_t i = 0; i < rows_.ids.size; ++i) check_row(i);
     check_tree();
+    return std::move(roots_);
   }
 
  private:
@@ -113,15 +118,21 @@ class KeyFrameCheck {
   }
 
   void check_tree() {
-    // 0: not looked at, 1: on the way up from a later one, 2: leads to keyframe 0.
+    // 0: not looked at, 1: on the way up from a later one, 2: leads to a root.
     std::vector<std::uint8_t> state(rows_.ids.size, 0);
     state[0] = 2;
     if (rows_.parent[0] != -1) refuse("keyframe 0 has a parent in the spanning tree");
+    roots_[0] = 0;
     std::vector<std::size_t> way;
     for (std::size_t i = 1; i < rows_.ids.size; ++i) {
       way.clear();
       std::size_t at = i;
       while (state[at] == 0) {
+        if (rows_.parent[at] == -1) {  // the root of another map
+          state[at] = 2;
+          roots_[at] = at;
+          break;
+        }
         state[at] = 1;
         way.push_back(at);
         const std::int64_t parent = row_of(rows_.ids, rows_.parent[at]);
@@ -132,12 +143,16 @@ class KeyFrameCheck {
         at = static_cast<std::size_t>(parent);
       }
       if (state[at] == 1) refuse(keyframe(rows_.ids[at]) + " is its own ancestor");
-      for (const std::size_t passed : way) state[passed] = 2;
+      for (const std::size_t passed : way) {
+        state[passed] = 2;
+        roots_[passed] = roots_[at];
+      }
     }
   }
 
   const StoredMap& stored_;
   const decltype(StoredMap::keyframes)& rows_;
+  std::vector<std::size_t> roots_;
 };
 
 void check_keypoints_of(const StoredMap& stored, const StoredKeypoints& keypoints,
@@ -207,7 +222,7 @@ void check_point_row(const StoredMap& stored, std::size_t i) {
   if (!good) refuse(point(rows.ids[i]) + " has a number out of range");
 }
 
-void check_points(const StoredMap& stored) {
+void check_points(const StoredMap& stored, const std::vector<std::size_t>& roots) {
   const auto& rows = stored.points;
   const auto& seen = stored.observations;
   check_next(rows.ids.size, stored.next_point, kFewPointIds, "point");
@@ -217,6 +232,7 @@ void check_points(const StoredMap& stored) {
   for (std::size_t i = 0; i < rows.ids.size; ++i) {
     check_point_row(stored, i);
     bool reference_sees_it = false;
+    std::size_t root = 0;
     const std::size_t first = o;
     for (; o < seen.point.size && seen.point[o] == rows.ids[i]; ++o) {
       const std::int64_t row = row_of(stored.keyframes.ids, seen.keyframe[o]);
@@ -224,6 +240,10 @@ void check_points(const StoredMap& stored) {
         refuse(point(rows.ids[i]) + " is seen by " + keyframe(seen.keyframe[o]) +
                ", which is not there or out of order");
       }
+      if (o > first && roots[static_cast<std::size_t>(row)] != root) {
+        refuse(point(rows.ids[i]) + " is seen by keyframes of two maps");
+      }
+      root = roots[static_cast<std::size_t>(row)];
       const std::int64_t begin = stored.keyframes.offsets[static_cast<std::size_t>(row)];
       const std::int64_t end = stored.keyframes.offsets[static_cast<std::size_t>(row) + 1];
       const std::int64_t slot = begin + seen.keypoint[o];
@@ -241,10 +261,13 @@ void check_points(const StoredMap& stored) {
   }
 }
 
-void check_edges(const StoredMap& stored) {
+void check_edges(const StoredMap& stored, const std::vector<std::size_t>& roots) {
   const auto& edges = stored.covisibility;
   const auto is_edge = [&](std::int64_t a, std::int64_t b) {
-    return a < b && row_of(stored.keyframes.ids, a) >= 0 && row_of(stored.keyframes.ids, b) >= 0;
+    const std::int64_t row_a = row_of(stored.keyframes.ids, a);
+    const std::int64_t row_b = row_of(stored.keyframes.ids, b);
+    return a < b && row_a >= 0 && row_b >= 0 &&
+           roots[static_cast<std::size_t>(row_a)] == roots[static_cast<std::size_t>(row_b)];
   };
   for (std::size_t i = 0; i < edges.a.size; ++i) {
     const bool ascends = i == 0 || edges.a[i] > edges.a[i - 1] ||
@@ -268,10 +291,10 @@ void check_edges(const StoredMap& stored) {
 
 void check_stored_map(const StoredMap& stored) {
   check_cameras(stored);
-  KeyFrameCheck(stored).run();
+  const std::vector<std::size_t> roots = KeyFrameCheck(stored).run();
   check_removed(stored);
-  check_points(stored);
-  check_edges(stored);
+  check_points(stored, roots);
+  check_edges(stored, roots);
 }
 
 void check_stored_keypoints(const StoredMap& stored, const StoredKeypoints& keypoints) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "map/trajectory.hpp"
 
+#include <algorithm>
+
 #include "base/errors.hpp"
 
 namespace orbslam {
@@ -8,10 +10,10 @@ namespace {
 
 /// Grows by a quarter instead of doubling, so that long sequences waste little.
 template <class Item>
-void append(std::vector<Item>& items, const Item& item) {
+void insert(std::vector<Item>& items, std::size_t at, const Item& item) {
   constexpr std::size_t kFirst = 256;
   if (items.size() == items.capacity()) items.reserve(kFirst + items.size() + items.size() / 4);
-  items.push_back(item);
+  items.insert(items.begin() + static_cast<std::ptrdiff_t>(at), item);
 }
 
 }  // namespace
@@ -22,7 +24,15 @@ void TrajectoryRecorder::check_epoch(const Map& map) const {
       "the map was cleared since the trajectory began; rebuild() before and clear() after it");
 }
 
+/// Where the frame is, or would be: ids ascend.
+std::size_t TrajectoryRecorder::place_of(FrameId frame) const {
+  if (frames_.empty() || frames_.back() < frame) return size();
+  const auto found = std::lower_bound(frames_.begin(), frames_.end(), frame);
+  return static_cast<std::size_t>(found - frames_.begin());
+}
+
 void TrajectoryRecorder::record(const Map& map, const TrackedFrame& frame, bool lost) {
+  const std::size_t at = place_of(frame.frame->id);
   RelativePose T_cr;
   KeyFrameId reference;
   {
@@ -36,30 +46,58 @@ void TrajectoryRecorder::record(const Map& map, const TrackedFrame& frame, bool 
       const Eigen::Quaterniond& q = pose.rotation();
       const Eigen::Vector3d t = pose.translation() / anchor.scale;
       T_cr = {q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z()};
-    } else if (size() > 0) {
-      reference = references_.back();
-      T_cr = T_cr_.back();
+    } else if (at > 0) {
+      reference = references_[at - 1];
+      T_cr = T_cr_[at - 1];
     }
   }
-  append(timestamps_, frame.frame->timestamp);
-  append(T_cr_, T_cr);
-  append(references_, reference);
-  append(frames_, frame.frame->id);
-  append(lost_, static_cast<std::uint8_t>(lost || !reference.valid() ? 1 : 0));
+  const auto is_lost = static_cast<std::uint8_t>(lost || !reference.valid() ? 1 : 0);
+  if (at < size() && frames_[at] == frame.frame->id) {
+    T_cr_[at] = T_cr;
+    references_[at] = reference;
+    lost_[at] = is_lost;
+    return;
+  }
+  insert(timestamps_, at, frame.frame->timestamp);
+  insert(T_cr_, at, T_cr);
+  insert(references_, at, reference);
+  insert(frames_, at, frame.frame->id);
+  insert(lost_, at, is_lost);
 }
 
-Trajectory TrajectoryRecorder::rebuild(const Map& map) const {
-  Trajectory trajectory{timestamps_, {}, lost_, frames_};
-  trajectory.T_wc.reserve(size());
+/// The map of every frame. The caller holds a lock.
+std::vector<MapIndex> TrajectoryRecorder::maps_of_frames(const Map& map) const {
+  std::vector<MapIndex> maps(size());
+  KeyFrameId reference;
+  MapIndex of_reference = map.active_map();
+  for (std::size_t i = size(); i-- > 0;) {
+    if (references_[i].valid() && references_[i] != reference) {
+      reference = references_[i];
+      of_reference = map.map_of(reference);
+    }
+    maps[i] = of_reference;
+  }
+  return maps;
+}
+
+Trajectory TrajectoryRecorder::rebuild(const Map& map, MapIndex which) const {
+  Trajectory trajectory;
   const auto lock = map.read_lock();
   check_epoch(map);
+  const std::vector<MapIndex> maps = maps_of_frames(map);
+  if (which == kNoMap) which = map.active_map();
 
+  const KeyFrameId root = map.root(which);
   Pose T_0w;
-  if (map.find(KeyFrameId(0))) T_0w = map.T_cw(KeyFrameId(0));
+  if (map.find(root)) T_0w = map.T_cw(root);
   KeyFrameId reference;
   ScaledPose T_rw;
   Pose T_0r;  // frames follow each other under one reference: walk its chain of parents once
   for (std::size_t i = 0; i < size(); ++i) {
+    if (maps[i] != which) continue;
+    trajectory.timestamps.push_back(timestamps_[i]);
+    trajectory.lost.push_back(lost_[i]);
+    trajectory.frames.push_back(frames_[i]);
     if (!references_[i].valid()) {
       trajectory.T_wc.push_back(row_major(Pose()));
       continue;
@@ -75,6 +113,36 @@ Trajectory TrajectoryRecorder::rebuild(const Map& map) const {
     trajectory.T_wc.push_back(row_major(T_0r * T_cr.inverse()));
   }
   return trajectory;
+}
+
+void TrajectoryRecorder::drop(const Map& map, MapIndex which) {
+  std::vector<MapIndex> maps;
+  {
+    const auto lock = map.read_lock();
+    check_epoch(map);
+    maps = maps_of_frames(map);
+  }
+  std::size_t n_kept = 0;
+  for (std::size_t i = 0; i < maps.size(); ++i) {
+    if (maps[i] == which) continue;
+    timestamps_[n_kept] = timestamps_[i];
+    T_cr_[n_kept] = T_cr_[i];
+    references_[n_kept] = references_[i];
+    frames_[n_kept] = frames_[i];
+    lost_[n_kept] = lost_[i];
+    ++n_kept;
+  }
+  truncate(n_kept);
+}
+
+void TrajectoryRecorder::truncate(std::size_t n) {
+  if (n == 0) return clear();
+  if (n >= size()) return;
+  timestamps_.resize(n);
+  T_cr_.resize(n);
+  references_.resize(n);
+  frames_.resize(n);
+  lost_.resize(n);
 }
 
 TrajectoryRecorder::Entries TrajectoryRecorder::entries() const {

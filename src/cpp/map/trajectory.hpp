@@ -12,7 +12,7 @@ namespace orbslam {
 /// Camera poses of all recorded frames, one entry each.
 struct Trajectory {
   std::vector<double> timestamps;  ///< seconds
-  std::vector<Matrix4> T_wc;       ///< camera to world; the world is the frame of keyframe 0
+  std::vector<Matrix4> T_wc;       ///< camera to world; the world is the frame of the map's root
   std::vector<std::uint8_t> lost;  ///< 1: tracking was lost, the pose repeats the last known one
   std::vector<FrameId> frames;
 };
@@ -22,14 +22,20 @@ struct Trajectory {
 /// docs/method/map.md#anchors.
 class TrajectoryRecorder {
  public:
-  /// Appends a frame. Without a pose or a reference keyframe it repeats the last relative pose (at
-  /// first: none, the frame then is lost whatever the flag says). Takes the map's read lock.
+  /// Appends a frame, or records one anew that is there already. Without a pose or a reference
+  /// keyframe it repeats the relative pose before it (at first: none, the frame then is lost
+  /// whatever the flag says). Takes the map's read lock.
   /// Throws StateError when the map was cleared since the first record and clear() was not called.
   void record(const Map& map, const TrackedFrame& frame, bool lost);
 
-  /// All poses, through culled keyframes as well, anchored at keyframe 0. Takes the map's read
-  /// lock. Frames recorded before the first pose have the identity. Throws StateError as above.
-  Trajectory rebuild(const Map& map) const;
+  /// All poses in one map (kNoMap: the active one), through culled keyframes as well, anchored at
+  /// its root. Takes the map's read lock. Frames without a keyframe, recorded before the first
+  /// pose, have the identity and belong to the map of the next one that has (the active one, if
+  /// there is none). Throws StateError as above.
+  Trajectory rebuild(const Map& map, MapIndex which = kNoMap) const;
+
+  /// Forgets the frames of one map, which is about to be dropped. Takes the map's read lock.
+  void drop(const Map& map, MapIndex which);
 
   /// Everything recorded, relative to the keyframes, as map files keep it.
   struct Entries {
@@ -54,6 +60,9 @@ class TrajectoryRecorder {
     double qw = 1, qx = 0, qy = 0, qz = 0, x = 0, y = 0, z = 0;
   };
   void check_epoch(const Map& map) const;
+  std::size_t place_of(FrameId frame) const;
+  void truncate(std::size_t n);
+  std::vector<MapIndex> maps_of_frames(const Map& map) const;
 
   std::vector<double> timestamps_;
   std::vector<RelativePose> T_cr_;

@@ -20,6 +20,7 @@ struct GatheredBundle {
   std::vector<std::uint32_t> keypoints;  ///< per observation: slot of its keyframe
   std::uint64_t epoch = 0;               ///< of the map when it was gathered
   std::uint64_t big_changes = 0;         ///< Map::big_change_index() then
+  MapIndex map_index = kNoMap;           ///< of a full bundle: the map that it is of
   bool solved = false;  ///< the parameters are a result that is better than what was gathered
   std::unordered_map<KeyFrameId, std::uint32_t> camera_of;  ///< for look-ups only
 

@@ -35,13 +35,14 @@ FullBundleResult full_bundle_adjustment(Map& map, const FullBundleOptions& optio
 // Its steps, for those that let the map change between them: after a loop, tracking and mapping go
 // on while it is solved. See docs/method/loops.md#after-a-loop.
 
-/// All keyframes that are tied to each other by points, and these points. Others (a keyframe that
+/// All keyframes of a map (kNoMap: the active one) that are tied to each other by points, and these
+/// points. Others (a keyframe that
 /// was just inserted and has not been processed) are left out: nothing says where they are relative
 /// to the rest. If the map falls apart, the part with most keyframes is taken. The first keyframe
-/// of the bundle is fixed: it is keyframe 0 unless that one has lost its points. Takes the read
+/// of the bundle is fixed: it is the root unless that one has lost its points. Takes the read
 /// lock in short sections, so that tracking does not wait for a large map; what changes between
 /// them is taken as it is found.
-GatheredBundle gather_full_bundle(const Map& map);
+GatheredBundle gather_full_bundle(const Map& map, MapIndex which = kNoMap);
 
 /// Solves a gathered bundle in place, without a lock. It counts as solved, and may be committed,
 /// unless there was no step that lowered the cost, the result is not finite or `abort` was raised.

@@ -31,9 +31,10 @@ class KeyFrameMover {
       : map_(map), bundle_(bundle), prepared_(prepared) {}
 
   void run() {
-    // Keyframe 0 comes first; others without a parent are not published yet.
+    // The root comes first; others without a parent are not published yet.
     const KeyFrame* before = nullptr;
     map_.for_each_keyframe([&](const KeyFrame& keyframe) {
+      if (keyframe.map != bundle_.map_index) return;
       if (!keyframe.parent.valid()) move_tree(keyframe, before);
       if (prepared_.rewrite.T_cw(keyframe.id) != nullptr) before = &keyframe;
     });

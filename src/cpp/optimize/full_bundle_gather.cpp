@@ -52,6 +52,7 @@ GatheredBundle reduce(const GatheredBundle& all, const std::vector<bool>& camera
   GatheredBundle kept(map);
   kept.epoch = all.epoch;
   kept.big_changes = all.big_changes;
+  kept.map_index = all.map_index;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     if (!cameras[i]) continue;
     kept.camera_of.emplace(all.keyframes[i], static_cast<std::uint32_t>(kept.keyframes.size()));
@@ -98,14 +99,20 @@ void gather_points(const Map& map, const std::vector<MapPointId>& ids, GatheredB
 
 }  // namespace
 
-GatheredBundle gather_full_bundle(const Map& map) {
+GatheredBundle gather_full_bundle(const Map& map, MapIndex which) {
   GatheredBundle bundle(map);
   std::vector<MapPointId> points;
   {
     const auto lock = map.read_lock();
     bundle = GatheredBundle(map);
-    map.for_each_keyframe([&](const KeyFrame& keyframe) { bundle.add_camera(keyframe, false); });
-    points = map.point_ids();
+    bundle.map_index = which == kNoMap ? map.active_map() : which;
+    map.for_each_keyframe([&](const KeyFrame& keyframe) {
+      if (keyframe.map == bundle.map_index) bundle.add_camera(keyframe, false);
+    });
+    points.reserve(map.n_points());
+    map.for_each_point([&](const MapPoint& point) {
+      if (map.is_in(point, bundle.map_index)) points.push_back(point.id);
+    });
   }
   gather_points(map, points, bundle);
   if (bundle.keyframes.empty()) return bundle;

@@ -96,7 +96,10 @@ GatheredBundle gather(const Map& map, KeyFrameId current, bool monocular,
   if (keyframe == nullptr) return bundle;
   const std::vector<KeyFrameId> local = local_keyframes(map, *keyframe);
   const std::vector<const MapPoint*> points = local_points(map, local);
-  for (const KeyFrameId id : local) bundle.add_camera(*map.find(id), id.value == 0);
+  for (const KeyFrameId id : local) {
+    const KeyFrame& camera = *map.find(id);
+    bundle.add_camera(camera, map.is_root(camera));
+  }
   for (const KeyFrameId id : outer_keyframes(points, local)) {
     bundle.add_camera(*map.find(id), true);
   }

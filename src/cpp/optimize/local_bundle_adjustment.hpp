@@ -23,8 +23,8 @@ struct LocalBundleResult {
 /// one write section that re-checks what has died meanwhile. An epoch change in between drops the
 /// result, and a dead or unknown `current` gives an empty one (a reset may have been faster).
 ///
-/// Fixed are keyframe 0, the outer observers and, where that leaves fewer fixed poses than the
-/// gauge needs (two for a single camera because of the scale, else one), the oldest local
+/// Fixed are the root of the map, the outer observers and, where that leaves fewer fixed poses than
+/// the gauge needs (two for a single camera because of the scale, else one), the oldest local
 /// keyframes. `abort` is polled once per iteration; nullptr: never. After an abort the progress is
 /// written; observations are erased only if the first stage was finished. See
 /// docs/method/mapping.md#local-bundle-adjustment and

@@ -59,8 +59,9 @@ MonocularMap build(Map& map, const TrackedFrame& initial, const TrackedFrame& cu
                    const std::vector<Eigen::Vector3d>& points, std::uint64_t& epoch) {
   const auto lock = map.write_lock();
   epoch = map.epoch();
-  if (!map.keyframe_ids().empty()) {
-    throw StateError("create_monocular_map: the map holds keyframes already; clear() it first");
+  if (map.root(map.active_map()).valid()) {
+    throw StateError(
+        "create_monocular_map: the map holds keyframes already; clear() it, or begin_map() first");
   }
   MonocularMap made;
   made.first = map.add_keyframe(initial.frame, Pose());
@@ -77,13 +78,17 @@ int count_points(const Map& map, KeyFrameId id) {
       slots.begin(), slots.end(), [&](MapPointId point) { return map.find(point) != nullptr; }));
 }
 
-/// Keyframe 0 is the origin, so scaling about it leaves its pose as it is. Scale range and
+/// The first keyframe is the origin, so scaling about it leaves its pose as it is. Scale range and
 /// direction of every point follow: the original leaves them as they were, and the first frames
 /// then miss points or look for them on the wrong level.
 void scale_map(Map& map, KeyFrameId second, double factor) {
   const Pose& T_21 = map.find(second)->T_cw;
   map.set_pose(second, Pose(T_21.rotation(), factor * T_21.translation()));
-  for (const MapPointId id : map.point_ids()) {
+  std::vector<MapPointId> ids;
+  map.for_each_point([&](const MapPoint& point) {
+    if (map.is_in(point, map.find(second)->map)) ids.push_back(point.id);
+  });
+  for (const MapPointId id : ids) {
     map.set_position(id, factor * map.find(id)->position);
     map.update_geometry(id);
   }

@@ -24,7 +24,7 @@ enum class MonocularMapFailure {
 struct MonocularMap {
   bool ok = false;
   MonocularMapFailure failure = MonocularMapFailure::kNone;
-  KeyFrameId first, second;  ///< keyframe 0 and 1
+  KeyFrameId first, second;  ///< of the active map
   int n_points = 0;          ///< points of the second keyframe
   /// Median depth in the first keyframe before it was scaled to 1, in units of |t_21|; NaN without
   /// points.
@@ -35,10 +35,10 @@ struct MonocularMap {
 /// Makes the first map of a single camera from two frames whose relative pose is known up to scale
 /// (Mur-Artal et al. 2015, section IV). Keyframe 0 (the world's frame) and 1 are made, the matched
 /// points are added with both observations, everything is refined by full bundle adjustment (20
-/// iterations, robust), and the map is scaled so that the median depth in keyframe 0 is 1. Both
-/// keyframes are connected and published at the end, in one section with the scaling: nobody sees
-/// the map before. Local mapping takes them both, in order, afterwards; the points then enter its
-/// list of recent points with the second.
+/// iterations, robust), and the map is scaled so that the median depth in the first keyframe is 1.
+/// Both keyframes are connected and published at the end, in one section with the scaling: nobody
+/// sees the map before. Local mapping takes them both, in order, afterwards; the points then enter
+/// its list of recent points with the second.
 ///
 /// `matches`: per keypoint of `initial` its partner in `current` or -1. `points`: per keypoint of
 /// `initial` its position in the frame of the initial camera, read where matched; matches whose

@@ -99,6 +99,18 @@ FinalAdjustmentFlag = Annotated[
         "--final-adjustment", help="At the end, refine the finished map before it is written."
     ),
 ]
+SeveralMapsFlag = Annotated[
+    bool,
+    typer.Option(
+        "--several-maps/--one-map",
+        help="Lost for long, begin another map, and join maps that show the same place; or wait "
+        "until the old one is in view again.",
+    ),
+]
+NewMapAfterOption = Annotated[
+    float,
+    typer.Option(help="Seconds that it is lost before another map begins.", metavar="SECONDS"),
+]
 SeedOption = Annotated[int, typer.Option(help="Seed of all random draws.", min=0)]
 
 
@@ -135,7 +147,7 @@ LocalizeOption = Annotated[
     ),
 ]
 SaveOption = Annotated[
-    Path | None, typer.Option(help="Save the last map in this file.", metavar="FILE")
+    Path | None, typer.Option(help="Save the maps in this file.", metavar="FILE")
 ]
 AutosaveOption = Annotated[
     float | None,

@@ -25,7 +25,7 @@ class KeyframesSet:
     timestamps: FloatArray
     """(k,) seconds."""
     parents: IntArray
-    """(k,) parent in the spanning tree, -1 for keyframe 0."""
+    """(k,) parent in the spanning tree, -1 for the first keyframe of the map."""
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -58,8 +58,7 @@ class MapChanges:
     map_index: int
     """Which map it is, as in `TrackingRecord.map_index`."""
     restarted: bool
-    """Everything seen before is void: the first look, or another map has begun, whose ids begin
-    anew."""
+    """Everything seen before is void: the first look, or another map than before."""
     keyframes_set: KeyframesSet
     """New, moved or otherwise changed keyframes."""
     keyframes_removed: IntArray
@@ -115,10 +114,19 @@ class MapFollower:
         The map, as in ``slam.pipeline.back_end.map``; other threads may change it.
     least_weight
         Shared points of two keyframes whose covisibility is told.
+    map_index
+        The map that is followed, if there are several; None: the active one, whichever that is.
     """
 
-    def __init__(self, slam_map: core.Map, *, least_weight: int = STRONG_EDGE) -> None:
-        self._follower = core.MapFollower(slam_map, least_weight)
+    def __init__(
+        self,
+        slam_map: core.Map,
+        *,
+        least_weight: int = STRONG_EDGE,
+        map_index: int | None = None,
+    ) -> None:
+        which = -1 if map_index is None else map_index
+        self._follower = core.MapFollower(slam_map, least_weight, which)
 
     def update(self) -> MapChanges:
         """Look at the map.
@@ -131,7 +139,7 @@ class MapFollower:
         changes = self._follower.update()
         keyframes, points = changes.keyframes_set, changes.points_set
         return MapChanges(
-            map_index=int(changes.epoch),
+            map_index=int(changes.map),
             restarted=changes.restarted,
             keyframes_set=KeyframesSet(
                 keyframes.ids, keyframes.T_wc, keyframes.timestamps, keyframes.parents

@@ -2,8 +2,8 @@
 """The parts of a map as groups of arrays: keyframes, points, and who sees what.
 
 Ids ascend and are never reused in one map. ``T_ab`` maps coordinates of frame b into frame a; the
-world is the camera frame of keyframe 0 when it was made. Lengths are metres, with a single camera
-the map's own unit. Pixels: the centre of the top-left pixel is (0, 0).
+world of a map is the camera frame of its root when it was made. Lengths are metres, with a single
+camera the map's own unit. Pixels: the centre of the top-left pixel is (0, 0).
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class Keyframes(ArrayGroup):
     """
 
     ids: IntArray
-    """(k,) ascending; keyframe 0 is always there and is the root of the spanning tree."""
+    """(k,) ascending; those without a parent are the roots of maps, one as a rule: keyframe 0."""
     frame_ids: IntArray
     """(k,) number of the image that became the keyframe, in the run that made it."""
     timestamps: FloatArray
@@ -89,7 +89,7 @@ class Keyframes(ArrayGroup):
     scale: FloatArray
     """(k,) by how much lengths around the keyframe have been multiplied since it was made."""
     parent: IntArray
-    """(k,) ids in the spanning tree, -1 for keyframe 0."""
+    """(k,) ids in the spanning tree, -1 for the root of a map."""
     provisional_parent: BoolArray
     """(k,) the parent is the keyframe before, for want of a neighbour."""
     processed: BoolArray

@@ -45,10 +45,18 @@ class MapArrays:
     """(l, 2) ids of keyframes that a loop connects."""
 
     @classmethod
-    def of(cls, slam_map: core.Map) -> MapArrays:
-        """Copy what is drawn of a map that is at rest; the world is its first keyframe."""
-        changes = MapFollower(slam_map).update()
-        seen = core.snapshot_observations(slam_map)
+    def of(cls, slam_map: core.Map, map_index: int | None = None) -> MapArrays:
+        """Copy what is drawn of a map that is at rest; the world is its first keyframe.
+
+        Parameters
+        ----------
+        slam_map
+            The map or maps.
+        map_index
+            Which; the active one if None.
+        """
+        changes = MapFollower(slam_map, map_index=map_index).update()
+        seen = core.snapshot_observations(slam_map, -1 if map_index is None else map_index)
         first = np.full(len(seen.ids), -1, np.int64)
         observed = np.diff(seen.offsets) > 0
         if observed.any():

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -156,31 +156,58 @@ class SavedMap:
         fits = vocabulary is not None and self.vocabulary.is_of(vocabulary)
         restore_contents(self.contents, slam_map, vocabulary, index, words_fit=fits)
 
-    def trajectory(self, run: int = -1) -> Trajectory:
+    def trajectory(self, run: int = -1, map_number: int | None = None) -> Trajectory:
         """Where the images of a run were, in the map as it is now.
 
         Parameters
         ----------
         run
             Which of `runs`; the last one by default.
+        map_number
+            Which of several maps, from 0 for the oldest one; by default the one that most images
+            of the run are in.
 
         Returns
         -------
         Trajectory
-            Relative to keyframe 0; empty when the map has no runs.
+            Of the images in that map, relative to its first keyframe; empty when the map has no
+            runs.
         """
         if not self.runs:
             return Trajectory(np.zeros(0), np.zeros((0, 4, 4)))
         frames = self.runs[run].frames
+        numbers = self._maps_of(frames.keyframes)
+        if map_number is None:
+            map_number = int(np.bincount(numbers[numbers >= 0], minlength=1).argmax())
+        # Before the first pose a frame is in no map, and is told with the first one.
+        chosen = (numbers == map_number) | ((numbers < 0) & (map_number == 0))
+        frames = RecordedFrames(
+            **{field.name: getattr(frames, field.name)[chosen] for field in fields(frames)}
+        )
+        root = int(np.flatnonzero(self.contents.keyframes.parent < 0)[map_number])
         T_rw, scale = self._keyframe_poses(frames.keyframes)
         T_cr = poses_from(
             rotations_from_quaternions(frames.T_cr[:, :4]), scale[:, None] * frames.T_cr[:, 4:]
         )
         T_wc = inverse_poses(T_cr @ T_rw)
         if len(frames):
-            T_wc = self.contents.keyframes.T_cw[0] @ T_wc
+            T_wc = self.contents.keyframes.T_cw[root] @ T_wc
         T_wc[frames.keyframes < 0] = np.eye(4)
         return Trajectory(frames.timestamps, T_wc, frames.lost != 0, frames.ids)
+
+    def _maps_of(self, wanted: IntArray) -> IntArray:
+        """Numbers of the maps of keyframes (n,), removed ones included; -1 for none."""
+        keyframes, removed = self.contents.keyframes, self.contents.removed_keyframes
+        ids = np.concatenate([keyframes.ids, removed.ids])
+        order = np.argsort(ids)
+        above = np.concatenate([keyframes.parent, removed.parent])
+        rows = order[np.searchsorted(ids[order], np.maximum(above, ids.min()))]
+        rows = np.where(above < 0, np.arange(len(ids)), rows)
+        while not np.array_equal(rows[rows], rows):
+            rows = rows[rows]
+        roots = np.flatnonzero(keyframes.parent < 0)
+        known = np.minimum(np.searchsorted(ids[order], np.maximum(wanted, ids.min())), len(ids) - 1)
+        return np.where(wanted < 0, -1, np.searchsorted(roots, rows[order[known]]))
 
     def _keyframe_poses(self, wanted: IntArray) -> tuple[FloatArray, FloatArray]:
         """`T_cw` (n, 4, 4) and scale (n,) of keyframes, removed ones by those they hang on."""

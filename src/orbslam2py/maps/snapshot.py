@@ -14,7 +14,7 @@ from orbslam2py.trajectory import Trajectory
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MapSnapshot:
-    """A consistent copy of the map, in the frame of keyframe 0's first pose (the world).
+    """A consistent copy of a map, in the frame of its first keyframe's first pose (the world).
 
     Two snapshots are equal if all their arrays are, bit by bit.
     """
@@ -49,9 +49,17 @@ class MapSnapshot:
         )
 
 
-def take_snapshot(slam_map: core.Map) -> MapSnapshot:
-    """Copy keyframe poses, points and loop edges in one consistent view."""
-    snapshot = core.snapshot_map(slam_map)
+def take_snapshot(slam_map: core.Map, map_index: int | None = None) -> MapSnapshot:
+    """Copy keyframe poses, points and loop edges of a map in one consistent view.
+
+    Parameters
+    ----------
+    slam_map
+        The map or maps.
+    map_index
+        Which; the active one if None.
+    """
+    snapshot = core.snapshot_map(slam_map, -1 if map_index is None else map_index)
     keyframes, points = snapshot.keyframes, snapshot.points
     return MapSnapshot(
         keyframe_ids=keyframes.ids,
@@ -63,9 +71,9 @@ def take_snapshot(slam_map: core.Map) -> MapSnapshot:
     )
 
 
-def keyframe_trajectory(slam_map: core.Map) -> Trajectory:
-    """Poses of the keyframes, relative to keyframe 0."""
-    keyframes = core.snapshot_keyframes(slam_map)
+def keyframe_trajectory(slam_map: core.Map, map_index: int | None = None) -> Trajectory:
+    """Poses of the keyframes of a map (None: the active one), relative to the first one."""
+    keyframes = core.snapshot_keyframes(slam_map, -1 if map_index is None else map_index)
     T_wc = keyframes.T_wc
     if len(T_wc):
         T_wc = np.linalg.inv(T_wc[0]) @ T_wc

@@ -49,7 +49,7 @@ class RunOptions:
     allow_other_setup: bool = False
     """Load the map although it was made with another camera or other visual words."""
     save_map: Path | None = None
-    """Save the last map in this file at the end ..."""
+    """Save the maps in this file at the end ..."""
     autosave: float | None = None
     """... and every so many seconds on the way."""
 

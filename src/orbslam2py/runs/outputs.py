@@ -172,24 +172,26 @@ class OutputWriter:
                     path.unlink()
 
     def _write_trajectories(self, result: RunResult, evaluation: RunEvaluation | None) -> None:
-        *earlier, last = result.trajectories
-        for number, trajectory in enumerate(earlier):
+        main = result.trajectories[result.main_map]
+        others = dict(enumerate(result.trajectories))
+        del others[result.main_map]
+        for number, trajectory in others.items():
             self._write_tum(f"trajectory_map{number}.txt", result, trajectory)
-        self._write_tum("trajectory.txt", result, last)
+        self._write_tum("trajectory.txt", result, main)
         self._write_tum("trajectory_online.txt", result, result.online_trajectory())
         self._write_tum("keyframes.txt", result, result.keyframes)
         if evaluation is not None:
             truth = truth_of_frames(result, evaluation)
             self._write("groundtruth_aligned.txt", lambda path: write_tum(path, *truth))
-        paths = [f"trajectory_map{n}.txt" for n, t in enumerate(earlier) if not t.lost.all()]
-        if last.lost.all() and paths:
+        paths = [f"trajectory_map{n}.txt" for n, t in others.items() if not t.lost.all()]
+        if main.lost.all() and paths:
             _log.warning(
                 "no trajectory.txt: the last map has no pose; the path until then is in %s",
                 ", ".join(paths),
             )
-        if not last.lost.all():
+        if not main.lost.all():
             n_frames = len(result.rows)
-            self._write("trajectory_kitti.txt", lambda path: write_kitti(path, last, n_frames))
+            self._write("trajectory_kitti.txt", lambda path: write_kitti(path, main, n_frames))
 
     def _write_tum(self, name: str, result: RunResult, trajectory: Trajectory) -> None:
         if trajectory.lost.all():  # also if there are no poses at all

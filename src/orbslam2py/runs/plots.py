@@ -162,7 +162,7 @@ def _draw_height(
         axes.set_ylim(middle - 0.05, middle + 0.05)
     if timeline is None:
         return
-    labels = {_UNTRACKED: "not tracked", _EARLIER: "in an earlier map"}
+    labels = {_UNTRACKED: "not tracked", _EARLIER: "in another map"}
     for spans, color in ((timeline.untracked, _UNTRACKED), (timeline.earlier, _EARLIER)):
         for begin, end in spans:
             axes.axvspan(begin, end, color=color, linewidth=0, label=labels.pop(color, None))

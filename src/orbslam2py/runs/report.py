@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from orbslam2py._files import describe_error, printable_name
 from orbslam2py._version import __version__
 from orbslam2py.errors import OrbSlamError
@@ -23,7 +25,7 @@ from orbslam2py.runs.machine import describe_machine
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.result import RunResult
 from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.events import LoopClosed
+from orbslam2py.slam.events import LoopClosed, MapsMerged
 from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
 from orbslam2py.slam.records import TrackingState, Verdict
 from orbslam2py.trajectory.trajectory import Trajectory
@@ -46,7 +48,7 @@ class RunEvaluation:
 
 
 def evaluate_run(result: RunResult) -> RunEvaluation | None:
-    """Compare the last map's trajectory with the sequence's ground truth.
+    """Compare the main map's trajectory with the sequence's ground truth.
 
     Returns
     -------
@@ -116,6 +118,8 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "map_points": len(result.snapshot.point_ids),
         "loaded_map": loaded_map_entry(options.load_map),
         "saved_map": None if result.saved_map is None else str(result.saved_map),
+        "maps": maps_entry(result),
+        "main_map": result.main_map,
         "loops_closed": len(result.loops),
         "relocalisations": result.n_relocalizations,
         "resets": result.n_resets,
@@ -132,6 +136,7 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "milliseconds": result.stages,
         "losses": each_loss,
         "loops": [loop_entry(loop) for loop in result.loops],
+        "merges": [merge_entry(merge) for merge in result.merges],
         "full_adjustments": [adjustment_entry(a) for a in result.full_adjustments],
         "final_adjustment": None
         if result.final_adjustment is None
@@ -183,7 +188,54 @@ def options_entry(options: RunOptions) -> dict[str, Any]:
         "final_adjustment": options.final_adjustment,
         "loop_closing": options.system.loop_closing,
         "full_adjustment": options.system.full_adjustment,
+        "several_maps": options.system.several_maps,
+        "new_map_after": options.system.new_map_after,
         "full_adjustment_time_limit": options.system.full_adjustment_time_limit,
+    }
+
+
+def maps_entry(result: RunResult) -> list[dict[str, Any]]:
+    """What report.json says about the maps: all that began, those that are no more included."""
+    there = {summary.map_index: summary for summary in result.maps}
+    merged_into = {merge.merged_map: merge.map_index for merge in result.merges}
+    entries = []
+    for number, path in enumerate(result.trajectories):
+        summary = there.get(number)
+        if summary is not None:
+            state = "active" if summary.active else "resting"
+        elif number in merged_into:
+            state = "merged"
+        elif len(path):
+            state = "given up"
+        else:
+            continue
+        entries.append(
+            {
+                "map": number,
+                "state": state,
+                "merged_into": merged_into.get(number),
+                "keyframes": 0 if summary is None else summary.n_keyframes,
+                "map_points": 0 if summary is None else summary.n_map_points,
+                "tracked": int(np.count_nonzero(~path.lost)),
+            }
+        )
+    return entries
+
+
+def merge_entry(merge: MapsMerged) -> dict[str, Any]:
+    """What report.json says about two maps that became one."""
+    return {
+        "map": merge.map_index,
+        "merged": merge.merged_map,
+        "keyframes": [merge.matched_keyframe, merge.current_keyframe],
+        "timestamps": [merge.matched_timestamp, merge.current_timestamp],
+        "inliers": merge.n_inliers,
+        "matches": merge.n_matches,
+        "fused_points": merge.n_fused,
+        "moved_keyframes": merge.n_moved_keyframes,
+        "moved_points": merge.n_moved_points,
+        "scale": merge.scale,
+        "milliseconds": _rounded(merge.milliseconds),
     }
 
 

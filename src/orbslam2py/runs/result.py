@@ -15,9 +15,9 @@ from orbslam2py.maps.map_arrays import MapArrays
 from orbslam2py.maps.snapshot import MapSnapshot
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.settings.settings import Settings
-from orbslam2py.slam.events import LoopClosed
+from orbslam2py.slam.events import LoopClosed, MapsMerged
 from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
-from orbslam2py.slam.records import TrackingRecord, TrackingState
+from orbslam2py.slam.records import MapSummary, TrackingRecord, TrackingState
 from orbslam2py.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -73,15 +73,21 @@ class RunResult:
     were."""
     rows: list[FrameRow] = field(default_factory=list)
     trajectories: list[Trajectory] = field(default_factory=list)
-    """One per map, lost frames included; `Trajectory.indices` are positions in `rows`."""
+    """One per map, by its number, lost frames included; `Trajectory.indices` are positions in
+    `rows`. Empty for a map that has become part of another one."""
+    main_map: int = 0
+    """The map that the figures are of: the one with most tracked frames of those that were there at
+    the end; the last one if the system keeps only one."""
+    maps: list[MapSummary] = field(default_factory=list)
+    """Those that were there at the end, the oldest first."""
     keyframes: Trajectory = field(default_factory=empty_trajectory)
-    """Keyframes of the last map."""
+    """Keyframes of the main map."""
     snapshot: MapSnapshot = field(default_factory=empty_snapshot)
-    """The last map."""
+    """The main map."""
     sightings: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
-    """(o, 2) ids of a point of the last map and of a keyframe that observes it."""
+    """(o, 2) ids of a point of the main map and of a keyframe that observes it."""
     drawing: MapArrays | None = None
-    """What is drawn of the last map."""
+    """What is drawn of the main map."""
     kept_images: KeptImages | None = None
     """Of some frames of a camera, which cannot be read again; None for a recording."""
     stages: dict[str, dict[str, float]] = field(default_factory=dict)
@@ -92,6 +98,8 @@ class RunResult:
     n_relocalizations: int = 0
     loops: list[LoopClosed] = field(default_factory=list)
     """Loops closed, over all maps."""
+    merges: list[MapsMerged] = field(default_factory=list)
+    """Maps that have become part of older ones."""
     full_adjustments: list[FullAdjustmentRecord] = field(default_factory=list)
     """Full bundle adjustments, also those that were given up."""
     final_adjustment: FullAdjustmentRecord | None = None
@@ -107,7 +115,7 @@ class RunResult:
     is_live: bool = False
     """The images came from a camera."""
     saved_map: Path | None = None
-    """The file that the last map was saved in."""
+    """The file that the maps were saved in."""
     interrupted: bool = False
     """The run was stopped before its end; never for a camera, which has none."""
     error: Exception | None = None
@@ -133,18 +141,25 @@ class RunResult:
         return self.n_lost_by_camera + sum(row.state == "DROPPED" for row in self.rows)
 
     def tracked_trajectory(self) -> Trajectory:
-        """Frames of the last map that have a pose, after the last optimisation."""
+        """Frames of the main map that have a pose, after the last optimisation."""
         if not self.trajectories:
             return empty_trajectory()
-        last = self.trajectories[-1]
-        return last.select(~last.lost)
+        main = self.trajectories[self.main_map]
+        return main.select(~main.lost)
 
     def online_trajectory(self) -> Trajectory:
-        """Poses as they were when each frame was tracked; every map in its own world frame."""
+        """Poses as they were when each frame was tracked.
+
+        Those of frames that were tracked in the main map; if the system keeps only one, of all
+        maps that came after each other, every map in its own world frame.
+        """
+        several = self.options.system.several_maps
         tracked = [
             (position, row.record)
             for position, row in enumerate(self.rows)
-            if row.record is not None and row.record.T_cw is not None
+            if row.record is not None
+            and row.record.T_cw is not None
+            and (not several or row.record.map_index == self.main_map)
         ]
         if not tracked:
             return empty_trajectory()

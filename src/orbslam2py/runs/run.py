@@ -52,7 +52,7 @@ class FinishedRun:
 
     @property
     def trajectory(self) -> Trajectory:
-        """Frames of the last map that have a pose, after the last optimisation."""
+        """Frames of the main map that have a pose, after the last optimisation."""
         return self.result.tracked_trajectory()
 
 

@@ -33,7 +33,7 @@ def anchored_points(result: RunResult) -> npt.NDArray[np.float64]:
 
 
 def _loop_positions(result: RunResult) -> npt.NDArray[np.float64]:
-    """Both ends of every loop of the last map, (l, 2, 3), in the frame of keyframe 0."""
+    """Both ends of every loop of the main map, (l, 2, 3), in the frame of keyframe 0."""
     snapshot = result.snapshot
     rows = np.searchsorted(snapshot.keyframe_ids, snapshot.loop_edges)
     return np.asarray(result.keyframes.positions[rows])
@@ -50,7 +50,7 @@ def draw_run(
         If the file cannot be written.
     """
     last = result.tracked_trajectory()
-    timeline = Timeline.of(result.rows, len(result.trajectories) - 1)
+    timeline = Timeline.of(result.rows, result.main_map)
     begin = float(result.rows[0].timestamp)
     truth = None
     subtitle = (

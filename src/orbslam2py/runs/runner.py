@@ -257,7 +257,8 @@ class SequenceRunner:
         ended = stop.is_set() and not self.result.is_live
         if self._options.final_adjustment and system.n_keyframes > 0 and not ended:
             give_up = threading.Event() if self.result.is_live else stop
-            self.result.final_adjustment = system.optimize(stop=give_up)
+            main = main_map(system, system.trajectories())
+            self.result.final_adjustment = system.optimize(stop=give_up, map_index=main)
 
     def _shut_down(self, system: System) -> None:
         try:
@@ -289,14 +290,15 @@ class SequenceRunner:
     def _collect(self, system: System) -> None:
         result = self.result
         trajectories = system.trajectories()
-        last_map = len(trajectories) - 1
+        result.main_map = main = main_map(system, trajectories)
+        result.maps = system.maps
         by_frame: dict[tuple[int, int], int] = {}
         by_time: dict[float, int] = {}
         for position, row in enumerate(result.rows):
             if row.record is not None:
                 by_frame[row.record.map_index, row.record.frame_id] = position
-                # Of equal times that of the last map counts.
-                if row.record.map_index == last_map or row.record.timestamp not in by_time:
+                # Of equal times that of the main map counts.
+                if row.record.map_index == main or row.record.timestamp not in by_time:
                     by_time[row.record.timestamp] = position
         # A map may hold frames from before it, when one before it came to nothing.
         result.trajectories = [
@@ -309,20 +311,33 @@ class SequenceRunner:
             )
             for number, t in enumerate(trajectories)
         ]
-        keyframes = system.keyframe_trajectory()
+        keyframes = system.keyframe_trajectory(main)
         result.keyframes = _renumber(
             keyframes, [by_time.get(float(t), -1) for t in keyframes.timestamps]
         )
-        result.snapshot = system.map_snapshot()
-        seen = core.snapshot_observations(system.pipeline.back_end.map)
+        result.snapshot = system.map_snapshot(main)
+        seen = core.snapshot_observations(system.pipeline.back_end.map, main)
         points = np.repeat(seen.ids, np.diff(seen.offsets))
         result.sightings = np.stack([points, seen.keyframes], axis=1)
-        result.drawing = MapArrays.of(system.pipeline.back_end.map)
+        result.drawing = MapArrays.of(system.pipeline.back_end.map, main)
         result.stages = system.stage_statistics()
         result.n_resets = system.n_resets
         result.n_relocalizations = system.n_relocalizations
         result.loops = system.loops
+        result.merges = system.merges
         result.full_adjustments = system.full_adjustments
+
+
+def main_map(system: System, trajectories: list[Trajectory]) -> int:
+    """Choose the map that the figures of a run are of: see `RunResult.main_map`."""
+    last = len(trajectories) - 1
+    if not system.options.several_maps:
+        return last
+    n_tracked = {
+        there.map_index: int(np.count_nonzero(~trajectories[there.map_index].lost))
+        for there in system.maps
+    }
+    return max(n_tracked, key=lambda index: (n_tracked[index], -index), default=last)
 
 
 def _renumber(trajectory: Trajectory, positions: list[int]) -> Trajectory:

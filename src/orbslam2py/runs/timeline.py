@@ -50,7 +50,7 @@ class Timeline:
     untracked: list[Span]
     """When there was no pose."""
     earlier: list[Span]
-    """When there were poses in a map before the last one."""
+    """When there were poses in another map than the main one."""
 
     @property
     def duration(self) -> float:
@@ -59,7 +59,7 @@ class Timeline:
 
     @classmethod
     def of(cls, rows: Sequence[FrameRow], last_map: int) -> Timeline:
-        """Take it from the rows of a run whose last map has a number."""
+        """Take it from the rows of a run whose main map has a number."""
         seconds = np.array([float(row.timestamp) for row in rows])
         seconds = seconds - seconds[:1].sum()
         # What nobody looked at is no failure: tracking went on across it.
@@ -86,7 +86,7 @@ class Timeline:
 
 
 def _in_map_before(row: FrameRow, last_map: int) -> bool:
-    return row.record is not None and row.state == "OK" and row.record.map_index < last_map
+    return row.record is not None and row.state == "OK" and row.record.map_index != last_map
 
 
 def _spans(seconds: FloatArray, chosen: npt.NDArray[np.bool_]) -> list[Span]:

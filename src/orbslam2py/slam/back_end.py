@@ -19,6 +19,7 @@ from orbslam2py.slam.events import (
     LoopClosed,
     MapChangeCause,
     MapChanged,
+    MapsMerged,
 )
 from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord, FullBundleAdjustment
 from orbslam2py.slam.local_mapping import LocalMapping
@@ -66,6 +67,7 @@ class BackEnd:
             self.adjustment,
             options,
             on_loop=_announce_loop(self.events),
+            on_merge=_announce_merge(self.events),
         )
         self.mapping.on_done = _pass_on_keyframe(self.map, self.loop_closing, self.events)
 
@@ -99,9 +101,28 @@ class BackEnd:
         self.mapping.reset()
         self.loop_closing.reset()
         keep()
-        ended = self.map.epoch
+        ended = self.map.active_map
         self.keyframe_index.clear()
         self.map.clear()
+        self.events.post(MapChanged(ended, MapChangeCause.RESET))
+
+    def drop_map(self, timeout: float, *, keep: Callable[[int], None]) -> None:
+        """Drop the active map alone: the youngest of the others becomes the active one.
+
+        Parameters
+        ----------
+        timeout : float
+            Seconds to wait for each worker.
+        keep : callable
+            Called with its number when nobody works on it any more, before it is dropped.
+        """
+        # Only tracking, which waits here, gives them work.
+        for worker in (self.mapping.worker, self.loop_closing.worker):
+            worker.wait_until_idle(timeout, unless_held=True)
+        ended = self.map.active_map
+        keep(ended)
+        for keyframe in self.map.erase_map(ended).tolist():
+            self.keyframe_index.erase(keyframe)
         self.events.post(MapChanged(ended, MapChangeCause.RESET))
 
     def wait_until_idle(self, timeout: float | None) -> bool:
@@ -154,7 +175,7 @@ def _pass_on_keyframe(
     def pass_on(keyframe: int) -> None:
         if events.wanted(KeyframeAdded):
             added = KeyframeAdded(
-                map_index=slam_map.epoch,
+                map_index=slam_map.map_of(keyframe),
                 keyframe=keyframe,
                 timestamp=slam_map.keyframe_timestamp(keyframe),
                 T_wc=slam_map.keyframe_pose(keyframe).inverse().matrix,
@@ -171,6 +192,14 @@ def _announce_loop(events: EventDispatcher) -> Callable[[LoopClosed], None]:
     def announce(closed: LoopClosed) -> None:
         events.post(closed)
         events.post(MapChanged(closed.map_index, MapChangeCause.LOOP))
+
+    return announce
+
+
+def _announce_merge(events: EventDispatcher) -> Callable[[MapsMerged], None]:
+    def announce(merged: MapsMerged) -> None:
+        events.post(merged)
+        events.post(MapChanged(merged.map_index, MapChangeCause.MERGE))
 
     return announce
 

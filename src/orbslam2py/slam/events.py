@@ -28,7 +28,7 @@ class LoopClosed:
     """A place was seen again, and the drift gathered meanwhile was taken out."""
 
     map_index: int
-    """0 for the first map; grows with every reset."""
+    """As in `TrackingRecord.map_index`."""
     current_keyframe: int
     matched_keyframe: int
     """The keyframe that showed the place before."""
@@ -69,6 +69,46 @@ class KeyframeAdded:
 
 
 @dataclass(frozen=True)
+class MapStarted:
+    """A map has begun: the first one, or one after a reset, or beside those that rest."""
+
+    map_index: int
+    frame_id: int
+    timestamp: float
+    """Seconds."""
+
+
+@dataclass(frozen=True)
+class MapsMerged:
+    """Two maps showed the same place and are one now, in the world of the older one."""
+
+    map_index: int
+    """The older map, which goes on."""
+    merged_map: int
+    """The younger one, which is part of it now."""
+    current_keyframe: int
+    matched_keyframe: int
+    """The keyframe of the other map that showed the place before."""
+    current_timestamp: float
+    """Seconds."""
+    matched_timestamp: float
+    n_inliers: int
+    """Matches that agree with the refined similarity."""
+    n_matches: int
+    """Keypoints of the current keyframe that show points around the matched one."""
+    n_fused: int
+    """Points that were found to be the same in both maps."""
+    n_moved_keyframes: int
+    n_moved_points: int
+    S_km: FloatArray
+    """(4, 4) similarity: world of the younger map to that of the older one."""
+    scale: float
+    """Its scale: lengths of the younger map were multiplied by it; 1 with stereo and RGB-D."""
+    milliseconds: dict[str, float] = field(default_factory=dict)
+    """Time per step: detect, verify, wait, plan, apply, weld, graph."""
+
+
+@dataclass(frozen=True)
 class TrackingLost:
     """No pose was found for an image, after one that had one."""
 
@@ -96,6 +136,8 @@ class MapChangeCause(str, enum.Enum):
     """A loop was closed."""
     FULL_ADJUSTMENT = "full adjustment"
     """All keyframes and points were refined together."""
+    MERGE = "merge"
+    """Two maps became one."""
     RESET = "reset"
     """The map was dropped; the next one begins."""
 
@@ -130,6 +172,8 @@ class Callbacks:
     on_lost: Callable[[TrackingLost], None] | None = None
     on_relocalized: Callable[[Relocalized], None] | None = None
     on_map_change: Callable[[MapChanged], None] | None = None
+    on_map_started: Callable[[MapStarted], None] | None = None
+    on_maps_merged: Callable[[MapsMerged], None] | None = None
 
     def __post_init__(self) -> None:
         for listener in fields(self):
@@ -156,7 +200,9 @@ class Callbacks:
         return value or cls()
 
 
-Event = LoopClosed | KeyframeAdded | TrackingLost | Relocalized | MapChanged
+Event = (
+    LoopClosed | KeyframeAdded | TrackingLost | Relocalized | MapChanged | MapStarted | MapsMerged
+)
 
 
 class EventDispatcher:
@@ -177,6 +223,8 @@ class EventDispatcher:
             TrackingLost: callbacks.on_lost,
             Relocalized: callbacks.on_relocalized,
             MapChanged: callbacks.on_map_change,
+            MapStarted: callbacks.on_map_started,
+            MapsMerged: callbacks.on_maps_merged,
         }
         self.worker: Worker[Callable[[], None]] = Worker(
             "callbacks", lambda deliver: deliver(), threaded=threaded

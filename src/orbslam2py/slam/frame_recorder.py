@@ -13,9 +13,11 @@ from orbslam2py import _core as core
 from orbslam2py.maps.saved_map import RecordedFrames
 from orbslam2py.trajectory.trajectory import Trajectory
 
+_NO_POSES = Trajectory(timestamps=np.zeros(0), T_wc=np.zeros((0, 4, 4)))
+
 
 class FrameRecorder:
-    """The path of the camera through the present map, and through those before it.
+    """The path of the camera through the present maps, and through those that ended before.
 
     A frame is kept relative to its reference keyframe, so its pose moves with whatever refines the
     map later. May be used from any thread, also while a frame is recorded.
@@ -29,12 +31,15 @@ class FrameRecorder:
     def __init__(self, slam_map: core.Map) -> None:
         self._map = slam_map
         self._recorder = core.TrajectoryRecorder()
-        self._ended: list[Trajectory] = []
+        self._ended: dict[int, Trajectory] = {}
         self._lock = threading.Lock()
         self._doubted: core.TrackedFrame | None = None
         self._waiting: core.TrackedFrame | None = None
         # Frames of a young map, whose poses are estimated again; None: those of no map.
         self._young: list[tuple[core.TrackedFrame, bool]] | None = None
+        self._young_map = -1
+        # The youngest map that a frame was recorded in.
+        self._last_map = 0
 
     @property
     def n_young(self) -> int:
@@ -42,9 +47,14 @@ class FrameRecorder:
         return len(self._young or ())
 
     def begin(self, earlier: Sequence[core.TrackedFrame]) -> None:
-        """Keep the first frames of a map, which `look_again` will give new poses to."""
+        """Keep the first frames of a map, which `look_again` will give new poses to.
+
+        Those of them that had been recorded as lost have been found.
+        """
         with self._lock:
+            self._settle()
             self._young = []
+            self._young_map = earlier[0].map_index
             for frame in earlier:
                 self._append(frame, lost=False)
 
@@ -56,12 +66,14 @@ class FrameRecorder:
             self._settle()
             young, self._young = self._young or [], None
             frames = estimate([frame for frame, _ in young])
-            self._recorder.clear()
             for frame, (_, lost) in zip(frames, young, strict=True):
                 self._append(frame, lost=lost)
 
     def _append(self, frame: core.TrackedFrame, *, lost: bool) -> None:
         self._recorder.record(self._map, frame, lost=lost)
+        self._last_map = max(self._last_map, frame.map_index)
+        if not lost and frame.map_index != self._young_map:
+            self._young = None
         if self._young is not None:
             self._young.append((frame, lost))
 
@@ -91,19 +103,36 @@ class FrameRecorder:
             frame.T_cw = None
         self._append(frame, lost=not believed)
 
-    def end_map(self) -> None:
-        """Keep the trajectory of the map as it is now: it is about to be dropped."""
+    def end_maps(self) -> None:
+        """Keep the trajectories of the maps as they are now: they are about to be dropped."""
         with self._lock:
             self._settle()
-            self._ended.append(self._present())
+            for map_index in self._living():
+                self._ended[map_index] = self._present(map_index)
             self._recorder.clear()
             self._young = None
 
-    def trajectories(self) -> list[Trajectory]:
-        """One trajectory a map, relative to its keyframe 0: those ended, then the present one."""
+    def end_map(self, map_index: int) -> None:
+        """Keep the trajectory of one of the maps, which is about to be dropped beside others."""
         with self._lock:
             self._settle()
-            return [*self._ended, self._present()]
+            self._ended[map_index] = self._present(map_index)
+            self._recorder.drop(self._map, map_index)
+            self._young = None
+
+    def trajectories(self) -> list[Trajectory]:
+        """One trajectory a map, by its number, relative to its first keyframe.
+
+        That of a map that has become part of another one is empty.
+        """
+        with self._lock:
+            self._settle()
+            found = self._ended | {index: self._present(index) for index in self._living()}
+        last = max(*found, self._last_map)
+        return [found.get(index, _NO_POSES) for index in range(last + 1)]
+
+    def _living(self) -> list[int]:
+        return sorted({*self._map.maps, self._map.active_map})
 
     def recorded(self, map_index: int, known: npt.NDArray[np.int64]) -> RecordedFrames:
         """The frames of the present map relative to their keyframes, as map files keep them.
@@ -131,8 +160,8 @@ class FrameRecorder:
             lost=entries["lost"][:n].astype(np.uint8),
         )
 
-    def _present(self) -> Trajectory:
-        poses = self._recorder.rebuild(self._map)
+    def _present(self, map_index: int) -> Trajectory:
+        poses = self._recorder.rebuild(self._map, map_index)
         return Trajectory(
             timestamps=poses.timestamps, T_wc=poses.T_wc, lost=poses.lost, indices=poses.frames
         )

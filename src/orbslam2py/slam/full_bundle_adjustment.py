@@ -34,7 +34,7 @@ class FullAdjustmentRecord:
     """One full bundle adjustment."""
 
     map_index: int
-    """Which map: 0 for the first; grows with every reset."""
+    """Which map, as in `TrackingRecord.map_index`."""
     n_keyframes: int
     """Keyframes that took part."""
     n_points: int
@@ -99,26 +99,34 @@ class FullBundleAdjustment:
         self.statistics = StageStatistics()
         self._numbers = itertools.count()
         self._latest: tuple[int, FullAdjustmentRecord] | None = None
+        # Which map the last one begun is of.
+        self._wanted: tuple[int, int] = -1, -1
         #: Its jobs are numbers that tell one adjustment from another.
         self.worker: Worker[int] = Worker(
             "full bundle adjustment", self._process, threaded=threaded
         )
 
-    def start(self) -> int:
-        """Begin one; a running one is given up. Returns its number."""
+    def start(self, map_index: int | None = None) -> int:
+        """Begin one, of the active map if no other is named; a running one is given up.
+
+        Returns its number.
+        """
         self.cancel()
         number = next(self._numbers)
+        self._wanted = number, self._map.active_map if map_index is None else map_index
         self.worker.submit(number)
         return number
 
-    def start_and_wait(self, stop: threading.Event | None = None) -> FullAdjustmentRecord:
+    def start_and_wait(
+        self, stop: threading.Event | None = None, map_index: int | None = None
+    ) -> FullAdjustmentRecord:
         """Begin one, and wait for its end.
 
         It is given up when the worker is to stand still for longer (localization mode), and when
         another one, a reset or the shutdown takes its place, maybe before it has begun: then
         nothing is counted in its record. Also when `stop` is set.
         """
-        number = self.start()
+        number = self.start(map_index)
         worker = self.worker
         stop = stop or threading.Event()
 
@@ -138,7 +146,7 @@ class FullBundleAdjustment:
         if latest is not None and latest[0] == number:
             return latest[1]
         return FullAdjustmentRecord(
-            map_index=self._map.epoch,
+            map_index=self._wanted[1],
             n_keyframes=0,
             n_points=0,
             n_observations=0,
@@ -162,24 +170,26 @@ class FullBundleAdjustment:
         """Give up a running one. On return it will not touch the map any more."""
         self.worker.reset(timeout)
 
-    def run(self) -> FullAdjustmentRecord:
+    def run(self, map_index: int | None = None) -> FullAdjustmentRecord:
         """Do one now, in the caller's thread; for when the workers have ended."""
-        return self._adjust(core.StopFlag())
+        chosen = self._map.active_map if map_index is None else map_index
+        return self._adjust(core.StopFlag(), chosen)
 
-    def _refine_newest(self, cancelled: core.StopFlag) -> None:
+    def _refine_newest(self, cancelled: core.StopFlag, map_index: int) -> None:
         """Fit keyframes that were made meanwhile, and only moved along, to the refined map."""
-        newest = int(core.snapshot_keyframes(self._map).ids[-1])
+        newest = int(core.snapshot_keyframes(self._map, map_index).ids[-1])
         core.local_bundle_adjustment(self._map, newest, cancelled, self._monocular)
 
     def _process(self, number: int) -> None:
-        self._latest = number, self._adjust(self.worker.cancel_flag)
+        wanted, map_index = self._wanted
+        if wanted == number:
+            self._latest = number, self._adjust(self.worker.cancel_flag, map_index)
 
-    def _adjust(self, cancelled: core.StopFlag) -> FullAdjustmentRecord:
+    def _adjust(self, cancelled: core.StopFlag, map_index: int) -> FullAdjustmentRecord:
         timer = StageTimer()
-        map_index = self._map.epoch
         with self.worker.off_duty():
             with timer("gather"):
-                bundle = core.gather_full_bundle(self._map)
+                bundle = core.gather_full_bundle(self._map, map_index)
             with timer("solve"):
                 summary = core.solve_full_bundle(bundle, self._options, cancelled, self._n_threads)
         used = False
@@ -192,7 +202,7 @@ class FullBundleAdjustment:
                 used = commit.committed
                 if commit.n_followed_keyframes > 0:
                     with timer("local"):
-                        self._refine_newest(cancelled)
+                        self._refine_newest(cancelled, map_index)
         record = FullAdjustmentRecord(
             map_index=map_index,
             n_keyframes=bundle.n_keyframes,

@@ -83,7 +83,7 @@ class KeyframeDecision:
             return False
         limits = self.limits
         interval = self._max_keyframe_interval
-        n_keyframes = self._map.n_keyframes
+        n_keyframes = self._map.n_keyframes_of(self._map.active_map)
         wait = min(interval, limits.wait_in_loaded_map) if last.in_loaded_map else interval
         if frame.id < last.last_relocalization + wait and n_keyframes > wait:
             return False

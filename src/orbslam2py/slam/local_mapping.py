@@ -106,7 +106,8 @@ class LocalMapping:
         self.on_done(keyframe)
 
     def _refine(self, keyframe: int, timer: StageTimer) -> None:
-        if self._map.n_keyframes > self._adjusted_keyframes:
+        n_keyframes = self._map.n_keyframes_of(self._map.map_of(keyframe))
+        if n_keyframes > self._adjusted_keyframes:
             with timer("mapping.local_bundle_adjustment"):
                 core.local_bundle_adjustment(
                     self._map, keyframe, self.worker.interrupt_flag, self._monocular

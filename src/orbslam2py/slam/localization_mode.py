@@ -81,7 +81,8 @@ class FirstEstimateInFixedMap:
         if not relocalized.found or found.T_cw is None:
             return odometry
         # The odometry's drift ends here and is no motion: the last frame moves along.
-        if odometry.found and frame.T_cw is not None and motion.last.T_cw is not None:
+        followed = odometry.found and found.map_index == frame.map_index
+        if followed and frame.T_cw is not None and motion.last.T_cw is not None:
             motion.jump(motion.last.T_cw @ frame.T_cw.inverse() @ found.T_cw)
         else:
             motion.jump(None)
@@ -116,9 +117,13 @@ class LocalizationSwitch:
         #: The mode in force.
         self.on = False
 
+    @property
+    def _n_keyframes(self) -> int:
+        return int(self._map.n_keyframes_of(self._map.active_map))
+
     def apply(self) -> None:
         """Carry out the switch, between two frames."""
-        wanted = self.wanted and self._map.n_keyframes >= self._min_keyframes
+        wanted = self.wanted and self._n_keyframes >= self._min_keyframes
         if wanted == self.on:
             return
         if wanted:

@@ -20,8 +20,9 @@ from orbslam2py._timing import StageStatistics, StageTimer
 from orbslam2py._worker import Worker
 from orbslam2py.errors import StateError
 from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.events import LoopClosed
+from orbslam2py.slam.events import LoopClosed, MapsMerged
 from orbslam2py.slam.full_bundle_adjustment import FullBundleAdjustment
+from orbslam2py.slam.merging import MapMerging
 from orbslam2py.slam.options import SystemOptions
 from orbslam2py.slam.thresholds import LoopThresholds
 
@@ -58,6 +59,8 @@ class LoopClosing:
         draws, and whether there is a thread.
     on_loop : callable
         ``on_loop(event)``, after each loop.
+    on_merge : callable
+        ``on_merge(event)``, after two maps have become one.
     thresholds : LoopThresholds, optional
         Limits.
     """
@@ -72,6 +75,7 @@ class LoopClosing:
         options: SystemOptions,
         *,
         on_loop: Callable[[LoopClosed], None],
+        on_merge: Callable[[MapsMerged], None],
         thresholds: LoopThresholds | None = None,
     ) -> None:
         self._map = slam_map
@@ -86,10 +90,16 @@ class LoopClosing:
             fix_scale=self._fix_scale, seed=options.seed % 2**64
         )
         self._on_loop = on_loop
+        self._on_merge = on_merge
+        self._merging = MapMerging(
+            slam_map, self._confirm, self._find_alike, fix_scale=self._fix_scale
+        )
         self._consistency = core.LoopConsistency()
         self._next_search = 1
         #: Loops closed so far, over all maps.
         self.loops: list[LoopClosed] = []
+        #: Maps that have become part of older ones.
+        self.merges: list[MapsMerged] = []
         #: The last keyframe that arrived, -1 before the first.
         self.last_keyframe = -1
         #: Milliseconds per step.
@@ -115,7 +125,9 @@ class LoopClosing:
         with self._lease(keyframe) as alive:
             if alive:
                 loop = self._find_loop(keyframe, timer)
-                if loop is not None:
+                if loop is not None and self._joins_maps(loop):
+                    self._join(loop, timer)
+                elif loop is not None:
                     self._close(loop, timer)
         self.last_keyframe = keyframe
         self.statistics.add({f"loop.{step}": ms for step, ms in timer.milliseconds.items()})
@@ -148,31 +160,58 @@ class LoopClosing:
         if not self._enabled or keyframe < self._next_search:
             self._consistency.clear()
             return _Proposals([], [])
-        least_score = core.lowest_neighbour_score(self._map, keyframe)
-        found = core.find_loop_candidates(self._keyframe_index, self._map, keyframe, least_score)
-        candidates = [place.keyframe for place in found]
+        candidates = self._find_alike(keyframe)
         consistent = list(self._consistency.update(self._map, candidates))
         return _Proposals(consistent, [c for c in candidates if c not in consistent])
 
+    def _find_alike(self, keyframe: int) -> list[int]:
+        """Keyframes that look like this one and share no point with it, of all maps."""
+        least_score = core.lowest_neighbour_score(self._map, keyframe)
+        found = core.find_loop_candidates(self._keyframe_index, self._map, keyframe, least_score)
+        return [place.keyframe for place in found]
+
+    def _confirm(self, keyframe: int, candidate: int) -> core.Loop | None:
+        return core.verify_loop_candidate(self._map, keyframe, candidate, self._verification)
+
+    def _joins_maps(self, loop: core.Loop) -> bool:
+        return self._map.map_of(loop.current) != self._map.map_of(loop.matched)
+
     def _verify(self, keyframe: int, proposals: _Proposals) -> core.Loop | None:
-        """Choose the loop that geometry confirms, unless another place fits as well."""
+        """Choose the loop that geometry confirms, unless another place fits as well.
+
+        It leads to another map only when none does within this one.
+        """
 
         def confirmed(candidates: list[int]) -> list[core.Loop]:
-            loops = (
-                core.verify_loop_candidate(self._map, keyframe, candidate, self._verification)
-                for candidate in candidates
-            )
+            loops = (self._confirm(keyframe, candidate) for candidate in candidates)
             return [loop for loop in loops if loop is not None]
 
-        loops = confirmed(proposals.consistent)
+        found = confirmed(proposals.consistent)
+        loops = [loop for loop in found if not self._joins_maps(loop)]
+        elsewhere = [loop for loop in found if self._joins_maps(loop)]
         best = core.choose_loop(self._map, loops, self._fix_scale)
         if best is None:
-            return None
-        loops += confirmed(proposals.others)
+            return self._merging.choose(elsewhere, lambda: [*loops, *confirmed(proposals.others)])
+        loops += [loop for loop in confirmed(proposals.others) if not self._joins_maps(loop)]
         if core.choose_loop(self._map, loops, self._fix_scale) is None:
             _log.info("keyframe %d looks like several places; no loop closed", keyframe)
             return None
         return best
+
+    # ---- two maps --------------------------------------------------------------------------------
+    def _join(self, loop: core.Loop, timer: StageTimer) -> None:
+        with self._adjustment.kept_away(), self._mapping.pause(brief=True) as ticket:
+            with timer("wait"):
+                ticket.wait()
+            merged = self._merging.join(loop, timer, self.worker.cancel_flag)
+        if merged is None:
+            return
+        self._consistency.clear()
+        self._next_search = loop.current + self._limits.gap
+        self.merges.append(merged)
+        self._on_merge(merged)
+        if self._adjust:
+            self._adjustment.start(merged.map_index)
 
     # ---- correction ------------------------------------------------------------------------------
     def _close(self, loop: core.Loop, timer: StageTimer) -> None:
@@ -194,7 +233,7 @@ class LoopClosing:
         self._consistency.clear()
         self._next_search = loop.current + self._limits.gap
         closed = LoopClosed(
-            map_index=self._map.epoch,
+            map_index=self._map.map_of(loop.current),
             current_keyframe=loop.current,
             matched_keyframe=loop.matched,
             current_timestamp=self._map.keyframe_timestamp(loop.current),
@@ -217,4 +256,4 @@ class LoopClosing:
         )
         self._on_loop(closed)
         if self._adjust:
-            self._adjustment.start()
+            self._adjustment.start(closed.map_index)

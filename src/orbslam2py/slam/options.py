@@ -20,6 +20,8 @@ from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings, resolve_settings
 from orbslam2py.vocabulary.vocabulary import load_vocabulary, vocabulary_name
 
+_SWITCHES = "deterministic", "wait_for_mapping", "loop_closing", "full_adjustment", "several_maps"
+
 
 @dataclass(frozen=True)
 class SystemOptions:
@@ -28,8 +30,9 @@ class SystemOptions:
     Raises
     ------
     SettingsError
-        If a switch is not True or False, the seed is no whole number from 0 to 2^64 - 1, or the
-        time limit is not more than 0 or given for the deterministic mode.
+        If a switch is not True or False, the seed is no whole number from 0 to 2^64 - 1, the time
+        limit is not more than 0 or given for the deterministic mode, or `new_map_after` is not a
+        number of seconds.
     """
 
     deterministic: bool = False
@@ -40,11 +43,19 @@ class SystemOptions:
     keyframe_images: bool = False
     seed: int = 0
     check_calibration: bool = True
+    several_maps: bool = True
+    new_map_after: float = 2.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "seed", seed_of(self.seed))
-        for name in ("deterministic", "wait_for_mapping", "loop_closing", "full_adjustment"):
+        for name in _SWITCHES:
             object.__setattr__(self, name, choice_of(getattr(self, name), name))
+        if not (is_number(self.new_map_after) and 0 <= self.new_map_after < math.inf):
+            raise SettingsError(
+                "new_map_after must be a number of seconds from 0 on, got "
+                f"{shown(self.new_map_after)}; to wait for the old map for ever, switch "
+                "several_maps off"
+            )
         seconds = self.full_adjustment_time_limit
         if seconds is None:
             return

@@ -22,7 +22,7 @@ from orbslam2py.maps.map_keeper import MapKeeper, encode_image
 from orbslam2py.maps.saved_map import VocabularyIdentity
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.back_end import RESET_PATIENCE, BackEnd
-from orbslam2py.slam.events import Callbacks, Relocalized, TrackingLost
+from orbslam2py.slam.events import Callbacks, MapStarted, Relocalized, TrackingLost
 from orbslam2py.slam.evidence.belief import Belief
 from orbslam2py.slam.evidence.harder_search import HarderSearch
 from orbslam2py.slam.evidence.judgement import EvidenceJudge
@@ -85,7 +85,7 @@ class Pipeline:
             setup.settings, sensor, check_calibration=options.check_calibration
         )
         self.back_end = back_end = BackEnd(sensor, options, callbacks)
-        self.tracking = _make_tracking(setup, back_end, options.seed)
+        self.tracking = _make_tracking(setup, back_end, options)
         self.localization = LocalizationSwitch(
             back_end.map, 1 if sensor.has_depth else 2, back_end.map_workers
         )
@@ -97,11 +97,13 @@ class Pipeline:
         self._limits = InitializationThresholds()
         self._start_failed = False
         self._keeps_frames = False
+        self._drops_one_map = False
         self._next_frame_id = 0
         self._last_timestamp = -math.inf
         if setup.loaded is not None:
             setup.loaded.restore(back_end.map, setup.vocabulary, back_end.keyframe_index)
             self.tracking.begin_in_loaded_map(setup.initial_pose)
+        self._last_map = -1 if setup.loaded is None else max(back_end.map.maps)
         self.keeper = MapKeeper(
             back_end.map,
             self.recorder.recorded,
@@ -196,7 +198,8 @@ class Pipeline:
     def _look_again_at_start(self) -> None:
         """Once a single camera's map has settled, its first frames get better poses in it."""
         n_young = self.recorder.n_young
-        settled = self.back_end.map.n_keyframes > self._limits.settled_map
+        slam_map = self.back_end.map
+        settled = slam_map.n_keyframes_of(slam_map.active_map) > self._limits.settled_map
         if n_young > 0 and (settled or n_young >= self._limits.young_frames):
             self.recorder.look_again(self.tracking.look_again)
 
@@ -205,6 +208,7 @@ class Pipeline:
             self._start_failed = outcome.estimate.reason is Reason.INITIAL_MAP_FAILED
             # Depths begin a map with one frame; one camera's frames from before serve it again.
             self._keeps_frames = not self._sensor.has_depth
+            self._drops_one_map = len(self.back_end.map.maps) > 1
             if not self._start_failed:
                 _log.info("lost soon after initialization; starting a new map")
             self.reset_requested.set()
@@ -226,7 +230,7 @@ class Pipeline:
         return TrackingRecord(
             frame_id=frame.id,
             timestamp=frame.timestamp,
-            map_index=self.back_end.map.epoch,
+            map_index=frame.map_index if ok else self.back_end.map.active_map,
             state=outcome.state,
             reason=estimate.reason,
             T_cw=frame.T_cw.matrix if ok and frame.T_cw is not None else None,
@@ -244,6 +248,9 @@ class Pipeline:
 
     def _announce(self, before: TrackingState, record: TrackingRecord) -> None:
         events = self.back_end.events
+        if record.state is TrackingState.OK and record.map_index > self._last_map:
+            self._last_map = record.map_index
+            events.post(MapStarted(record.map_index, record.frame_id, record.timestamp))
         if before is TrackingState.OK and record.state is TrackingState.LOST:
             events.post(
                 TrackingLost(
@@ -265,28 +272,33 @@ class Pipeline:
 
     def request_reset(self) -> None:
         """Begin a new map with the next image, and forget all before it."""
-        self._keeps_frames = False
+        self._keeps_frames = self._drops_one_map = False
         self.reset_requested.set()
 
     # ---- a new map -------------------------------------------------------------------------------
     def _reset(self) -> None:
-        _log.info("resetting: map %d ends", self.back_end.map.epoch)
-        self.back_end.reset(RESET_PATIENCE, keep=self.recorder.end_map)
-        if self._keeps_frames:
+        _log.info("resetting: map %d ends", self.back_end.map.active_map)
+        if self._drops_one_map:
+            self.back_end.drop_map(RESET_PATIENCE, keep=self.recorder.end_map)
+            self.tracking.go_back()
+        elif self._keeps_frames:
+            self.back_end.reset(RESET_PATIENCE, keep=self.recorder.end_maps)
             self.tracking.restart()
         else:
+            self.back_end.reset(RESET_PATIENCE, keep=self.recorder.end_maps)
             self.tracking.reset()
             self.front_end.reset()
             self._next_frame_id = 0
             self._last_timestamp = -math.inf
-        self._keeps_frames = False
+        self._keeps_frames = self._drops_one_map = False
         self.reset_requested.clear()
         # A map that never began was not given up.
         self.n_resets += not self._start_failed
         self._start_failed = False
 
 
-def _make_tracking(setup: Setup, back_end: BackEnd, seed: int) -> Tracking:
+def _make_tracking(setup: Setup, back_end: BackEnd, options: SystemOptions) -> Tracking:
+    seed = options.seed
     sensor, vocabulary = setup.sensor, setup.vocabulary
     max_keyframe_interval = setup.settings.max_keyframe_interval
     slam_map, mapping = back_end.map, back_end.mapping
@@ -324,4 +336,5 @@ def _make_tracking(setup: Setup, back_end: BackEnd, seed: int) -> Tracking:
         belief=belief(searching),
         keyframe_decision=KeyframeDecision(slam_map, mapping.worker, sensor, max_keyframe_interval),
         has_depth=sensor.has_depth,
+        new_map_after=options.new_map_after if options.several_maps else None,
     )

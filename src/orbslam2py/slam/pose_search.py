@@ -157,6 +157,8 @@ class PoseSearch:
     last_relocalization : int
         Id of the frame in which the camera was last found again. 0 at the beginning, as if the
         first frame had been: a young map has to prove itself.
+    searches_loaded_map : bool
+        The camera was not found yet in the map that was loaded.
     initial_pose : Pose or None
         ``T_cw`` that the user gave for the beginning in a loaded map; tried before all else until
         a frame is found.
@@ -186,6 +188,7 @@ class PoseSearch:
         self.local_map: core.LocalMap | None = None
         self.last_relocalization = 0
         self.initial_pose: core.Pose | None = None
+        self.searches_loaded_map = False
         self._place_of_loss: PlaceOfLoss | None = None
         if self._relocalizer is not None:
             self._relocalizer.reset()
@@ -313,7 +316,9 @@ class PoseSearch:
 
     def by_relocalization(self, frame: core.TrackedFrame) -> PoseEstimate:
         """From the user's guess, if any; else from any keyframe that looks like the frame."""
-        not_found = Reason.NOT_FOUND_IN_MAP if self.has_last_frame else Reason.SEARCHING_LOADED_MAP
+        not_found = Reason.NOT_FOUND_IN_MAP
+        if self.searches_loaded_map and not self.has_last_frame:
+            not_found = Reason.SEARCHING_LOADED_MAP
         if self._relocalizer is None:
             return PoseEstimate(not_found)
         n_inliers = 0
@@ -324,14 +329,27 @@ class PoseSearch:
             n_inliers = self._relocalizer.relocalize(frame)
         if n_inliers == 0:
             return PoseEstimate(not_found)
-        # Keyframe 0 always lives: any anchor serves until the local map has been searched.
-        core.anchor_frame(self._map, frame, max(0, self.reference_keyframe))
+        core.anchor_frame(self._map, frame, self._some_keyframe_around(frame))
         return PoseEstimate(
             n_matches=n_inliers,
             n_inliers=n_inliers,
             relocalized=True,
             method=PoseMethod.RELOCALIZATION,
         )
+
+    def _some_keyframe_around(self, frame: core.TrackedFrame) -> int:
+        """Any keyframe of the map that the frame was found in, until its local map is searched."""
+        slam_map = self._map
+        ids = frame.map_points
+        found_in = slam_map.active_map
+        for point in ids[ids >= 0].tolist():
+            of_point = slam_map.map_of_point(point)
+            if of_point >= 0:
+                found_in = of_point
+                break
+        if slam_map.map_of(self.reference_keyframe) == found_in:
+            return self.reference_keyframe
+        return int(slam_map.root(found_in))
 
     def _optimize(self, frame: core.TrackedFrame, n_matches: int, too_few: Reason) -> PoseEstimate:
         optimized = core.optimize_pose(frame)

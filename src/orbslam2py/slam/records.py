@@ -142,8 +142,9 @@ class TrackingRecord:
     timestamp: float
     """Seconds, as given by the caller."""
     map_index: int
-    """0 for the first map; grows with every reset, and with every start of a single camera that
-    failed."""
+    """The map that the pose is in: 0 for the first one; every map that begins has the next number,
+    also after a reset and after a start of a single camera that failed. Without a pose: the map in
+    which tracking was lost."""
     state: TrackingState
     reason: Reason
     """Why there is no pose (`Reason.NONE` if there is one)."""
@@ -179,6 +180,18 @@ class TrackingRecord:
         T_wc[:3, :3] = self.T_cw[:3, :3].T
         T_wc[:3, 3] = -self.T_cw[:3, :3].T @ self.T_cw[:3, 3]
         return T_wc
+
+
+@dataclass(frozen=True)
+class MapSummary:
+    """One of the maps that a system holds."""
+
+    map_index: int
+    """As in `TrackingRecord.map_index`: older maps have lower numbers."""
+    active: bool
+    """New keyframes belong to it; the others rest."""
+    n_keyframes: int
+    n_map_points: int
 
 
 # ---- inside the pipeline ---------------------------------------------------------------------

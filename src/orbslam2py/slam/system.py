@@ -24,13 +24,13 @@ from orbslam2py.maps.snapshot import MapSnapshot, keyframe_trajectory, take_snap
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
 from orbslam2py.slam.back_end import abandon
-from orbslam2py.slam.events import Callbacks, LoopClosed
+from orbslam2py.slam.events import Callbacks, LoopClosed, MapsMerged
 from orbslam2py.slam.frame_source import FrameSource, timed_images, track_images
 from orbslam2py.slam.front_end import Mask, PairMask
 from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
 from orbslam2py.slam.options import Setup, SystemOptions
 from orbslam2py.slam.pipeline import BuildFrame, Pipeline
-from orbslam2py.slam.records import TrackingRecord, TrackingState
+from orbslam2py.slam.records import MapSummary, TrackingRecord, TrackingState
 from orbslam2py.trajectory.trajectory import Trajectory
 
 _log = logging.getLogger(__name__)
@@ -51,7 +51,7 @@ class System:
         Visual words; the one shipped with the package if None.
     load_map : SavedMap, MapFile or path, optional
         Begin in a map that was saved before: lost at first, every image is searched in it. It is
-        never given up for a new one, unless you `reset`.
+        never given up for a new one, unless you `reset`; another one may begin beside it.
     initial_pose : array (4, 4), optional
         Camera to world: where in the loaded map the camera may be; tried before all else until the
         first image is found.
@@ -77,6 +77,11 @@ class System:
         Keep a small grey JPEG of every keyframe for map files.
     seed : int
         Seed of all random draws.
+    several_maps : bool
+        Begin another map when tracking is lost for long; the old one rests and is searched on.
+        Otherwise nothing is mapped until the camera sees the old map again.
+    new_map_after : float
+        Seconds of time stamps that tracking is lost before another map begins.
     check_calibration : bool
         Log one warning if the calibration cannot belong to images of the first one's size.
         `orbslam2py.check_calibration` looks into the images, too.
@@ -120,6 +125,8 @@ class System:
         keyframe_images: bool = False,
         seed: int = 0,
         check_calibration: bool = True,
+        several_maps: bool = True,
+        new_map_after: float = 2.0,
     ) -> None:
         self.options = SystemOptions(
             deterministic=deterministic,
@@ -130,6 +137,8 @@ class System:
             keyframe_images=keyframe_images,
             seed=seed,
             check_calibration=check_calibration,
+            several_maps=several_maps,
+            new_map_after=new_map_after,
         )
         setup = Setup.of(settings, sensor, vocabulary, load_map, initial_pose, allow_other_setup)
         self.sensor, self.settings, self.vocabulary = setup.sensor, setup.settings, setup.vocabulary
@@ -351,8 +360,10 @@ class System:
         """
         self.pipeline.request_reset()
 
-    def optimize(self, *, stop: threading.Event | None = None) -> FullAdjustmentRecord:
-        """Refine all keyframes and points together, now (full bundle adjustment).
+    def optimize(
+        self, *, stop: threading.Event | None = None, map_index: int | None = None
+    ) -> FullAdjustmentRecord:
+        """Refine all keyframes and points of a map together, now (full bundle adjustment).
 
         Tracking may go on meanwhile. A Ctrl-C gives up and leaves the map as it was; so do a loop
         that is closed meanwhile, another call, a reset, the shutdown and a switch to localization
@@ -363,6 +374,8 @@ class System:
         stop : threading.Event, optional
             Gives up when it is set, as a Ctrl-C does. In the deterministic mode nothing does once
             it has begun.
+        map_index : int, optional
+            One of `maps`; the active one if None.
 
         Returns
         -------
@@ -381,8 +394,8 @@ class System:
             raise StateError("optimize changes the map; switch localization mode off first")
         adjustment = self.pipeline.back_end.adjustment
         if adjustment.worker.ended:
-            return adjustment.run()
-        return adjustment.start_and_wait(stop)
+            return adjustment.run(map_index)
+        return adjustment.start_and_wait(stop, map_index)
 
     def wait_until_idle(self, timeout: float | None = None) -> bool:
         """Wait until every keyframe has been processed, and full adjustments have ended.
@@ -491,13 +504,27 @@ class System:
         return self.pipeline.tracking.state
 
     @property
+    def maps(self) -> list[MapSummary]:
+        """The maps that hold keyframes, the oldest first."""
+        slam_map = self.pipeline.back_end.map
+        return [
+            MapSummary(
+                map_index=index,
+                active=index == slam_map.active_map,
+                n_keyframes=slam_map.n_keyframes_of(index),
+                n_map_points=slam_map.n_points_of(index),
+            )
+            for index in slam_map.maps
+        ]
+
+    @property
     def n_keyframes(self) -> int:
-        """Keyframes in the map."""
+        """Keyframes in all maps."""
         return int(self.pipeline.back_end.map.n_keyframes)
 
     @property
     def n_map_points(self) -> int:
-        """Points in the map."""
+        """Points in all maps."""
         return int(self.pipeline.back_end.map.n_points)
 
     @property
@@ -509,6 +536,11 @@ class System:
     def loops(self) -> list[LoopClosed]:
         """The loops closed so far, over all maps."""
         return list(self.pipeline.back_end.loop_closing.loops)
+
+    @property
+    def merges(self) -> list[MapsMerged]:
+        """The maps that have become part of older ones so far."""
+        return list(self.pipeline.back_end.loop_closing.merges)
 
     @property
     def full_adjustments(self) -> list[FullAdjustmentRecord]:
@@ -526,33 +558,38 @@ class System:
         return self.pipeline.tracking.n_relocalizations
 
     def trajectory(self) -> Trajectory:
-        """Poses of all images of the present map, after the latest optimisation.
+        """Poses of all images of the active map, after the latest optimisation.
 
         Returns
         -------
         Trajectory
-            Time stamps, ``T_wc`` (n, 4, 4) relative to keyframe 0, and which frames were lost.
+            Time stamps, ``T_wc`` (n, 4, 4) relative to the map's first keyframe, and which frames
+            were lost.
         """
-        return self.trajectories()[-1]
+        return self.trajectories()[self.pipeline.back_end.map.active_map]
 
     def trajectories(self) -> list[Trajectory]:
-        """One trajectory per map: those that ended, also failed starts, then the present one."""
+        """One trajectory per map, by its number: also of those that ended, and of failed starts.
+
+        Each is relative to the first keyframe of its map. That of a map that has become part of
+        another one is empty.
+        """
         return self.pipeline.recorder.trajectories()
 
-    def keyframe_trajectory(self) -> Trajectory:
-        """Poses of the keyframes, relative to keyframe 0."""
-        return keyframe_trajectory(self.pipeline.back_end.map)
+    def keyframe_trajectory(self, map_index: int | None = None) -> Trajectory:
+        """Poses of the keyframes of a map (None: the active one), relative to the first one."""
+        return keyframe_trajectory(self.pipeline.back_end.map, map_index)
 
-    def map_snapshot(self) -> MapSnapshot:
-        """A copy of keyframe poses and points; may be called while the system runs."""
-        return take_snapshot(self.pipeline.back_end.map)
+    def map_snapshot(self, map_index: int | None = None) -> MapSnapshot:
+        """A copy of keyframe poses and points of a map (None: the active one), at any time."""
+        return take_snapshot(self.pipeline.back_end.map, map_index)
 
     def map_hash(self) -> int:
         """Hash over poses, points and observations: equal for equal maps."""
         return int(self.pipeline.back_end.map.content_hash())
 
     def check_map(self) -> list[str]:
-        """Violated invariants of the map, one sentence each; empty if it is consistent."""
+        """Violated invariants of the maps, one sentence each; empty if it is consistent."""
         return list(core.check_invariants(self.pipeline.back_end.map, require_words=True))
 
     def stage_statistics(self) -> dict[str, dict[str, float]]:

@@ -272,3 +272,23 @@ class LoopThresholds:
 
     gap: int = 10
     """Keyframes after a loop that are not searched for another one."""
+
+
+@dataclass(frozen=True)
+class MergeThresholds:
+    """When two maps are believed to show the same place."""
+
+    neighbours: int = 6
+    """Neighbours of the keyframe that may confirm what it shows ..."""
+    confirmations: int = 2
+    """... of which so many have to."""
+    far_neighbours: int = 3
+    """Neighbours of the keyframe in the other map that they are compared with as well."""
+    position: float = 0.15
+    """Median depths of the other keyframe by which a neighbour may be elsewhere than it should."""
+    angle: float = 0.1
+    """Radians by which it may be turned otherwise."""
+    log_scale: float = 0.2
+    """Logarithm of the factor by which its scale may differ."""
+    places: int = 5
+    """Places in the other map that are compared with the one that was found there."""

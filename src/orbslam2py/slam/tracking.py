@@ -9,6 +9,7 @@ section V; Mur-Artal and Tardos, "ORB-SLAM2", 2017, section III. Step by step:
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Protocol
@@ -109,6 +110,9 @@ class Tracking:
         Which frames become keyframes.
     has_depth : bool
         Whether frames measure depths, which become points of the map with a keyframe.
+    new_map_after : float or None
+        Seconds that tracking is lost before another map begins beside those there are; None: only
+        the old one is searched, for ever.
     """
 
     def __init__(
@@ -122,6 +126,7 @@ class Tracking:
         belief: Belief,
         keyframe_decision: KeyframeDecision,
         has_depth: bool,
+        new_map_after: float | None = None,
     ) -> None:
         self._map = slam_map
         self._vocabulary = vocabulary
@@ -131,6 +136,7 @@ class Tracking:
         self._belief = belief
         self._keyframe_decision = keyframe_decision
         self._has_depth = has_depth
+        self._new_map_after = new_map_after
         self._in_growing_map = FirstEstimateInGrowingMap(search)
         self._in_fixed_map = FirstEstimateInFixedMap(search, has_depth=has_depth)
         self._blur_watch = BlurWatch()
@@ -152,9 +158,12 @@ class Tracking:
         """Forget the map's past; the map itself is cleared by the pipeline."""
         self.state = TrackingState.NO_IMAGES_YET
         self._last_keyframe_frame_id = 0
-        # Whether the map was loaded, or localization mode has been on in it.
-        self._map_is_kept = False
-        self._map_was_loaded = False
+        # Maps that were loaded, and those that localization mode has been on in.
+        self._loaded_maps: set[int] = set()
+        self._kept_maps: set[int] = set()
+        self._lost_since: float | None = None
+        # Whether the initializer is shown the frames of a loss.
+        self._seeks_map = False
         self._search.reset()
         self._belief.reset()
         self._in_fixed_map.reset()
@@ -172,8 +181,27 @@ class Tracking:
             ``T_cw`` where the camera may be; tried before all else.
         """
         self.state = TrackingState.LOST
-        self._map_is_kept = self._map_was_loaded = True
+        self._loaded_maps = set(self._map.maps)
+        self._kept_maps = set(self._map.maps)
         self._search.initial_pose = initial_pose
+        self._search.searches_loaded_map = True
+
+    def go_back(self) -> None:
+        """Be lost in the maps that are left: the one that had begun beside them was dropped."""
+        frames = self._initializer.remembered()
+        self._leave_map()
+        self.state = TrackingState.LOST
+        # The next image that can begin a map does.
+        self._lost_since = -math.inf
+        self._seeks_map = True
+        self._initializer.restart(frames)
+
+    def _leave_map(self) -> None:
+        """Forget the frames before: what follows is in another map."""
+        self._search.reset()
+        self._belief.reset()
+        self._in_fixed_map.reset()
+        self._confirmation.reset()
 
     @property
     def initializing(self) -> bool:
@@ -183,7 +211,8 @@ class Tracking:
     @property
     def feature_factor(self) -> int:
         """Features that a single camera's next image needs, in multiples of the settings'."""
-        return self._initializer.feature_factor if self.initializing else 1
+        begins = self.initializing or self._seeks_map
+        return self._initializer.feature_factor if begins else 1
 
     def look_again(self, frames: Sequence[core.TrackedFrame]) -> list[core.TrackedFrame]:
         """Versions of the frames of the start, with their poses in the map as it is now."""
@@ -238,15 +267,18 @@ class Tracking:
         if self.initializing:
             return self._begin_map(frame, timer)
         self._blurred = self._blur_watch.is_blurred(frame.features)
-        if self._map.n_keyframes <= self._search.limits.small_map:
+        if self._is_small and not self._seeks_map:
             self._initializer.remember(frame)
         estimate = self._find_pose(frame, timer, localize)
         if estimate.found:
             estimate = self._confirm(frame, estimate)
         if not estimate.found:
-            return self._lose(frame, estimate)
+            begun = self._begin_map_beside(frame, timer, localize=localize)
+            return begun or self._lose(frame, estimate)
 
         self.state = TrackingState.OK
+        if not estimate.unconfirmed:
+            self._stay(frame)
         self._search.motion.update_velocity(frame)
         # Before temporary points go, and a keyframe's keypoints become points.
         inliers = accepted_keypoints(frame) if details else None
@@ -289,7 +321,7 @@ class Tracking:
             return PoseEstimate(Reason.BLURRED)
         strategy: FirstEstimate = self._in_growing_map
         if localize:
-            self._map_is_kept = True
+            self._kept_maps.add(self._map.active_map)
             strategy = self._in_fixed_map
         with timer("predict"):
             estimate = strategy.estimate(frame, lost=lost)
@@ -322,6 +354,35 @@ class Tracking:
         if reason is not Reason.NONE:
             spoilt = reason is Reason.INITIAL_MAP_FAILED
             return TrackingOutcome(self.state, PoseEstimate(reason), reset_needed=spoilt)
+        return self._map_begun(frame)
+
+    def _begin_map_beside(
+        self, frame: core.TrackedFrame, timer: StageTimer, *, localize: bool
+    ) -> TrackingOutcome | None:
+        """Begin another map with a frame that is not found; None if the time has not come."""
+        patience, since = self._new_map_after, self._lost_since
+        if patience is None or since is None or localize or self._blurred:
+            return None
+        if self.state is not TrackingState.LOST or frame.timestamp - since < patience:
+            return None
+        if not self._seeks_map:
+            self._initializer.reset()
+            self._seeks_map = True
+        frame.clear_associations()
+        with timer("keyframe"):
+            reason = self._initializer.try_initialize(frame)
+        if reason is Reason.INITIAL_MAP_FAILED:
+            return TrackingOutcome(self.state, PoseEstimate(reason), reset_needed=True)
+        if reason is not Reason.NONE:
+            return None
+        self._leave_map()
+        # A young map has to prove itself.
+        self._search.last_relocalization = frame.id
+        self._seeks_map = False
+        self._lost_since = None
+        return self._map_begun(frame)
+
+    def _map_begun(self, frame: core.TrackedFrame) -> TrackingOutcome:
         self.state = TrackingState.OK
         self._search.reference_keyframe = frame.reference_keyframe
         self._search.motion.remember(frame)
@@ -334,6 +395,8 @@ class Tracking:
 
     def _lose(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> TrackingOutcome:
         was_ok = self.state is TrackingState.OK
+        if self._lost_since is None:
+            self._lost_since = frame.timestamp
         if was_ok:
             _log.info("tracking lost at frame %d: %s", frame.id, estimate.reason)
         self.state = TrackingState.LOST
@@ -345,8 +408,24 @@ class Tracking:
         frame.clear_associations()
         frame.T_cw = None
         # A map that was loaded, or used for localization, is the user's, however small.
-        small = self._map.n_keyframes <= self._search.limits.small_map
-        return TrackingOutcome(self.state, estimate, reset_needed=small and not self._map_is_kept)
+        given_up = self._is_small and self._map.active_map not in self._kept_maps
+        return TrackingOutcome(self.state, estimate, reset_needed=given_up)
+
+    def _stay(self, frame: core.TrackedFrame) -> None:
+        """Go on in the map that a frame was found in, which may have rested."""
+        self._lost_since = None
+        if self._seeks_map:
+            self._seeks_map = False
+            self._initializer.reset()
+        if frame.map_index != self._map.active_map:
+            found_in = self._map.activate_map_of(frame.reference_keyframe)
+            _log.info("found again at frame %d in map %d", frame.id, found_in)
+
+    @property
+    def _is_small(self) -> bool:
+        """Whether the map is given up if tracking is lost."""
+        n_keyframes = self._map.n_keyframes_of(self._map.active_map)
+        return bool(n_keyframes <= self._search.limits.small_map)
 
     # ---- keyframes -------------------------------------------------------------------------------
     def _keyframe_wanted(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> bool:
@@ -355,7 +434,7 @@ class Tracking:
         since = KeyframeClock(
             last_keyframe=self._last_keyframe_frame_id,
             last_relocalization=self._search.last_relocalization,
-            in_loaded_map=self._map_was_loaded,
+            in_loaded_map=self._map.active_map in self._loaded_maps,
         )
         return self._keyframe_decision.wanted(
             frame, self.reference_keyframe, estimate.n_inliers, self.motion.velocity, since

@@ -23,6 +23,8 @@ struct RingOptions {
   double half_view = 120;      ///< keypoints lie in columns up to this far from the middle [pixels]
   double turn_drift = 4e-4;    ///< between keyframes, about the vertical [rad]
   double log_scale_drift = 0;  ///< for a single camera
+  int second_map_from = -1;    ///< the keyframe that begins another map; -1: there is one map only
+  Similarity S_21;             ///< world of the first map to that of the second
   int flipped_bits = 0;        ///< of each descriptor
   std::uint64_t seed = 1;
 };
@@ -51,6 +53,7 @@ class RingScene {
                             ? Similarity(truth[0])
                             : step * Similarity(truth.back() * truth[truth.size() - 2].inverse()) *
                                   drifted.back());
+      if (k == options.second_map_from) drifted.back() = drifted.back() * options.S_21.inverse();
     }
     instances_.resize(2 * walls_.positions.size());
     first_seen_.assign(walls_.positions.size(), -1);
@@ -179,12 +182,15 @@ class RingScene {
   void add_keyframe(int k) {
     std::vector<std::size_t> seen;
     const auto frame = make_frame(k, seen);
+    if (k == options.second_map_from) map.begin_map();
+    const bool later = options.second_map_from >= 0 && k >= options.second_map_from;
     const auto at = static_cast<std::size_t>(k);
     const KeyFrameId keyframe = map.add_keyframe(frame, drifted[at].pose());
     for (std::size_t i = 0; i < seen.size(); ++i) {
       int& first = first_seen_[seen[i]];
       if (first < 0) first = k;
-      MapPointId& instance = instances_[2 * seen[i] + (k - first > options.per_lap / 2 ? 1 : 0)];
+      const bool again = later || k - first > options.per_lap / 2;
+      MapPointId& instance = instances_[2 * seen[i] + (again ? 1 : 0)];
       if (!instance.valid()) {
         instance = map.add_point(drifted[at].inverse() * (truth[at] * walls_.positions[seen[i]]),
                                  keyframe, k);

@@ -68,7 +68,7 @@ TEST(MapFollower, TellsEverythingAtFirst) {
   MapFollower follower(borrowed(builder.map), 15);
   const MapChanges changes = follower.update();
   EXPECT_TRUE(changes.restarted);
-  EXPECT_EQ(changes.epoch, 0U);
+  EXPECT_EQ(changes.map, 0);
   EXPECT_EQ(values(changes.keyframes_set.ids), (Ids{0, 1}));
   EXPECT_EQ(changes.keyframes_set.T_wc[1][3], 1.0);
   EXPECT_EQ(changes.keyframes_set.timestamps[1], 1.0 / 30);
@@ -205,7 +205,7 @@ TEST(MapFollower, BeginsAnewWithEveryMap) {
   followed.map.clear();
   MapChanges changes = followed.look();
   EXPECT_TRUE(changes.restarted);
-  EXPECT_EQ(changes.epoch, 1U);
+  EXPECT_EQ(changes.map, 1);
   EXPECT_TRUE(changes.covisibility && changes.covisibility->empty());
   EXPECT_FALSE(followed.look().restarted);
   followed.map.clear();

@@ -66,7 +66,7 @@ def test_errors_are_told_with_the_frames_that_they_are_of() -> None:
     lengths = {"matched_path_m": 0.123, "true_path_m": 1.5, "ate_rmse_m": 0.00254}
     lengths |= {"tracked_fraction": 0.9, "ate_alignment": "se3"}
     table = printed("k", **figures, **lengths)
-    told = "0.0025 m over 2 of 10 frames, the last map only; turned and shifted"
+    told = "0.0025 m over 2 of 10 frames, the main map only; turned and shifted"
     assert line_with("ATE", table) == f"error (ATE, RMSE) │ {told}"
     assert line_with("tracked", table) == "tracked │ 9 of 10 frames (90.0 %)"
     assert line_with("path", table) == "true path compared │ 0.12 of 1.50 m"

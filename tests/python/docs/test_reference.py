@@ -21,7 +21,7 @@ from orbslam2py.runs.remedies import what_helps
 from orbslam2py.runs.result import DROPPED
 from orbslam2py.settings import BUILTIN_NAMES, keys
 from orbslam2py.settings.settings import CameraSettings, DepthSettings, OrbSettings, ViewerSettings
-from orbslam2py.slam.events import LoopClosed
+from orbslam2py.slam.events import LoopClosed, MapsMerged
 from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
 from orbslam2py.slam.records import Reason, TrackingState
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
@@ -147,6 +147,8 @@ def test_files_page_lists_the_keys_of_entries() -> None:
     loop = _filled(LoopClosed, {"milliseconds": {}})
     adjustment = _filled(FullAdjustmentRecord, numbers)
     assert tables_below("An entry of loops") == list(report.loop_entry(loop))
+    merge = _filled(MapsMerged, {"milliseconds": {}})
+    assert tables_below("An entry of merges") == list(report.merge_entry(merge))
     listed = tables_below("An entry of full_adjustments")
     assert listed == list(report.adjustment_entry(adjustment))
 

@@ -269,7 +269,15 @@ def test_worst_places() -> None:
 #: Keys that are no single figure, or that the page tells elsewhere.
 ELSEWHERE = {
     *("settings", "options", "command", "command_folder", "machine", "milliseconds", "losses"),
-    *("loops", "full_adjustments", "lost_reasons", "initialisation_reasons"),
+    *(
+        "maps",
+        "main_map",
+        "merges",
+        "loops",
+        "full_adjustments",
+        "lost_reasons",
+        "initialisation_reasons",
+    ),
     *("matched_from_s", "matched_to_s", "warnings", "final_adjustment"),
 }
 

@@ -49,8 +49,8 @@ def test_errors_of_the_last_map_alone_are_told_as_such(tmp_path: Path) -> None:
     states = "kkkkkkk" + "l" + "kk"
     page = changed(made_up_run(tmp_path / "parted", states, maps="0" * 8 + "11"))
     note, _, tiles = page.partition('class="tiles"')
-    assert "The errors are over 2 of 10 frames, the last map only" in note
-    assert "over 2 of 10 frames, the last map only" in tiles
+    assert "The errors are over 2 of 10 frames, the main map only" in note
+    assert "over 2 of 10 frames, the main map only" in tiles
 
 
 def test_the_first_finding_in_a_loaded_map(tmp_path: Path) -> None:

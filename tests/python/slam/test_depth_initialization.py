@@ -40,13 +40,19 @@ def test_depth_initializer(
         inserted.append(options)
         return 0
 
-    fake = SimpleNamespace(Pose=_core.Pose, describe=FakeCore().describe, insert_keyframe=insert)
+    fakes = FakeCore()
+    fake = SimpleNamespace(
+        Pose=_core.Pose,
+        describe=fakes.describe,
+        insert_keyframe=insert,
+        TrackedFrame=fakes.TrackedFrame,
+    )
     monkeypatch.setattr(from_depth, "core", fake)
     mapping = FakeMapping()
     frame = FakeFrame(0)
     depth = np.full(size, -1, np.float32)
     depth[:n_depths] = 2.0
-    frame.features = SimpleNamespace(size=size, depth=depth, described=False)
+    frame.features = SimpleNamespace(size=size, depth=depth, described=False, frame_id=0)
     initializer = initialization.DepthInitializer(
         FakeMap(),  # type: ignore[arg-type]
         "vocabulary",  # type: ignore[arg-type]

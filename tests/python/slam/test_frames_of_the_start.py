@@ -12,6 +12,7 @@ import pytest
 from orbslam2py import System, open_sequence
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
+from orbslam2py._timing import StageTimer
 from orbslam2py.evaluation import match_poses
 from orbslam2py.slam.frame_recorder import FrameRecorder
 from orbslam2py.slam.thresholds import InitializationThresholds
@@ -95,7 +96,12 @@ def test_poses_that_are_estimated_again_replace_the_first_ones() -> None:
         slam_map = system.pipeline.back_end.map
         frames = []
         for i in range(3):
-            frame = core.TrackedFrame(slam_map.keyframe_frame(0))
+            images = sequence.load(i)
+            frame = core.TrackedFrame(
+                system.pipeline.front_end.rgbd(
+                    images.image, images.depth, i, i / 20, StageTimer(), None
+                )
+            )
             frame.T_cw = core.Pose(np.array([0.0, 0, 0, 1]), np.array([0, 0, float(i)]))
             core.anchor_frame(slam_map, frame, 0)
             frames.append(frame)
@@ -107,6 +113,6 @@ def test_poses_that_are_estimated_again_replace_the_first_ones() -> None:
         recorder.look_again(moved)
         after = recorder.trajectories()[0]
         assert recorder.n_young == 0
-    assert seen == [[0, 0, 0]]
+    assert seen == [[0, 1, 2]]
     assert list(after.lost) == [False, False, True]
     assert after.positions[:, 2] == pytest.approx(before.positions[:, 2] + 1.0)

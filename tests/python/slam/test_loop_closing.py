@@ -55,6 +55,9 @@ class FakeMap:
     def keyframe_timestamp(self, keyframe: int) -> float:
         return keyframe / 10
 
+    def map_of(self, keyframe: int) -> int:
+        return self.epoch
+
 
 class FakeIndex:
     def __init__(self) -> None:
@@ -87,7 +90,8 @@ class FakeAdjustment:
         yield
         self.calls.append("adjustments again")
 
-    def start(self) -> None:
+    def start(self, map_index: int) -> None:
+        assert map_index == 0
         self.calls.append("start adjustment")
 
 
@@ -117,6 +121,7 @@ class Scene:
             self.adjustment,  # type: ignore[arg-type]
             SystemOptions(deterministic=True, loop_closing=enabled, full_adjustment=adjust, seed=5),
             on_loop=self.events.append,
+            on_merge=lambda merged: pytest.fail(f"{merged} within one map"),
         )
 
     def _core(self) -> SimpleNamespace:

@@ -120,6 +120,7 @@ def result_of(sequence: MadeUpSequence, states: str, maps: str, noise: float) ->
         result.trajectories.append(
             Trajectory(path.timestamps[which], T_wc[which], indices=which.astype(np.int64))
         )
+    result.main_map = len(result.trajectories) - 1
     last = result.trajectories[-1]
     result.keyframes = last.select(last.indices % 5 == 0)
     ids = np.arange(len(result.keyframes))

@@ -48,6 +48,7 @@ class FakeFrame:
         self.n_discards = 0
         self.anchor_x = 0.0
         self.big_change = 0
+        self.map_index = 0
 
     def share_anchor(self, other: FakeFrame) -> None:
         self.anchor_x, self.big_change = other.anchor_x, other.big_change
@@ -81,8 +82,29 @@ class FakeMap:
         self.big_change_index = 0
         self.culled: dict[int, int] = {}
 
+        self.active_map = 0
+        self.maps = [0]
+
     def living(self, keyframe: int) -> int:
         return self.culled.get(keyframe, keyframe)
+
+    def n_keyframes_of(self, map_index: int) -> int:
+        return self.n_keyframes if map_index == self.active_map else 0
+
+    def n_points_of(self, map_index: int) -> int:
+        return self.n_points if map_index == self.active_map else 0
+
+    def map_of(self, keyframe: int) -> int:
+        return 0 if keyframe >= 0 else -1
+
+    def map_of_point(self, point: int) -> int:
+        return 0
+
+    def root(self, map_index: int) -> int:
+        return 0
+
+    def begin_map(self) -> int:
+        return self.active_map
 
     def best_neighbours(self, keyframe: int, n: int) -> np.ndarray:
         return np.array([keyframe + 1000])

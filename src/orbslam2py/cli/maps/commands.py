@@ -14,13 +14,15 @@ from rich.markup import escape
 from orbslam2py.cli.calibrate import Force, Quiet, check_target
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.maps.description import describe_map
-from orbslam2py.cli.maps.edits import MapFile, align, crop, optimize, save_edited
+from orbslam2py.cli.maps.edits import MapFile, MapNumber, align, crop, optimize, save_edited
 from orbslam2py.cli.maps.export import ExportCommand, export
-from orbslam2py.maps import load_map, map_differences, verify_map_file
+from orbslam2py.cli.maps.merge import merge
+from orbslam2py.maps import MapContents, load_map, map_differences, verify_map_file
+from orbslam2py.maps.edits.parts import map_numbers, take_map
 from orbslam2py.runs.map_picture import draw_map
 
 app = typer.Typer(
-    help="Look at map files, check, compare, cut, move and refine them, and export them.",
+    help="Look at map files, check, compare, merge, cut, move and refine them, and export them.",
     no_args_is_help=True,
     rich_markup_mode="markdown",
 )
@@ -31,6 +33,7 @@ def info(
     picture: Annotated[
         Path | None, typer.Option(help="PNG file for a picture of the path.", metavar="FILE")
     ] = None,
+    number: MapNumber = None,
     force: Force = False,
 ) -> None:
     """Show what is in a map file: camera, keyframes, points, runs, extent."""
@@ -40,7 +43,7 @@ def info(
     for name, value in describe_map(saved, file):
         console.print(f"{name:20}{value}", markup=False)
     if picture is not None:
-        draw_map(picture, saved, title=file.name)
+        draw_map(picture, take_map(saved, number), title=file.name)
         console.print(f"Look at [bold]{escape(str(picture))}[/]")
 
 
@@ -53,9 +56,15 @@ def verify(files: Annotated[list[Path], typer.Argument(help="Map files.")]) -> N
     for file in files:
         contents = verify_map_file(file).contents
         console.print(
-            f"{file} is whole: {len(contents.keyframes)} keyframes, {len(contents.points)} points",
+            f"{file} is whole: {len(contents.keyframes)} keyframes, {len(contents.points)} points"
+            f"{_in_maps(contents)}",
             markup=False,
         )
+
+
+def _in_maps(contents: MapContents) -> str:
+    n = int(map_numbers(contents.keyframes).max()) + 1
+    return f", in {n} maps" if n > 1 else ""
 
 
 def compare(
@@ -104,6 +113,7 @@ for command, example in (
     (info, "info office.orbmap --picture office.png"),
     (verify, "verify office.orbmap"),
     (compare, "compare office.orbmap copy.orbmap"),
+    (merge, "merge monday.orbmap tuesday.orbmap --output both.orbmap"),
     (compact, "compact office.orbmap --output small.orbmap"),
     (export, "export colmap office.orbmap office-colmap --images video.mp4"),
     (crop, "crop office.orbmap --output start.orbmap --from 0 --to 30"),

@@ -9,8 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from orbslam2py._arguments import number_of
 from orbslam2py._arrays import FloatArray
 from orbslam2py.maps import MapContents, SavedMap, reprojection_errors
+from orbslam2py.maps.content_groups import BoolArray
+from orbslam2py.maps.edits.parts import map_numbers
 from orbslam2py.maps.units import unit_of
 
 #: Time stamps above are seconds since 1970, as a date is easier to read (1990).
@@ -26,6 +29,11 @@ def describe_map(saved: SavedMap, file: Path) -> Iterator[tuple[str, str]]:
     size = f", {contents.cameras.width[0]} x {contents.cameras.height[0]}"
     yield "camera", f"{saved.sensor}{size}, fx {camera.fx:g}"
     yield "vocabulary", f"{words.hash}{f' ({words.name})' if words.name else ''}"
+    numbers = map_numbers(keyframes)
+    if numbers.max() > 0:
+        yield "maps", f"{numbers.max() + 1}, each in a world of its own"
+        for number in range(int(numbers.max()) + 1):
+            yield f"map {number}", _one_map(contents, numbers == number)
     yield "keyframes", f"{len(keyframes)} ({len(contents.removed_keyframes)} were culled)"
     yield "points", str(len(contents.points))
     yield "observations", f"{len(contents.observations)}{_per_point(contents)}"
@@ -35,14 +43,29 @@ def describe_map(saved: SavedMap, file: Path) -> Iterator[tuple[str, str]]:
     yield "loops", str(len(contents.loop_edges))
     yield "times", _times(keyframes.timestamps)
     path = keyframes.T_wc[:, :3, 3]
-    length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
-    yield "path", f"{length:.2f} {unit} from keyframe to keyframe"
-    yield "cameras stood in", _box(path, unit)
+    if numbers.max() == 0:
+        yield "path", f"{_length(path):.2f} {unit} from keyframe to keyframe"
+        yield "cameras stood in", _box(path, unit)
     yield "colours", f"of {int(keyframes.has_colours.sum())} keyframes"
     yield "images", f"of {len(saved.images)} keyframes"
     for number, run in enumerate(saved.runs):
         frames = f"{len(run.frames)} frames, {int((run.frames.lost != 0).sum())} of them lost"
         yield f"run {number}", f"{run.started}, {run.program}, {frames}"
+
+
+def _one_map(contents: MapContents, chosen: BoolArray) -> str:
+    keyframes, unit = contents.keyframes, unit_of(contents)
+    reference = np.searchsorted(keyframes.ids, contents.points.reference_keyframe)
+    path = keyframes.T_wc[chosen, :3, 3]
+    points = number_of(int(chosen[reference].sum()), "point")
+    return (
+        f"{number_of(len(path), 'keyframe')}, {points}, path {_length(path):.2f} {unit}, "
+        f"{_times(keyframes.timestamps[chosen])}"
+    )
+
+
+def _length(path: FloatArray) -> float:
+    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
 
 
 def _per_point(contents: MapContents) -> str:

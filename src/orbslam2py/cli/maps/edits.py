@@ -30,11 +30,18 @@ from orbslam2py.maps import (
     transform_map,
 )
 from orbslam2py.maps.edits.crop import inside_box, keyframes_in_box, keyframes_of_times
+from orbslam2py.maps.edits.parts import take_map
 from orbslam2py.maps.edits.saved import crop_saved_map
 from orbslam2py.maps.units import unit_of
 from orbslam2py.slam.full_bundle_adjustment import optimize_map
 
 MapFile = Annotated[Path, typer.Argument(help="Map file.")]
+MapNumber = Annotated[
+    int | None,
+    typer.Option(
+        "--map", help="Which one, if the file holds several; 0 is the oldest.", metavar="K", min=0
+    ),
+]
 Output = Annotated[Path, typer.Option("--output", "-o", help="Map file to write.")]
 
 _LINE_OF_TIME, _LINE_OF_POSITION = 4, 6
@@ -65,6 +72,7 @@ def crop(
         bool,
         typer.Option("--points", help="Drop points outside of the box, too, not only cameras."),
     ] = False,
+    number: MapNumber = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -81,7 +89,7 @@ def crop(
     if points and not by_box:
         raise MapFileError("--points needs a box; give --low and --high")
     check_target(output, force=force)
-    saved = load_map(file, images=True)
+    saved = take_map(load_map(file, images=True), number)
     contents = saved.contents
     inside = None
     if by_time:
@@ -133,6 +141,7 @@ def align(
             metavar="PLACE PLACE",
         ),
     ] = None,
+    number: MapNumber = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -148,7 +157,7 @@ def align(
         raise MapFileError("a length is that between two places: give --length and --between")
     check_target(output, force=force)
     log_to(Console(stderr=True), quiet=quiet)
-    saved = load_map(file, images=True)
+    saved = take_map(load_map(file, images=True), number)
     contents = saved.contents
     if truth is not None:
         placement = place_by_trajectory(contents, read_true_path(truth, saved.sensor))
@@ -173,6 +182,7 @@ def optimize(
         float | None,
         typer.Option(help="Seconds after which it ends with what it has reached."),
     ] = None,
+    number: MapNumber = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
@@ -180,7 +190,7 @@ def optimize(
     if time_limit is not None and not (math.isfinite(time_limit) and time_limit > 0):
         raise MapFileError(f"--time-limit must be more than 0 seconds, got {time_limit:g}")
     check_target(output, force=force)
-    saved = load_map(file, images=True)
+    saved = take_map(load_map(file, images=True), number)
     refined, record = optimize_map(saved.contents, time_limit=time_limit)
     save_edited(replace(saved, contents=refined), output, force=force)
     seconds = sum(record.milliseconds.values()) / 1000

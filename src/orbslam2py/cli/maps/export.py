@@ -17,6 +17,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from orbslam2py._arrays import ByteArray
 from orbslam2py.cli.calibrate import Force, Quiet, check_target
+from orbslam2py.cli.maps.edits import MapNumber
 from orbslam2py.cli.messages import log_to
 from orbslam2py.datasets import open_input
 from orbslam2py.errors import DatasetError
@@ -33,6 +34,7 @@ from orbslam2py.maps import (
     load_map,
     with_colours,
 )
+from orbslam2py.maps.edits.parts import take_map
 from orbslam2py.runs.feeds import is_sequence
 from orbslam2py.trajectory import Trajectory
 
@@ -104,13 +106,14 @@ def export(
             "--frames", help="tum, kitti, euroc: all images of the last run, not only keyframes."
         ),
     ] = False,
+    number: MapNumber = None,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
     """Write a map for another program: Gaussian splatting, NeRF, photogrammetry, viewers, tools."""
     _refuse_what_does_nothing(file_format, images, fps, times, without_images, frames)
     log_to(Console(stderr=True), quiet=quiet)
-    saved = load_map(file, images=images is None and not without_images)
+    saved = take_map(load_map(file, images=images is None and not without_images), number)
     if file_format not in _FOLDERS:
         check_target(output, force=force)
     console = Console(quiet=quiet, highlight=False, soft_wrap=True)

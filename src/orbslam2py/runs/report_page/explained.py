@@ -43,11 +43,11 @@ def compared_over(report: dict[str, Any]) -> str:
     if poses is None or frames is None:
         return ""
     told = f"over {poses} of {number_of(frames, 'frame')}"
-    return f"{told}, the last map only" if is_of_last_map_only(report) else told
+    return f"{told}, the main map only" if is_of_last_map_only(report) else told
 
 
 def is_of_last_map_only(report: dict[str, Any]) -> bool:
-    """Whether frames of earlier maps have poses, which the errors know nothing of."""
+    """Whether frames of other maps have poses, which the errors know nothing of."""
     poses = report.get("matched_of_poses")
     return poses is not None and poses < report.get("tracked", 0)
 
@@ -119,8 +119,8 @@ FIGURES: dict[str, tuple[Figure, ...]] = {
         Figure("r_rel_deg_per_100m", "KITTI, rotation", "deg/100 m",
                "KITTI's error of rotation over the same segments", -1),
         Figure("matched_poses", "compared poses", "",
-               "poses of the last map with a true one at their time: the errors are of these"),
-        Figure("matched_of_poses", "of poses", "", "poses of the last map"),
+               "poses of the main map with a true one at their time: the errors are of these"),
+        Figure("matched_of_poses", "of poses", "", "poses of the main map"),
         Figure("matched_path_m", "compared path", "m",
                "length of the true path along the matched poses, without gaps"),
         Figure("true_path_m", "true path", "m", "length of the whole true path"),
@@ -151,8 +151,8 @@ FIGURES: dict[str, tuple[Figure, ...]] = {
         Figure("interrupted", "interrupted", "", "whether Ctrl-C ended the run"),
     ),
     "Map": (
-        Figure("keyframes", "keyframes", "", "of the last map"),
-        Figure("map_points", "map points", "", "of the last map"),
+        Figure("keyframes", "keyframes", "", "of the main map"),
+        Figure("map_points", "map points", "", "of the main map"),
         Figure("loops_closed", "loops closed", "", "over all maps"),
     ),
     "Speed": (
@@ -173,7 +173,7 @@ FIGURES: dict[str, tuple[Figure, ...]] = {
         Figure("seed", "seed", "", "of all random draws"),
         Figure("depth", "depth", "", "of the first depth images, in metres"),
         Figure("loaded_map", "loaded map", "", "what the run began in"),
-        Figure("saved_map", "saved map", "", "the file that the last map was saved in"),
+        Figure("saved_map", "saved map", "", "the file that the maps were saved in"),
         Figure("started", "started", "", "date and time of the run's beginning"),
         Figure("version", "version", "", "of orbslam2py"),
     ),

@@ -23,7 +23,7 @@ from orbslam2py.trajectory.rotations import inverse_poses
 
 _log = logging.getLogger(__name__)
 
-#: Keyframes that are shown, spread evenly over those of the last map.
+#: Keyframes that are shown, spread evenly over those of the main map.
 _N_KEYFRAMES = 8
 #: Frames in which tracking was lost that are shown.
 _N_LOST = 4
@@ -60,7 +60,7 @@ def choose_frames(result: RunResult, extra: IntArray | None = None) -> list[int]
     Returns
     -------
     list of int
-        Positions in `RunResult.rows`, ascending: some keyframes of the last map, those of its
+        Positions in `RunResult.rows`, ascending: some keyframes of the main map, those of its
         loops, the first images of losses, and the extra ones.
     """
     keyframes = result.keyframes.indices

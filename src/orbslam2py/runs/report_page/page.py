@@ -35,7 +35,7 @@ def run_page(run: RunFolder) -> str:
         "figures": sections.figures_section(story),
         "repeat": repeat_section(report),
     }
-    titles = {"error": "Error", "figures": "All figures", "maps": "Earlier maps"}
+    titles = {"error": "Error", "figures": "All figures", "maps": "Other maps"}
     links = [(name, titles.get(name, name.capitalize())) for name, part in parts.items() if part]
     told = f"{report.get('sensor')}, {report.get('layout')}"
     when = report.get("started")
@@ -167,7 +167,7 @@ def _notes(report: dict[str, Any]) -> Markup | None:
     elif report.get("lost_at_end") and not warnings:
         said.append("Tracking was lost at the end of the run.")
     if report.get("ate_rmse_m") is not None and is_of_last_map_only(report):
-        said.append(f"The errors are {compared_over(report)}: earlier maps are not in them.")
+        said.append(f"The errors are {compared_over(report)}: other maps are not in them.")
     if report.get("interrupted"):
         seen = f"{report.get('seen_frames')} of {report.get('frames')} frames"
         said.append(f"The run was interrupted after {seen}.")

@@ -18,7 +18,7 @@ from orbslam2py.runs.timeline import gaps_in_time
 def path_section(story: Story) -> Markup:
     """The path in three dimensions and from above."""
     if not len(story.run.path):
-        return section("path", "Path", element("p", "No frame of the last map has a pose."))
+        return section("path", "Path", element("p", "No frame of the main map has a pose."))
     layers = ("points", "keyframes", "truth", "loops")
     there = {
         "points": len(story.run.points) > 0,

@@ -67,9 +67,9 @@ class RunFolder:
     report: dict[str, Any]
     frames: Frames
     path: Trajectory
-    """Of the last map, after the last optimisation."""
-    earlier: list[Trajectory]
-    """Of the maps before it, each in a frame of its own."""
+    """Of the main map, after the last optimisation."""
+    others: dict[int, Trajectory]
+    """Of the other maps, by their numbers, each in a frame of its own."""
     keyframes: Trajectory
     truth: Trajectory | None
     """True poses in the frame and unit of `path`."""
@@ -87,7 +87,7 @@ class RunFolder:
 
     @cached_property
     def map(self) -> MapArrays | None:
-        """What is drawn of the last map; None if the file is not there.
+        """What is drawn of the main map; None if the file is not there.
 
         Raises
         ------
@@ -149,9 +149,17 @@ def read_run(folders: Path | Sequence[Path]) -> RunFolder:
         raise DatasetError(
             f"{places[0]} holds no whole run: frames.csv is missing; run the sequence again"
         )
-    earlier: list[Trajectory] = []
-    while (file := _find(places, f"trajectory_map{len(earlier)}.txt")) is not None:
-        earlier.append(read_tum(file))
+    numbers = {
+        int(file.stem.removeprefix("trajectory_map"))
+        for place in places
+        for file in place.glob("trajectory_map*.txt")
+        if file.stem.removeprefix("trajectory_map").isdecimal()
+    }
+    others = {
+        number: read_tum(file)
+        for number in sorted(numbers)
+        if (file := _find(places, f"trajectory_map{number}.txt")) is not None
+    }
     points = _find(places, "points.ply")
     truth = _find(places, "groundtruth_aligned.txt")
     return RunFolder(
@@ -159,7 +167,7 @@ def read_run(folders: Path | Sequence[Path]) -> RunFolder:
         report=report,
         frames=read_frames(frames_file),
         path=_read_path(places, "trajectory.txt"),
-        earlier=earlier,
+        others=others,
         keyframes=_read_path(places, "keyframes.txt"),
         truth=None if truth is None else read_tum(truth),
         points=np.zeros((0, 3)) if points is None else read_points(points),

@@ -81,11 +81,12 @@ def frames_shown(story: Story) -> IntArray:
 
 
 def loop_ends(run: RunFolder) -> FloatArray:
-    """Positions of both ends of the loops of the last map, (l, 2, 3), in the unit of the page."""
-    last_map = len(run.earlier)
+    """Positions of both ends of the loops of the main map, (l, 2, 3), in the unit of the page."""
     numbers = run.frames.map_index[np.isfinite(run.frames.map_index)]
-    last_map = int(numbers[-1]) if len(numbers) else last_map
-    of_map = [loop for loop in run.report.get("loops", []) if loop.get("map") == last_map]
+    last_map = int(numbers[-1]) if len(numbers) else 0
+    # Folders of earlier versions hold only what came last.
+    main = run.report.get("main_map", last_map)
+    of_map = [loop for loop in run.report.get("loops", []) if loop.get("map") == main]
     if not of_map or not len(run.path):
         return np.zeros((0, 2, 3))
     times = np.array([loop["timestamps"] for loop in of_map], np.float64)

@@ -152,20 +152,20 @@ def _image_text(story: Story, position: int, worst: int | None) -> str:
 
 
 def maps_section(story: Story) -> Markup | None:
-    """Paths of the maps before the last; None if there were none with a path."""
+    """Paths of the maps beside the main one; None if there were none with a path."""
     run = story.run
     drawn = []
-    for number, path in enumerate(run.earlier):
+    for number, path in run.others.items():
         if len(path):
             drawn.append(_earlier_map(story, number, path))
     if not drawn:
         return None
     note = (
         "Each map has a frame and, with one camera, a unit of its own, and no place in the "
-        "pictures of the last one. Its path is in trajectory_mapK.txt."
+        "pictures of the main one. Its path is in trajectory_mapK.txt."
     )
     return section(
-        "maps", "Earlier maps", element("div", *drawn, class_="images"),
+        "maps", "Other maps", element("div", *drawn, class_="images"),
         element("p", note, class_="note"),
     )  # fmt: skip
 

@@ -104,13 +104,16 @@ def _events(run: RunFolder) -> list[Event]:
             text = f"tracking lost for {frames_text} ({entry['seconds']:.1f} s{end}): "
             events.append(Event(int(where[0]), "lost", text + entry["reason"]))
     previous_map, previous_state = np.nan, ""
+    seen: set[float] = set()
     for position, (number, state) in enumerate(zip(frames.map_index, frames.state, strict=True)):
         if np.isnan(number):
             continue
         if number != previous_map and not np.isnan(previous_map):
-            events.append(Event(position, "map", f"map {number:.0f} begun"))
+            what = "again" if number in seen else "begun"
+            events.append(Event(position, "map", f"map {number:.0f} {what}"))
         elif state == "OK" and previous_state == "LOST":
             events.append(Event(position, "relocalised", _found(run, events)))
+        seen.add(number)
         previous_map, previous_state = number, state
     unit = "units" if run.is_monocular else "m"
     for entry in run.report.get("loops", []):

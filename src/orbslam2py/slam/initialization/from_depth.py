@@ -87,14 +87,18 @@ class DepthInitializer:
         return None
 
     def try_initialize(self, frame: core.TrackedFrame) -> Reason:
-        """Make the frame keyframe 0, with a map point for every depth; or say why not."""
+        """Make the frame the first keyframe, with a point for every depth; or say why not."""
         if frame.features.size <= self._least:
             return Reason.TOO_FEW_KEYPOINTS
         if int(np.count_nonzero(frame.features.depth > 0)) < self._limits.depths:
             return Reason.TOO_FEW_DEPTHS
+        # It may have been searched in other maps before.
+        frame.take_over(core.TrackedFrame(frame.features))
+        self._map.begin_map()
         frame.T_cw = core.Pose()
         core.describe(frame.features, self._vocabulary)
         keyframe = core.insert_keyframe(self._map, frame, create_points=True, n_minimum=sys.maxsize)
         self._mapping.insert_keyframe(keyframe)
-        _log.info("new map with %d points", self._map.n_points)
+        n_points = self._map.n_points_of(self._map.active_map)
+        _log.info("new map with %d points", n_points)
         return Reason.NONE

@@ -194,12 +194,14 @@ class MonocularInitializer:
         first = next(f for f in self._history if f.id == view.frame.id)
         core.describe(first.features, self._vocabulary)
         core.describe(second.features, self._vocabulary)
+        self._map.begin_map()
         begun = core.create_monocular_map(
             self._map, first, second, motion.T_21, placed_matches(view, motion), motion.points
         )
         if not begun.ok:
             return Reason.INITIAL_MAP_FAILED
-        _log.info("new map with %d points", self._map.n_points)
+        n_points = self._map.n_points_of(self._map.active_map)
+        _log.info("new map with %d points", n_points)
         self._mapping.insert_keyframe(begun.first)
         self._mapping.insert_keyframe(begun.second)
         self._earlier.track(list(self._history), first)

@@ -46,7 +46,8 @@ class PlaceOfLoss:
         if reference < 0:
             return []
         covisible = slam_map.best_neighbours(reference, limits.covisible_keyframes)
-        youngest: IntArray = slam_map.keyframe_ids()[: -limits.last_keyframes - 1 : -1]
+        same_map = slam_map.keyframe_ids(slam_map.map_of(reference))
+        youngest: IntArray = same_map[: -limits.last_keyframes - 1 : -1]
         return list(dict.fromkeys([reference, *covisible.tolist(), *youngest.tolist()]))
 
     def guesses(self, frame_id: int, limits: RelocalizationThresholds) -> list[core.Pose]:

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <vector>
+
+#include "loops/loop.hpp"
+#include "loops/loop_correction.hpp"
+#include "map/map.hpp"
+
+namespace orbslam {
+
+/// What joining two maps does to them, worked out on copies. The younger one is moved into the
+/// world of the older one, whose frame and scale stay. See docs/method/several_maps.md#merging.
+///
+/// The caller keeps local mapping still from plan_map_merge() to apply_map_merge().
+struct MapMerge {
+  Loop loop;  ///< `current` and `matched` are of two maps
+  std::uint64_t epoch = 0;
+  MapIndex kept = kNoMap, moved = kNoMap;  ///< kNoMap: an end is dead, or both are of one map
+  Similarity S_km;                         ///< world of the moved map to that of the kept one
+  std::vector<LoopCorrection::Fusion> fusions;
+  std::vector<KeyFrameId> group;  ///< `current` and its neighbours, whose connections change
+};
+
+/// Takes the map's read lock in short sections; the map is not changed. `fix_scale`: the similarity
+/// is rigid.
+MapMerge plan_map_merge(const Map& map, const Loop& loop, bool fix_scale);
+
+struct MapMergeResult {
+  bool applied = false;  ///< false: the map was cleared meanwhile, or an end has died
+  MapIndex kept = kNoMap, moved = kNoMap;
+  int n_moved_keyframes = 0, n_moved_points = 0;
+  int n_fused = 0;   ///< points replaced or added
+  double scale = 1;  ///< by which lengths of the moved map were multiplied
+};
+
+/// Moves one map into the other's world, makes them one map and one spanning tree, fuses points,
+/// brings connections up to date and adds the loop edge, in one write section, which counts as a
+/// big change. Prepared under the read lock.
+MapMergeResult apply_map_merge(Map& map, const MapMerge& merge);
+
+/// The keyframes around the seam of two maps that have just become one: `current` and its
+/// neighbours, ascending. Takes the read lock.
+std::vector<KeyFrameId> keyframes_of_seam(const Map& map, KeyFrameId current);
+
+/// Where every keyframe of a map is.
+struct KeyFramePoses {
+  std::vector<KeyFrameId> ids;  ///< ascending
+  std::vector<Pose> T_cw;
+};
+/// Published keyframes. Takes the read lock.
+KeyFramePoses poses_of_map(const Map& map, MapIndex which);
+
+/// Spreads what an adjustment of the seam has moved over the rest of the map: a pose graph with the
+/// relative poses of `before`, in which the seam stays where it is now. Points move with their
+/// reference keyframes, those of the seam stay. Returns whether anything was moved. Takes the map's
+/// locks in short sections. See docs/method/several_maps.md#the-seam.
+bool spread_from_seam(Map& map, const KeyFramePoses& before, const std::vector<KeyFrameId>& seam,
+                      bool fix_scale, const std::atomic<bool>* abort);
+
+}  // namespace orbslam

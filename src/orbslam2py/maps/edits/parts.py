@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Several maps in one file: which keyframe belongs to which, one taken out, several put together.
+
+Each keyframe without a parent is the root of a map; ``docs/method/several_maps.md``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orbslam2py._arrays import IntArray
+from orbslam2py.errors import MapFileError
+from orbslam2py.maps.content_groups import (
+    ArrayGroup,
+    Cameras,
+    Covisibility,
+    Keyframes,
+    Observations,
+    Points,
+    RemovedKeyframes,
+)
+from orbslam2py.maps.contents import MapContents
+from orbslam2py.maps.edits.saved import crop_saved_map
+from orbslam2py.maps.saved_map import Run, SavedMap
+
+
+def map_numbers(keyframes: Keyframes) -> IntArray:
+    """Number of the map of every keyframe, int64 (k,): 0 for the oldest one in the file."""
+    ids, parents = keyframes.ids, keyframes.parent
+    rows = np.arange(len(ids))
+    above = np.where(parents < 0, rows, np.searchsorted(ids, np.maximum(parents, 0)))
+    while True:
+        higher = above[above]
+        if np.array_equal(higher, above):
+            break
+        above = higher
+    return np.asarray(np.unique(above, return_inverse=True)[1], np.int64)
+
+
+def take_map(saved: SavedMap, number: int | None = None) -> SavedMap:
+    """Take one map of a file that may hold several.
+
+    Parameters
+    ----------
+    saved
+        What the file holds.
+    number
+        Which, from 0 for the oldest one; may be left out if there is only one.
+
+    Returns
+    -------
+    SavedMap
+        `saved` itself if it holds no other.
+
+    Raises
+    ------
+    MapFileError
+        If there is no such map, or none is named and there are several.
+    """
+    numbers = map_numbers(saved.contents.keyframes)
+    counts = np.bincount(numbers)
+    told = ", ".join(f"{k} ({n} keyframes)" for k, n in enumerate(counts))
+    name = saved.source or "the file"
+    if number is None and len(counts) > 1:
+        raise MapFileError(f"{name} holds {len(counts)} maps: {told}; say which one with --map")
+    if number is not None and not 0 <= number < len(counts):
+        raise MapFileError(f"{name} has no map {number}; it holds {told}")
+    return saved if len(counts) == 1 else crop_saved_map(saved, numbers == number)
+
+
+def put_together(files: Sequence[SavedMap]) -> SavedMap:
+    """Put the maps of several files into one, each in a world of its own as before.
+
+    Numbers of keyframes and points follow each other in the order of the files; settings and visual
+    words are those of the first.
+
+    Parameters
+    ----------
+    files
+        At least one; of one camera and one vocabulary.
+    """
+    offsets = np.cumsum([0, *(saved.contents.next_keyframe for saved in files)])
+    contents = _joined([saved.contents for saved in files])
+    runs: list[Run] = []
+    images: dict[int, bytes] = {}
+    for saved, offset in zip(files, offsets.tolist(), strict=False):
+        for run in saved.runs:
+            keyframes = _shifted(run.frames.keyframes, offset)
+            runs.append(replace(run, frames=replace(run.frames, keyframes=keyframes)))
+        images.update({number + offset: image for number, image in saved.images.items()})
+    return replace(files[0], contents=contents, runs=tuple(runs), images=images, source="")
+
+
+def _shifted(ids: IntArray, offset: int) -> IntArray:
+    return np.where(ids >= 0, ids + offset, ids)
+
+
+def _joined(parts: Sequence[MapContents]) -> MapContents:
+    keyframe = np.cumsum([0, *(part.next_keyframe for part in parts)])
+    point = np.cumsum([0, *(part.next_point for part in parts)])
+    camera = np.cumsum([0, *(len(part.cameras) for part in parts)])
+
+    def together(
+        kind: type[Any], group: Callable[[MapContents], ArrayGroup], **shifts: NDArray[np.int64]
+    ) -> Any:
+        """Arrays of one group one after the other; ids are shifted."""
+        columns: dict[str, list[NDArray[Any]]] = {}
+        for number, part in enumerate(parts):
+            for name, array in group(part).arrays():
+                by = shifts.get(name)
+                shifted = array if by is None else _shifted(array, int(by[number]))
+                columns.setdefault(name, []).append(shifted)
+        return kind(**{name: np.concatenate(arrays) for name, arrays in columns.items()})
+
+    def keyframes_of(part: MapContents) -> Keyframes:
+        return _complete(part.keyframes, [other.keyframes for other in parts])
+
+    keyframes = together(Keyframes, keyframes_of, ids=keyframe, parent=keyframe, camera=camera)
+    counts = [np.diff(part.keyframes.offsets) for part in parts]
+    offsets = np.concatenate([[0], np.cumsum(np.concatenate(counts))]).astype(np.int64)
+    return replace(
+        parts[0],
+        map_index=0,
+        next_keyframe=int(keyframe[-1]),
+        next_point=int(point[-1]),
+        cameras=together(Cameras, lambda part: part.cameras),
+        keyframes=replace(keyframes, offsets=offsets),
+        removed_keyframes=together(
+            RemovedKeyframes, lambda part: part.removed_keyframes, ids=keyframe, parent=keyframe
+        ),
+        points=together(
+            Points,
+            lambda part: part.points,
+            ids=point,
+            reference_keyframe=keyframe,
+            first_keyframe=keyframe,
+        ),
+        observations=together(
+            Observations, lambda part: part.observations, point=point, keyframe=keyframe
+        ),
+        covisibility=together(Covisibility, lambda part: part.covisibility, a=keyframe, b=keyframe),
+        loop_edges=np.concatenate(
+            [part.loop_edges + by for part, by in zip(parts, keyframe[:-1], strict=True)]
+        ),
+    )
+
+
+def _complete(keyframes: Keyframes, all_of_them: Sequence[Keyframes]) -> Keyframes:
+    """With what may be left out where no keyframe has it, if others have it."""
+    n = int(keyframes.offsets[-1])
+    raw, colours, words = keyframes.raw_keypoints, keyframes.colours, keyframes.words
+    if not len(raw) and any(len(other.raw_keypoints) for other in all_of_them):
+        raw = keyframes.keypoints
+    if not len(colours) and any(len(other.colours) for other in all_of_them):
+        colours = np.zeros((n, 3), np.uint8)
+    if not all(len(other.words) for other in all_of_them):
+        words = np.zeros(0, np.uint32)
+    return replace(keyframes, raw_keypoints=raw, colours=colours, words=words)

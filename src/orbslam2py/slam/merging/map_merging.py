@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Map merging: two maps that show the same place become one.
+
+Campos et al., "ORB-SLAM3", IEEE T-RO 2021, section VI, and Elvira et al., "ORBSLAM-Atlas", IROS
+2019, with the care of loop closing and more: no drift limits how far two maps may be apart. Step by
+step: ``docs/method/several_maps.md``.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from orbslam2py import _core as core
+from orbslam2py._arrays import FloatArray
+from orbslam2py._timing import StageTimer
+from orbslam2py.slam.events import MapsMerged
+from orbslam2py.slam.thresholds import MergeThresholds
+
+_log = logging.getLogger(__name__)
+
+#: Verifies by geometry that two keyframes show the same place.
+Verify = Callable[[int, int], core.Loop | None]
+#: Keyframes of any map that look like one.
+FindAlike = Callable[[int], list[int]]
+
+
+class MapMerging:
+    """Decides whether two maps show the same place, and makes them one.
+
+    Parameters
+    ----------
+    slam_map : orbslam2py._core.Map
+        The maps.
+    fix_scale : bool
+        Depth is measured: the maps have one scale.
+    verify : callable
+        ``verify(current, candidate)``: a loop or None.
+    find_alike : callable
+        Keyframes that look like one and share no point with it.
+    thresholds : MergeThresholds, optional
+        Limits.
+    """
+
+    def __init__(
+        self,
+        slam_map: core.Map,
+        verify: Verify,
+        find_alike: FindAlike,
+        *,
+        fix_scale: bool,
+        thresholds: MergeThresholds | None = None,
+    ) -> None:
+        self._map = slam_map
+        self._fix_scale = fix_scale
+        self._verify = verify
+        self._find_alike = find_alike
+        self._limits = thresholds or MergeThresholds()
+
+    # ---- is it the same place? -------------------------------------------------------------------
+    def choose(
+        self, consistent: Sequence[core.Loop], others: Callable[[], Sequence[core.Loop]]
+    ) -> core.Loop | None:
+        """Choose the place in another map that a keyframe shows, if nothing speaks against it.
+
+        Parameters
+        ----------
+        consistent : sequence of Loop
+            Verified places in other maps, that the keyframes before proposed as well.
+        others : callable
+            Gives all other verified places, in any map, that look like it.
+        """
+        if not consistent:
+            return None
+        best = core.choose_merge(self._map, list(consistent), self._fix_scale)
+        if best is None:
+            return None
+        if not self._is_alone(best, others()):
+            _log.info("keyframe %d looks like several places; no maps joined", best.current)
+            return None
+        if not self._is_confirmed(best):
+            _log.info("keyframe %d alone shows a place of another map", best.current)
+            return None
+        return best
+
+    def _is_alone(self, best: core.Loop, others: Sequence[core.Loop]) -> bool:
+        """Whether no other place looks like both ends."""
+        here = self._map.map_of(best.current)
+        elsewhere = [loop for loop in others if self._map.map_of(loop.matched) != here]
+        if core.choose_merge(self._map, [best, *elsewhere], self._fix_scale) is None:
+            return False
+        same_map = [loop for loop in others if self._map.map_of(loop.matched) == here]
+        if not all(self._is_drift(loop) for loop in same_map):
+            return False
+        # What the far end looks like in its own map.
+        there = self._map.map_of(best.matched)
+        alike = [k for k in self._find_alike(best.matched) if self._map.map_of(k) == there]
+        found = (self._verify(best.matched, k) for k in alike[: self._limits.places])
+        return all(loop is None or self._is_drift(loop) for loop in found)
+
+    def _is_drift(self, loop: core.Loop) -> bool:
+        """Whether two places of one map may be one, that drift has torn apart."""
+        return bool(core.assess_drift(self._map, loop, self._fix_scale).plausible())
+
+    def _is_confirmed(self, best: core.Loop) -> bool:
+        """Whether keyframes around see the other map from where they should be."""
+        limits = self._limits
+        slam_map = self._map
+        scene_depth = core.median_scene_depth(slam_map, best.matched)
+        if scene_depth is None:
+            return False
+        T_cw = slam_map.keyframe_pose(best.current)
+        candidates = [best.matched, *slam_map.best_neighbours(best.matched, limits.far_neighbours)]
+        n_agreeing = 0
+        for keyframe in slam_map.best_neighbours(best.current, limits.neighbours).tolist():
+            T_kc = slam_map.keyframe_pose(keyframe) @ T_cw.inverse()
+            expected = T_kc.matrix @ best.S_cw
+            for candidate in map(int, candidates):
+                loop = self._verify(keyframe, candidate)
+                if loop is None:
+                    continue
+                if not self._agree(expected, loop.S_cw, scene_depth):
+                    return False
+                n_agreeing += 1
+                break
+            if n_agreeing >= limits.confirmations:
+                return True
+        return False
+
+    def _agree(self, expected: FloatArray, found: FloatArray, scene_depth: float) -> bool:
+        limits = self._limits
+        scale_a, R_a, centre_a = _parts(expected)
+        scale_b, R_b, centre_b = _parts(found)
+        cosine = (np.trace(R_a.T @ R_b) - 1) / 2
+        return bool(
+            np.linalg.norm(centre_a - centre_b) <= limits.position * scene_depth
+            and cosine >= np.cos(limits.angle)
+            and abs(np.log(scale_a / scale_b)) <= limits.log_scale
+        )
+
+    # ---- one map ---------------------------------------------------------------------------------
+    def join(
+        self, loop: core.Loop, timer: StageTimer, cancelled: core.StopFlag
+    ) -> MapsMerged | None:
+        """Make one map of two; local mapping stands still meanwhile.
+
+        Parameters
+        ----------
+        loop : Loop
+            What `choose` gave.
+        timer : StageTimer
+            Takes the time of each step.
+        cancelled : StopFlag
+            Ends the adjustments early; the maps are joined all the same once that has begun.
+        """
+        self._map.update_connections(loop.current)
+        with timer("plan"):
+            merge = core.plan_map_merge(self._map, loop, self._fix_scale)
+        if merge.kept < 0 or cancelled.is_set():
+            return None
+        with timer("apply"):
+            result = core.apply_map_merge(self._map, merge)
+        if not result.applied:
+            return None
+        self._weld(loop.current, result.kept, timer, cancelled)
+        _log.info(
+            "map %d becomes part of map %d: keyframe %d shows the place of %d",
+            result.moved,
+            result.kept,
+            loop.current,
+            loop.matched,
+        )
+        return MapsMerged(
+            map_index=result.kept,
+            merged_map=result.moved,
+            current_keyframe=loop.current,
+            matched_keyframe=loop.matched,
+            current_timestamp=self._map.keyframe_timestamp(loop.current),
+            matched_timestamp=self._map.keyframe_timestamp(loop.matched),
+            n_inliers=loop.n_inliers,
+            n_matches=loop.n_matches,
+            n_fused=result.n_fused,
+            n_moved_keyframes=result.n_moved_keyframes,
+            n_moved_points=result.n_moved_points,
+            S_km=merge.S_km,
+            scale=result.scale,
+            milliseconds=dict(timer.milliseconds),
+        )
+
+    def _weld(
+        self, current: int, map_index: int, timer: StageTimer, cancelled: core.StopFlag
+    ) -> None:
+        """Adjust both neighbourhoods together, and let the rest of the map follow."""
+        slam_map = self._map
+        before = core.poses_of_map(slam_map, map_index)
+        seam = core.keyframes_of_seam(slam_map, current)
+        with timer("weld"):
+            core.local_bundle_adjustment(slam_map, current, cancelled, not self._fix_scale)
+        with timer("graph"):
+            core.spread_from_seam(slam_map, before, seam.tolist(), self._fix_scale, cancelled)
+
+
+def _parts(S_cw: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+    """Scale, rotation and the camera's centre of a similarity (4, 4)."""
+    scale = float(np.cbrt(np.linalg.det(S_cw[:3, :3])))
+    rotation = S_cw[:3, :3] / scale
+    return scale, rotation, -rotation.T @ S_cw[:3, 3] / scale

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A lost camera begins another map, and maps that meet become one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+import orbslam2py as orb
+from orbslam2py.evaluation import align
+from support.cut_sequences import FPS, Cut, corridor, cut, settings_of, track
+
+#: A lap is 376 frames. The camera is covered for three seconds and set down elsewhere; after a
+#: while it comes to where it began.
+KIDNAPPED = range(100), 60, range(250, 450)
+
+
+@dataclass
+class Tracked:
+    """A run over a cut sequence and what was told of it."""
+
+    slam: orb.System
+    sequence: Cut
+    events: list[object] = field(default_factory=list)
+    records: list[orb.TrackingRecord] = field(default_factory=list)
+
+    def told(self, kind: type) -> list:
+        return [event for event in self.events if isinstance(event, kind)]
+
+
+def run(sequence: Cut, sensor: str, **options: object) -> Tracked:
+    tracked = Tracked(None, sequence)  # type: ignore[arg-type]
+    tell = tracked.events.append
+    callbacks = orb.Callbacks(on_map_started=tell, on_maps_merged=tell, on_map_change=tell)
+    given = {"deterministic": True, "full_adjustment": False, **options}
+    with orb.System(settings_of(sequence), sensor, callbacks=callbacks, **given) as slam:
+        tracked.slam = slam
+        tracked.records = track(slam, sequence)
+        slam.wait_until_idle()
+    assert slam.check_map() == []
+    return tracked
+
+
+def error_of(path: orb.Trajectory, sequence: Cut, *, monocular: bool = False) -> float:
+    """Root mean square distance from the truth, metres."""
+    path = path.select(~path.lost)
+    indices = np.rint(path.timestamps * FPS).astype(int)
+    truth = np.array([sequence.T_wc(int(i))[:3, 3] for i in indices])
+    moved = align(path.positions, truth, with_scale=monocular).apply(path.positions)
+    return float(np.sqrt(((moved - truth) ** 2).sum(1).mean()))
+
+
+@pytest.fixture(scope="module")
+def kidnapped() -> Tracked:
+    return run(cut(corridor("rgbd"), *KIDNAPPED), "rgbd")
+
+
+def test_a_covered_camera_set_down_elsewhere_ends_in_one_map(kidnapped: Tracked) -> None:
+    (first, second) = kidnapped.told(orb.MapStarted)
+    assert (first.map_index, second.map_index) == (0, 1)
+    assert 160 <= second.frame_id < 165, "with the first image that can begin a map"
+    (merged,) = kidnapped.told(orb.MapsMerged)
+    assert (merged.map_index, merged.merged_map) == (0, 1)
+    assert merged.scale == 1
+    assert kidnapped.slam.merges == [merged]
+    causes = [changed.cause for changed in kidnapped.told(orb.MapChanged)]
+    assert causes == [orb.MapChangeCause.MERGE]
+    (there,) = kidnapped.slam.maps
+    assert (there.map_index, there.active) == (0, True)
+    assert there.n_keyframes == kidnapped.slam.n_keyframes
+
+
+def test_every_frame_that_saw_something_has_a_pose_in_the_common_map(kidnapped: Tracked) -> None:
+    whole, gone = kidnapped.slam.trajectories()
+    assert len(gone) == 0
+    assert kidnapped.slam.trajectory().timestamps.tolist() == whole.timestamps.tolist()
+    seen = [i for i, index in enumerate(kidnapped.sequence.order) if index is not None]
+    found = np.rint(whole.timestamps[~whole.lost] * FPS).astype(int)
+    assert len(found) >= 0.98 * len(seen)
+    assert error_of(whole, kidnapped.sequence) < 0.1
+
+
+def test_records_tell_the_map_that_their_pose_is_in(kidnapped: Tracked) -> None:
+    numbers = [record.map_index for record in kidnapped.records if record.T_cw is not None]
+    changes = np.flatnonzero(np.diff(numbers))
+    assert np.diff(numbers)[changes].tolist() == [1, -1]
+    (merged,) = kidnapped.told(orb.MapsMerged)
+    back = next(r for r in kidnapped.records[170:] if r.map_index == 0)
+    assert back.timestamp >= merged.current_timestamp
+
+
+def test_runs_with_merges_give_the_same_bytes(kidnapped: Tracked) -> None:
+    again = run(kidnapped.sequence, "rgbd")
+    assert again.slam.map_hash() == kidnapped.slam.map_hash()
+    for mine, theirs in zip(again.records, kidnapped.records, strict=True):
+        assert (mine.map_index, mine.state) == (theirs.map_index, theirs.state)
+        assert (mine.T_cw is None) == (theirs.T_cw is None)
+        assert mine.T_cw is None or mine.T_cw.tobytes() == theirs.T_cw.tobytes()
+
+
+def test_with_one_map_the_rest_is_not_mapped(kidnapped: Tracked) -> None:
+    alone = run(kidnapped.sequence, "rgbd", several_maps=False)
+    assert len(alone.slam.maps) == 1
+    assert alone.told(orb.MapsMerged) == []
+    assert all(record.T_cw is None for record in alone.records[160:200])
+
+
+def test_the_resting_map_is_kept_while_they_have_not_met() -> None:
+    sequence = cut(corridor("rgbd"), range(100), 60, range(200, 300))
+    tracked = run(sequence, "rgbd")
+    old, young = tracked.slam.maps
+    assert (old.active, young.active) == (False, True)
+    assert old.n_keyframes > 5
+    first, second = tracked.slam.trajectories()
+    assert error_of(first, sequence) < 0.1
+    assert error_of(second, sequence) < 0.1
+    # Each is relative to its own first keyframe.
+    assert np.allclose(second.T_wc[~second.lost][0], np.eye(4), atol=0.05)
+    assert tracked.slam.map_snapshot(0).keyframe_ids.max() < min(
+        tracked.slam.map_snapshot(1).keyframe_ids
+    )
+
+
+def test_found_again_in_a_resting_map_it_goes_on() -> None:
+    sequence = cut(corridor("rgbd"), range(100), 60, range(200, 250), 20, range(60, 130))
+    tracked = run(sequence, "rgbd", new_map_after=1.0)
+    assert [event.map_index for event in tracked.told(orb.MapStarted)] == [0, 1]
+    assert tracked.records[-1].map_index == 0
+    assert next(iter(tracked.slam.maps)).active
+    assert tracked.slam.n_relocalizations >= 1
+
+
+def test_a_map_that_is_lost_when_small_is_dropped_alone() -> None:
+    sequence = cut(corridor("rgbd"), range(100), 60, range(200, 208), 10, range(250, 300))
+    tracked = run(sequence, "rgbd")
+    numbers = [event.map_index for event in tracked.told(orb.MapStarted)]
+    assert numbers == [0, 1, 2]
+    assert [there.map_index for there in tracked.slam.maps] == [0, 2]
+    assert tracked.slam.n_resets == 1
+    _, dropped, _ = tracked.slam.trajectories()
+    assert 0 < np.count_nonzero(~dropped.lost) <= 8, "nothing that was tracked is thrown away"
+
+
+def test_patience_is_a_setting() -> None:
+    sequence = cut(corridor("rgbd"), range(60), 30, range(200, 230))
+    assert len(run(sequence, "rgbd", new_map_after=5.0).slam.maps) == 1
+    assert len(run(sequence, "rgbd", new_map_after=0.5).slam.maps) == 2
+
+
+@pytest.mark.parametrize("value", [-1.0, float("nan"), float("inf"), "soon"])
+def test_impossible_patience_is_refused(value: object) -> None:
+    with pytest.raises(orb.SettingsError, match="new_map_after must be a number of seconds"):
+        orb.System("tum1", "rgbd", new_map_after=value)  # type: ignore[arg-type]
+
+
+def test_all_maps_are_saved_and_loaded(tmp_path: pytest.TempPathFactory) -> None:
+    sequence = cut(corridor("rgbd"), range(100), 60, range(200, 260))
+    tracked = run(sequence, "rgbd")
+    path = tmp_path / "two.orbmap"  # type: ignore[operator]
+    tracked.slam.save_map(path)
+    with orb.System(load_map=path, deterministic=True) as slam:
+        assert slam.check_map() == []
+        assert [there.n_keyframes for there in slam.maps] == [
+            there.n_keyframes for there in tracked.slam.maps
+        ]
+        # Found in whichever map shows it.
+        again = cut(corridor("rgbd"), range(210, 230))
+        assert {r.map_index for r in track(slam, again) if r.T_cw is not None} == {1}
+
+
+def test_a_reset_drops_all_maps() -> None:
+    sequence = cut(corridor("rgbd"), range(100), 60, range(200, 240))
+    with orb.System(settings_of(sequence), "rgbd", deterministic=True) as slam:
+        track(slam, sequence)
+        assert len(slam.maps) == 2
+        slam.reset()
+        track(slam, sequence, range(10))
+        assert [there.map_index for there in slam.maps] == [2]
+        assert len(slam.trajectories()) == 3
+        assert slam.check_map() == []
