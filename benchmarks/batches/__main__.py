@@ -49,7 +49,7 @@ def parse() -> argparse.Namespace:
     _with_size(part, "320x240")
     part.set_defaults(run=two_cores)
     part = parts.add_parser("overhead", help="what the engine takes of a run")
-    add_counts(part, frames=(900, "of the run"), seeds=(2, "runs"), rounds=(3, "of all"))
+    add_counts(part, frames=(900, "of the run"), seeds=(3, "runs, from 2"), rounds=(3, "of all"))
     _with_size(part, "640x480")
     part.set_defaults(run=overhead)
     part = parts.add_parser("tiny", help="thousands of short runs")

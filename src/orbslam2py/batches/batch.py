@@ -11,7 +11,7 @@ from typing import Any
 
 from orbslam2py._arguments import path_of
 from orbslam2py.batches.cache import DEFAULT_SIZE, Cache, bytes_of, default_folder
-from orbslam2py.batches.engine import open_workers, run_on
+from orbslam2py.batches.engine import Watch, open_workers, run_on
 from orbslam2py.batches.jobs import Job, make_jobs, read_jobs
 from orbslam2py.batches.results import Results
 from orbslam2py.batches.summary import Group, summarise
@@ -70,6 +70,7 @@ def batch(
     cache: str | Path | None = None,
     cache_size: str | None = None,
     progress: Progress | None = None,
+    watch: Watch | None = None,
     stop: threading.Event | None = None,
 ) -> BatchResult:
     """Run many sequences with many settings and seeds, and write one table of all runs.
@@ -99,6 +100,8 @@ def batch(
         Most that it takes, such as ``20GB``, which it is by default.
     progress
         Called after each run with its row, and how many of how many have ended.
+    watch
+        Called now and then with a dictionary: the run that each worker makes.
     stop
         When it is set no more runs begin, and those that run are waited for.
 
@@ -144,6 +147,7 @@ def batch(
             bytes_of(cache_size or DEFAULT_SIZE),
         ),
         progress=progress,
+        watch=watch,
         stop=stop,
     )
 
@@ -159,6 +163,7 @@ def run_jobs(
     report_pages: bool = False,
     cache: Cache | None = None,
     progress: Progress | None = None,
+    watch: Watch | None = None,
     stop: threading.Event | None = None,
 ) -> BatchResult:
     """Run jobs that are made already; see `batch`."""
@@ -168,7 +173,10 @@ def run_jobs(
     left = [job for job in wanted if job.key not in rows]
     stop = stop or threading.Event()
     for job, row in _ended(
-        left, results, stop, scheduler, workers, memory_limit, page=report_pages, cache=cache
+        *(left, results, stop, scheduler, workers, memory_limit),
+        page=report_pages,
+        cache=cache,
+        watch=watch,
     ):
         rows[job.key] = row
         if progress is not None:
@@ -195,6 +203,7 @@ def _ended(
     *,
     page: bool,
     cache: Cache | None,
+    watch: Watch | None,
 ) -> Iterator[tuple[Job, dict[str, Any]]]:
     if not jobs:
         return
@@ -202,10 +211,12 @@ def _ended(
         for job in jobs:
             if stop.is_set():
                 return
+            if watch is not None:
+                watch({"here": job.key})
             if (row := run_job(job, results, page=page, cache=cache)) is not None:
                 yield job, row
         return
     if workers is not None:
         workers = min(workers, len(jobs))
     with open_workers(scheduler, workers, memory_limit) as client:
-        yield from run_on(client, jobs, results, stop, page=page, cache=cache)
+        yield from run_on(client, jobs, results, stop, page=page, cache=cache, watch=watch)

@@ -13,7 +13,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from orbslam2py._version import __version__
@@ -35,6 +35,10 @@ _PATIENCE = 10.0
 _LOOK_AROUND = 0.5
 #: Libraries that would start as many threads as there are cores, in every worker.
 _THREAD_LIMITS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+Watch = Callable[[dict[str, str]], None]
+"""Hears which run each worker makes."""
 
 
 def require_dask() -> Any:
@@ -122,6 +126,7 @@ def run_on(
     *,
     page: bool,
     cache: Cache | None = None,
+    watch: Watch | None = None,
 ) -> Iterator[tuple[Job, dict[str, Any]]]:
     """Run jobs, and yield each with its row as it ends.
 
@@ -139,6 +144,8 @@ def run_on(
         Write ``report.html`` for every run.
     cache
         Where sequences from elsewhere go, on each worker's computer.
+    watch
+        Told now and then which run each worker makes.
 
     Raises
     ------
@@ -160,6 +167,8 @@ def run_on(
             runs.hand_over(job)
         if not runs.n:
             break
+        if watch is not None and runs.is_time_to_look():
+            watch(runs.at_workers())
         ended = runs.next_ended()
         if ended is not None:
             yield ended
@@ -177,7 +186,7 @@ class _Handed:
         self._running: dict[Any, tuple[Job, int]] = {}
         self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._n_at_once = 1
-        self._counted = -_LOOK_AROUND
+        self._counted = self._looked = -_LOOK_AROUND
 
     @property
     def n(self) -> int:
@@ -190,6 +199,22 @@ class _Handed:
                 self._n_at_once = max(1, sum(self._client.nthreads().values()))
             self._counted = time.monotonic()
         return self._n_at_once
+
+    def is_time_to_look(self) -> bool:
+        """True once in a while."""
+        if time.monotonic() < self._looked + _LOOK_AROUND:
+            return False
+        self._looked = time.monotonic()
+        return True
+
+    def at_workers(self) -> dict[str, str]:
+        """Return the run that each worker makes; those that wait there come behind it."""
+        jobs = {future.key: job.key for future, (job, _) in self._running.items()}
+        with contextlib.suppress(OSError):  # the scheduler may come back
+            at = self._client.processing().items()
+            mine = {worker: [jobs[key] for key in keys if key in jobs] for worker, keys in at}
+            return {worker: names[0] for worker, names in mine.items() if names}
+        return {}
 
     def hand_over(self, job: Job, attempt: int = 0) -> None:
         # The first part alone names a group of runs, which the scheduler keeps its books about.

@@ -185,7 +185,11 @@ def test_runs_without_a_result_are_in_the_picture(
 def test_two_workers(sequences: Path, whole: Whole, tmp_path: Path) -> None:
     """In processes of their own: the same bytes as in this one."""
     pytest.importorskip("distributed", reason="dask is an extra")
-    done = orb.batch(jobs_of(sequences), tmp_path / "there", workers=2)
+    seen: list[dict[str, str]] = []
+    done = orb.batch(jobs_of(sequences), tmp_path / "there", workers=2, watch=seen.append)
+    runs = {row["run"] for row in done.rows}
+    assert any(seen)
+    assert all(len(one) <= 2 and runs.issuperset(one.values()) for one in seen)
     assert (len(done.rows), done.n_failed) == (4, 0)
     assert reproducible(whole.folder) == reproducible(tmp_path / "there")
     for row in done.rows:

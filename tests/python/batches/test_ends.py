@@ -15,19 +15,23 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import orbslam2py as orb
+from orbslam2py.batches import Job
+from orbslam2py.batches.work import run_job
 from support.batches import jobs_of, make_batch, make_sequences, reproducible, table
+from support.command_line import CommandLine
 from support.small_disk import small_disk
 
-N = 8
+N = 6
 
 
 @pytest.fixture(scope="module")
 def jobs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A job file of eight runs."""
+    """A job file of six runs."""
     folder = tmp_path_factory.mktemp("sequences")
     document = jobs_of(
         make_sequences(folder / "data"),
@@ -83,18 +87,9 @@ def finished(folder: Path) -> list[Path]:
     return sorted(folder.glob("runs/*/row.json"))
 
 
-@pytest.mark.watchdog(150)
-@pytest.mark.parametrize("workers", ["0", "2"])
-def test_interrupted(jobs: Path, whole: Whole, tmp_path: Path, workers: str) -> None:
-    """Runs that are being made end and are saved; the rest is left for --resume."""
-    if workers != "0":
-        pytest.importorskip("distributed", reason="dask is an extra")
-    folder = tmp_path / "out"
-    process = start(jobs, folder, "--workers", workers)
-    wait_for(lambda: bool(finished(folder)), lambda: process.poll() is None)
-    os.killpg(process.pid, signal.SIGINT)  # as a terminal sends it
-    _, errors = process.communicate(timeout=100)
-    assert process.returncode == 130, errors
+def require_well_ended(folder: Path, code: int, errors: str) -> None:
+    """Runs that were being made ended and are saved; the rest is left for --resume."""
+    assert code == 130, errors
     rows = table(folder)
     assert 1 <= len(rows) < N
     assert [row["state"] for row in rows] == ["done"] * len(rows)
@@ -102,9 +97,47 @@ def test_interrupted(jobs: Path, whole: Whole, tmp_path: Path, workers: str) -> 
     assert len(list((folder / "runs").iterdir())) == len(rows)
     assert f"{N - len(rows)} runs are left; go on with --resume" in errors
     assert "Traceback" not in errors
-    done = orb.batch(jobs, folder, workers=0, resume=True)
-    assert (len(done.rows), done.n_left) == (N, 0)
+
+
+@pytest.mark.watchdog(150)
+def test_interrupted_in_this_process(
+    jobs: Path,
+    whole: Whole,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    folder = tmp_path / "out"
+    begun: list[Job] = []
+
+    def interrupted(job: Job, *rest: Any, **named: Any) -> Any:
+        begun.append(job)
+        if len(begun) == 2:
+            os.kill(os.getpid(), signal.SIGINT)
+        return run_job(job, *rest, **named)
+
+    # Not by its name: the function `batch` hides the module.
+    monkeypatch.setattr(sys.modules["orbslam2py.batches.batch"], "run_job", interrupted)
+    command = CommandLine(monkeypatch, capsys, tmp_path)
+    done = command("batch", jobs, "--output", folder, "--workers", 0)
+    require_well_ended(folder, done.code, done.err)
+    assert len(table(folder)) == 2
+    done = command("batch", jobs, "--output", folder, "--workers", 0, "--resume")
+    assert done.code == 0
+    assert len(begun) == N, "none was made twice"
     assert reproducible(folder) == whole.table
+
+
+@pytest.mark.watchdog(150)
+def test_interrupted(jobs: Path, tmp_path: Path) -> None:
+    """Ctrl-C as a terminal sends it, to the command and all its workers."""
+    pytest.importorskip("distributed", reason="dask is an extra")
+    folder = tmp_path / "out"
+    process = start(jobs, folder, "--workers", "2")
+    wait_for(lambda: bool(finished(folder)), lambda: process.poll() is None)
+    os.killpg(process.pid, signal.SIGINT)
+    _, errors = process.communicate(timeout=100)
+    require_well_ended(folder, process.returncode, errors)
 
 
 @pytest.mark.watchdog(300)
@@ -113,7 +146,7 @@ def test_killed_at_any_moment(jobs: Path, whole: Whole, tmp_path: Path) -> None:
     draws = random.Random(14)
     # Processes that have loaded the package before they are told what to do.
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload([make_batch.__module__])
+    context.set_forkserver_preload([run_job.__module__, "matplotlib.backends.backend_agg"])
     for number in range(3):
         folder = tmp_path / str(number)
         process = context.Process(target=make_batch, args=(jobs, folder))
@@ -145,7 +178,7 @@ def rescue(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
 @pytest.mark.watchdog(150)
 def test_full_disk(jobs: Path, whole: Whole, tmp_path: Path, rescue: Path) -> None:
     """Results that do not fit are kept elsewhere, and runs are made again where there is room."""
-    with small_disk(tmp_path / "disk", "400k") as disk:
+    with small_disk(tmp_path / "disk", "300k") as disk:
         with pytest.raises(OSError, match=r"cannot write .*results\.csv: No space left on device"):
             orb.batch(jobs, disk / "out", workers=0)
         assert any(rescue.iterdir())

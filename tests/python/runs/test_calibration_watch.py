@@ -39,6 +39,12 @@ def scaled(settings: Settings, factor: float) -> Settings:
     return replace(settings, camera=replace(camera, fx=factor * camera.fx, fy=factor * camera.fy))
 
 
+@lru_cache
+def seen_with(sensor: Sensor, factor: float) -> Misfit | None:
+    """What the images say about a focal length that is so many times the right one."""
+    return watched(scaled(world(sensor).settings, factor), images(sensor))
+
+
 def watched(settings: Settings, shown: list[Images], **more: object) -> Misfit | None:
     watch = CalibrationWatch(settings, settings.sensor, **more)  # type: ignore[arg-type]
     for one in shown:
@@ -76,13 +82,13 @@ def misfits(log: pytest.LogCaptureFixture) -> list[str]:
 # ---- what the images say -------------------------------------------------------------------------
 @pytest.mark.parametrize("sensor", Sensor)
 def test_the_right_calibration_is_not_told(sensor: Sensor) -> None:
-    assert watched(world(sensor).settings, images(sensor)) is None
+    assert seen_with(sensor, 1.0) is None
 
 
 @pytest.mark.parametrize("sensor", Sensor)
 @pytest.mark.parametrize("factor", [0.65, 1.5])
 def test_a_wrong_focal_length_is_told_with_the_right_one(sensor: Sensor, factor: float) -> None:
-    misfit = watched(scaled(world(sensor).settings, factor), images(sensor))
+    misfit = seen_with(sensor, factor)
     assert misfit is not None
     assert "a wrong focal length" in misfit.cause
     found = float(misfit.seen.split("fx of about ")[1].split()[0])
@@ -154,7 +160,7 @@ def test_nothing_is_looked_at_after_the_first_images() -> None:
 def test_the_background_says_the_same() -> None:
     wrong = scaled(world(Sensor.RGBD).settings, 0.65)
     shown = images(Sensor.RGBD)
-    assert watched(wrong, shown, in_background=True) == watched(wrong, shown)
+    assert watched(wrong, shown, in_background=True) == seen_with(Sensor.RGBD, 0.65)
 
 
 # ---- runs ----------------------------------------------------------------------------------------
@@ -239,11 +245,12 @@ def test_a_system_tells_at_its_first_image(caplog: pytest.LogCaptureFixture) -> 
 
 
 def test_check_calibration_takes_sequences_and_frames(caplog: pytest.LogCaptureFixture) -> None:
-    sequence = world(Sensor.RGBD)
-    assert check_calibration(sequence) is None
-    wrong = scaled(sequence.settings, 0.65)
+    right = world(Sensor.RGBD).settings
+    assert check_calibration(Recording(right, images(Sensor.RGBD)[:20])) is None
+    wrong = scaled(right, 0.65)
     misfit = orb.check_calibration(Recording(wrong, images(Sensor.RGBD)))
     assert misfit is not None
+    assert misfit == seen_with(Sensor.RGBD, 0.65)
     assert misfits(caplog) == [str(misfit)]
 
     class Frame:

@@ -42,12 +42,14 @@ def test_turning_the_world_does_not_change_it() -> None:
     R = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     R *= np.sign(np.linalg.det(R))
     t, A = rng.normal(size=3), 1e-4 * rng.normal(size=(6, 6))
-    centres = []
-    for w, v in (A @ rng.normal(size=(6, 40_000))).T.reshape(-1, 2, 3):
-        skew = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
-        turned = (np.eye(3) + skew) @ R
-        centres.append(-turned.T @ (t + np.cross(w, t) + v))
-    measured = np.sqrt(np.var(np.array(centres), axis=0).sum())
+    w, v = (A @ rng.normal(size=(6, 40_000))).T.reshape(-1, 2, 3).swapaxes(0, 1)
+    zero = np.zeros(len(w))
+    skew = np.array(
+        [[zero, -w[:, 2], w[:, 1]], [w[:, 2], zero, -w[:, 0]], [-w[:, 1], w[:, 0], zero]]
+    )
+    turned = (np.eye(3) + skew.transpose(2, 0, 1)) @ R
+    centres = -np.einsum("nji,nj->ni", turned, t + np.cross(w, t) + v)
+    measured = np.sqrt(np.var(centres, axis=0).sum())
     (row,) = rows_of("k")
     assert row.record is not None
     deviation = pose_deviation(replace(row.record, covariance=A @ A.T))

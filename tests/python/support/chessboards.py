@@ -33,10 +33,13 @@ def poses(n: int, seed: int = 0) -> list[np.ndarray]:
 
 
 def _undistorted(pixels: np.ndarray) -> np.ndarray:
-    """Normalised coordinates (n, 2) of pixels: the distortion inverted by fixed-point iteration."""
-    x, y = wanted = ((pixels - K[:2, 2]) / (K[0, 0], K[1, 1])).T
-    k1, k2, p1, p2, k3 = DISTORTION
-    for _ in range(30):
+    """Normalised coordinates (n, 2) of pixels: the distortion inverted by fixed-point iteration.
+
+    Each step leaves less than a third of the error; float32 is good for 1e-4 pixels.
+    """
+    x, y = wanted = ((pixels - K[:2, 2]) / (K[0, 0], K[1, 1])).T.astype(np.float32)
+    k1, k2, p1, p2, k3 = DISTORTION.astype(np.float32)
+    for _ in range(14):
         r2 = x * x + y * y
         radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
         x, y = (
@@ -47,14 +50,14 @@ def _undistorted(pixels: np.ndarray) -> np.ndarray:
 
 
 @cache
-def _rays() -> np.ndarray:
-    """Directions (n, 3) of the samples of all pixels; pixel centres are whole numbers."""
+def _rays() -> tuple[np.ndarray, np.ndarray]:
+    """Directions (x, y, 1) of the samples of all pixels, float32; pixel centres are whole."""
     (width, height), n = SIZE, _OVERSAMPLING
     u, v = np.meshgrid(
         (np.arange(width * n) + 0.5) / n - 0.5, (np.arange(height * n) + 0.5) / n - 0.5
     )
     rays = _undistorted(np.stack([u.ravel(), v.ravel()], axis=1))
-    return np.column_stack([rays, np.ones(len(rays))])
+    return np.ascontiguousarray(rays[:, 0]), np.ascontiguousarray(rays[:, 1])
 
 
 def render(T_cb: np.ndarray) -> np.ndarray:
@@ -63,11 +66,13 @@ def render(T_cb: np.ndarray) -> np.ndarray:
     R, t = T_cb[:3, :3], T_cb[:3, 3]
     # A plane's homography: from rays to board coordinates in squares, from -1 to COLUMNS.
     H = np.linalg.inv(np.column_stack([R[:, 0], R[:, 1], t])) / np.array([[SQUARE], [SQUARE], [1]])
-    x, y, w = H @ _rays().T
-    column, row = np.floor(x / w), np.floor(y / w)
+    x, y = _rays()
+    board = [a * x + b * y + c for a, b, c in H.astype(np.float32)]
+    column, row = (np.floor(one / board[2]).astype(np.int32) for one in board[:2])
     inside = (column >= -1) & (column < COLUMNS) & (row >= -1) & (row < ROWS)
-    shade = np.where(inside & ((column + row) % 2 == 0), 30.0, 225.0)
-    return shade.reshape(height, n, width, n).mean(axis=(1, 3)).astype(np.uint8)
+    dark = inside & ((column + row) & 1 == 0)
+    samples = dark.reshape(height, n, width, n).sum(axis=(1, 3), dtype=np.int32)
+    return (225.0 - (225.0 - 30.0) * samples / n**2).astype(np.uint8)
 
 
 @cache

@@ -12,6 +12,7 @@ from typing import Any
 from orbslam2py._arguments import is_whole, path_of, shown
 from orbslam2py._files import atomic_write
 from orbslam2py.batches.batch import BatchResult, Progress, run_jobs
+from orbslam2py.batches.engine import Watch
 from orbslam2py.batches.jobs import Job, options_of
 from orbslam2py.batches.standard_sets.entries import Entry, entries_of
 from orbslam2py.batches.standard_sets.find import StandardSet, find_sequences
@@ -63,6 +64,7 @@ def benchmark(
     memory_limit: str | None = None,
     report_pages: bool = False,
     progress: Progress | None = None,
+    watch: Watch | None = None,
     stop: threading.Event | None = None,
     command: str | None = None,
 ) -> BenchmarkResult:
@@ -84,7 +86,7 @@ def benchmark(
         As in a job file, such as ``deterministic`` or ``max_frames``.
     command
         The line that started it, for the page.
-    resume, scheduler, workers, memory_limit, report_pages, progress, stop
+    resume, scheduler, workers, memory_limit, report_pages, progress, watch, stop
         As for `batch`.
 
     Returns
@@ -129,6 +131,7 @@ def benchmark(
         memory_limit=memory_limit,
         report_pages=report_pages,
         progress=progress,
+        watch=watch,
         stop=stop,
     )
     entries = entries_of(kind, done.rows)

@@ -61,7 +61,7 @@ def batch(
 ) -> None:
     """Run many sequences, settings and seeds on all cores or a cluster; write one table."""
     console, errors = Console(quiet=quiet), Console(stderr=True)
-    with watched_runs(console, errors) as (progress, stop):
+    with watched_runs(console, errors) as (progress, watch, stop):
         done = run_batch(
             jobs,
             output,
@@ -73,6 +73,7 @@ def batch(
             cache=cache,
             cache_size=cache_size,
             progress=progress,
+            watch=watch,
             stop=stop,
         )
     console.print(_table(done))

@@ -74,7 +74,7 @@ def benchmark(
     options: dict[str, Any] = {"deterministic": True} if deterministic else {}
     if max_frames is not None:
         options["max_frames"] = max_frames
-    with watched_runs(console, errors) as (progress, stop):
+    with watched_runs(console, errors) as (progress, watch, stop):
         done = run_benchmark(
             kind,
             root,
@@ -88,6 +88,7 @@ def benchmark(
             memory_limit=memory_limit,
             report_pages=report_pages,
             progress=progress,
+            watch=watch,
             stop=stop,
             command=shlex.join(["orbslam2py", *sys.argv[1:]]),
         )

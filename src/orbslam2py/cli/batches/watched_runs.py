@@ -4,25 +4,50 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
 import typer
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.text import Text
 
 from orbslam2py.batches import BatchResult
 from orbslam2py.batches.batch import Progress as OnProgress
+from orbslam2py.batches.engine import Watch
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.interrupts import StopOnInterrupt
 from orbslam2py.cli.messages import log_to
 
+#: Workers whose run is shown; of a cluster only the first.
+_SHOWN_WORKERS = 16
+
+
+class _Screen(Progress):
+    """A bar of all runs, and a line for each worker below it."""
+
+    workers: str = ""
+
+    def get_renderables(self) -> Iterable[RenderableType]:
+        yield from super().get_renderables()
+        yield Text(self.workers, style="dim", no_wrap=True, overflow="ellipsis")
+
+
+def lines_of(working: Mapping[str, str]) -> str:
+    """Say which run each worker makes, a line each."""
+    names = [working[worker] for worker in sorted(working)]
+    more = len(names) - _SHOWN_WORKERS
+    lines = [f"  {number}  {name}" for number, name in enumerate(names[:_SHOWN_WORKERS], 1)]
+    return "\n".join([*lines, f"  and {more} more"] if more > 0 else lines)
+
 
 @contextmanager
-def watched_runs(console: Console, errors: Console) -> Iterator[tuple[OnProgress, threading.Event]]:
-    """Show a bar while runs are made.
+def watched_runs(
+    console: Console, errors: Console
+) -> Iterator[tuple[OnProgress, Watch, threading.Event]]:
+    """Show a bar while runs are made, and what each worker makes.
 
     Parameters
     ----------
@@ -31,14 +56,14 @@ def watched_runs(console: Console, errors: Console) -> Iterator[tuple[OnProgress
 
     Yields
     ------
-    progress, stop
-        What to call after each run, and what Ctrl-C sets.
+    progress, watch, stop
+        What to call after each run, and when workers make others, and what Ctrl-C sets.
     """
     log_to(errors, quiet=True)  # what single runs say is in their folders
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
     with (
         StopOnInterrupt() as interrupt,
-        Progress(*columns, TimeRemainingColumn(), console=console, transient=True) as bar,
+        _Screen(*columns, TimeRemainingColumn(), console=console, transient=True) as bar,
     ):
         task = bar.add_task("Runs", total=None)
 
@@ -48,7 +73,10 @@ def watched_runs(console: Console, errors: Console) -> Iterator[tuple[OnProgress
             ending = "; waiting for those that run" if interrupt.event.is_set() else ""
             bar.update(task, completed=done, total=total, description=f"Runs{ending}")
 
-        yield progress, interrupt.event
+        def watch(working: Mapping[str, str]) -> None:
+            bar.workers = lines_of(working)
+
+        yield progress, watch, interrupt.event
 
 
 def exit_as_it_ended(done: BatchResult, errors: Console) -> None:

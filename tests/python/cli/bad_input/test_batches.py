@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
 from typing import Any
 
 import pytest
+from rich.console import Console
 
+from orbslam2py.cli.batches.watched_runs import lines_of, watched_runs
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.command_line import CommandLine
 
@@ -38,6 +41,21 @@ def test_command(command: CommandLine, sequences: Path, tmp_path: Path) -> None:
     assert "--resume" in again.err
     resumed = command("batch", "jobs.yaml", "--output", "out", "--resume")
     assert resumed.code == 0, resumed.err
+
+
+def test_what_the_screen_shows() -> None:
+    """A bar of all runs, and below it what each worker makes; of many workers the first."""
+    console = Console(force_terminal=True, width=60, record=True, file=io.StringIO())
+    with watched_runs(console, console) as (progress, watch, _):
+        watch({"tcp://b": "two-seed0", "tcp://a": "one-seed3"})
+        progress({"run": "x", "state": "done"}, 3, 8)
+    shown = console.export_text()
+    assert "3/8" in shown
+    assert "1  one-seed3" in shown
+    assert "2  two-seed0" in shown
+    many = lines_of({f"w{number:03d}": f"run{number}" for number in range(40)}).splitlines()
+    assert len(many) == 17
+    assert many[-1].strip() == "and 24 more"
 
 
 @pytest.mark.parametrize(
