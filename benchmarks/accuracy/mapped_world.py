@@ -26,7 +26,10 @@ class MappedWorld:
 
     def __init__(self, sequence: SyntheticSequence, frames: Iterable[int], seed: int = 0) -> None:
         self.sequence = sequence
-        self.system = System(sequence.settings, sequence.sensor, deterministic=True, seed=seed)
+        # Whatever is shown, it is searched in this map alone.
+        self.system = System(
+            sequence.settings, sequence.sensor, deterministic=True, seed=seed, several_maps=False
+        )
         self._n_shown = 0
         shown = list(frames)
         self.n_frames = len(shown)

@@ -120,6 +120,12 @@ class FrameRecorder:
             self._recorder.drop(self._map, map_index)
             self._young = None
 
+    def trajectory(self) -> Trajectory:
+        """The one in the active map."""
+        with self._lock:
+            self._settle()
+            return self._present(self._map.active_map)
+
     def trajectories(self) -> list[Trajectory]:
         """One trajectory a map, by its number, relative to its first keyframe.
 

@@ -566,7 +566,7 @@ class System:
             Time stamps, ``T_wc`` (n, 4, 4) relative to the map's first keyframe, and which frames
             were lost.
         """
-        return self.trajectories()[self.pipeline.back_end.map.active_map]
+        return self.pipeline.recorder.trajectory()
 
     def trajectories(self) -> list[Trajectory]:
         """One trajectory per map, by its number: also of those that ended, and of failed starts.

@@ -161,7 +161,9 @@ class Tracking:
         # Maps that were loaded, and those that localization mode has been on in.
         self._loaded_maps: set[int] = set()
         self._kept_maps: set[int] = set()
+        # Time stamps: of the loss, and since when the camera is followed again.
         self._lost_since: float | None = None
+        self._held_since: float | None = None
         # Whether the initializer is shown the frames of a loss.
         self._seeks_map = False
         self._search.reset()
@@ -379,7 +381,7 @@ class Tracking:
         # A young map has to prove itself.
         self._search.last_relocalization = frame.id
         self._seeks_map = False
-        self._lost_since = None
+        self._lost_since = self._held_since = None
         return self._map_begun(frame)
 
     def _map_begun(self, frame: core.TrackedFrame) -> TrackingOutcome:
@@ -395,6 +397,7 @@ class Tracking:
 
     def _lose(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> TrackingOutcome:
         was_ok = self.state is TrackingState.OK
+        self._held_since = None
         if self._lost_since is None:
             self._lost_since = frame.timestamp
         if was_ok:
@@ -413,7 +416,11 @@ class Tracking:
 
     def _stay(self, frame: core.TrackedFrame) -> None:
         """Go on in the map that a frame was found in, which may have rested."""
-        self._lost_since = None
+        if self._lost_since is not None:
+            # Found for a moment only, it is as lost as before.
+            self._held_since = self._held_since or frame.timestamp
+            if frame.timestamp - self._held_since >= (self._new_map_after or 0.0):
+                self._lost_since = self._held_since = None
         if self._seeks_map:
             self._seeks_map = False
             self._initializer.reset()

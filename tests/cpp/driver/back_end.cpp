@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "driver/back_end.hpp"
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <iterator>
+#include <utility>
 
 #include "loops/loop_choice.hpp"
 #include "loops/loop_correction.hpp"
+#include "loops/map_merge.hpp"
 #include "map/culling.hpp"
 #include "map/invariants.hpp"
 #include "map/keyframe_insertion.hpp"
@@ -148,7 +152,17 @@ void LoopClosing::process(KeyFrameId keyframe) {
   if (!lease.alive()) return;
   const std::optional<Loop> loop = find_loop(keyframe);
   members_.push_back(keyframe);
-  if (loop) close(*loop);
+  if (!loop) return;
+  if (joins_maps(*loop)) {
+    join(*loop);
+  } else {
+    close(*loop);
+  }
+}
+
+bool LoopClosing::joins_maps(const Loop& loop) const {
+  const auto lock = map_.read_lock();
+  return map_.map_of(loop.current) != map_.map_of(loop.matched);
 }
 
 std::optional<Loop> LoopClosing::find_loop(KeyFrameId keyframe) {
@@ -163,6 +177,11 @@ std::optional<Loop> LoopClosing::find_loop(KeyFrameId keyframe) {
     }
     candidates = consistency_.update(map_, proposed);
     if (candidates.empty()) candidates = a_lap_before(keyframe);
+    // What looks like a place of another map is tried at once, so that many maps meet.
+    const auto lock = map_.read_lock();
+    for (const KeyFrameId other : proposed) {
+      if (map_.map_of(other) != map_.map_of(keyframe)) candidates.push_back(other);
+    }
   }
   index_keyframe(index_, map_, keyframe);
 
@@ -173,7 +192,17 @@ std::optional<Loop> LoopClosing::find_loop(KeyFrameId keyframe) {
     if (loop) loops.push_back(std::move(*loop));
   }
   counts_.verified += static_cast<int>(loops.size());
+  return choose(std::move(loops));
+}
+
+std::optional<Loop> LoopClosing::choose(std::vector<Loop> loops) const {
+  std::vector<Loop> elsewhere;
+  const auto first = std::stable_partition(loops.begin(), loops.end(),
+                                           [this](const Loop& loop) { return !joins_maps(loop); });
+  std::move(first, loops.end(), std::back_inserter(elsewhere));
+  loops.erase(first, loops.end());
   if (auto chosen = choose_loop(map_, loops, options_.fix_scale)) return chosen;
+  if (auto chosen = choose_merge(map_, elsewhere, options_.fix_scale)) return chosen;
   // A hurried map of coarse images drifts by more than is believed of a map. Here every view shows
   // another place, so that what was verified is true.
   for (Loop& loop : loops) {
@@ -219,6 +248,34 @@ void LoopClosing::close(const Loop& loop) {
     return;
   }
   ++counts_.loops_closed;
+  consistency_.clear();
+  next_search_ = loop.current.value + kGap;
+  adjustment_.start();
+}
+
+void LoopClosing::join(const Loop& loop) {
+  adjustment_.cancel();
+  MapMergeResult result;
+  {
+    const Worker::Pause no_adjustment(adjustment_.worker, true);
+    Worker::Pause pause(mapping_.worker, true);
+    pause.wait();
+    {
+      const auto lock = map_.write_lock();
+      if (!map_.find(loop.current)) return;
+      map_.update_connections(loop.current);
+    }
+    result = apply_map_merge(map_, plan_map_merge(map_, loop, options_.fix_scale));
+    if (!result.applied) return;
+    check_map(map_, "after a merge");
+    const std::atomic<bool>& cancelled = worker.cancel_flag.value();
+    const KeyFramePoses before = poses_of_map(map_, result.kept);
+    const std::vector<KeyFrameId> seam = keyframes_of_seam(map_, loop.current);
+    local_bundle_adjustment(map_, loop.current, &cancelled);
+    spread_from_seam(map_, before, seam, options_.fix_scale, &cancelled);
+    check_map(map_, "after the seam was spread");
+  }
+  ++counts_.maps_merged;
   consistency_.clear();
   next_search_ = loop.current.value + kGap;
   adjustment_.start();

@@ -22,6 +22,8 @@ struct Counts {
   std::atomic<int> verified{0}, loops_closed{0}, corrections_dropped{0};
   std::atomic<int> adjustments_begun{0}, adjustments_committed{0}, adjustments_dropped{0};
   std::atomic<int> pauses{0}, snapshots{0}, shutdowns{0};
+  /// Beside others; found again in one that had rested; given up when small; made one of two.
+  std::atomic<int> maps_begun{0}, maps_switched{0}, maps_dropped{0}, maps_merged{0};
 };
 
 /// The mapper of local_mapping.py.
@@ -79,7 +81,10 @@ class LoopClosing {
   void process(KeyFrameId keyframe);
   std::optional<Loop> find_loop(KeyFrameId keyframe);
   std::vector<KeyFrameId> a_lap_before(KeyFrameId keyframe) const;
+  std::optional<Loop> choose(std::vector<Loop> loops) const;
+  bool joins_maps(const Loop& loop) const;
   void close(const Loop& loop);
+  void join(const Loop& loop);
 
   Map& map_;
   KeyFrameIndex& index_;

@@ -42,9 +42,19 @@ void System::track_next() {
       mapping_.worker.wait_until_waiting(1);
     }
   }
+  if (map_requested_.exchange(false)) tracker_.begin_map();
   const Tracked outcome = tracker_.track(next_frame());
   if (outcome == Tracked::lost_early) {
-    reset_requested_ = true;
+    std::size_t n_maps;
+    {
+      const auto lock = map_.read_lock();
+      n_maps = map_.maps().size();
+    }
+    if (n_maps > 1) {
+      drop_map();
+    } else {
+      reset_requested_ = true;
+    }
   } else if (tracker_.last()) {
     const std::lock_guard lock(trajectory_mutex_);
     recorder_.record(map_, *tracker_.last(), outcome != Tracked::ok);
@@ -58,7 +68,7 @@ std::shared_ptr<Frame> System::next_frame() {
   view_ = std::max<std::int64_t>(view_ + step, 0);
   if (jump_requested_.exchange(false)) {
     view_ = std::max<std::int64_t>(view_ - images_.size() / 4, 0);
-    dark_frames_ = 2;
+    dark_frames_ = view_ % 3 == 0 ? 20 : 2;
   }
   const FrameId id = next_frame_++;
   const double timestamp = static_cast<double>(id) / 30;
@@ -90,11 +100,32 @@ void System::reset_now() {
   ++counts_.resets;
 }
 
+/// The active map came to nothing; the others go on. Only this thread gives the workers work.
+void System::drop_map() {
+  mapping_.worker.wait_until_idle();
+  loop_closing_.worker.wait_until_idle();
+  std::vector<KeyFrameId> died;
+  {
+    const std::lock_guard lock(trajectory_mutex_);
+    recorder_.drop(map_, map_.active_map());
+    const auto write = map_.write_lock();
+    // A merge may have come first: what is active now is large.
+    if (map_.n_keyframes_of(map_.active_map()) <= 5 && map_.maps().size() > 1) {
+      died = map_.erase_map(map_.active_map());
+    }
+  }
+  if (died.empty()) return;
+  for (const KeyFrameId id : died) index_.erase(id);
+  tracker_.go_back();
+  check_map(map_, "after a map was dropped");
+  ++counts_.maps_dropped;
+}
+
 void System::switch_mode() {
   std::size_t n_keyframes;
   {
     const auto lock = map_.read_lock();
-    n_keyframes = map_.n_keyframes();
+    n_keyframes = map_.n_keyframes_of(map_.active_map());
   }
   // In a smaller map the camera, which turns back, would soon be outside.
   const bool wanted = localization_wanted_ && n_keyframes > 5;
@@ -152,6 +183,12 @@ void System::look() const {
   {
     const std::lock_guard lock(trajectory_mutex_);
     recorder_.rebuild(map_);
+    std::vector<MapIndex> maps;
+    {
+      const auto read = map_.read_lock();
+      maps = map_.maps();
+    }
+    for (const MapIndex index : maps) recorder_.rebuild(map_, index);
   }
   ++counts_.snapshots;
 }

@@ -29,6 +29,8 @@ class System {
   bool localization_wanted() const { return localization_wanted_; }
   /// The camera is carried back by a quarter of a lap, in the dark.
   void request_jump() { jump_requested_ = true; }
+  /// Another map begins, wherever the camera is.
+  void request_map() { map_requested_ = true; }
 
   /// Refines the whole map now; given up in localization mode.
   void optimize();
@@ -42,6 +44,7 @@ class System {
  private:
   std::vector<Worker*> map_workers();
   void reset_now();
+  void drop_map();
   void switch_mode();
   void release_mode();
   std::shared_ptr<Frame> next_frame();
@@ -66,7 +69,7 @@ class System {
 
   std::mutex shutdown_mutex_;
   std::atomic<bool> shut_down_{false}, reset_requested_{false}, localization_wanted_{false},
-      jump_requested_{false};
+      jump_requested_{false}, map_requested_{false};
   /// The tracker waits until mapping is through with every keyframe, so that maps are good enough
   /// for loops to be believed; or it hurries mapping all the time.
   const bool patient_;

@@ -123,6 +123,8 @@ class Session {
         reset();
       } else if (action < 4) {
         system_.request_jump();
+      } else if (action < 12) {
+        system_.request_map();
       } else if (action < 20) {
         system_.request_localization(true);
       } else if (action < 60) {
@@ -162,6 +164,9 @@ void print(const Counts& c, const Watchdog& watchdog, double minutes) {
               c.adjustments_committed.load(), c.adjustments_dropped.load());
   std::printf("%d resets, %d mode switches, %d pauses, %d looks, %d shutdowns\n", c.resets.load(),
               c.mode_switches.load(), c.pauses.load(), c.snapshots.load(), c.shutdowns.load());
+  std::printf("maps: %d begun beside others, %d merged, %d found again, %d dropped\n",
+              c.maps_begun.load(), c.maps_merged.load(), c.maps_switched.load(),
+              c.maps_dropped.load());
   std::printf("slowest:");
   for (const auto& [name, ms] : watchdog.slowest()) std::printf(" %s %.0f ms;", name.c_str(), ms);
   std::printf("\n");
@@ -177,7 +182,9 @@ std::vector<std::string> missing(const Counts& c) {
       {"mode switch", c.mode_switches},
       {"frame in localization mode", c.localized},
       {"pause", c.pauses},
-      {"look at the map", c.snapshots}};
+      {"look at the map", c.snapshots},
+      {"map begun beside another", c.maps_begun},
+      {"merge", c.maps_merged}};
   std::vector<std::string> result;
   for (const auto& [what, count] : needed) {
     if (count == 0) result.emplace_back(what);

@@ -17,6 +17,7 @@ namespace {
 
 constexpr int kFewestInliers = 15;
 constexpr std::size_t kSmallMap = 5;
+constexpr int kPatience = 8;  // lost frames in a row, after which another map begins
 
 }  // namespace
 
@@ -28,18 +29,44 @@ void Tracker::reset() {
   velocity_.reset();
   reference_ = KeyFrameId();
   last_keyframe_ = 0;
-  lost_ = false;
+  n_lost_ = 0;
+  lost_ = begins_map_ = false;
+}
+
+void Tracker::go_back() {
+  reset();
+  lost_ = true;
+}
+
+Tracked Tracker::begin(TrackedFrame& frame) {
+  if (frame.frame->size() < 100) return Tracked::lost;
+  {
+    const auto lock = map_.write_lock();
+    const MapIndex before = map_.active_map();
+    if (map_.begin_map() != before) ++counts_.maps_begun;
+  }
+  frame = TrackedFrame(frame.frame);
+  frame.T_cw = Pose();
+  insert(frame, std::numeric_limits<std::size_t>::max());
+  velocity_.reset();
+  n_lost_ = 0;
+  lost_ = begins_map_ = false;
+  last_ = std::move(frame);
+  return Tracked::ok;
+}
+
+std::size_t Tracker::n_keyframes() const {
+  const auto lock = map_.read_lock();
+  return map_.n_keyframes_of(map_.active_map());
 }
 
 Tracked Tracker::track(std::shared_ptr<Frame> image) {
   ++counts_.frames;
   TrackedFrame frame(std::move(image));
-  if (!last_) {
-    if (frame.frame->size() < 100) return Tracked::lost;
-    frame.T_cw = Pose();
-    insert(frame, std::numeric_limits<std::size_t>::max());
-    last_ = std::move(frame);
-    return Tracked::ok;
+  if (!last_ && !lost_) return begin(frame);
+  if (begins_map_ && !localization_only_ && n_keyframes() > kSmallMap) {
+    const Tracked begun = begin(frame);
+    if (begun == Tracked::ok) return begun;
   }
   const std::uint64_t moves = map_.big_change_index();
   bool found = find_pose(frame);
@@ -47,11 +74,23 @@ Tracked Tracker::track(std::shared_ptr<Frame> image) {
     frame.clear_associations();
     found = find_pose(frame);
   }
-  if (!found) return lose();
-  if (lost_) ++counts_.relocalized;
+  if (!found) {
+    if (n_lost_ >= kPatience && !localization_only_ && begin(frame) == Tracked::ok) {
+      return Tracked::ok;
+    }
+    return lose();
+  }
+  if (lost_) {
+    ++counts_.relocalized;
+    const auto lock = map_.write_lock();
+    const MapIndex found_in = map_.map_of(reference_);
+    if (found_in != map_.active_map()) ++counts_.maps_switched;
+    map_.activate_map(found_in);
+  }
+  n_lost_ = 0;
 
   const bool consecutive =
-      !lost_ && last_->T_cw && frame.anchor.big_change == last_->anchor.big_change;
+      !lost_ && last_ && last_->T_cw && frame.anchor.big_change == last_->anchor.big_change;
   velocity_.reset();
   if (consecutive) velocity_ = *frame.T_cw * last_->T_cw->inverse();
   lost_ = false;
@@ -67,14 +106,10 @@ Tracked Tracker::track(std::shared_ptr<Frame> image) {
 
 Tracked Tracker::lose() {
   ++counts_.lost;
+  ++n_lost_;
   lost_ = true;
   velocity_.reset();
-  std::size_t n_keyframes;
-  {
-    const auto lock = map_.read_lock();
-    n_keyframes = map_.n_keyframes();
-  }
-  return n_keyframes <= kSmallMap ? Tracked::lost_early : Tracked::lost;
+  return n_keyframes() <= kSmallMap ? Tracked::lost_early : Tracked::lost;
 }
 
 bool Tracker::find_pose(TrackedFrame& frame) {

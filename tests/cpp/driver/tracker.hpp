@@ -19,6 +19,10 @@ class Tracker {
   Tracker(Map& map, const KeyFrameIndex& index, LocalMapping& mapping, Counts& counts);
 
   Tracked track(std::shared_ptr<Frame> image);
+  /// The map that had begun beside others was dropped: lost in those that are left.
+  void go_back();
+  /// The next frame begins another map, whatever is in view.
+  void begin_map() { begins_map_ = true; }
   void reset();
   /// The last frame with a pose, nullptr before the map begins.
   const TrackedFrame* last() const { return last_ ? &*last_ : nullptr; }
@@ -37,7 +41,9 @@ class Tracker {
   int track_local_map(TrackedFrame& frame, const std::vector<MapPointId>& discarded);
   bool needs_keyframe(const TrackedFrame& frame) const;
   void insert(TrackedFrame& frame, std::size_t n_minimum);
+  Tracked begin(TrackedFrame& frame);
   Tracked lose();
+  std::size_t n_keyframes() const;
 
   Map& map_;
   const KeyFrameIndex& index_;
@@ -48,7 +54,8 @@ class Tracker {
   KeyFrameId reference_;
   FrameId last_keyframe_ = 0;
   int n_inliers_ = 0;
-  bool lost_ = false, localization_only_ = false;
+  int n_lost_ = 0;
+  bool lost_ = false, localization_only_ = false, begins_map_ = false;
   std::vector<MapPointId> discarded_;
 };
 
