@@ -143,7 +143,10 @@ def main(arguments: list[str] | None = None) -> int:
     good = True
     for case in (case for case in CASES if case.name in given.cases):
         for sensor in map(Sensor, given.sensors):
-            outcomes = [run(case, sensor, seed) for seed in range(given.seeds)]
+            outcomes = []
+            for seed in range(given.seeds):
+                outcomes.append(run(case, sensor, seed))
+                console.print(f"{case.name} {sensor} seed {seed}: {outcomes[-1]}")
             met = sum(outcome.n_maps == 1 for outcome in outcomes)
             wrong = sum(outcome.is_false for outcome in outcomes)
             tracked = statistics.fmean(outcome.tracked for outcome in outcomes)

@@ -23,9 +23,10 @@ from benchmarks.harness.folders import CHECKOUT
 from benchmarks.several_maps.meeting import CASES, FPS
 from benchmarks.several_maps.pieces import Pieces
 from orbslam2py import Callbacks, MapsMerged, System
-from orbslam2py._arrays import FloatArray
+from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
+LONG = 2.0  # seconds
 COLOURS = ("#1f5fa8", "#c8452d", "#3a8f4d")
 
 
@@ -34,6 +35,8 @@ class Drawn:
     """Keyframes and points of a map, from above."""
 
     path: FloatArray
+    gaps: IntArray
+    """Keyframes before which nothing was seen for long."""
     points: FloatArray
 
 
@@ -43,7 +46,9 @@ def maps_of(system: System) -> dict[int, Drawn]:
     for there in system.maps:
         snapshot = system.map_snapshot(there.map_index)
         drawn[there.map_index] = Drawn(
-            snapshot.keyframe_T_wc[:, [0, 2], 3], snapshot.point_positions[:, [0, 2]]
+            snapshot.keyframe_T_wc[:, [0, 2], 3],
+            np.flatnonzero(np.diff(snapshot.keyframe_timestamps) > LONG) + 1,
+            snapshot.point_positions[:, [0, 2]],
         )
     return drawn
 
@@ -53,7 +58,8 @@ def draw(axes: Axes, drawn: dict[int, Drawn], title: str) -> None:
     for number, one in drawn.items():
         colour = COLOURS[number % len(COLOURS)]
         axes.plot(*one.points.T, ",", color=colour, alpha=0.35)
-        axes.plot(*one.path.T, ".-", color=colour, linewidth=1, markersize=3, label=f"map {number}")
+        path = np.insert(one.path, one.gaps, np.nan, axis=0)
+        axes.plot(*path.T, ".-", color=colour, linewidth=1, markersize=3, label=f"map {number}")
     middle = np.concatenate([one.path for one in drawn.values()]).mean(axis=0)
     axes.set_xlim(middle[0] - 8, middle[0] + 8)
     axes.set_ylim(middle[1] - 8, middle[1] + 8)

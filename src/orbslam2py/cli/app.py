@@ -122,7 +122,7 @@ SUBCOMMANDS = {
     "map": Subcommand(
         "maps",
         "app",
-        "Look at map files, check, compare, cut, move and refine them, and export them.",
+        "Look at map files, check, compare, merge, cut, move and refine them, and export them.",
     ),
 }
 
