@@ -19,6 +19,8 @@ find "$folder" -type l -lname '/*' | while read -r link; do
   ln -sfn "$(realpath --canonicalize-missing --relative-to "$(dirname "$link")" "$folder$(readlink "$link")")" "$link"
 done
 for library in blas lapack; do
-  ln -sf "$library/lib$library.so.3" "$folder/usr/lib/aarch64-linux-gnu/lib$library.so.3"
+  for name in "lib$library.so" "lib$library.so.3"; do
+    ln -sf "$library/lib$library.so.3" "$folder/usr/lib/aarch64-linux-gnu/$name"
+  done
 done
 touch "$folder/complete"
