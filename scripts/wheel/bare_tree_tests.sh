@@ -26,9 +26,9 @@ install_into() {
   python -m pip list --format=freeze | grep -iE '^(numpy|opencv|typer|rich|matplotlib|pillow|pyyaml|lazy.loader)' | xargs
 }
 
-# demonstration FOLDER
+# demonstration FOLDER [OPTION...]
 demonstration() {
-  orbslam2py demo --output "$1" >"$1.log" 2>&1 || { tail -20 "$1.log"; fails "the demo"; }
+  orbslam2py demo --output "$@" >"$1.log" 2>&1 || { tail -20 "$1.log"; fails "the demo"; }
   test -s "$1/trajectory.txt" || fails "the demo left no trajectory"
 }
 
@@ -38,7 +38,8 @@ tests_without_build() {
   (
     cd /srv/checkout
     python -m pytest -q -p no:cacheprovider -m "not shared" tests/python/core tests/python/settings \
-      tests/python/trajectory tests/python/vocabulary tests/python/evaluation
+      tests/python/trajectory tests/python/vocabulary tests/python/evaluation \
+      --ignore=tests/python/trajectory/test_files.py --ignore=tests/python/evaluation/test_metrics.py # need evo
   ) || fails "the tests"
 }
 
@@ -93,7 +94,7 @@ for environment in $(cat /srv/wheels/environments.txt); do
   for command in "" run evaluate synthesize settings vocabulary; do
     orbslam2py $command --help >help.log 2>&1 || { tail -5 help.log; fails "the help of $command"; }
   done
-  demonstration "demo-$environment"
+  demonstration "demo-$environment" --frames 40
   orbslam2py run "Ordner mit Ä 日本/corridor" --sensor stereo --deterministic --output "run-$environment" >run.log 2>&1 ||
     { tail -20 run.log; fails "the sequence"; }
   cmp "run-$environment/trajectory.txt" stereo.txt || fails "another path than with the newest versions"

@@ -24,11 +24,11 @@ PROJECT = HERE.parent.parent
 SUITES = {"bookworm": "3.11", "trixie": "3.13"}
 SKIPPED = 77
 
-#: Other packages with OpenCV, each used in one process with ours: of each kind, oldest and newest.
+#: Other packages with OpenCV, each used in one process with ours. Those without "headless" need
+#: libraries of a desktop, which a bare tree has not.
 OTHER_OPENCV = [
-    "opencv-python==4.8.1.78",
     "opencv-python-headless==4.10.0.84",
-    "opencv-contrib-python==4.13.0.92",
+    "opencv-contrib-python-headless==4.11.0.86",
     "opencv-python-headless==5.0.0.93",
 ]
 #: For the Python tests inside.

@@ -41,6 +41,19 @@ def test_wheels_may_be_given_away() -> None:
     assert done.stdout.count("Ceres Solver 2") == len(WHEELS)
 
 
+def test_nothing_of_the_package_is_left_out() -> None:
+    if not WHEELS:
+        pytest.skip("dist has no wheel: make wheel builds one")
+    source = CHECKOUT / "src"
+    kinds = {".py", ".pyi", ".bvoc", ".typed", ".html", ".js", ".css", ".json", ".yaml"}
+    wanted = {p.relative_to(source).as_posix() for p in source.rglob("*") if p.suffix in kinds}
+    wanted |= {"orbslam2py/py.typed"}
+    for path in WHEELS:
+        with zipfile.ZipFile(path) as wheel:
+            missing = wanted - set(wheel.namelist())
+        assert not missing, f"{path.name}: {sorted(missing)[:5]}"
+
+
 def test_the_one_for_this_python_works_unpacked_anywhere(tmp_path: Path) -> None:
     if not OURS:
         pytest.skip(f"dist has no wheel for {TAG}: make wheel builds one")

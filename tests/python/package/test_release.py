@@ -39,3 +39,12 @@ def test_the_notes_name_what_a_wheel_is_linked_with() -> None:
         name = block.splitlines()[0].split('"')[1]
         (licence,) = re.findall(r'^licence = "(.*)"$', block, re.M)
         assert any(row.startswith(f"| {name}") and licence in row for row in rows), name
+
+
+def test_the_source_distribution_leaves_no_room_out() -> None:
+    """Folders of results at the top are left out by their place, not by a name that rooms have."""
+    (line,) = re.findall(r"^sdist\.exclude = (\[.*\])$", text("pyproject.toml"), re.M)
+    rooms = {path.name for path in (CHECKOUT / "src/orbslam2py").rglob("*") if path.is_dir()}
+    for pattern in yaml.safe_load(line):
+        assert pattern.startswith("/") or pattern == "*.so", pattern
+        assert pattern not in rooms

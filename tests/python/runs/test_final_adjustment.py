@@ -88,10 +88,12 @@ def test_ctrl_c_gives_it_up(monkeypatch: pytest.MonkeyPatch) -> None:
     stop = threading.Event()
     original = System.optimize
 
-    def optimize(self: System, *, stop: threading.Event | None = None) -> FullAdjustmentRecord:
+    def optimize(
+        self: System, *, stop: threading.Event | None = None, map_index: int | None = None
+    ) -> FullAdjustmentRecord:
         assert stop is not None
         stop.set()
-        return original(self, stop=stop)
+        return original(self, stop=stop, map_index=map_index)
 
     monkeypatch.setattr(System, "optimize", optimize)
     result = run(RunOptions(Sensor.STEREO, max_frames=N, final_adjustment=True), stop)
