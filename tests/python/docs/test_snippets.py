@@ -31,6 +31,7 @@ NOT_RUN = {
     "installs packages and opens a browser",
     "opens a browser",
     "needs another computer",
+    "needs a bucket",
     "builds the checkout",
     "builds Ceres and OpenCV",
     "takes a minute; another test runs it",

@@ -254,7 +254,7 @@ def test_nothing_runs_after_a_failed_construction(tmp_path: Path) -> None:
         System("tum1", "rgbd", bad)
     with pytest.raises(SettingsError, match="no-such-camera"):
         System("no-such-camera", "rgbd")
-    with pytest.raises(SettingsError, match="'lidar'; there are: mono, stereo, rgbd"):
+    with pytest.raises(SettingsError, match="'lidar'; give one of mono, stereo, rgbd"):
         System("tum1", "lidar")
 
 
