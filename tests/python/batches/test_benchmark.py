@@ -16,6 +16,7 @@ from orbslam2py.batches.standard_sets.find import find_sequences
 from orbslam2py.batches.standard_sets.markdown import markdown_table
 from orbslam2py.batches.standard_sets.published import published_figures
 from support.browser import Browser
+from support.command_line import logging_restored
 from support.data import shared_folder
 from support.standard_sets import make_root
 
@@ -59,7 +60,8 @@ def test_figures_are_those_of_evaluate(
     for row in done.batch.rows:
         figures = tmp_path / f"{row['run']}.json"
         run = done.batch.folder / "runs" / row["run"]
-        evaluate(run / "trajectory.txt", Path(row["path"]), json=figures)
+        with logging_restored():
+            evaluate(run / "trajectory.txt", Path(row["path"]), json=figures)
         told = json.loads(figures.read_text())
         for name in ("ate_rmse_m", "t_rel_percent", "r_rel_deg_per_100m"):
             if told[name] is None:
