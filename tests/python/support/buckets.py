@@ -11,12 +11,14 @@ from contextlib import contextmanager
 
 import pytest
 
+_MISSING = "pip install --group buckets brings the stores that are served here"
+
 
 @contextmanager
 def s3_store() -> Iterator[str]:
     """Serve an empty bucket, and have s3fs find it; yields its address."""
-    pytest.importorskip("s3fs", reason="for s3://")
-    moto = pytest.importorskip("moto.server", reason="serves s3:// in tests")
+    pytest.importorskip("s3fs", reason=_MISSING)
+    moto = pytest.importorskip("moto.server", reason=_MISSING)
     logging.getLogger("werkzeug").setLevel(logging.ERROR)
     server = moto.ThreadedMotoServer("127.0.0.1", 0, verbose=False)
     server.start()
@@ -37,8 +39,8 @@ def s3_store() -> Iterator[str]:
 @contextmanager
 def gs_store() -> Iterator[str]:
     """The same for gcsfs."""
-    pytest.importorskip("gcsfs", reason="for gs://")
-    emulator = pytest.importorskip("gcp_storage_emulator.server", reason="serves gs:// in tests")
+    pytest.importorskip("gcsfs", reason=_MISSING)
+    emulator = pytest.importorskip("gcp_storage_emulator.server", reason=_MISSING)
     port = _free_port()
     server = emulator.create_server("127.0.0.1", port, in_memory=True)
     server.start()
