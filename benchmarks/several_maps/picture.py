@@ -64,6 +64,8 @@ def draw(axes: Axes, drawn: dict[int, Drawn], title: str) -> None:
     axes.set_xlim(middle[0] - 8, middle[0] + 8)
     axes.set_ylim(middle[1] - 8, middle[1] + 8)
     axes.set_aspect("equal")
+    axes.set_xlabel("x [m]")
+    axes.set_ylabel("z [m]")
     axes.set_title(title, fontsize=10)
     axes.legend(loc="upper right", fontsize=8)
 
