@@ -69,7 +69,10 @@ class Random {
 class Session {
  public:
   Session(ImageRing& images, Counts& counts, Watchdog& watchdog, std::uint64_t seed)
-      : counts_(counts), system_(images, counts, watchdog, seed), seed_(seed) {}
+      : counts_(counts),
+        system_(images, counts, watchdog, seed),
+        seed_(seed),
+        at_reset_{counts.frames, counts.loops_closed, counts.maps_begun} {}
 
   /// Ends after `n_frames`, or when it is enough.
   void run(int n_frames, const std::function<bool()>& enough, bool drain) {
@@ -100,37 +103,64 @@ class Session {
     return !done_;
   }
 
+  enum class Action { none, reset, jump, begin_map, localize, pause };
+
   void control() {
     Random random(seed_);
-    int loops = counts_.loops_closed, frames_at_reset = counts_.frames;
-    const auto reset = [&] {
-      loops = counts_.loops_closed;
-      frames_at_reset = counts_.frames;
-      system_.request_reset();
-    };
     while (wait_for_frames(1 + random.below(kFramesPerLap / 3))) {
       if (system_.localization_wanted()) {
         // The mode ends soon; now and then a reset comes first.
-        if (random.chance(10)) reset();
+        if (random.chance(10)) take(Action::reset, random);
         system_.request_localization(false);
         continue;
       }
-      const int action = random.below(100);
-      // The same map sees no second loop at this place, and a map that has been tracked badly sees
-      // none at all.
-      const bool stale = counts_.frames > frames_at_reset + 4 * kFramesPerLap;
-      if (action < 2 || (action < 60 && (stale || counts_.loops_closed != loops))) {
-        reset();
-      } else if (action < 4) {
-        system_.request_jump();
-      } else if (action < 12) {
-        system_.request_map();
-      } else if (action < 20) {
-        system_.request_localization(true);
-      } else if (action < 60) {
+      const Action drawn = draw(random);
+      const Action due = due_now();
+      take(due != Action::none && random.chance(70) ? due : drawn, random);
+    }
+  }
+
+  Action draw(Random& random) const {
+    const int number = random.below(100);
+    if (number < 2) return Action::reset;
+    if (number < 4) return Action::jump;
+    if (number < 12) return Action::begin_map;
+    if (number < 20) return Action::localize;
+    return number < 60 ? Action::pause : Action::none;
+  }
+
+  /// What must happen and has not, which a slow machine cannot leave to chance; or a reset, when
+  /// this map has shown what it can.
+  Action due_now() const {
+    const bool may_meet = counts_.maps_begun > at_reset_.maps_begun;
+    const bool loop_closed = counts_.loops_closed > at_reset_.loops_closed;
+    // A map that has been tracked badly sees no loop at all.
+    const bool stale = counts_.frames > at_reset_.frames + 4 * kFramesPerLap;
+    if (stale) return Action::reset;
+    if (counts_.maps_merged == 0 && !may_meet) return Action::begin_map;
+    if (counts_.localized == 0) return Action::localize;
+    if (counts_.pauses == 0) return Action::pause;
+    // The same map sees no second loop at this place.
+    const bool waits_for_merge = counts_.maps_merged == 0;
+    return loop_closed && !waits_for_merge ? Action::reset : Action::none;
+  }
+
+  void take(Action action, Random& random) {
+    switch (action) {
+      case Action::none:
+        return;
+      case Action::reset:
+        at_reset_ = {counts_.frames, counts_.loops_closed, counts_.maps_begun};
+        return system_.request_reset();
+      case Action::jump:
+        return system_.request_jump();
+      case Action::begin_map:
+        return system_.request_map();
+      case Action::localize:
+        return system_.request_localization(true);
+      case Action::pause:
         const std::chrono::milliseconds duration(random.below(20));
-        system_.pause(random.below(3), random.chance(50), duration);
-      }
+        return system_.pause(random.below(3), random.chance(50), duration);
     }
   }
 
@@ -151,6 +181,10 @@ class Session {
   System system_;
   const std::uint64_t seed_;
   std::atomic<bool> done_{false};
+  /// What had happened when the map was last empty.
+  struct {
+    int frames, loops_closed, maps_begun;
+  } at_reset_;
 };
 
 void print(const Counts& c, const Watchdog& watchdog, double minutes) {
@@ -213,7 +247,7 @@ int main(int argc, char** argv) {
   };
   // On a slow machine it takes longer until everything has happened.
   const auto enough = [&] {
-    return seconds() > (missing(counts).empty() ? 1 : 6) * options.seconds;
+    return seconds() > (missing(counts).empty() ? 1 : 15) * options.seconds;
   };
   for (std::uint64_t n = 0; !enough(); ++n) {
     Session session(images, counts, watchdog, options.seed * 1000 + n);
