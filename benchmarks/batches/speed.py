@@ -85,7 +85,8 @@ def overhead(arguments: argparse.Namespace, console: Console) -> None:
         there += own[1:]
         between += gaps[1:]
         starts.append(wall - len(own) * statistics.median(own[1:]) - sum(gaps[1:]))
-    run, on_worker, gap = (statistics.median(x) for x in (here, there, between or [0.0]))
+    run, on_worker = statistics.median(here), statistics.median(there)
+    gap = statistics.fmean(between or [0.0])
     taken = (on_worker - run + gap) / run
     console.print(
         f"A run takes {run:.2f} s in this process ({min(here):.2f} to {max(here):.2f}), "
@@ -114,8 +115,10 @@ def _watched(document: dict[str, Any], folder: Path) -> tuple[float, list[float]
     wall = time.perf_counter() - begin
     if done.n_failed:
         raise RuntimeError(done.rows[0]["reason"])
+    # A row is noticed a little after its end, or after the next run has begun: single gaps may be
+    # negative, their mean is not.
     gaps, before = [], begin
     for end, own in ends:
-        gaps.append(max(0.0, end - before - own))
+        gaps.append(end - before - own)
         before = end
     return wall, [own for _, own in ends], gaps

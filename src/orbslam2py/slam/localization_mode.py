@@ -9,87 +9,11 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable
-from dataclasses import replace
-
-import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py._worker import PauseTicket, Worker
-from orbslam2py.slam.pose_search import PoseSearch
-from orbslam2py.slam.records import PoseEstimate, Reason
 
 _log = logging.getLogger(__name__)
-
-
-class FirstEstimateInFixedMap:
-    """By the motion model or the reference keyframe, also where the map ends.
-
-    There the pose hangs on the depths of the frame before (visual odometry), while every frame is
-    also searched in the map.
-
-    Parameters
-    ----------
-    search : PoseSearch
-        The ways to a pose.
-    has_depth : bool
-        Whether frames measure depths.
-    """
-
-    def __init__(self, search: PoseSearch, *, has_depth: bool) -> None:
-        self._search = search
-        self._has_depth = has_depth
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget that the last frame hung on depths more than on the map."""
-        self._beyond_the_map = False
-
-    def estimate(self, frame: core.TrackedFrame, *, lost: bool) -> PoseEstimate:
-        """See `FirstEstimate`."""
-        search = self._search
-        if lost:
-            return search.by_relocalization(frame)
-        search.follow_map()
-        if self._beyond_the_map:
-            estimate = self._back_into_the_map(frame)
-        elif search.motion.velocity is not None:
-            estimate = self._by_motion_model(frame)
-        else:
-            estimate = search.by_reference_keyframe(frame)
-        if estimate.found:
-            self._beyond_the_map = estimate.visual_odometry
-        return estimate
-
-    def _by_motion_model(self, frame: core.TrackedFrame) -> PoseEstimate:
-        limits = self._search.limits
-        estimate = self._search.by_motion_model(frame, beyond_the_map=self._has_depth)
-        if not estimate.found or estimate.n_inliers <= limits.localization_matches:
-            return estimate.failed(Reason.FEW_MATCHES_LAST_FRAME)
-        beyond = core.count_map_points(frame) < limits.map_matches
-        return replace(estimate, visual_odometry=beyond)
-
-    def _back_into_the_map(self, frame: core.TrackedFrame) -> PoseEstimate:
-        """Go on with visual odometry, unless the map is in view again."""
-        search, motion = self._search, self._search.motion
-        odometry = PoseEstimate(Reason.FEW_MATCHES_LAST_FRAME)
-        if motion.velocity is not None:
-            odometry = self._by_motion_model(frame)
-            if odometry.found and not odometry.visual_odometry:
-                return odometry
-        found = core.TrackedFrame(frame.features)
-        relocalized = search.by_relocalization(found)
-        if not relocalized.found or found.T_cw is None:
-            return odometry
-        # The odometry's drift ends here and is no motion: the last frame moves along.
-        followed = odometry.found and found.map_index == frame.map_index
-        if followed and frame.T_cw is not None and motion.last.T_cw is not None:
-            motion.jump(motion.last.T_cw @ frame.T_cw.inverse() @ found.T_cw)
-        else:
-            motion.jump(None)
-        frame.copy_associations(found, np.ones(len(frame.features), bool))
-        frame.T_cw = found.T_cw
-        frame.share_anchor(found)
-        return relocalized
 
 
 class LocalizationSwitch:

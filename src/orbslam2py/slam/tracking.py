@@ -9,10 +9,8 @@ section V; Mur-Artal and Tardos, "ORB-SLAM2", 2017, section III. Step by step:
 from __future__ import annotations
 
 import logging
-import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
@@ -20,73 +18,20 @@ from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._timing import StageTimer
 from orbslam2py.slam.evidence.belief import Belief
+from orbslam2py.slam.first_estimate import (
+    FirstEstimate,
+    FirstEstimateInFixedMap,
+    FirstEstimateInGrowingMap,
+)
 from orbslam2py.slam.initialization import Initializer
 from orbslam2py.slam.keyframe_decision import KeyframeClock, KeyframeDecision
 from orbslam2py.slam.local_mapping import LocalMapping
-from orbslam2py.slam.localization_mode import FirstEstimateInFixedMap
 from orbslam2py.slam.pose_search import MotionModel, PoseSearch
 from orbslam2py.slam.records import PoseEstimate, Reason, TrackingOutcome, TrackingState
-from orbslam2py.slam.relocalization import BlurWatch, Confirmation
+from orbslam2py.slam.relocalization import BlurWatch, Confirmation, LossClock
 from orbslam2py.slam.watched_frame import accepted_keypoints
 
 _log = logging.getLogger(__name__)
-
-
-class FirstEstimate(Protocol):
-    """A strategy for the first pose of a frame."""
-
-    def estimate(self, frame: core.TrackedFrame, *, lost: bool) -> PoseEstimate:
-        """Find a first pose.
-
-        Parameters
-        ----------
-        frame : orbslam2py._core.TrackedFrame
-            The frame.
-        lost : bool
-            The frame before has no pose.
-        """
-        ...
-
-    def reset(self) -> None:
-        """Forget the frames before: tracking was lost, or the map is another one."""
-        ...
-
-
-class FirstEstimateInGrowingMap:
-    """By the motion model, else the reference keyframe; when lost, anywhere in the map.
-
-    Parameters
-    ----------
-    search : PoseSearch
-        The ways to a pose.
-    """
-
-    def __init__(self, search: PoseSearch) -> None:
-        self._search = search
-
-    def estimate(self, frame: core.TrackedFrame, *, lost: bool) -> PoseEstimate:
-        """See `FirstEstimate`."""
-        search = self._search
-        if lost:
-            estimate = search.by_relocalization(frame)
-            if estimate.found or not search.has_last_frame:
-                return estimate
-        search.follow_map()
-        if search.motion.velocity is not None and not search.just_relocalized(frame):
-            estimate = search.by_motion_model(frame)
-            if estimate.found:
-                return estimate
-        estimate = search.by_reference_keyframe(frame)
-        if not lost and not estimate.found and search.just_relocalized(frame):
-            # Found again where the map ends, the frame before shows most of what this one does.
-            standing = search.by_motion_model(frame)
-            return standing if standing.found else estimate
-        if lost and not estimate.found:
-            return estimate.failed(Reason.NOT_FOUND_IN_MAP)
-        return estimate
-
-    def reset(self) -> None:
-        """Nothing is kept from frame to frame."""
 
 
 class Tracking:
@@ -136,11 +81,11 @@ class Tracking:
         self._belief = belief
         self._keyframe_decision = keyframe_decision
         self._has_depth = has_depth
-        self._new_map_after = new_map_after
         self._in_growing_map = FirstEstimateInGrowingMap(search)
         self._in_fixed_map = FirstEstimateInFixedMap(search, has_depth=has_depth)
         self._blur_watch = BlurWatch()
         self._confirmation = Confirmation()
+        self._loss = LossClock(new_map_after)
         #: How often tracking was found again, over all maps.
         self.n_relocalizations = 0
         self.reset()
@@ -161,9 +106,6 @@ class Tracking:
         # Maps that were loaded, and those that localization mode has been on in.
         self._loaded_maps: set[int] = set()
         self._kept_maps: set[int] = set()
-        # Time stamps: of the loss, and since when the camera is followed again.
-        self._lost_since: float | None = None
-        self._held_since: float | None = None
         # Whether the initializer is shown the frames of a loss.
         self._seeks_map = False
         self._search.reset()
@@ -172,6 +114,7 @@ class Tracking:
         self._initializer.reset()
         self._blur_watch.reset()
         self._confirmation.reset()
+        self._loss.reset()
         self._blurred = False
 
     def begin_in_loaded_map(self, initial_pose: core.Pose | None) -> None:
@@ -194,7 +137,7 @@ class Tracking:
         self._leave_map()
         self.state = TrackingState.LOST
         # The next image that can begin a map does.
-        self._lost_since = -math.inf
+        self._loss.be_overdue()
         self._seeks_map = True
         self._initializer.restart(frames)
 
@@ -362,10 +305,9 @@ class Tracking:
         self, frame: core.TrackedFrame, timer: StageTimer, *, localize: bool
     ) -> TrackingOutcome | None:
         """Begin another map with a frame that is not found; None if the time has not come."""
-        patience, since = self._new_map_after, self._lost_since
-        if patience is None or since is None or localize or self._blurred:
+        if self.state is not TrackingState.LOST or localize or self._blurred:
             return None
-        if self.state is not TrackingState.LOST or frame.timestamp - since < patience:
+        if not self._loss.overdue(frame.timestamp):
             return None
         if not self._seeks_map:
             self._initializer.reset()
@@ -381,7 +323,7 @@ class Tracking:
         # A young map has to prove itself.
         self._search.last_relocalization = frame.id
         self._seeks_map = False
-        self._lost_since = self._held_since = None
+        self._loss.reset()
         return self._map_begun(frame)
 
     def _map_begun(self, frame: core.TrackedFrame) -> TrackingOutcome:
@@ -397,9 +339,7 @@ class Tracking:
 
     def _lose(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> TrackingOutcome:
         was_ok = self.state is TrackingState.OK
-        self._held_since = None
-        if self._lost_since is None:
-            self._lost_since = frame.timestamp
+        self._loss.lost(frame.timestamp)
         if was_ok:
             _log.info("tracking lost at frame %d: %s", frame.id, estimate.reason)
         self.state = TrackingState.LOST
@@ -416,11 +356,7 @@ class Tracking:
 
     def _stay(self, frame: core.TrackedFrame) -> None:
         """Go on in the map that a frame was found in, which may have rested."""
-        if self._lost_since is not None:
-            # Found for a moment only, it is as lost as before.
-            self._held_since = self._held_since or frame.timestamp
-            if frame.timestamp - self._held_since >= (self._new_map_after or 0.0):
-                self._lost_since = self._held_since = None
+        self._loss.followed(frame.timestamp)
         if self._seeks_map:
             self._seeks_map = False
             self._initializer.reset()

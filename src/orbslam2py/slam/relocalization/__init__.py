@@ -4,7 +4,15 @@
 from orbslam2py.slam.relocalization.blur import BlurWatch
 from orbslam2py.slam.relocalization.candidates import CandidatePlaces
 from orbslam2py.slam.relocalization.confirmation import Confirmation
+from orbslam2py.slam.relocalization.loss_clock import LossClock
 from orbslam2py.slam.relocalization.place_of_loss import PlaceOfLoss
 from orbslam2py.slam.relocalization.relocalizer import Relocalizer
 
-__all__ = ["BlurWatch", "CandidatePlaces", "Confirmation", "PlaceOfLoss", "Relocalizer"]
+__all__ = [
+    "BlurWatch",
+    "CandidatePlaces",
+    "Confirmation",
+    "LossClock",
+    "PlaceOfLoss",
+    "Relocalizer",
+]
