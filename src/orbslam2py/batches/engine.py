@@ -111,6 +111,8 @@ def open_workers(
             memory_limit=memory_limit or "auto",
             host="127.0.0.1",
             dashboard_address=None,
+            # Any port: for its usual one two batches at a time would contend.
+            scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
             silence_logs=50,
         )
         with cluster, distributed.Client(cluster, set_as_default=False) as client:

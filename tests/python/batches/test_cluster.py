@@ -183,3 +183,16 @@ def test_own_workers_listen_on_loopback_addresses_only() -> None:
         ]
     assert len(listening) >= 2
     assert set(listening) == {"127.0.0.1"}
+
+
+def test_two_batches_at_a_time_do_not_contend_for_a_port(
+    recwarn: pytest.WarningsRecorder,
+) -> None:
+    with engine.open_workers(None, 1, None), engine.open_workers(None, 1, None) as second:
+        assert second.run_on_scheduler(_web_address).startswith("127.0.0.1:")
+    assert [str(warning.message) for warning in recwarn if "Port" in str(warning.message)] == []
+
+
+def _web_address(dask_scheduler: Any) -> str:
+    server = dask_scheduler.http_server
+    return f"{server.address}:{server.port}"
