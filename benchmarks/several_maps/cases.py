@@ -45,6 +45,8 @@ class Case:
         Makes the sequence.
     can_be_told
         Whether the images say where the pieces belong. If not, each is judged by itself.
+    unbroken
+        Where the uncut sequence closes a loop that the pieces leave open: their way in one go.
     """
 
     name: str
@@ -52,6 +54,7 @@ class Case:
     order: Callable[[int, np.random.Generator], Order]
     source: Callable[[SyntheticOptions], SyntheticSequence] = SyntheticSequence
     can_be_told: bool = True
+    unbroken: Callable[[int], Order] | None = None
 
     @property
     def scene(self) -> str:
@@ -76,6 +79,11 @@ def _kidnapped(n: int, _: np.random.Generator) -> Order:
     return with_covered(_parts(n, (0, 0.29), (0.53, 1)), COVERED)
 
 
+def _open_lap(n: int) -> Order:
+    """The way of the kidnapped, from where it was set down to where it was taken."""
+    return [*range(int(0.53 * n), n), *range(round(n - n / 1.2), int(0.29 * n))]
+
+
 def _shuffled(n: int, random: np.random.Generator) -> Order:
     """A lap in five pieces that overlap a little, in any order.
 
@@ -94,6 +102,11 @@ def _two_places(n: int, _: np.random.Generator) -> Order:
     return with_covered(_parts(n, (0, 0.3), (0.5, 1)), COVERED)
 
 
+def _open_eight(n: int) -> Order:
+    """The same in one go."""
+    return [*range(int(0.5 * n), n), *range(round(n - n / 1.1), int(0.3 * n))]
+
+
 def _door(n: int, _: np.random.Generator) -> Order:
     """One room, the light goes off, another room, and the door to the first found later."""
     return with_covered(_parts(n, (0.62, 0.9), (0, 0.8)), COVERED)
@@ -110,10 +123,10 @@ def _twin(n: int, _: np.random.Generator) -> Order:
 
 
 CASES = (
-    Case("kidnapped", "corridor", _kidnapped),
-    Case("repeating", "repeating-corridor", _kidnapped),
+    Case("kidnapped", "corridor", _kidnapped, unbroken=_open_lap),
+    Case("repeating", "repeating-corridor", _kidnapped, unbroken=_open_lap),
     Case("five-pieces", "corridor", _shuffled),
-    Case("two-places", "figure-eight", _two_places),
+    Case("two-places", "figure-eight", _two_places, unbroken=_open_eight),
     Case("door", "two-rooms", _door, source=DifferentRooms),
     Case("alike", "two-rooms", _alike),
     Case("twin", "two-rooms", _twin, can_be_told=False),

@@ -6,8 +6,8 @@
 
 Every draw has a process, a seed and a sensor of its own; every second one runs with threads. The
 pieces do not overlap, so that maps that are left need not be of one place. A frame is lost if it
-had a pose when it was tracked and has none in the end, or one in two maps; poses that were found
-again and not confirmed by the next frame do not count.
+had a pose when it was tracked and has none in the end, or one in two living maps; poses that were
+found again and not confirmed by the next frame do not count.
 
 Exits with 1 if a draw failed, hung, or lost a frame.
 """
@@ -67,23 +67,25 @@ def run(draw: int, frames: int | None) -> Row:
     with System(source.settings, sensor, deterministic=not threaded, seed=draw) as system:
         records = pieces.track(system)
         paths = system.trajectories()
-        n_maps, violations = len(system.maps), len(system.check_map())
+        living, violations = {there.map_index for there in system.maps}, len(system.check_map())
         merges = len(system.merges)
-    poses = np.zeros(len(order), np.int64)
-    for path in paths:
-        poses[pieces.positions_of(path.select(~path.lost))] += 1
+    poses, living_poses = np.zeros((2, len(order)), np.int64)
+    for map_index, path in enumerate(paths):
+        frames = pieces.positions_of(path.select(~path.lost))
+        poses[frames] += 1
+        living_poses[frames] += map_index in living
     tracked = np.array([r.T_cw is not None and not r.unconfirmed for r in records])
     largest = max(int(np.count_nonzero(~path.lost)) for path in paths)
     return {
         "pieces": n_pieces,
         "sensor": str(sensor),
         "threaded": threaded,
-        "n_maps": n_maps,
+        "n_maps": len(living),
         "merges": merges,
         "seen": pieces.n_seen,
         "with_pose": int((poses > 0).sum()),
         "in_largest": largest,
-        "lost": int((tracked & (poses == 0)).sum() + (poses > 1).sum()),
+        "lost": int((tracked & (poses == 0)).sum() + (living_poses > 1).sum()),
         "violations": violations,
         "failure": "",
     }
