@@ -83,10 +83,10 @@ def jump(n: int, _: int, __: Random) -> Order:
 
 
 def black(n: int, n_covered: int, _: Random) -> Order:
-    """A black stretch, seen at last."""
+    """A black stretch, seen at last, and a fifth of the sequence before and after it."""
     begin, end = round(0.4 * n), round(0.6 * n)
     hidden: Order = [None] * max(end - begin, n_covered)
-    last = _parts(n, (0.3, 0.7))[0]
+    last = _parts(n, (0.2, 0.8))[0]
     return [*range(begin), *hidden, *range(end, n), *[None] * n_covered, *last]
 
 
