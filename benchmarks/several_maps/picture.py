@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 
 from benchmarks.harness.arguments import add_counts, new_parser
 from benchmarks.harness.folders import CHECKOUT
-from benchmarks.several_maps.meeting import CASES, FPS
+from benchmarks.several_maps.cases import CASES, FPS
 from benchmarks.several_maps.pieces import Pieces
 from orbslam2py import Callbacks, MapsMerged, System
 from orbslam2py._arrays import FloatArray, IntArray

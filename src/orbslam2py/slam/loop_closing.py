@@ -116,6 +116,7 @@ class LoopClosing:
         """Drop waiting keyframes and what the last ones proposed."""
         self.worker.reset()
         self._consistency.clear()
+        self._merging.reset()
         self._next_search = 1
         self.last_keyframe = -1
 

@@ -284,6 +284,8 @@ class MergeThresholds:
     """... of which so many have to."""
     far_neighbours: int = 3
     """Neighbours of the keyframe in the other map that they are compared with as well."""
+    remembered: int = 10
+    """Keyframes whose places in another map are kept until others confirm them."""
     position: float = 0.15
     """Median depths of the other keyframe by which a neighbour may be elsewhere than it should."""
     angle: float = 0.1

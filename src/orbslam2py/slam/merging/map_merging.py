@@ -58,6 +58,12 @@ class MapMerging:
         self._verify = verify
         self._find_alike = find_alike
         self._limits = thresholds or MergeThresholds()
+        # What keyframes showed that alone were not enough: the far keyframe and S_cm, by keyframe.
+        self._shown: dict[int, tuple[int, FloatArray]] = {}
+
+    def reset(self) -> None:
+        """Forget what keyframes showed: the maps are others."""
+        self._shown.clear()
 
     # ---- is it the same place? -------------------------------------------------------------------
     def choose(
@@ -82,6 +88,7 @@ class MapMerging:
             return None
         if not self._is_confirmed(best):
             _log.info("keyframe %d alone shows a place of another map", best.current)
+            self._remember(best)
             return None
         return best
 
@@ -104,6 +111,11 @@ class MapMerging:
         """Whether two places of one map may be one, that drift has torn apart."""
         return bool(core.assess_drift(self._map, loop, self._fix_scale).plausible())
 
+    def _remember(self, best: core.Loop) -> None:
+        self._shown[best.current] = (best.matched, best.S_cm)
+        while len(self._shown) > self._limits.remembered:
+            del self._shown[next(iter(self._shown))]
+
     def _is_confirmed(self, best: core.Loop) -> bool:
         """Whether keyframes around see the other map from where they should be."""
         limits = self._limits
@@ -112,22 +124,38 @@ class MapMerging:
         if scene_depth is None:
             return False
         T_cw = slam_map.keyframe_pose(best.current)
-        candidates = [best.matched, *slam_map.best_neighbours(best.matched, limits.far_neighbours)]
+        around = slam_map.best_neighbours(best.matched, limits.far_neighbours).tolist()
+        candidates = [best.matched, *around]
         n_agreeing = 0
         for keyframe in slam_map.best_neighbours(best.current, limits.neighbours).tolist():
             T_kc = slam_map.keyframe_pose(keyframe) @ T_cw.inverse()
             expected = T_kc.matrix @ best.S_cw
-            for candidate in map(int, candidates):
-                loop = self._verify(keyframe, candidate)
-                if loop is None:
-                    continue
-                if not self._agree(expected, loop.S_cw, scene_depth):
+            found = self._place_of(keyframe, candidates, best.matched)
+            if found is not None:
+                if not self._agree(expected, found, scene_depth):
                     return False
                 n_agreeing += 1
-                break
             if n_agreeing >= limits.confirmations:
                 return True
         return False
+
+    def _place_of(self, keyframe: int, candidates: list[int], far: int) -> FloatArray | None:
+        """S_cw (4, 4) of a keyframe in the map of `far`, by one of the candidates there.
+
+        Else by what it showed when it came: of keyframes that stand far apart each may show
+        another part of that map.
+        """
+        for candidate in candidates:
+            loop = self._verify(keyframe, candidate)
+            if loop is not None:
+                return np.asarray(loop.S_cw)
+        matched, S_cm = self._shown.get(keyframe, (-1, np.eye(4)))
+        slam_map = self._map
+        if matched < 0 or not slam_map.has_keyframe(matched):
+            return None
+        if slam_map.map_of(matched) != slam_map.map_of(far):
+            return None
+        return np.asarray(S_cm @ slam_map.keyframe_pose(matched).matrix)
 
     def _agree(self, expected: FloatArray, found: FloatArray, scene_depth: float) -> bool:
         limits = self._limits
@@ -164,6 +192,7 @@ class MapMerging:
             result = core.apply_map_merge(self._map, merge)
         if not result.applied:
             return None
+        self.reset()
         self._weld(loop.current, result.kept, timer, cancelled)
         _log.info(
             "map %d becomes part of map %d: keyframe %d shows the place of %d",

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Rows of runs in a file, one JSON object a line, which an interrupted benchmark goes on with."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+Row = dict[str, Any]
+
+
+class Rows:
+    """What was run, by names.
+
+    Parameters
+    ----------
+    path
+        The file; None: nothing is kept.
+    """
+
+    def __init__(self, path: Path | None) -> None:
+        self._path = path
+        self._rows: dict[str, Row] = {}
+        if path is not None and path.is_file():
+            lines = path.read_text(encoding="utf-8").splitlines()
+            # The last line of a program that was killed may be cut short.
+            whole = [line for line in lines if line.endswith("}")]
+            self._rows = {row["key"]: row for row in map(json.loads, whole)}
+            if len(whole) < len(lines):
+                path.write_text("".join(f"{line}\n" for line in whole), encoding="utf-8")
+
+    def get(self, key: str, make: Callable[[], Row]) -> Row:
+        """Return the row of a name; it is made and kept if it is not there."""
+        if key not in self._rows:
+            row = {"key": key, **make()}
+            self._rows[key] = row
+            if self._path is not None:
+                self._path.parent.mkdir(parents=True, exist_ok=True)
+                with self._path.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(row) + "\n")
+        return self._rows[key]
+
+
+def add_rows(parser: argparse.ArgumentParser) -> None:
+    """Option that names the file."""
+    parser.add_argument(
+        "--rows", type=Path, help="file of all runs; those that stand in it are not run again"
+    )
