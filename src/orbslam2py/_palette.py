@@ -43,6 +43,16 @@ LOOP: Colour = (238, 140, 200)
 TRUTH: Colour = (120, 150, 40)
 NOW: Colour = (255, 255, 255)
 
+#: Several maps, by their numbers; the first one looks like one that is alone.
+MAPS: tuple[Colour, ...] = (
+    KEYFRAME,
+    (240, 160, 40),
+    (64, 200, 140),
+    (226, 130, 190),
+    (240, 228, 66),
+    (178, 150, 255),
+)
+
 #: Stages of tracking, in plots.
 STAGE_COLOURS: dict[str, Colour] = {
     "extract": (86, 180, 233),
@@ -64,7 +74,15 @@ PAPER_POINTS: Colour = (201, 185, 154)
 PAPER_LOOP: Colour = (200, 68, 44)
 #: Times without a pose, and of maps that were given up.
 PAPER_UNTRACKED: Colour = (246, 207, 198)
-PAPER_EARLIER: Colour = (226, 226, 226)
+#: Several maps, by their numbers.
+PAPER_MAPS: tuple[Colour, ...] = (
+    PAPER_PATH,
+    (216, 126, 0),
+    (0, 132, 100),
+    (166, 74, 138),
+    (128, 108, 10),
+    (104, 82, 190),
+)
 #: From no error to the largest: a part of matplotlib's plasma, seen well on white.
 PAPER_ERRORS: tuple[Colour, ...] = (
     (42, 5, 147),
@@ -73,6 +91,22 @@ PAPER_ERRORS: tuple[Colour, ...] = (
     (238, 127, 78),
     (249, 154, 62),
 )
+
+
+def map_colour(number: int) -> Colour:
+    """Colour of a map among several, on a dark ground; they come again after six."""
+    return MAPS[number % len(MAPS)]
+
+
+def paper_map_colour(number: int) -> Colour:
+    """Colour of a map among several, on white."""
+    return PAPER_MAPS[number % len(PAPER_MAPS)]
+
+
+def lighter(colour: Colour, by: float) -> Colour:
+    """A colour mixed with white: 0 leaves it, 1 is white."""
+    red, green, blue = (round(255 * by + value * (1 - by)) for value in colour)
+    return red, green, blue
 
 
 def hexadecimal(colour: Colour) -> str:

@@ -81,7 +81,36 @@ Blur = Annotated[
     float, typer.Option(help="How long the shutter is open, in times between two frames: 0 to 1.")
 ]
 Cover = Annotated[
-    float, typer.Option(help="Seconds that a hand is over the lens, in the middle of it all.")
+    str,
+    typer.Option(
+        metavar="SECONDS",
+        help="How long a hand is over the lens, in the middle of it all; FROM:SECONDS says when.",
+    ),
+]
+Pieces = Annotated[
+    int | None,
+    typer.Option(
+        help="Cut the way into so many pieces, which come in another order with darkness between."
+    ),
+]
+Order = Annotated[
+    str | None,
+    typer.Option(
+        metavar="N,N,...",
+        help="Which of the pieces come, in which order, from 0; the others are left out.  "
+        "[default: all, shuffled by --seed]",
+    ),
+]
+Gap = Annotated[
+    float | None,
+    typer.Option(help="Seconds in the dark between two pieces.  [default: 3]"),
+]
+Overlap = Annotated[
+    float | None,
+    typer.Option(
+        help="Seconds by which each piece begins earlier and ends later: what neighbours share.  "
+        "[default: 0]"
+    ),
 ]
 Exposure = Annotated[
     str,
@@ -114,7 +143,11 @@ def synthesize(
     ] = 0.0,
     exposure: Exposure = "1",
     blur: Blur = 0.0,
-    cover: Cover = 0.0,
+    cover: Cover = "0",
+    pieces: Pieces = None,
+    order: Order = None,
+    gap: Gap = None,
+    overlap: Overlap = None,
     lateral: Annotated[float, typer.Option(help="Metres to the right of the usual way.")] = 0.0,
     yaw: Annotated[float, typer.Option(help="Look so many degrees to the right.")] = 0.0,
     force: Annotated[
@@ -139,7 +172,11 @@ def synthesize(
         depth_noise=depth_noise,
         exposure=parse_exposure(exposure),
         blur=blur,
-        cover=cover,
+        cover=parse_cover(cover),
+        pieces=pieces,
+        order=None if order is None else parse_order(order),
+        gap=gap,
+        overlap=overlap,
         lateral=lateral,
         yaw=yaw,
     )
@@ -206,3 +243,38 @@ def parse_exposure(text: str) -> float | tuple[float, float]:
     if len(factors) == 2:
         return factors[0], factors[1]
     raise SettingsError(f"--exposure is '{text}'; give a factor like 0.8, or two like 0.4:1.5")
+
+
+def parse_cover(text: str) -> float | tuple[float, float]:
+    """Read seconds, or when they begin and how many they are: ``10:3``.
+
+    Raises
+    ------
+    SettingsError
+        If the text is anything else.
+    """
+    try:
+        numbers = [float(part) for part in text.split(":")]
+    except ValueError:
+        numbers = []
+    if len(numbers) == 1:
+        return numbers[0]
+    if len(numbers) == 2:
+        return numbers[0], numbers[1]
+    raise SettingsError(
+        f"--cover is '{text}'; give seconds like 1.5, or when and how long like 10:3"
+    )
+
+
+def parse_order(text: str) -> tuple[int, ...]:
+    """Read numbers of pieces: ``2,0,1``.
+
+    Raises
+    ------
+    SettingsError
+        If the text is anything else.
+    """
+    parts = [part.strip() for part in text.split(",")]
+    if not all(part.isdecimal() and part.isascii() for part in parts):
+        raise SettingsError(f"--order is '{text}'; give numbers of pieces from 0, like 2,0,1")
+    return tuple(int(part) for part in parts)

@@ -36,7 +36,12 @@ from orbslam2py.maps.map_reader import load_map
 from orbslam2py.maps.ply import write_ply
 from orbslam2py.maps.reprojection import reprojection_errors
 from orbslam2py.maps.saved_map import RecordedFrames, Run, SavedMap, VocabularyIdentity
-from orbslam2py.maps.snapshot import MapSnapshot, keyframe_trajectory, take_snapshot
+from orbslam2py.maps.snapshot import (
+    MapSnapshot,
+    keyframe_trajectory,
+    take_snapshot,
+    take_snapshots,
+)
 from orbslam2py.maps.verify import verify_map_file
 
 __all__ = [
@@ -83,6 +88,7 @@ __all__ = [
     "save_map",
     "take_contents",
     "take_snapshot",
+    "take_snapshots",
     "transform_map",
     "verify_map_file",
     "with_colours",

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 
@@ -16,7 +16,8 @@ from orbslam2py.trajectory import Trajectory
 class MapSnapshot:
     """A consistent copy of a map, in the frame of its first keyframe's first pose (the world).
 
-    Two snapshots are equal if all their arrays are, bit by bit.
+    Of several maps each has a world of its own: where keyframes of two of them are to each other,
+    nobody knows. Two snapshots are equal if all their arrays are, bit by bit.
     """
 
     keyframe_ids: IntArray
@@ -31,13 +32,16 @@ class MapSnapshot:
     """(p, 3) world [m] (one camera: the map's own units)."""
     loop_edges: IntArray
     """(l, 2) ids of the keyframes that a closed loop connects."""
+    map_index: int = field(default=0, compare=False)
+    """The map that all of it belongs to, as in `TrackingRecord.map_index`; not compared."""
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, MapSnapshot):
             return NotImplemented
         return all(
-            np.array_equal(getattr(self, field.name), getattr(other, field.name))
-            for field in fields(self)
+            np.array_equal(getattr(self, one.name), getattr(other, one.name))
+            for one in fields(self)
+            if one.compare
         )
 
     __hash__ = None  # type: ignore[assignment]  # arrays may be changed
@@ -59,7 +63,11 @@ def take_snapshot(slam_map: core.Map, map_index: int | None = None) -> MapSnapsh
     map_index
         Which; the active one if None.
     """
-    snapshot = core.snapshot_map(slam_map, -1 if map_index is None else map_index)
+    chosen = int(slam_map.active_map) if map_index is None else map_index
+    snapshot = core.snapshot_map(slam_map, chosen)
+    while map_index is None and slam_map.active_map != chosen:  # it was merged, or rests now
+        chosen = int(slam_map.active_map)
+        snapshot = core.snapshot_map(slam_map, chosen)
     keyframes, points = snapshot.keyframes, snapshot.points
     return MapSnapshot(
         keyframe_ids=keyframes.ids,
@@ -68,7 +76,24 @@ def take_snapshot(slam_map: core.Map, map_index: int | None = None) -> MapSnapsh
         point_ids=points.ids,
         point_positions=points.positions,
         loop_edges=snapshot.loop_edges,
+        map_index=chosen,
     )
+
+
+def take_snapshots(slam_map: core.Map) -> list[MapSnapshot]:
+    """Copy all maps, the oldest first; no keyframe or point is in two of them.
+
+    Parameters
+    ----------
+    slam_map
+        The map or maps.
+    """
+    while True:
+        epoch, there = slam_map.epoch, slam_map.maps
+        snapshots = [take_snapshot(slam_map, index) for index in there]
+        # Two that became one meanwhile would be told twice, in two worlds.
+        if (slam_map.epoch, slam_map.maps) == (epoch, there):
+            return snapshots
 
 
 def keyframe_trajectory(slam_map: core.Map, map_index: int | None = None) -> Trajectory:

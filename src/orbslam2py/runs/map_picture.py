@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The picture of a saved map: the paths of its runs, its keyframes and points, from above."""
+"""The picture of a saved map, or of several in a file: paths of the runs, keyframes, points."""
 
 from __future__ import annotations
 
@@ -11,23 +11,29 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py.maps.saved_map import SavedMap
 from orbslam2py.maps.units import unit_of
 from orbslam2py.runs.plots import draw_trajectory
+from orbslam2py.runs.several_maps import draw_maps, maps_of_file
 from orbslam2py.trajectory import Trajectory
 
 
 def draw_map(path: Path, saved: SavedMap, *, title: str) -> None:
     """Draw a saved map into a PNG file, as seen in the first keyframe's camera.
 
+    Of several maps each has a part of the picture, a colour and a world of its own.
+
     Parameters
     ----------
     path
         Where to write.
     saved
-        The map.
+        The map or maps.
     title
         First line above the picture.
     """
     contents = saved.contents
     keyframes = contents.keyframes
+    if np.count_nonzero(keyframes.parent < 0) > 1:
+        draw_maps(path, maps_of_file(saved), title=title, unit=unit_of(contents))
+        return
     T_0w = keyframes.T_cw[0]
     paths = [saved.trajectory(run) for run in range(len(saved.runs))]
     paths = [one.select(~one.lost) for one in paths if not one.lost.all()]

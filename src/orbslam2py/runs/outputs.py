@@ -26,7 +26,7 @@ from orbslam2py.runs.report_page.frame_images import (
     write_frame_images,
 )
 from orbslam2py.runs.result import RunResult
-from orbslam2py.runs.run_picture import anchored_points, draw_run
+from orbslam2py.runs.run_picture import anchored_points, draw_maps_of_run, draw_run
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.trajectory import Trajectory, write_kitti, write_tum
 
@@ -35,7 +35,7 @@ _log = logging.getLogger(__name__)
 #: Files that a run may have no content for.
 _NOT_ALWAYS = (
     *("trajectory.txt", "trajectory_online.txt", "trajectory_kitti.txt", "keyframes.txt"),
-    *("trajectory.png", "trajectory_map*.txt", "groundtruth_aligned.txt"),
+    *("trajectory.png", "maps.png", "trajectory_map*.txt", "groundtruth_aligned.txt"),
     *("report.html", "frame_images.zip"),
 )
 
@@ -148,6 +148,8 @@ class OutputWriter:
             self._write("map.npz", result.drawing.save)
         if len(result.tracked_trajectory()):
             self._write("trajectory.png", lambda path: draw_run(path, result, evaluation, report))
+        if sum(not one.lost.all() for one in result.trajectories) > 1:
+            self._write("maps.png", lambda path: draw_maps_of_run(path, result, report))
         self._write(
             "report.json", lambda path: _write_text(path, json.dumps(report, indent=2) + "\n")
         )

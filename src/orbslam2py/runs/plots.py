@@ -26,12 +26,13 @@ FloatArray = npt.NDArray[np.float64]
 _ESTIMATE = hexadecimal(palette.PAPER_PATH)
 _TRUTH = hexadecimal(palette.PAPER_TRUTH)
 _UNTRACKED = hexadecimal(palette.PAPER_UNTRACKED)
-_EARLIER = hexadecimal(palette.PAPER_EARLIER)
 _POINTS = hexadecimal(palette.PAPER_POINTS)
 _LOOP = hexadecimal(palette.PAPER_LOOP)
 _TEXT = hexadecimal(palette.PAPER_TEXT)
 _GRID = hexadecimal(palette.PAPER_GRID)
 _ERRORS = [hexadecimal(colour) for colour in palette.PAPER_ERRORS]
+#: How much white is in the shade behind times in another map.
+_SHADE = 0.72
 #: Width by height of the view from above.
 _SHAPE = 1.85
 #: Room for words around the axes, in parts of the picture. Measuring the words instead would take
@@ -126,6 +127,29 @@ def draw_trajectory(
         figure.savefig(stream, format="png")
 
 
+def draw_map_from_above(
+    axes: Axes,
+    *,
+    positions: FloatArray,
+    gaps: npt.NDArray[np.bool_],
+    keyframes: FloatArray,
+    points: FloatArray,
+    loops: FloatArray,
+    colour: palette.Colour,
+    unit: str,
+) -> None:
+    """Draw one of several maps into a part of a picture; arrays as for `draw_trajectory`."""
+    view = choose_view(positions)
+    path = _Path(np.arange(float(len(positions))), positions, gaps)
+    _draw_flat(axes, view, path, keyframes, points, None, "path", hexadecimal(colour))
+    if len(loops):
+        _draw_loops(axes, view, loops)
+    _say_where_up_is(axes, view, unit)
+    axes.legend(loc="best", fontsize=7, framealpha=0.9)
+    axes.grid(color=_GRID, linewidth=0.8)
+    axes.set_axisbelow(True)
+
+
 @dataclass(frozen=True)
 class _Path:
     """Positions (n, 3) over time (n,), and whether there is a gap before each."""
@@ -162,12 +186,16 @@ def _draw_height(
         axes.set_ylim(middle - 0.05, middle + 0.05)
     if timeline is None:
         return
-    labels = {_UNTRACKED: "not tracked", _EARLIER: "in another map"}
-    for spans, color in ((timeline.untracked, _UNTRACKED), (timeline.earlier, _EARLIER)):
-        for begin, end in spans:
-            axes.axvspan(begin, end, color=color, linewidth=0, label=labels.pop(color, None))
-    if len(labels) < 2:
-        axes.legend(loc="best", fontsize=8, framealpha=0.9)
+    shaded = [(_UNTRACKED, "not tracked", timeline.untracked)]
+    for number, spans in timeline.in_others.items():
+        colour = palette.lighter(palette.paper_map_colour(number), _SHADE)
+        shaded.append((hexadecimal(colour), f"in map {number}", spans))
+    for colour_text, label, spans in shaded:
+        for place, (begin, end) in enumerate(spans):
+            name = label if place == 0 else None
+            axes.axvspan(begin, end, color=colour_text, linewidth=0, label=name)
+    if any(spans for _, _, spans in shaded):
+        axes.legend(loc="best", fontsize=8, framealpha=0.9, ncols=1 + len(shaded) // 4)
     end = max([timeline.duration, *(span[1] for span in timeline.untracked)])
     if end > 0:
         axes.set_xlim(-0.01 * end, 1.01 * end)
@@ -181,6 +209,7 @@ def _draw_flat(
     points: FloatArray,
     truth: _Path | None,
     label: str | None,
+    colour: str = _ESTIMATE,
 ) -> None:
     flat, dots = view.flatten(estimate.positions), view.flatten(points)
     true = None if truth is None else view.flatten(truth.positions)
@@ -192,13 +221,12 @@ def _draw_flat(
     if truth is not None and true is not None:
         # Wide enough to be seen on both sides of an estimate that lies on it.
         truth.draw(axes, *true.T, color=_TRUTH, linewidth=6.0, label="ground truth")
-    estimate.draw(axes, *flat.T, color=_ESTIMATE, linewidth=1.4, label=label)
-    rings: dict[str, Any] = {"facecolors": "white", "edgecolors": _ESTIMATE, "linewidths": 0.7}
+    estimate.draw(axes, *flat.T, color=colour, linewidth=1.4, label=label)
+    rings: dict[str, Any] = {"facecolors": "white", "edgecolors": colour, "linewidths": 0.7}
     x, y = view.flatten(keyframes).T
-    axes.scatter(x, y, s=9, zorder=3, label="keyframes", **rings)
-    axes.scatter(
-        flat[:1, 0], flat[:1, 1], s=50, marker="s", color=_ESTIMATE, zorder=4, label="start"
-    )
+    if len(keyframes):
+        axes.scatter(x, y, s=9, zorder=3, label="keyframes", **rings)
+    axes.scatter(flat[:1, 0], flat[:1, 1], s=50, marker="s", color=colour, zorder=4, label="start")
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     axes.set_aspect("equal", adjustable="box")

@@ -84,6 +84,8 @@ class RunResult:
     """Keyframes of the main map."""
     snapshot: MapSnapshot = field(default_factory=empty_snapshot)
     """The main map."""
+    other_maps: list[MapSnapshot] = field(default_factory=list)
+    """The others that were there at the end, each in a world of its own."""
     sightings: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
     """(o, 2) ids of a point of the main map and of a keyframe that observes it."""
     drawing: MapArrays | None = None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The picture of a run: trajectory.png."""
+"""The pictures of a run: trajectory.png, and maps.png if there were several."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from orbslam2py.runs.plots import draw_trajectory
 from orbslam2py.runs.report import RunEvaluation
 from orbslam2py.runs.report_page.explained import compared_over
 from orbslam2py.runs.result import RunResult
+from orbslam2py.runs.several_maps import draw_maps, maps_of_run
 from orbslam2py.runs.timeline import Timeline
 from orbslam2py.settings.sensor import Sensor
 
@@ -50,13 +51,17 @@ def draw_run(
         If the file cannot be written.
     """
     last = result.tracked_trajectory()
-    timeline = Timeline.of(result.rows, result.main_map)
+    merged_into = {merge.merged_map: merge.map_index for merge in result.merges}
+    timeline = Timeline.of(result.rows, result.main_map, merged_into)
     begin = float(result.rows[0].timestamp)
     truth = None
     subtitle = (
         f"{report['tracked']} of {report['frames']} frames tracked, "
         f"{report['keyframes']} keyframes, {report['map_points']} points"
     )
+    n_maps = sum(not one.lost.all() for one in result.trajectories)
+    if n_maps > 1:
+        subtitle += f", map {result.main_map} (the main one of {n_maps})"
     scale, unit = metres_per_unit(result, evaluation), "m"
     if scale is None:
         scale, unit = 1.0, "units"
@@ -82,6 +87,24 @@ def draw_run(
         timeline=timeline,
         unit=unit,
         height=None if evaluation is None else evaluation.height,
+    )
+
+
+def draw_maps_of_run(path: Path, result: RunResult, report: dict[str, Any]) -> None:
+    """Draw maps.png: all maps of the run, each in its colour.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    drawn = maps_of_run(result)
+    draw_maps(
+        path,
+        drawn,
+        title=f"{report['sequence']} ({report['sensor']}): {len(drawn)} maps",
+        unit="units" if result.options.sensor is Sensor.MONOCULAR else "m",
+        main=result.main_map,
     )
 
 

@@ -316,6 +316,7 @@ class SequenceRunner:
             keyframes, [by_time.get(float(t), -1) for t in keyframes.timestamps]
         )
         result.snapshot = system.map_snapshot(main)
+        result.other_maps = [one for one in system.map_snapshots() if one.map_index != main]
         seen = core.snapshot_observations(system.pipeline.back_end.map, main)
         points = np.repeat(seen.ids, np.diff(seen.offsets))
         result.sightings = np.stack([points, seen.keyframes], axis=1)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,8 +49,8 @@ class Timeline:
     """(n,) how many frames up to each, itself included, should have a pose and have none."""
     untracked: list[Span]
     """When there was no pose."""
-    earlier: list[Span]
-    """When there were poses in another map than the main one."""
+    in_others: dict[int, list[Span]]
+    """When there were poses in another map than the main one, by its number."""
 
     @property
     def duration(self) -> float:
@@ -58,14 +58,36 @@ class Timeline:
         return float(self.seconds[-1]) if len(self.seconds) else 0.0
 
     @classmethod
-    def of(cls, rows: Sequence[FrameRow], last_map: int) -> Timeline:
-        """Take it from the rows of a run whose main map has a number."""
+    def of(
+        cls,
+        rows: Sequence[FrameRow],
+        main_map: int,
+        merged_into: Mapping[int, int] | None = None,
+    ) -> Timeline:
+        """Take it from the rows of a run.
+
+        Parameters
+        ----------
+        rows
+            Of the run.
+        main_map
+            Number of its main map.
+        merged_into
+            Maps that have become part of others, by their numbers: poses in them are poses there.
+        """
         seconds = np.array([float(row.timestamp) for row in rows])
         seconds = seconds - seconds[:1].sum()
         # What nobody looked at is no failure: tracking went on across it.
         failed = np.array([row.state not in ("OK", "DROPPED") for row in rows], bool)
-        earlier = np.array([_in_map_before(row, last_map) for row in rows], bool)
-        return cls(seconds, np.cumsum(failed), _spans(seconds, failed), _spans(seconds, earlier))
+        parts = merged_into or {}
+        maps = np.array([_map_of(row, parts) for row in rows], np.int64)
+        others = set(maps.tolist()) - {-1, main_map}
+        return cls(
+            seconds,
+            np.cumsum(failed),
+            _spans(seconds, failed),
+            {number: _spans(seconds, maps == number) for number in sorted(others)},
+        )
 
     def gaps_before(self, positions: IntArray) -> npt.NDArray[np.bool_]:
         """Find gaps between poses.
@@ -85,8 +107,12 @@ class Timeline:
         return gaps
 
 
-def _in_map_before(row: FrameRow, last_map: int) -> bool:
-    return row.record is not None and row.state == "OK" and row.record.map_index != last_map
+def _map_of(row: FrameRow, merged_into: Mapping[int, int]) -> int:
+    """The map that a frame has a pose in at the end; -1 without one."""
+    number = row.record.map_index if row.record is not None and row.state == "OK" else -1
+    while number in merged_into:
+        number = merged_into[number]
+    return number
 
 
 def _spans(seconds: FloatArray, chosen: npt.NDArray[np.bool_]) -> list[Span]:

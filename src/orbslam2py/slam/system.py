@@ -20,7 +20,12 @@ from orbslam2py.maps.contents import MapContents
 from orbslam2py.maps.map_copies import take_contents
 from orbslam2py.maps.map_file import MapFile
 from orbslam2py.maps.saved_map import SavedMap
-from orbslam2py.maps.snapshot import MapSnapshot, keyframe_trajectory, take_snapshot
+from orbslam2py.maps.snapshot import (
+    MapSnapshot,
+    keyframe_trajectory,
+    take_snapshot,
+    take_snapshots,
+)
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
 from orbslam2py.slam.back_end import abandon
@@ -583,6 +588,10 @@ class System:
     def map_snapshot(self, map_index: int | None = None) -> MapSnapshot:
         """A copy of keyframe poses and points of a map (None: the active one), at any time."""
         return take_snapshot(self.pipeline.back_end.map, map_index)
+
+    def map_snapshots(self) -> list[MapSnapshot]:
+        """Copies of all maps at any time, the oldest first; `MapSnapshot.map_index` tells which."""
+        return take_snapshots(self.pipeline.back_end.map)
 
     def map_hash(self) -> int:
         """Hash over poses, points and observations: equal for equal maps."""

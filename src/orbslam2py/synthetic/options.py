@@ -60,7 +60,20 @@ class SyntheticOptions:
         How long the shutter is open, in times between two frames (0 to 1): what the camera moves
         by meanwhile is smeared. The truth is where it is in the middle.
     cover
-        Seconds that a hand is over the lens, in the middle of the sequence.
+        Seconds that a hand is over the lens, in the middle of the sequence. Two numbers: when it
+        comes [s], and for how long it stays.
+    pieces
+        Cut the way into so many pieces of one length, which come one after the other; `frames`
+        and `laps` are those of the way before it is cut.
+    order
+        Numbers of the pieces that come, from 0; those that are not named are left out. By default
+        all of them come, shuffled by the seed.
+    gap
+        Seconds in the dark between two pieces: the camera stands where the one before ends
+        (3 with `pieces`).
+    overlap
+        Seconds by which each piece begins earlier and ends later on the way, so that neighbours
+        show common places (0 with `pieces`).
     depth_noise
         Standard deviation of the depth [m] at 1 m; it grows with the square of the depth (RGB-D).
     lateral
@@ -92,7 +105,11 @@ class SyntheticOptions:
     motion: SyntheticMotion | str = SyntheticMotion.SMOOTH
     corners: Corners | str = Corners.ROUND
     blur: float = 0.0
-    cover: float = 0.0
+    cover: float | tuple[float, float] = 0.0
+    pieces: int | None = None
+    order: tuple[int, ...] | None = None
+    gap: float | None = None
+    overlap: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "world", _member(SyntheticWorld, "world", self.world))
@@ -109,7 +126,8 @@ class SyntheticOptions:
         _check_range("noise", self.noise, 0, 100)
         _check_exposure(self.exposure)
         _check_range("blur", self.blur, 0, 1)
-        _check_range("cover", self.cover, 0, 1000)
+        _check_cover(self.cover)
+        self._check_pieces()
         _check_range("depth_noise", self.depth_noise, 0, 1)
         beside = ROOM_BESIDE[SyntheticWorld(self.world)]
         _check_range("lateral", self.lateral, -beside, beside)
@@ -128,6 +146,17 @@ class SyntheticOptions:
         if self.corners is Corners.SHARP and self.world not in CORNERED:
             names = ", ".join(map(str, CORNERED))
             raise SettingsError(f"corners are sharp on ways with corners: {names}; take one")
+
+    def _check_pieces(self) -> None:
+        _check_range("pieces", self.pieces, 1, 1000, whole=True)
+        _check_range("gap", self.gap, 0, 1000)
+        _check_range("overlap", self.overlap, 0, 1000)
+        if self.pieces is None:
+            for name in ("order", "gap", "overlap"):
+                if getattr(self, name) is not None:
+                    raise SettingsError(f"{name} applies to a way in pieces; give pieces as well")
+        elif self.order is not None:
+            object.__setattr__(self, "order", _order_of(self.order, self.pieces))
 
     def _check_pace(self) -> None:
         _check_range("pace", self.pace, 0.01, 100)
@@ -163,6 +192,28 @@ def _check_size(size: Any) -> None:
         raise SettingsError(f"size is {shown(size)}; give width and height, such as (640, 480)")
     for pixels in size:
         _check_range("size", pixels, 64, 8192, whole=True)
+
+
+def _check_cover(cover: Any) -> None:
+    if not isinstance(cover, tuple | list):
+        _check_range("cover", cover, 0, 1000)
+        return
+    if len(cover) != 2:
+        raise SettingsError(
+            f"cover has {len(cover)} numbers; give the seconds, or when it begins and the seconds"
+        )
+    _check_range("beginning of cover", cover[0], 0, 1_000_000)
+    _check_range("cover", cover[1], 0, 1000)
+
+
+def _order_of(order: Any, n_pieces: int) -> tuple[int, ...]:
+    if not isinstance(order, tuple | list) or not len(order):
+        raise SettingsError(f"order is {shown(order)}; give numbers of pieces, such as (2, 0, 1)")
+    for number in order:
+        _check_range("order", number, 0, n_pieces - 1, whole=True)
+    if len(set(order)) < len(order):
+        raise SettingsError("order names a piece twice; name each at most once")
+    return tuple(int(number) for number in order)
 
 
 def _check_exposure(exposure: Any) -> None:

@@ -29,6 +29,7 @@ from orbslam2py.synthetic import lens
 from orbslam2py.synthetic.files import write_sequence
 from orbslam2py.synthetic.motions import Motion, SyntheticMotion
 from orbslam2py.synthetic.options import SyntheticOptions
+from orbslam2py.synthetic.pieces import arrange
 from orbslam2py.synthetic.scenes import LAPS, Corners, SyntheticWorld, make_scene
 from orbslam2py.trajectory import Trajectory
 from orbslam2py.trajectory.rotations import inverse_poses
@@ -61,10 +62,16 @@ class SyntheticSequence(FramesInOrder):
         self._fps = options.fps or (10.0 if self._scene.outdoors else 20.0)
         self._speed = options.speed or self._scene.speed
         self._motion = Motion(SyntheticMotion(options.motion), self._fps, options.seed)
-        self._n_frames = options.frames or self._frames_of_whole_way()
+        n_images = options.frames or self._frames_of_whole_way()
+        self._arrangement = arrange(options, n_images, self._fps)
+        self._n_frames = len(self._arrangement.of_way)
         nanoseconds = np.arange(self._n_frames, dtype=np.float64) * (1e9 / self._fps)
         #: Time stamps, int64 (n,), nanoseconds from the start.
         self.nanoseconds: IntArray = np.rint(nanoseconds).astype(np.int64)
+
+    def _seconds_on_way(self, index: int) -> float:
+        """When the camera is on its way where an image is taken."""
+        return float(np.rint(self._arrangement.of_way[index] * (1e9 / self._fps))) / 1e9
 
     @property
     def _size(self) -> tuple[int, int]:
@@ -188,7 +195,7 @@ class SyntheticSequence(FramesInOrder):
             If there is no such frame.
         """
         index = index_of(index, len(self))
-        return self._T_wc_at(float(self.timestamps[index]))
+        return self._T_wc_at(self._seconds_on_way(index))
 
     def _T_wc_at(self, seconds: float) -> FloatArray:
         options = self.options
@@ -202,7 +209,7 @@ class SyntheticSequence(FramesInOrder):
         return self._motion.applied(on_way, seconds)
 
     def covered(self, index: int) -> bool:
-        """Whether a hand is over the lens, be it in part.
+        """Whether a hand is over the lens, be it in part, or the image is taken in the dark.
 
         Raises
         ------
@@ -210,13 +217,20 @@ class SyntheticSequence(FramesInOrder):
             If there is no such frame.
         """
         index = index_of(index, len(self))
-        return self._hand_rows(float(self.timestamps[index])) > 0
+        return self._hand_rows(index) > 0
 
-    def _hand_rows(self, seconds: float) -> int:
-        if self.options.cover == 0:
+    def _hand_rows(self, index: int) -> int:
+        if self._arrangement.dark[index]:
+            return self._size[1]
+        cover = self.options.cover
+        if isinstance(cover, tuple | list):
+            begin, lasting = cover
+        else:
+            begin, lasting = (self._n_frames / self._fps - cover) / 2, cover
+        if lasting == 0:
             return 0
-        begin = (self._n_frames / self._fps - self.options.cover) / 2
-        return lens.hand_rows(seconds, begin, begin + self.options.cover, self._size[1])
+        seconds = float(self.timestamps[index])
+        return lens.hand_rows(seconds, begin, begin + lasting, self._size[1])
 
     def view(self, T_wc: FloatArray, number: int = 0, *, exposure: float | None = None) -> Images:
         """Render the images seen from anywhere: without smear and without a hand over the lens.
@@ -248,7 +262,8 @@ class SyntheticSequence(FramesInOrder):
 
     def exact_depth(self, index: int) -> NDArray[np.float32]:
         """Depth of the (left) image along z, (height, width) [m]; 0 where nothing is hit."""
-        seconds = float(self.timestamps[index])
+        index = index_of(index, len(self))
+        seconds = self._seconds_on_way(index)
         return self._render(self.T_wc(index), 2 * index, 1.0, seconds=seconds)[1]
 
     def write(
@@ -311,9 +326,9 @@ class SyntheticSequence(FramesInOrder):
     ) -> tuple[ByteArray, NDArray[np.float32]]:
         """One image of a frame, with all that is between the world and it, and its depth."""
         options = self.options
-        seconds = float(self.timestamps[index])
+        seconds = self._seconds_on_way(index)
         number = 2 * index + right
-        exposure = self._exposure(seconds)
+        exposure = self._exposure(float(self.timestamps[index]))
         place = self._right_of if right else np.copy
         if options.blur > 0:
             sharp, depth = self._render(place(T_wc), number, 1.0, noise=0.0, seconds=seconds)
@@ -323,7 +338,7 @@ class SyntheticSequence(FramesInOrder):
             grey = lens.exposed(image, exposure, options.noise, [options.seed, number])
         else:
             grey, depth = self._render(place(T_wc), number, exposure, seconds=seconds)
-        return lens.covered(grey, depth, self._hand_rows(seconds))
+        return lens.covered(grey, depth, self._hand_rows(index))
 
     def _render(
         self,

@@ -3,6 +3,7 @@
 
 from orbslam2py.viewer.live import LiveView, Viewer
 from orbslam2py.viewer.publisher import Publisher
+from orbslam2py.viewer.resting_maps import RestingMaps, RestingMapsWatcher
 from orbslam2py.viewer.watching import FrameView, QueueState, Watcher
 
 __all__ = [
@@ -10,6 +11,8 @@ __all__ = [
     "LiveView",
     "Publisher",
     "QueueState",
+    "RestingMaps",
+    "RestingMapsWatcher",
     "Viewer",
     "Watcher",
 ]

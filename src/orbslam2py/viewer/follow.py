@@ -89,9 +89,16 @@ class Follower:
         return eye, place + size * _AHEAD * forward, _UP if upright else -T_wc[:3, 1]
 
 
-def whole_view(points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """From where all of the map is seen: eye and target, from points (n, 3) of it."""
+def whole_view(
+    points: FloatArray, beside: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """From where all of the map is seen: eye and target, from points (n, 3) of it.
+
+    What lies beside it (m, 3) is seen as well.
+    """
     low, high = np.percentile(points, [2, 98], axis=0)
+    if beside is not None and len(beside):
+        low, high = np.minimum(low, beside.min(axis=0)), np.maximum(high, beside.max(axis=0))
     target = (low + high) / 2
     breadth = max(float(np.linalg.norm(high - low)), 1e-3)
     away = np.array([0.35, -0.75, -0.55])

@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py.maps.changes import MapChanges
-from orbslam2py.slam.events import Event, LoopClosed
+from orbslam2py.slam.events import Event, LoopClosed, MapsMerged
 from orbslam2py.slam.records import TrackingRecord
 from orbslam2py.slam.system import System
 from orbslam2py.trajectory import Trajectory
@@ -30,6 +30,7 @@ from orbslam2py.viewer.controls import RunActions
 from orbslam2py.viewer.process import Companion, CompanionError
 from orbslam2py.viewer.process.messages import PathNow, Subject
 from orbslam2py.viewer.publisher import Publisher
+from orbslam2py.viewer.resting_maps import RestingMaps
 from orbslam2py.viewer.server import LOOPBACK, open_page, require_viser
 from orbslam2py.viewer.watching import FrameView
 
@@ -165,9 +166,13 @@ class LiveView:
         """Show what has become of the map."""
         self._show("on_map", changes)
 
+    def on_resting_maps(self, maps: RestingMaps) -> None:
+        """Show the maps that rest beside the active one."""
+        self._show("on_resting_maps", maps)
+
     def on_event(self, event: Event) -> None:
-        """Tell that a loop was closed."""
-        if isinstance(event, LoopClosed):
+        """Tell that a loop was closed, or that two maps are one now."""
+        if isinstance(event, LoopClosed | MapsMerged):
             self._show("on_event", event)
 
     def _show(self, *news: object) -> None:

@@ -10,13 +10,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
+from orbslam2py._palette import KEYFRAME, map_colour
 from orbslam2py.pictures.album import Album, KeyframePicture
 from orbslam2py.viewer.actions import Neighbours
 from orbslam2py.viewer.controls import add_view_controls
 from orbslam2py.viewer.follow import Follow, Follower, whole_view
 from orbslam2py.viewer.left_panel import LeftPanel
 from orbslam2py.viewer.map_model import KEYFRAME_IDS, MapModel, Stale
+from orbslam2py.viewer.maps_panel import MapLine, MapsPanel
 from orbslam2py.viewer.point_colours import ColourBy, PointColours
+from orbslam2py.viewer.resting_maps import RestingMaps
+from orbslam2py.viewer.resting_scene import RestingScene
 from orbslam2py.viewer.scene import Scene, Selection
 from orbslam2py.viewer.server import address_of, start_server, stop_server
 
@@ -49,7 +53,7 @@ class Page:
         To be held by whoever draws.
     model : MapModel
         The map that is shown.
-    scene, left
+    scene, resting, left
         The parts.
     neighbours : callable
         Tells which keyframes share points with one, and how many.
@@ -77,6 +81,9 @@ class Page:
         gui.main_panel.set_width(300)
         self.left = LeftPanel(self.server)
         self.scene = Scene(self.server, self.model, self._colours, self._select)
+        self.resting = RestingScene(self.server)
+        self._active_map = 0
+        self._maps_panel = MapsPanel(self.server, self.show_map)
         add_view_controls(self.server, self)
         self.server.on_client_connect(self._connected)
 
@@ -113,6 +120,28 @@ class Page:
         for path in ("path", "online", "truth"):
             self.scene.draw_path(path, np.zeros((0, 2, 3)))
 
+    def take_resting_maps(self, maps: RestingMaps) -> None:
+        """Learn which maps rest beside the active one, and what has changed in them."""
+        self._active_map = maps.active
+        self.resting.apply(maps)
+        colour = map_colour(maps.active) if maps.there else KEYFRAME
+        if self.scene.set_keyframe_colour(colour):
+            self._stale.keyframes |= set((self.model.keyframe_ids // KEYFRAME_IDS).tolist())
+        if self._colours.map_colour != colour:
+            self._colours.map_colour = colour
+            if self._colours.by is ColourBy.MAP:
+                self._stale.points |= set(self.model.points)
+        self.scene.show_map(self.resting.is_shown(maps.active) or not maps.there)
+
+    def _draw_resting_maps(self, at_most: int | None) -> None:
+        sizes = self.resting.sizes
+        if sizes:
+            self.resting.draw(self.scene.size, self.scene.point_diameter, at_most)
+        self.resting.place(self._active_map, self.model)
+        lines = [MapLine(number, False, *size) for number, size in sizes.items()]
+        own = MapLine(self._active_map, True, len(self.model.keyframe_ids), self.model.n_points)
+        self._maps_panel.show(sorted([*lines, own], key=lambda line: line.number))
+
     def draw_map(self, at_most: int | None = _PAGES) -> None:
         """Draw what has changed in the map, of very much a part at a time."""
         self._gather_stale()
@@ -123,6 +152,7 @@ class Page:
         self._stale.points -= late
         with self.server.atomic():
             self.scene.draw(self._stale)
+            self._draw_resting_maps(at_most)
             if moved and self._selected is not None:
                 self._draw_selected()
         self._stale = Stale(points=late)
@@ -158,6 +188,7 @@ class Page:
             return
         distance = float(np.median(np.linalg.norm(places - T_wc[:3, 3], axis=1)))
         if self.scene.fit_size(distance):
+            self.resting.resize()
             self._stale.keyframes |= set((self.model.keyframe_ids // KEYFRAME_IDS).tolist())
 
     def show_camera(self, T_wc: FloatArray | None, image: ByteArray | None, aspect: float) -> None:
@@ -180,6 +211,14 @@ class Page:
         """Show or hide a layer."""
         with self.lock:
             self.scene.show(layer, visible)
+
+    def show_map(self, number: int, visible: bool) -> None:
+        """Show or hide one of several maps."""
+        with self.lock:
+            self.resting.show(number, visible)
+            if number == self._active_map:
+                self.scene.show_map(visible)
+                self.resting.show_label(visible)
 
     def follow(self, mode: Follow) -> None:
         """Move the views with the camera, or not."""
@@ -207,7 +246,8 @@ class Page:
             places = [page.positions for page in self.model.points.values() if len(page.ids)]
             if not places:
                 return
-            _look(client, *whole_view(np.concatenate(places).astype(np.float64)))
+            whole = whole_view(np.concatenate(places).astype(np.float64), self.resting.places())
+            _look(client, *whole)
 
     def look_from(self, eye: FloatArray, target: FloatArray) -> None:
         """Let all browsers look from one place to another, and stay there."""

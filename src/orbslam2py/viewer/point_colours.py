@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from orbslam2py._arrays import ByteArray, FloatArray
-from orbslam2py._palette import POINTS
+from orbslam2py._palette import KEYFRAME, POINTS, Colour
 from orbslam2py.viewer.map_model import MapModel
 
 #: How far the span of the values may grow or shrink before all points are coloured anew.
@@ -31,6 +31,8 @@ class ColourBy(str, Enum):
     """When it was made."""
     OBSERVATIONS = "observations"
     """How often it was seen."""
+    MAP = "map"
+    """Which map they belong to: the colour of its keyframes."""
     NOTHING = "nothing"
     """All alike."""
 
@@ -50,12 +52,14 @@ class PointColours:
     def __init__(self, model: MapModel) -> None:
         self._model = model
         self.by = ColourBy.IMAGE
+        #: Of the map, for those that are coloured by it.
+        self.map_colour: Colour = KEYFRAME
         self._span = (0.0, 1.0)
         self._table = _colour_table()
 
     def update_span(self) -> bool:
         """Look whether the scale still fits; True if all pages are to be coloured anew."""
-        if self.by in (ColourBy.IMAGE, ColourBy.NOTHING, ColourBy.OBSERVATIONS):
+        if self.by not in (ColourBy.HEIGHT, ColourBy.AGE):
             return False
         pages = list(self._model.points)
         if not pages:
@@ -77,8 +81,9 @@ class PointColours:
         if self.by is ColourBy.IMAGE:
             return self._model.colours_of(number, POINTS)
         values = self._values(number)
-        if self.by is ColourBy.NOTHING:
-            return np.full((len(values), 3), POINTS, np.uint8)
+        if self.by in (ColourBy.NOTHING, ColourBy.MAP):
+            colour = self.map_colour if self.by is ColourBy.MAP else POINTS
+            return np.full((len(values), 3), colour, np.uint8)
         low, high = (np.log(2.0), np.log(_MANY_OBSERVATIONS)) if self._by_count else self._span
         place = np.clip((values - low) / (high - low), 0.0, 1.0)
         return np.asarray(self._table[(255 * place).astype(np.uint8)])

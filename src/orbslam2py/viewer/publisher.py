@@ -29,6 +29,7 @@ from orbslam2py.maps.changes import MapChanges, MapFollower
 from orbslam2py.slam.events import Event
 from orbslam2py.slam.system import System
 from orbslam2py.slam.watched_frame import WatchedFrame
+from orbslam2py.viewer.resting_maps import RestingMapsFollower, RestingMapsWatcher
 from orbslam2py.viewer.watching import FrameView, QueueState, Watcher
 
 _log = logging.getLogger(__name__)
@@ -37,6 +38,8 @@ _log = logging.getLogger(__name__)
 _WAITING_VIEWS = 4
 #: After a look at the map that took a second, the next one waits for so many: loops move all of it.
 _REST = 4.0
+#: Seconds between two looks at the maps that rest.
+_RESTING_PERIOD = 1.0
 #: Seconds after which a thread that computes in Python lets another in. Python's own are ten times
 #: as many, for which tracking would wait again and again within one image.
 _SWITCH_INTERVAL = 5e-4
@@ -83,13 +86,14 @@ class Publisher:
         self._map_period = 1.0 / map_rate
         self._every_frame = every_frame
         self._follower = MapFollower(system.pipeline.back_end.map)
+        self._resting = RestingMapsFollower(system.pipeline.back_end.map)
         self._condition = threading.Condition()
         #: With the changes of the map that were seen with the image, when none is passed over.
         self._views: deque[tuple[MapChanges | None, FrameView]] = deque()
         self._events: deque[Event] = deque()
         self._seen_at: deque[float] = deque(maxlen=_RATE_IMAGES)
         self._next_view_at = 0.0
-        self._next_look_at = 0.0
+        self._next_look_at = self._next_resting_at = 0.0
         self._n_frames = self._n_not_shown = self._n_dropped = 0
         self._closing = False
         self._thread = threading.Thread(target=self._run, name="viewer publisher", daemon=True)
@@ -256,11 +260,22 @@ class Publisher:
         changes = self._follower.update()
         if changes:
             self._tell(methodcaller("on_map", changes))
+        self._look_at_resting_maps(now=now or changes.restarted)
         end = time.perf_counter()
         self._next_look_at = max(begin + self._map_period, end + _REST * (end - begin))
 
-    def _tell(self, news: Callable[[Watcher], None]) -> None:
-        for watcher in list(self._watchers):
+    def _look_at_resting_maps(self, *, now: bool) -> None:
+        """Little happens in them: a full adjustment, or that one of them is the active one."""
+        wanted = any(isinstance(watcher, RestingMapsWatcher) for watcher in self._watchers)
+        if not wanted or (time.perf_counter() < self._next_resting_at and not now):
+            return
+        maps = self._resting.update()
+        if maps is not None:
+            self._tell(methodcaller("on_resting_maps", maps), RestingMapsWatcher)
+        self._next_resting_at = time.perf_counter() + _RESTING_PERIOD
+
+    def _tell(self, news: Callable[[Watcher], None], whom: type = object) -> None:
+        for watcher in [watcher for watcher in self._watchers if isinstance(watcher, whom)]:
             try:
                 news(watcher)
             except Exception as error:

@@ -13,20 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from orbslam2py import _palette as palette
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
-from orbslam2py._palette import (
-    CAMERA,
-    COVISIBILITY,
-    KEYFRAME,
-    LOCAL_POINTS,
-    LOOP,
-    NOW,
-    ONLINE_PATH,
-    PATH,
-    SPANNING_TREE,
-    TRUTH,
-    Colour,
-)
+from orbslam2py._palette import Colour
 from orbslam2py.viewer.frusta import CORNERS, FACES, frusta, nearest_to_ray, orientations
 from orbslam2py.viewer.map_model import MapModel, Stale
 from orbslam2py.viewer.point_colours import PointColours
@@ -101,6 +90,10 @@ class Scene:
         #: Half the width of a keyframe's frustum, in the unit of the map.
         self.size = 0.0
         self.fov = _FOV
+        #: Of keyframes: that of the map, if there are several.
+        self.keyframe_colour: Colour = palette.KEYFRAME
+        self._switched_on = {name for name in LAYERS if name not in HIDDEN}
+        self._is_shown = True
         self._scene.set_up_direction("-y")  # that of the first camera
         self._scene.configure_environment_map(None)  # nothing here mirrors, and it takes a while
         self._scene.configure_default_lights(enabled=True, cast_shadow=False)
@@ -108,11 +101,28 @@ class Scene:
             name: self._scene.add_frame(f"/{name}", show_axes=False, visible=name not in HIDDEN)
             for name in LAYERS
         }
-        self._scene.add_frame("/selection", show_axes=False)
+        self._selection = self._scene.add_frame("/selection", show_axes=False)
 
     def show(self, layer: str, visible: bool) -> None:
         """Show or hide a layer."""
-        self._layers[layer].visible = visible
+        (self._switched_on.add if visible else self._switched_on.discard)(layer)
+        self._layers[layer].visible = visible and self._is_shown
+
+    def show_map(self, visible: bool) -> None:
+        """Show or hide the map with all of its layers."""
+        self._is_shown = visible
+        for name, layer in self._layers.items():
+            layer.visible = visible and name in self._switched_on
+        self._selection.visible = visible
+
+    def set_keyframe_colour(self, colour: Colour) -> bool:
+        """Draw keyframes in another colour; whether all of them are to be drawn again."""
+        if colour == self.keyframe_colour:
+            return False
+        self.keyframe_colour = colour
+        for name in [name for name in self._nodes if name.startswith("/keyframes/")]:
+            self._remove(name)
+        return True
 
     def clear(self) -> None:
         """Remove all but the layers themselves."""
@@ -131,14 +141,14 @@ class Scene:
             self._draw_keyframes(number)
         for number in sorted(stale.covisibility):
             edges = self._model.edges_in_page(self._model.covisibility, number)
-            self._lines(f"/covisibility/{number}", edges, COVISIBILITY, 1.0)
+            self._lines(f"/covisibility/{number}", edges, palette.COVISIBILITY, 1.0)
         for number in sorted(stale.tree):
             edges = self._model.edges_in_page(self._model.spanning_tree, number)
-            self._lines(f"/tree/{number}", edges, SPANNING_TREE, 1.5)
+            self._lines(f"/tree/{number}", edges, palette.SPANNING_TREE, 1.5)
         if stale.loops:
             rows = self._model.rows_of(self._model.loop_edges)
             ends = self._model.keyframe_T_wc[rows][:, :, :3, 3]
-            self._lines("/loops/all", ends, LOOP, 3.0)
+            self._lines("/loops/all", ends, palette.LOOP, 3.0)
 
     def draw_points(self, number: int) -> None:
         """Draw a page of points."""
@@ -147,17 +157,18 @@ class Scene:
         if page is None or not len(page.ids):
             self._remove(name)
             return
-        self._cloud(name, page.positions, self._colours.of_page(number), self._point_size)
+        self._cloud(name, page.positions, self._colours.of_page(number), self.point_diameter)
 
     def set_point_size(self, factor: float) -> None:
         """Draw points larger or smaller than usual."""
         self.point_size = factor
         for name, node in self._nodes.items():
             if name.startswith("/points/"):
-                node.point_size = self._point_size
+                node.point_size = self.point_diameter
 
     @property
-    def _point_size(self) -> float:
+    def point_diameter(self) -> float:
+        """In the unit of the map."""
         return max(1e-6, _POINT * self.size * self.point_size)
 
     def fit_size(self, distance: float) -> bool:
@@ -181,14 +192,14 @@ class Scene:
         if not len(positions):
             self._remove("/local/points")
             return
-        colour = np.array(LOCAL_POINTS, np.uint8)
-        self._cloud("/local/points", positions, colour, 1.35 * self._point_size)
+        colour = np.array(palette.LOCAL_POINTS, np.uint8)
+        self._cloud("/local/points", positions, colour, 1.35 * self.point_diameter)
 
     def _draw_keyframes(self, number: int) -> None:
         rows = self._model.rows_in_page(number)
         T_wc = self._model.keyframe_T_wc[rows]
         lines, bodies = f"/keyframes/lines{number}", f"/keyframes/bodies{number}"
-        self._lines(lines, frusta(T_wc, self.size), KEYFRAME, 1.5)
+        self._lines(lines, frusta(T_wc, self.size), self.keyframe_colour, 1.5)
         if not len(T_wc):
             self._remove(bodies)
             return
@@ -198,7 +209,7 @@ class Scene:
             faces=FACES,
             batched_wxyzs=orientations(T_wc),
             batched_positions=T_wc[:, :3, 3],
-            batched_colors=KEYFRAME,
+            batched_colors=self.keyframe_colour,
             opacity=0.18,
             side="double",
             flat_shading=True,
@@ -239,7 +250,7 @@ class Scene:
             scale=2.6 * self.size,
             thickness=2.5,
             thickness_units="screen",
-            color=CAMERA,
+            color=palette.CAMERA,
             image=image,
             format="jpeg",
             wxyz=wxyz,
@@ -251,9 +262,9 @@ class Scene:
     def draw_path(self, layer: str, lines: FloatArray) -> None:
         """Draw one of the paths: ``path``, ``online`` or ``truth``, (s, 2, 3)."""
         colour, width = {
-            "path": (PATH, 2.5),
-            "online": (ONLINE_PATH, 1.5),
-            "truth": (TRUTH, 3.5),
+            "path": (palette.PATH, 2.5),
+            "online": (palette.ONLINE_PATH, 1.5),
+            "truth": (palette.TRUTH, 3.5),
         }[layer]
         self._lines(f"/{layer}/all", lines, colour, width)
 
@@ -268,12 +279,12 @@ class Scene:
             self._remove("/selection/neighbours")
             return
         T_wc = model.keyframe_T_wc[row]
-        self._lines("/selection/keyframe", frusta(T_wc, 1.3 * self.size), NOW, 3.0)
+        self._lines("/selection/keyframe", frusta(T_wc, 1.3 * self.size), palette.NOW, 3.0)
         pairs = np.column_stack(
             [np.full_like(selection.neighbours, selection.keyframe), selection.neighbours]
         )
         ends = model.keyframe_T_wc[model.rows_of(pairs)][:, :, :3, 3]
-        self._lines("/selection/neighbours", ends, NOW, 1.5)
+        self._lines("/selection/neighbours", ends, palette.NOW, 1.5)
 
     # ---- nodes -----------------------------------------------------------------------------------
     def _cloud(

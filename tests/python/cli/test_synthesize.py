@@ -50,6 +50,20 @@ def test_the_command_writes_what_it_was_asked_for(tmp_path):
     assert len(list((folder / "depth").iterdir())) == 4
 
 
+def test_the_command_cuts_a_way_into_pieces(tmp_path):
+    folder = tmp_path / "cut"
+    options = (
+        "--world corridor --sensor rgbd --frames 9 --size 160x120 "
+        "--pieces 3 --order 2,0 --gap 0.1 --overlap 0.05 --cover 0:0.1"
+    )
+    result = run_command(str(folder), *options.split())
+    assert result.exit_code == 0, result.output
+    about = json.loads((folder / "synthetic.json").read_text())
+    assert {"pieces": 3, "order": [2, 0], "gap": 0.1, "overlap": 0.05}.items() <= about.items()
+    assert about["cover"] == [0.0, 0.1]
+    assert len(list((folder / "rgb").iterdir())) == 4 + 2 + 4
+
+
 def test_the_command_refuses_bad_input(tmp_path):
     assert run_command(str(tmp_path / "x"), "--world", "moon").exit_code == 2
     result = run_command(str(tmp_path / "x"), "--size", "big")

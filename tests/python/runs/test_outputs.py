@@ -117,6 +117,7 @@ def test_results_of_an_earlier_run_are_gone_when_a_new_one_begins(tmp_path: Path
     run = made_up_run(tmp_path / "r", "kkkkkkllkkkk", maps="0" * 8 + "1" * 4)
     results = {path.name for path in run.iterdir()} - {"settings.yaml"}
     assert {"report.json", "trajectory.txt", "trajectory_map0.txt", "frames.csv"} <= results
+    assert "maps.png" in results
     for own in ("notes.txt", "office.orbmap", "trajectory_mine.txt"):
         (run / own).write_text("mine")
     remove_earlier_results(run)

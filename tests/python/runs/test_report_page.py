@@ -127,7 +127,12 @@ def test_any_run_has_a_page(tmp_path: Path, states: str, how: dict[str, object])
         assert "map's own units" in page.text
         assert " m " not in page.text.partition("All figures")[0]
     if "4" in str(how.get("maps")):
-        assert [f"map-{number}" in page.ids for number in range(5)] == [True] * 4 + [False]
+        assert [f"map-{number}" in page.ids for number in range(5)] == [True] * 5
+        assert "plot-maps" in page.ids
+        assert "Map 4, the main one" in page.text
+        assert "where one lies beside another means nothing" in page.text
+    if "maps" not in how:
+        assert "maps" not in page.ids, "nothing is said of several maps where there is one"
 
 
 def test_weak_evidence_is_shown(tmp_path: Path) -> None:

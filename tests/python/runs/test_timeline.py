@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -17,14 +19,28 @@ def test_spans_without_a_pose() -> None:
     assert timeline.untracked == [
         pytest.approx(span) for span in [(0.0, 0.2), (0.4, 0.6), (0.8, 0.9), (1.0, 1.1)]
     ]
-    assert timeline.earlier == []
+    assert timeline.in_others == {}
     assert timeline.duration == pytest.approx(1.0)
 
 
 def test_spans_in_an_earlier_map() -> None:
     timeline = Timeline.of(rows_of("kkkr"), 1)
-    assert timeline.earlier == [pytest.approx((0.0, 0.3))]
+    assert timeline.in_others == {0: [pytest.approx((0.0, 0.3))]}
     assert timeline.untracked == [pytest.approx((0.3, 0.4))]
+
+
+def test_spans_are_told_by_map() -> None:
+    rows = rows_of("kkrkkrkk")
+    numbers = [0, 0, 0, 1, 1, 1, 0, 0]
+    rows = [
+        replace(row, record=replace(row.record, map_index=number))
+        for row, number in zip(rows, numbers, strict=True)
+    ]
+    assert Timeline.of(rows, 1).in_others == {
+        0: [pytest.approx((0.0, 0.2)), pytest.approx((0.6, 0.8))]
+    }
+    assert list(Timeline.of(rows, 2).in_others) == [0, 1]
+    assert Timeline.of(rows, 0, {1: 0}).in_others == {}, "map 1 is part of map 0 at the end"
 
 
 def test_gaps_of_the_path() -> None:

@@ -121,6 +121,15 @@ def test_the_resting_map_is_kept_while_they_have_not_met() -> None:
     assert tracked.slam.map_snapshot(0).keyframe_ids.max() < min(
         tracked.slam.map_snapshot(1).keyframe_ids
     )
+    snapshots = tracked.slam.map_snapshots()
+    assert [one.map_index for one in snapshots] == [0, 1]
+    assert tracked.slam.map_snapshot().map_index == 1, "the active one"
+    for one, there in zip(snapshots, (old, young), strict=True):
+        assert one == tracked.slam.map_snapshot(there.map_index)
+        assert (len(one.keyframe_ids), len(one.point_ids)) == (
+            there.n_keyframes,
+            there.n_map_points,
+        )
 
 
 def test_found_again_in_a_resting_map_it_goes_on() -> None:

@@ -31,7 +31,11 @@ app = typer.Typer(
 def info(
     file: MapFile,
     picture: Annotated[
-        Path | None, typer.Option(help="PNG file for a picture of the path.", metavar="FILE")
+        Path | None,
+        typer.Option(
+            help="PNG file for a picture of the path; of several maps, unless --map names one.",
+            metavar="FILE",
+        ),
     ] = None,
     number: MapNumber = None,
     force: Force = False,
@@ -43,7 +47,8 @@ def info(
     for name, value in describe_map(saved, file):
         console.print(f"{name:20}{value}", markup=False)
     if picture is not None:
-        draw_map(picture, take_map(saved, number), title=file.name)
+        chosen = saved if number is None else take_map(saved, number)
+        draw_map(picture, chosen, title=file.name)
         console.print(f"Look at [bold]{escape(str(picture))}[/]")
 
 

@@ -11,6 +11,7 @@ from typing import Any
 from orbslam2py._version import __version__
 from orbslam2py.runs.report_page import sections
 from orbslam2py.runs.report_page.explained import compared_over, is_of_last_map_only
+from orbslam2py.runs.report_page.maps_section import maps_section
 from orbslam2py.runs.report_page.markup import Markup, element, join, section, table
 from orbslam2py.runs.report_page.path_section import path_section
 from orbslam2py.runs.report_page.round_numbers import NONE
@@ -31,11 +32,11 @@ def run_page(run: RunFolder) -> str:
         "tracking": sections.tracking_section(story),
         "times": sections.time_section(story),
         "images": sections.images_section(story),
-        "maps": sections.maps_section(story),
+        "maps": maps_section(story),
         "figures": sections.figures_section(story),
         "repeat": repeat_section(report),
     }
-    titles = {"error": "Error", "figures": "All figures", "maps": "Other maps"}
+    titles = {"error": "Error", "figures": "All figures"}
     links = [(name, titles.get(name, name.capitalize())) for name, part in parts.items() if part]
     told = f"{report.get('sensor')}, {report.get('layout')}"
     when = report.get("started")

@@ -9,16 +9,13 @@ import numpy as np
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py.runs.remedies import what_helps
-from orbslam2py.runs.report_page import above, run_plots, stages
+from orbslam2py.runs.report_page import run_plots, stages
 from orbslam2py.runs.report_page.explained import FIGURES, TERMS, compared_over
 from orbslam2py.runs.report_page.markup import Markup, element, join, section, table
 from orbslam2py.runs.report_page.path_section import frame_link
-from orbslam2py.runs.report_page.plane_view import choose_view
 from orbslam2py.runs.report_page.plot import figures
 from orbslam2py.runs.report_page.round_numbers import short
-from orbslam2py.runs.report_page.story import Story, positions_of
-from orbslam2py.runs.timeline import gaps_in_time
-from orbslam2py.trajectory import Trajectory
+from orbslam2py.runs.report_page.story import Story
 
 _MOST_EVENTS = 60
 
@@ -149,43 +146,6 @@ def _image_text(story: Story, position: int, worst: int | None) -> str:
     if np.isfinite(story.errors[position]):
         said.append(f"error {short(float(story.errors[position]))} {story.run.unit}")
     return ", ".join(said)
-
-
-def maps_section(story: Story) -> Markup | None:
-    """Paths of the maps beside the main one; None if there were none with a path."""
-    run = story.run
-    drawn = []
-    for number, path in run.others.items():
-        if len(path):
-            drawn.append(_earlier_map(story, number, path))
-    if not drawn:
-        return None
-    note = (
-        "Each map has a frame and, with one camera, a unit of its own, and no place in the "
-        "pictures of the main one. Its path is in trajectory_mapK.txt."
-    )
-    return section(
-        "maps", "Other maps", element("div", *drawn, class_="images"),
-        element("p", note, class_="note"),
-    )  # fmt: skip
-
-
-def _earlier_map(story: Story, number: int, path: Trajectory) -> Markup:
-    run = story.run
-    unit = "units" if run.is_monocular else "m"
-    view = choose_view(path.positions)
-    flat = view.flatten(path.positions)
-    window = above.Window.around(flat, np.zeros((0, 2)))
-    gaps = np.flatnonzero(gaps_in_time(path.timestamps))
-    marks = [above.path_mark(window, flat, gaps, "path s-path")]
-    marks.append(above.dots_mark(window, flat[:1], "start"))
-    first, last = positions_of(run, path)[[0, -1]].tolist()
-    caption = element(
-        "figcaption", element("b", f"Map {number}"), " ", frame_link(story, first), " to ",
-        frame_link(story, last), element("small", f"{len(path)} poses"),
-    )  # fmt: skip
-    plane = above.plane(window, marks, view, unit, name=f"map-{number}")
-    return element("figure", plane, caption, class_="plot")
 
 
 def figures_section(story: Story) -> Markup:

@@ -8,9 +8,10 @@ import time
 
 import numpy as np
 
+from orbslam2py._arguments import number_of
 from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py.maps.changes import MapChanges
-from orbslam2py.slam.events import LoopClosed
+from orbslam2py.slam.events import LoopClosed, MapsMerged
 from orbslam2py.viewer.actions import Neighbours
 from orbslam2py.viewer.controls import RunControls, SystemControls
 from orbslam2py.viewer.left_panel import overlaid, status_of, thumbnail
@@ -19,6 +20,7 @@ from orbslam2py.viewer.paths import OnlinePath, lay_truth, pieces
 from orbslam2py.viewer.plots import LastMinute
 from orbslam2py.viewer.process.messages import PathNow, Subject
 from orbslam2py.viewer.process.requests import Ask, RequestsToRun, RequestsToSystem
+from orbslam2py.viewer.resting_maps import RestingMaps
 from orbslam2py.viewer.watching import FrameView
 
 #: Seconds between two drawings of what need not be drawn with every image.
@@ -57,7 +59,7 @@ class LivePage:
         self._view: FrameView | None = None
         self._picture: ByteArray | None = None
         self._error = self._end = ""
-        self._n_dropped = 0
+        self._n_dropped = self._n_resting = 0
         self._next: dict[str, float] = {}
         self._shown_at: float | None = None
         self._stopping = threading.Event()
@@ -118,8 +120,25 @@ class LivePage:
                 self.page.draw_map()
                 self._draw_paths()
 
-    def on_event(self, event: LoopClosed) -> None:
-        """Tell that a loop was closed."""
+    def on_resting_maps(self, maps: RestingMaps) -> None:
+        """Show the maps that rest beside the active one."""
+        with self._lock:
+            self._shown_at = time.perf_counter()
+            self._n_resting = len(maps.there)
+            self.page.take_resting_maps(maps)
+            if self.page.is_watched:
+                self.page.draw_map()
+                self._show_status()
+
+    def on_event(self, event: LoopClosed | MapsMerged) -> None:
+        """Tell that a loop was closed, or that two maps are one now."""
+        if isinstance(event, MapsMerged):
+            self.page.tell(
+                "Maps merged",
+                f"Map {event.merged_map} is part of map {event.map_index} now: keyframe "
+                f"{event.current_keyframe} is where keyframe {event.matched_keyframe} was.",
+            )
+            return
         self.page.tell(
             "Loop closed",
             f"Keyframe {event.current_keyframe} is where keyframe {event.matched_keyframe} "
@@ -186,7 +205,8 @@ class LivePage:
 
     def _show_status(self) -> None:
         view, model = self._view, self.page.model
-        note = "\n".join(text for text in (self._error, self._end) if text)
+        resting = f"{number_of(self._n_resting, 'other map')} at rest" if self._n_resting else ""
+        note = "\n".join(text for text in (self._error, resting, self._end) if text)
         if view is None:
             self.page.left.show_status(None, note)
             return
@@ -227,11 +247,12 @@ class LivePage:
         self._next["paths"] += _REST * told.seconds
 
     def _in_world(self, positions: FloatArray) -> FloatArray:
-        """Positions relative to keyframe 0, in the world of the map."""
+        """Positions relative to the first keyframe of the map, in its world."""
         model = self.page.model
-        if not len(model.keyframe_ids) or model.keyframe_ids[0] != 0:
+        roots = np.flatnonzero(~np.isin(model.keyframe_ids, model.spanning_tree[:, 0]))
+        if not len(roots):
             return positions
-        T_w0 = model.keyframe_T_wc[0]
+        T_w0 = model.keyframe_T_wc[roots[0]]
         return np.asarray(positions @ T_w0[:3, :3].T + T_w0[:3, 3])
 
     def _neighbours(self, keyframe: int) -> Neighbours:

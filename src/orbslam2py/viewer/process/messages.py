@@ -33,7 +33,7 @@ class PathNow:
     timestamps: FloatArray
     """(n,) seconds."""
     positions: FloatArray
-    """(n, 3) relative to keyframe 0."""
+    """(n, 3) relative to the first keyframe of the map."""
     lost: npt.NDArray[np.bool_]
     """(n,) where the position is that of before."""
     seconds: float

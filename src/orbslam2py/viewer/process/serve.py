@@ -25,7 +25,7 @@ _NICE = 10
 #: Seconds between two looks whether the other process is still there.
 _LOOK = 1.0
 #: What must be drawn before more of it is sent.
-_PACED = frozenset({"on_frame", "on_map", "on_event"})
+_PACED = frozenset({"on_frame", "on_map", "on_resting_maps", "on_event"})
 
 
 class Parent:
@@ -152,6 +152,7 @@ def _serve(parent: Parent, page: LivePage) -> None:
         "attach": page.attach,
         "on_frame": page.on_frame,
         "on_map": page.on_map,
+        "on_resting_maps": page.on_resting_maps,
         "on_event": page.on_event,
         "close": page.close,
         "tell_end": page.tell_end,

@@ -1,0 +1,7 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Several maps in one picture: each in its colour, in a world of its own."""
+
+from orbslam2py.runs.several_maps.drawn_map import DrawnMap, maps_of_file, maps_of_run
+from orbslam2py.runs.several_maps.panels import draw_maps
+
+__all__ = ["DrawnMap", "draw_maps", "maps_of_file", "maps_of_run"]
