@@ -19,8 +19,9 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
       -march=x86-64 -mcx16 -msahf -mpopcnt -msse3 -mssse3 -msse4.1 -msse4.2)
   endif()
 else()
-  # Where fused multiply-add is part of the baseline, contraction would change results.
-  target_compile_options(orbslam_options INTERFACE -ffp-contract=off)
+  # Where fused multiply-add is part of the baseline, contraction would change results; Eigen's own
+  # uses of it go by the macro.
+  target_compile_options(orbslam_options INTERFACE -ffp-contract=off -U__ARM_FEATURE_FMA)
 endif()
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   target_compile_options(orbslam_options INTERFACE -fpch-preprocess) # lets ccache see them

@@ -98,11 +98,12 @@ void LocalMapping::process(KeyFrameId keyframe) {
 }
 
 // ---- full bundle adjustment ---------------------------------------------------------------------
-FullAdjustment::FullAdjustment(Map& map, LocalMapping& mapping, Counts& counts)
+FullAdjustment::FullAdjustment(Map& map, LocalMapping& mapping, Counts& counts, int n_threads)
     : worker("full adjustment", [this](KeyFrameId) { process(); }),
       map_(map),
       mapping_(mapping),
-      counts_(counts) {}
+      counts_(counts),
+      n_threads_(n_threads) {}
 
 void FullAdjustment::start() {
   cancel();
@@ -114,7 +115,8 @@ void FullAdjustment::process() {
   const std::atomic<bool>& cancelled = worker.cancel_flag.value();
   std::optional<Worker::OffDuty> off_duty(worker);
   GatheredBundle bundle = gather_full_bundle(map_);
-  const BundleSummary summary = solve_full_bundle(bundle, FullBundleOptions{}, &cancelled, 2);
+  const BundleSummary summary =
+      solve_full_bundle(bundle, FullBundleOptions{}, &cancelled, n_threads_);
   off_duty.reset();
   bool committed = false;
   if (!summary.aborted && !cancelled) {

@@ -52,7 +52,8 @@ class LocalMapping {
 /// The adjustment of full_adjustment.py.
 class FullAdjustment {
  public:
-  FullAdjustment(Map& map, LocalMapping& mapping, Counts& counts);
+  /// Of several threads each run gives other bytes.
+  FullAdjustment(Map& map, LocalMapping& mapping, Counts& counts, int n_threads);
 
   /// Begins one; a running one is given up.
   void start();
@@ -65,6 +66,7 @@ class FullAdjustment {
   Map& map_;
   LocalMapping& mapping_;
   Counts& counts_;
+  const int n_threads_;
 };
 
 /// The loop closer of loop_closing.py. Beside the keyframes that words propose, it may try the one

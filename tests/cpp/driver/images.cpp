@@ -37,14 +37,28 @@ FrameContext context_for(const synthetic::RenderOptions& view, const OrbExtracto
   return {std::make_shared<Camera>(camera), std::make_shared<ScalePyramid>(extractor.scales())};
 }
 
-/// Turning steadily on the spot, the camera held at arm's length. `turn` in radians.
-Pose T_wc_at(double turn) {
+/// Goes on from a hash with more bytes: FNV-1a.
+std::uint64_t hash_bytes(std::uint64_t hash, const void* bytes, std::size_t n) {
+  const auto* at = static_cast<const std::uint8_t*>(bytes);
+  for (std::size_t i = 0; i < n; ++i) hash = (hash ^ at[i]) * 0x100000001b3ULL;
+  return hash;
+}
+
+std::uint64_t hash_image(std::uint64_t hash, const cv::Mat& image) {
+  const std::size_t n = image.elemSize() * static_cast<std::size_t>(image.cols);
+  for (int row = 0; row < image.rows; ++row) hash = hash_bytes(hash, image.ptr(row), n);
+  return hash;
+}
+constexpr std::uint64_t kHashOfNothing = 0xcbf29ce484222325ULL;
+
+}  // namespace
+
+Pose ImageRing::T_wc(std::int64_t view, int frames_per_lap) {
+  const double turn = 2 * kPi * static_cast<double>(view) / frames_per_lap;
   const Eigen::Quaterniond heading(Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitY()));
   const Eigen::Vector3d arm(0, 0.1 * std::sin(3 * turn), 0.8);
   return Pose(heading, heading * arm);
 }
-
-}  // namespace
 
 ImageRing::ImageRing(int frames_per_lap, std::uint64_t seed) : extractor_(orb_options()) {
   synthetic::RenderOptions options = view_options();
@@ -54,8 +68,8 @@ ImageRing::ImageRing(int frames_per_lap, std::uint64_t seed) : extractor_(orb_op
   TrainingSet descriptors;
   for (int i = 0; i < frames_per_lap; ++i) {
     options.noise_seed = static_cast<std::uint64_t>(i);
-    const Pose T_wc = T_wc_at(2 * kPi * i / frames_per_lap);
-    const synthetic::Rendering image = synthetic::render(world, T_wc.inverse(), options);
+    const Pose T_cw = T_wc(i, frames_per_lap).inverse();
+    const synthetic::Rendering image = synthetic::render(world, T_cw, options);
     views_.push_back({image.grey, image.depth, extractor_.extract(image.grey).features});
     const Features& features = views_.back().features;
     descriptors.descriptors.insert(descriptors.descriptors.end(), features.descriptors.begin(),
@@ -86,6 +100,28 @@ std::shared_ptr<Frame> ImageRing::frame(std::int64_t view, FrameId id, double ti
 
 std::shared_ptr<Frame> ImageRing::dark_frame(FrameId id, double timestamp) {
   return build(dark_.features, dark_.depth, id, timestamp);
+}
+
+std::uint64_t ImageRing::grey_hash() const {
+  std::uint64_t hash = kHashOfNothing;
+  for (const View& view : views_) hash = hash_image(hash, view.grey);
+  return hash;
+}
+
+std::uint64_t ImageRing::depth_hash() const {
+  std::uint64_t hash = kHashOfNothing;
+  for (const View& view : views_) hash = hash_image(hash, view.depth);
+  return hash;
+}
+
+std::uint64_t ImageRing::feature_hash() const {
+  std::uint64_t hash = kHashOfNothing;
+  for (const View& view : views_) {
+    const Features& found = view.features;
+    hash = hash_bytes(hash, found.keypoints.data(), found.size() * sizeof(Keypoint));
+    hash = hash_bytes(hash, found.descriptors.data(), found.size() * sizeof(Descriptor));
+  }
+  return hash;
 }
 
 std::shared_ptr<Frame> ImageRing::build(const Features& features, const cv::Mat& depth, FrameId id,

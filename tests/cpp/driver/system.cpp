@@ -16,7 +16,7 @@ System::System(ImageRing& images, Counts& counts, Watchdog& watchdog, std::uint6
       counts_(counts),
       watchdog_(watchdog),
       mapping_(map_, index_, counts),
-      adjustment_(map_, mapping_, counts),
+      adjustment_(map_, mapping_, counts, 2),
       loop_closing_(map_, index_, mapping_, adjustment_, counts, images.size(), seed),
       tracker_(map_, index_, mapping_, counts),
       patient_(seed % 3 != 0),
