@@ -73,7 +73,15 @@ bool is_seen_from_seam(const MapPoint& point, const SeamGraph& seam) {
   });
 }
 
-MapRewrite rewrite_of(const Map& map, const SeamGraph& seam) {
+/// Up to which keyframe and point a map has been looked at; of an empty one the ids are invalid.
+struct LookedAt {
+  KeyFrameId keyframe;
+  MapPointId point;
+};
+
+/// Where all keyframes and points go that are younger than those looked at before.
+MapRewrite rewrite_of(const Map& map, const SeamGraph& seam, LookedAt& looked_at) {
+  const LookedAt before = looked_at;
   std::vector<Similarity> world;  // per vertex: from the world before to the one after
   for (std::size_t k = 0; k < seam.ids.size(); ++k) {
     world.push_back(seam.graph.S_iw[k].inverse() * seam.uncorrected[k]);
@@ -81,13 +89,18 @@ MapRewrite rewrite_of(const Map& map, const SeamGraph& seam) {
   const MapIndex which = map.map_of(seam.ids.front());
   MapRewrite rewrite;
   map.for_each_keyframe([&](const KeyFrame& keyframe) {
+    if (before.keyframe.valid() && keyframe.id <= before.keyframe) return;
+    looked_at.keyframe = keyframe.id;
     if (keyframe.map != which) return;
     const std::size_t vertex = vertex_before(seam.ids, keyframe.id);
     if (seam.in_seam[vertex] != 0 && seam.ids[vertex] == keyframe.id) return;
     const Similarity S_cw = Similarity(keyframe.T_cw) * world[vertex].inverse();
     rewrite.move_keyframe(keyframe.id, S_cw.pose(), 1 / S_cw.scale());
   });
+  if (before.keyframe.valid() && rewrite.n_keyframes() == 0) return rewrite;
   map.for_each_point([&](const MapPoint& point) {
+    if (before.point.valid() && point.id <= before.point) return;
+    looked_at.point = point.id;
     if (!map.is_in(point, which)) return;
     const std::size_t vertex = vertex_before(seam.ids, point.reference_keyframe);
     const bool stays = seam.in_seam[vertex] != 0 || is_seen_from_seam(point, seam);
@@ -108,21 +121,19 @@ bool spread_from_seam(Map& map, const KeyFramePoses& before, const std::vector<K
   const PoseGraphSummary summary = optimize_pose_graph(seam.graph, options, abort);
   if (summary.aborted || summary.iterations == 0) return false;
   MapRewrite rewrite;
-  std::uint64_t structure = 0;
+  LookedAt looked_at;
   {
     const auto lock = map.read_lock();
     if (map.epoch() != seam.epoch || map.big_change_index() != seam.big_changes) return false;
-    rewrite = rewrite_of(map, seam);
+    rewrite = rewrite_of(map, seam, looked_at);
     rewrite.prepare(map);
-    structure = map.structure_version();
   }
   const auto lock = map.write_lock();
   if (map.epoch() != seam.epoch || map.big_change_index() != seam.big_changes) return false;
-  if (map.structure_version() != structure) {  // the tracker has just inserted a keyframe
-    rewrite = rewrite_of(map, seam);
-    rewrite.prepare(map);
-  }
+  // The tracker may just have inserted keyframes, with points of their own: they move too.
+  const MapRewrite late = rewrite_of(map, seam, looked_at);
   rewrite.apply(map);
+  late.apply(map);
   map.count_big_change();
   return true;
 }
