@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= $(shell nproc)
 
-.PHONY: demo test bench lint types stubs docs format sanitize stress fuzz-maps tidy wheel test-wheel compare-wheel \
+.PHONY: demo test bench lint types stubs docs format sanitize stress fuzz-maps tidy wheel test-wheel compare-wheel test-arm \
   install clean test-cpp test-python help
 
 help:
@@ -19,6 +19,7 @@ help:
 	@echo "make wheel     build dist/*.whl, which needs nothing of the system, and check it"
 	@echo "make test-wheel  install the wheel on a bare Debian (chroot, needs root) and use it"
 	@echo "make compare-wheel  the wheel's results beside those of the package built from source"
+	@echo "make test-arm  the C++ core and its tests for arm64, run by an emulator"
 	@echo "make format    apply clang-format and ruff"
 
 # ---- environment ---------------------------------------------------------------------------------
@@ -134,6 +135,15 @@ test-wheel:
 
 compare-wheel: install
 	@$(BIN)/python scripts/wheel/compare_builds.py dist
+
+# The core for another processor: libraries are unpacked into build/arm, nothing of arm64 is installed. With
+# ARM_TESTS=all also the tests that take the emulator long.
+ARM_PACKAGES := g++-aarch64-linux-gnu qemu-user-static mmdebstrap
+ARM_TESTS ?= chosen
+test-arm: build/.system-packages
+	@dpkg-query -W $(ARM_PACKAGES) >/dev/null || { echo "apt-get install $(ARM_PACKAGES)" >&2; exit 1; }
+	@mkdir -p build/arm
+	@scripts/arm/test_arm.sh build/arm $(JOBS) $(ARM_TESTS)
 
 format: $(VENV)/.requirements
 	@$(BIN)/ruff check --fix-only src tests examples benchmarks scripts

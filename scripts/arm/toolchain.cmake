@@ -1,0 +1,21 @@
+# Debian's cross compiler for arm64 with the libraries of a folder, which fetch_libraries.sh makes. What is
+# built runs by qemu-user, also the listing of tests while it is built.
+set(ORBSLAM2PY_SYSROOT "$ENV{ORBSLAM2PY_SYSROOT}")
+if(NOT IS_DIRECTORY "${ORBSLAM2PY_SYSROOT}")
+  message(FATAL_ERROR "ORBSLAM2PY_SYSROOT names no folder: run scripts/arm/fetch_libraries.sh FOLDER")
+endif()
+set(CMAKE_SYSTEM_NAME Linux)
+set(CMAKE_SYSTEM_PROCESSOR aarch64)
+set(CMAKE_C_COMPILER aarch64-linux-gnu-gcc)
+set(CMAKE_CXX_COMPILER aarch64-linux-gnu-g++)
+set(CMAKE_SYSROOT "${ORBSLAM2PY_SYSROOT}")
+set(CMAKE_LIBRARY_ARCHITECTURE aarch64-linux-gnu)
+find_program(ORBSLAM2PY_EMULATOR NAMES qemu-aarch64 qemu-aarch64-static REQUIRED)
+set(CMAKE_CROSSCOMPILING_EMULATOR "${ORBSLAM2PY_EMULATOR};-L;${ORBSLAM2PY_SYSROOT}")
+set(CMAKE_FIND_ROOT_PATH "${ORBSLAM2PY_SYSROOT}")
+set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
+set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY ONLY)
+set(CMAKE_FIND_ROOT_PATH_MODE_INCLUDE ONLY)
+set(CMAKE_FIND_ROOT_PATH_MODE_PACKAGE ONLY)
+# Debian's list of OpenCV's modules wants all of them to be there; two are.
+set(OpenCV_DIR "${CMAKE_CURRENT_LIST_DIR}" CACHE PATH "OpenCV's core and imgproc in the folder")
