@@ -39,7 +39,6 @@ from .slam.events import Relocalized as Relocalized
 from .slam.events import TrackingLost as TrackingLost
 from .slam.full_bundle_adjustment import FullAdjustmentRecord as FullAdjustmentRecord
 from .slam.full_bundle_adjustment import optimize_map as optimize_map
-from .slam.merging.saved_map_merging import merge_maps as merge_maps
 from .slam.records import Evidence as Evidence
 from .slam.records import FrameFeatures as FrameFeatures
 from .slam.records import MapSummary as MapSummary
@@ -48,6 +47,7 @@ from .slam.records import Reason as Reason
 from .slam.records import TrackingRecord as TrackingRecord
 from .slam.records import TrackingState as TrackingState
 from .slam.records import Verdict as Verdict
+from .slam.saved_map_merging import merge_maps as merge_maps
 from .slam.system import System as System
 from .trajectory import Trajectory as Trajectory
 from .viewer import Publisher as Publisher

@@ -18,15 +18,16 @@ from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._timing import StageTimer
 from orbslam2py.slam.evidence.belief import Belief
-from orbslam2py.slam.first_estimate import (
-    FirstEstimate,
-    FirstEstimateInFixedMap,
-    FirstEstimateInGrowingMap,
-)
 from orbslam2py.slam.initialization import Initializer
 from orbslam2py.slam.keyframe_decision import KeyframeClock, KeyframeDecision
 from orbslam2py.slam.local_mapping import LocalMapping
-from orbslam2py.slam.pose_search import MotionModel, PoseSearch
+from orbslam2py.slam.pose_search import (
+    FirstEstimate,
+    FirstEstimateInFixedMap,
+    FirstEstimateInGrowingMap,
+    MotionModel,
+    PoseSearch,
+)
 from orbslam2py.slam.records import PoseEstimate, Reason, TrackingOutcome, TrackingState
 from orbslam2py.slam.relocalization import BlurWatch, Confirmation, LossClock
 from orbslam2py.slam.watched_frame import accepted_keypoints

@@ -14,7 +14,7 @@ from orbslam2py import _core as core
 from orbslam2py.maps import SavedMap, load_map, save_map, verify_map_file
 from orbslam2py.maps.edits.parts import map_numbers, put_together, take_map
 from orbslam2py.maps.map_copies import restore_contents
-from orbslam2py.slam.merging.saved_map_merging import merge_maps
+from orbslam2py.slam.saved_map_merging import merge_maps
 from support.command_line import CommandLine
 from support.cut_sequences import corridor, cut, settings_of, track
 

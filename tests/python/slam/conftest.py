@@ -9,8 +9,9 @@ import pytest
 
 from orbslam2py import Sensor, System
 from orbslam2py._worker import Worker
-from orbslam2py.slam import keyframe_decision, localization_mode, pose_search, tracking
+from orbslam2py.slam import keyframe_decision, tracking
 from orbslam2py.slam.evidence import harder_search, judgement
+from orbslam2py.slam.pose_search import first_estimate, motion_model, search
 from orbslam2py.slam.relocalization import blur
 from support.interleaving import LIMIT, Stage
 from support.small_sequences import new_system, play
@@ -49,7 +50,7 @@ def core(monkeypatch: pytest.MonkeyPatch) -> FakeCore:
     """Stands in for the verbs that tracking calls."""
     core = FakeCore()
     for module in (
-        *(tracking, pose_search, localization_mode, keyframe_decision),
+        *(tracking, first_estimate, motion_model, search, keyframe_decision),
         *(harder_search, judgement, blur),
     ):
         monkeypatch.setattr(module, "core", core)

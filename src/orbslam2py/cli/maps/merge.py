@@ -18,7 +18,7 @@ from orbslam2py.maps import SavedMap, load_map, save_map
 from orbslam2py.maps.edits.parts import map_numbers
 from orbslam2py.maps.units import unit_of
 from orbslam2py.slam.events import MapsMerged
-from orbslam2py.slam.merging.saved_map_merging import merge_maps
+from orbslam2py.slam.saved_map_merging import merge_maps
 
 
 def merge(

@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from orbslam2py import _core as core
-from orbslam2py.slam.pose_search import PoseSearch
+from orbslam2py.slam.pose_search.search import PoseSearch
 from orbslam2py.slam.records import PoseEstimate, Reason
 
 

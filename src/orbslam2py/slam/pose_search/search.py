@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The ways to a frame's pose: each takes a frame and returns one estimate.
 
-The motion model knows where the camera should be, from the last frame and its speed.
-
 Mur-Artal, Montiel and Tardos, 2015, sections V-B to V-D; ``docs/method/tracking.md``.
 """
 
@@ -10,11 +8,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from orbslam2py import _core as core
-from orbslam2py._arrays import FloatArray, IntArray
+from orbslam2py._arrays import IntArray
 from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.pose_search.motion_model import MotionModel
 from orbslam2py.slam.records import PoseEstimate, PoseMethod, Reason
 from orbslam2py.slam.relocalization import PlaceOfLoss, Relocalizer
 from orbslam2py.slam.thresholds import TrackingThresholds
@@ -32,100 +29,6 @@ class RefinedPose:
     """Ids of the points in view that the first estimate did not hold."""
     n_predicted: int
     """Points that should be in view."""
-
-
-class MotionModel:
-    """The last frame that had a pose, and the motion since the one before it.
-
-    Attributes
-    ----------
-    velocity : Pose or None
-        Motion from the last frame to the next, ``T_cl``; None where none is known.
-    last_points : PointBatch
-        Copies of the points that the last frame saw, as of the last `follow_map`.
-    """
-
-    def __init__(self) -> None:
-        self.velocity: core.Pose | None = None
-        self.last_points = core.PointBatch()
-        self._last: core.TrackedFrame | None = None
-        self._last_tracked = False
-
-    @property
-    def has_last(self) -> bool:
-        """Whether any frame had a pose."""
-        return self._last is not None
-
-    @property
-    def last(self) -> core.TrackedFrame:
-        """The last frame that had a pose; stays where tracking was lost."""
-        assert self._last is not None
-        return self._last
-
-    def follow_map(self, slam_map: core.Map) -> None:
-        """Bring the last frame up to date with the map, which mapping and loop closing move."""
-        self.last_points, stretched = core.follow_map(slam_map, self.last)
-        if self.velocity is not None and stretched != 1.0:
-            # A single camera's loop took out a drift of scale, in which the speed was measured.
-            self.velocity = core.Pose(
-                self.velocity.quaternion_xyzw, stretched * self.velocity.translation
-            )
-
-    def predict(self, frame: core.TrackedFrame) -> None:
-        """Give a frame the pose that the speed leads to, or the last frame's without a speed."""
-        T_lw = self.last.T_cw
-        assert T_lw is not None
-        frame.T_cw = T_lw if self.velocity is None else self.velocity @ T_lw
-        frame.share_anchor(self.last)
-
-    def predict_turned(self, frame: core.TrackedFrame, quaternion_xyzw: FloatArray) -> None:
-        """Give a frame the pose on the way that the speed leads to, but turned as given.
-
-        Parameters
-        ----------
-        frame : orbslam2py._core.TrackedFrame
-            The frame.
-        quaternion_xyzw : array of float64, (4,)
-            Rotation of the last camera's directions into the frame's.
-        """
-        T_lw = self.last.T_cw
-        assert T_lw is not None
-        # Where the camera's centre goes, in the last camera's frame.
-        way = np.zeros(3) if self.velocity is None else self.velocity.center
-        turn = core.Pose(quaternion_xyzw, np.zeros(3))
-        frame.T_cw = core.Pose(quaternion_xyzw, -(turn @ way)) @ T_lw
-        frame.share_anchor(self.last)
-
-    def stand_still(self, frame: core.TrackedFrame) -> None:
-        """Give a frame the last frame's pose."""
-        frame.T_cw = self.last.T_cw
-        frame.share_anchor(self.last)
-
-    def jump(self, T_lw: core.Pose | None) -> None:
-        """The last frame was elsewhere than it seemed; None: nobody knows where."""
-        if T_lw is None:
-            self._last_tracked = False
-        else:
-            self.last.T_cw = T_lw
-
-    def remember(self, frame: core.TrackedFrame) -> None:
-        """Make a tracked frame the last one."""
-        self._last = frame
-        self._last_tracked = True
-
-    def update_velocity(self, frame: core.TrackedFrame) -> None:
-        """Measure the motion from the last frame to this one, if they follow each other."""
-        last = self._last
-        self.velocity = None
-        if last is None or last.T_cw is None or frame.T_cw is None or not self._last_tracked:
-            return
-        if frame.id == last.id + 1 and frame.big_change == last.big_change:
-            self.velocity = frame.T_cw @ last.T_cw.inverse()
-
-    def lose(self) -> None:
-        """Tracking was lost: the speed is unknown."""
-        self.velocity = None
-        self._last_tracked = False
 
 
 class PoseSearch:
