@@ -102,6 +102,8 @@ def open_workers(
             "distributed.scheduler.allowed-failures": _MOST_DEATHS,
             "distributed.nanny.pre-spawn-environ": limits,
             "distributed.worker.profile.enabled": False,  # it looks at all threads every 10 ms
+            # Nobody sees its samples, two a second of which an hour would be kept.
+            "distributed.admin.system-monitor.log-length": 60,
         }
     ):
         cluster = distributed.LocalCluster(
