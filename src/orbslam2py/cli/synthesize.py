@@ -234,15 +234,10 @@ def parse_exposure(text: str) -> float | tuple[float, float]:
     SettingsError
         If the text is anything else.
     """
-    try:
-        factors = [float(part) for part in text.split(":")]
-    except ValueError:
-        factors = []
-    if len(factors) == 1:
-        return factors[0]
-    if len(factors) == 2:
-        return factors[0], factors[1]
-    raise SettingsError(f"--exposure is '{text}'; give a factor like 0.8, or two like 0.4:1.5")
+    factors = _one_or_two(text)
+    if factors is None:
+        raise SettingsError(f"--exposure is '{text}'; give a factor like 0.8, or two like 0.4:1.5")
+    return factors
 
 
 def parse_cover(text: str) -> float | tuple[float, float]:
@@ -253,17 +248,23 @@ def parse_cover(text: str) -> float | tuple[float, float]:
     SettingsError
         If the text is anything else.
     """
+    seconds = _one_or_two(text)
+    if seconds is None:
+        raise SettingsError(
+            f"--cover is '{text}'; give seconds like 1.5, or when and how long like 10:3"
+        )
+    return seconds
+
+
+def _one_or_two(text: str) -> float | tuple[float, float] | None:
+    """A number, or two with a colon between them; None for anything else."""
     try:
         numbers = [float(part) for part in text.split(":")]
     except ValueError:
-        numbers = []
-    if len(numbers) == 1:
-        return numbers[0]
+        return None
     if len(numbers) == 2:
         return numbers[0], numbers[1]
-    raise SettingsError(
-        f"--cover is '{text}'; give seconds like 1.5, or when and how long like 10:3"
-    )
+    return numbers[0] if len(numbers) == 1 else None
 
 
 def parse_order(text: str) -> tuple[int, ...]:
