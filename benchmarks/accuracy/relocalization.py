@@ -43,6 +43,8 @@ from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence, SyntheticW
 
 #: Both views had enough matches, and a reconstruction was tried.
 ATTEMPTED = {Reason.LOW_PARALLAX, Reason.AMBIGUOUS_MOTION, Reason.DEGENERATE_VIEWS}
+#: Metres: whoever is found farther away was found at another place that looks alike.
+WRONG = 1.0
 
 
 def sequence_of(arguments: argparse.Namespace, sensor: str, **options: object) -> SyntheticSequence:
@@ -158,8 +160,10 @@ def recall(arguments: argparse.Namespace, sensor: str) -> None:
         if record.state is TrackingState.OK:
             found += 1
             errors.append(world.error(record, T_wc))
+    n_wrong = sum(not e.is_within(WRONG, 180.0) for e in errors)
     print(
-        f"  found {found} of {arguments.count} ({found / arguments.count:.1%}); attempt "
+        f"  found {found} of {arguments.count} ({found / arguments.count:.1%}), {n_wrong} of them "
+        f"more than {WRONG:g} m away; attempt "
         f"{np.median(times):.1f} ms (median), {np.percentile(times, 99):.1f} ms (p99)"
     )
     print(f"  {summary(errors)}", flush=True)
@@ -296,7 +300,7 @@ def _relocalization_speed(arguments: argparse.Namespace, sensor: str) -> None:
         core.find_relocalization_candidates = lambda *_: chosen
         for name, enough in limits.items():
             thresholds = RelocalizationThresholds(enough=enough, word_candidates=n_candidates)
-            relocalizer = Relocalizer(slam_map, index, 0, thresholds)
+            relocalizer = Relocalizer(slam_map, index, 0, fix_scale=False, thresholds=thresholds)
             candidates = relocalizer._candidates(core.TrackedFrame(frame))
             times_of(
                 f"relocalization, {n_candidates} keyframes, {len(candidates)} of them with enough "

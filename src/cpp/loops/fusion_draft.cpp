@@ -165,10 +165,11 @@ std::vector<SharedPoints> FusionDraft::shared_points() const {
   return shared;
 }
 
-int carry_out(const std::vector<LoopCorrection::Fusion>& fusions, Map& map,
-              std::vector<MapPointId>& added) {
+int carry_out(const std::vector<LoopCorrection::Fusion>& fusions, std::size_t first,
+              std::size_t last, Map& map, std::vector<MapPointId>& added) {
   int n_fused = 0;
-  for (const LoopCorrection::Fusion& fusion : fusions) {
+  for (std::size_t i = first; i < last; ++i) {
+    const LoopCorrection::Fusion& fusion = fusions[i];
     const MapPointId survivor = map.resolve(fusion.point);
     const MapPoint* point = map.find(survivor);
     if (!point) continue;

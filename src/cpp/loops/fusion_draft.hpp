@@ -81,10 +81,10 @@ class FusionDraft {
   std::vector<LoopCorrection::Fusion> fusions_;
 };
 
-/// Carries out fusions that were drafted before; what has died meanwhile is left out. Returns the
-/// number of changes. Points that gained an observation are appended to `added`. The caller holds
-/// the write lock.
-int carry_out(const std::vector<LoopCorrection::Fusion>& fusions, Map& map,
-              std::vector<MapPointId>& added);
+/// Carries out the fusions [first, last) of those that were drafted before; what has died meanwhile
+/// is left out. Returns the number of changes. Points that gained an observation are appended to
+/// `added`. The caller holds the write lock.
+int carry_out(const std::vector<LoopCorrection::Fusion>& fusions, std::size_t first,
+              std::size_t last, Map& map, std::vector<MapPointId>& added);
 
 }  // namespace orbslam

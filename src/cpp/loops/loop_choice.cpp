@@ -34,6 +34,13 @@ double angle_between(const Pose& a, const Pose& b) {
   return 2 * std::atan2(turn.vec().norm(), std::abs(turn.w()));
 }
 
+/// 0 for a dead keyframe.
+double scene_depth_around(const Map& map, KeyFrameId id) {
+  const auto lock = map.read_lock();
+  const KeyFrame* keyframe = map.find(id);
+  return keyframe ? std::max(0.0, median_scene_depth(map, *keyframe).value_or(0)) : 0.0;
+}
+
 struct Limits {
   double translation = 0, rotation = 0, log_scale = 0;
 };
@@ -98,27 +105,33 @@ LoopDrift assess(const Surroundings& around, const Loop& loop, const KeyFrameWay
   return drift;
 }
 
-/// Where two loops put the keyframe, one against the other.
+/// Where two measurements put one camera, one against the other.
 struct Difference {
-  double translation = 0, rotation = 0;
+  Difference(const Pose& a, const Pose& b)
+      : translation((a.center() - b.center()).norm()), rotation(angle_between(a, b)) {}
+
+  double translation, rotation;
 
   bool within(const Limits& limits) const {
     return translation <= limits.translation && rotation <= limits.rotation;
   }
 };
 
+/// Most measurements agree closely; only for the others it matters how far apart their far ends
+/// are.
+KeyFrameWay nowhere() {
+  KeyFrameWay way;
+  way.length = 0;
+  return way;
+}
+
 bool contradict(const Loop& a, const Loop& b, const Surroundings& around, bool fix_scale) {
-  const Pose place_a = a.S_cw.pose(), place_b = b.S_cw.pose();
-  const Difference difference{(place_a.center() - place_b.center()).norm(),
-                              angle_between(place_a, place_b)};
+  const Difference difference(a.S_cw.pose(), b.S_cw.pose());
   const double log_scale = std::log(a.S_cm.scale() / b.S_cm.scale());
   const auto limits = [&](const KeyFrameWay& way) {
     return limits_of(way, around.scene_depth, log_scale, fix_scale, kTwoMeasurements);
   };
-  // Most agree closely; only for the others it matters how far apart their far ends are.
-  KeyFrameWay nowhere;
-  nowhere.length = 0;
-  if (difference.within(limits(nowhere))) return false;
+  if (difference.within(limits(nowhere()))) return false;
   return !difference.within(limits(around.ways(a.matched, {b.matched}).front()));
 }
 
@@ -181,6 +194,18 @@ std::optional<Loop> choose_merge(const Map& map, const std::vector<Loop>& loops,
     }
   }
   return *std::min_element(loops.begin(), loops.end(), stronger);
+}
+
+bool may_be_one_place(const Map& map, KeyFrameId a, const Pose& T_aw, KeyFrameId b,
+                      const Pose& T_bw, bool fix_scale) {
+  const Difference difference(T_aw, T_bw);
+  const auto explained = [&](const KeyFrameWay& way, double scene_depth) {
+    return difference.within(limits_of(way, scene_depth, 0, fix_scale, kTwoMeasurements));
+  };
+  // The graph of a large map is not copied for poses that agree.
+  if (explained(nowhere(), scene_depth_around(map, a))) return true;
+  const Surroundings around(map, a);
+  return explained(around.ways(a, {b}).front(), around.scene_depth);
 }
 
 }  // namespace orbslam

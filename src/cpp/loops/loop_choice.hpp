@@ -59,4 +59,11 @@ std::optional<Loop> choose_loop(const Map& map, const std::vector<Loop>& loops, 
 /// while it copies. See docs/method/several_maps.md#choice.
 std::optional<Loop> choose_merge(const Map& map, const std::vector<Loop>& loops, bool fix_scale);
 
+/// Whether a camera that was found at two keyframes of a map, with poses T_aw and T_bw, may be at
+/// one place: drift between the keyframes and the error of both poses explain how far they are
+/// apart. Lengths are those around `a`. Takes the read lock while it copies. See
+/// docs/method/relocalization.md#another-place-that-fits.
+bool may_be_one_place(const Map& map, KeyFrameId a, const Pose& T_aw, KeyFrameId b,
+                      const Pose& T_bw, bool fix_scale);
+
 }  // namespace orbslam

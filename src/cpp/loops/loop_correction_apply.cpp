@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The changes that a correction makes to the map.
 #include <algorithm>
-#include <optional>
 
 #include "loops/essential_graph.hpp"
 #include "loops/loop_correction.hpp"
@@ -20,6 +19,7 @@ bool is_applicable(const Map& map, const LoopCorrection& correction) {
 
 PreparedCorrection::PreparedCorrection(const Map& map, const LoopCorrection& correction)
     : correction_(correction) {
+  auto lock = map.read_lock();
   if (!is_applicable(map, correction)) return;
   world_.reserve(correction.keyframes.size());
   for (std::size_t k = 0; k < correction.keyframes.size(); ++k) {
@@ -37,6 +37,7 @@ PreparedCorrection::PreparedCorrection(const Map& map, const LoopCorrection& cor
     move_point(point, was_planned ? world_[planned->second] : world_at(point.reference_keyframe),
                rewrite_);
   });
+  lock.unlock();
   rewrite_.prepare(map);
 }
 
@@ -77,7 +78,7 @@ LoopCorrectionResult PreparedCorrection::commit(Map& map) const {
   const ScaledPose before = map.scaled_pose(current);
   const MapRewrite late = newcomers(map);
   std::vector<MapPointId> added;
-  result.n_fused = carry_out(correction_.fusions, map, added);
+  result.n_fused = carry_out(correction_.fusions, 0, correction_.fusions.size(), map, added);
   rewrite_.apply(map);
   late.apply(map);
   std::sort(added.begin(), added.end());
@@ -98,13 +99,9 @@ LoopCorrectionResult PreparedCorrection::commit(Map& map) const {
 }
 
 LoopCorrectionResult apply_loop_correction(Map& map, const LoopCorrection& correction) {
-  std::optional<PreparedCorrection> prepared;
-  {
-    const auto lock = map.read_lock();
-    prepared.emplace(map, correction);
-  }
+  const PreparedCorrection prepared(map, correction);
   const auto lock = map.write_lock();
-  return prepared->commit(map);
+  return prepared.commit(map);
 }
 
 }  // namespace orbslam

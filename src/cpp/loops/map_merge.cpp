@@ -22,8 +22,9 @@ bool can_be_joined(const Map& map, const MapMerge& merge) {
 /// the write section.
 class MovedMap {
  public:
-  /// The caller holds a lock.
+  /// Takes the read lock, for a short while at a time.
   MovedMap(const Map& map, const MapMerge& merge) : merge_(merge) {
+    auto lock = map.read_lock();
     if (!can_be_joined(map, merge)) return;
     map.for_each_keyframe([&](const KeyFrame& keyframe) {
       if (keyframe.map == merge_.moved) move(keyframe, rewrite_);
@@ -33,6 +34,7 @@ class MovedMap {
       if (map.is_in(point, merge_.moved)) move(point, rewrite_);
       last_point_ = point.id;
     });
+    lock.unlock();
     rewrite_.prepare(map);
   }
 
@@ -75,6 +77,42 @@ void join(Map& map, const MapMerge& merge) {
   map.join_maps(current_moves ? current : matched, current_moves ? matched : current);
 }
 
+/// Calls visit(first, last) for short runs of `count` elements, each in a write section of its own:
+/// who reads the map meanwhile waits for one of them at most. Ends early when the map was cleared.
+template <typename Visit>
+void in_short_sections(Map& map, std::uint64_t epoch, std::size_t count, std::size_t length,
+                       Visit&& visit) {
+  for (std::size_t first = 0; first < count; first += length) {
+    const auto lock = map.write_lock();
+    if (map.epoch() != epoch) return;
+    visit(first, std::min(first + length, count));
+  }
+}
+
+/// What both sides share becomes one, and is known to both. The number of fused points.
+int fuse_seam(Map& map, const MapMerge& merge) {
+  constexpr std::size_t kPoints = 256, kKeyframes = 4;
+  int n_fused = 0;
+  std::vector<MapPointId> added;
+  in_short_sections(map, merge.epoch, merge.fusions.size(), kPoints,
+                    [&](std::size_t first, std::size_t last) {
+                      n_fused += carry_out(merge.fusions, first, last, map, added);
+                    });
+  std::sort(added.begin(), added.end());
+  added.erase(std::unique(added.begin(), added.end()), added.end());
+  in_short_sections(map, merge.epoch, added.size(), kPoints,
+                    [&](std::size_t first, std::size_t last) {
+                      for (std::size_t i = first; i < last; ++i) map.update_point(added[i]);
+                    });
+  in_short_sections(map, merge.epoch, merge.group.size(), kKeyframes,
+                    [&](std::size_t first, std::size_t last) {
+                      for (std::size_t i = first; i < last; ++i) {
+                        if (map.find(merge.group[i])) map.update_connections(merge.group[i]);
+                      }
+                    });
+  return n_fused;
+}
+
 }  // namespace
 
 MapMerge plan_map_merge(const Map& map, const Loop& loop, bool fix_scale) {
@@ -95,25 +133,16 @@ MapMerge plan_map_merge(const Map& map, const Loop& loop, bool fix_scale) {
 
 MapMergeResult apply_map_merge(Map& map, const MapMerge& merge) {
   MapMergeResult result;
-  std::optional<MovedMap> moved;
+  const MovedMap moved(map, merge);
   {
-    const auto lock = map.read_lock();
-    moved.emplace(map, merge);
+    const auto lock = map.write_lock();
+    if (!can_be_joined(map, merge)) return result;
+    moved.apply(map, result);
+    join(map, merge);
+    map.add_loop_edge(merge.loop.matched, merge.loop.current);
+    map.count_big_change();
   }
-  const auto lock = map.write_lock();
-  if (!can_be_joined(map, merge)) return result;
-  moved->apply(map, result);
-  join(map, merge);
-  std::vector<MapPointId> added;
-  result.n_fused = carry_out(merge.fusions, map, added);
-  std::sort(added.begin(), added.end());
-  added.erase(std::unique(added.begin(), added.end()), added.end());
-  for (const MapPointId id : added) map.update_point(id);
-  for (const KeyFrameId id : merge.group) {
-    if (map.find(id)) map.update_connections(id);
-  }
-  map.add_loop_edge(merge.loop.matched, merge.loop.current);
-  map.count_big_change();
+  result.n_fused = fuse_seam(map, merge);
   result.applied = true;
   result.kept = merge.kept;
   result.moved = merge.moved;

@@ -36,9 +36,9 @@ struct MapMergeResult {
   double scale = 1;  ///< by which lengths of the moved map were multiplied
 };
 
-/// Moves one map into the other's world, makes them one map and one spanning tree, fuses points,
-/// brings connections up to date and adds the loop edge, in one write section, which counts as a
-/// big change. Prepared under the read lock.
+/// Moves one map into the other's world and makes them one map and one spanning tree with a loop
+/// edge, in one write section, which counts as a big change; prepared under the read lock. Then
+/// fuses points and brings connections up to date, in many short ones.
 MapMergeResult apply_map_merge(Map& map, const MapMerge& merge);
 
 /// The keyframes around the seam of two maps that have just become one: `current` and its

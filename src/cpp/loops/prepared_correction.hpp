@@ -13,7 +13,7 @@ namespace orbslam {
 /// docs/method/loops.md#correction.
 class PreparedCorrection {
  public:
-  /// The caller holds a lock.
+  /// Takes the read lock, for a short while at a time.
   PreparedCorrection(const Map& map, const LoopCorrection& correction);
   /// The caller holds the write lock. Keyframes may have been added since the preparation, with
   /// points of their own: they follow too.

@@ -126,8 +126,8 @@ bool spread_from_seam(Map& map, const KeyFramePoses& before, const std::vector<K
     const auto lock = map.read_lock();
     if (map.epoch() != seam.epoch || map.big_change_index() != seam.big_changes) return false;
     rewrite = rewrite_of(map, seam, looked_at);
-    rewrite.prepare(map);
   }
+  rewrite.prepare(map);
   const auto lock = map.write_lock();
   if (map.epoch() != seam.epoch || map.big_change_index() != seam.big_changes) return false;
   // The tracker may just have inserted keyframes, with points of their own: they move too.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "map/map_rewrite.hpp"
 
+#include <algorithm>
+
 namespace orbslam {
 
 void MapRewrite::move_keyframe(KeyFrameId id, const Pose& T_cw, double rescaled) {
@@ -21,23 +23,46 @@ const Pose* MapRewrite::T_cw(KeyFrameId id) const {
   return slot == slot_of_.end() ? nullptr : &keyframes_[slot->second].T_cw;
 }
 
-void MapRewrite::prepare(const Map& map) {
-  std::unordered_map<KeyFrameId, Eigen::Vector3d> center_of;
+MapRewrite::Centers MapRewrite::centers_of(const Map& map) const {
+  Centers center_of;
   map.for_each_keyframe([&](const KeyFrame& keyframe) {
     const Pose* moved = T_cw(keyframe.id);
     center_of.emplace(keyframe.id, moved ? moved->center() : keyframe.center());
   });
-  std::vector<Eigen::Vector3d> centers;
-  for (MovedPoint& moved : points_) {
-    const MapPoint* point = map.find(moved.id);
-    moved.n_observations = point ? point->observations.size() : 0;
-    if (!point) continue;
-    centers.clear();
-    for (const Observation& observation : point->observations) {
-      centers.push_back(center_of.at(observation.keyframe));
-    }
-    moved.geometry = map.geometry_at(*point, moved.geometry.position, centers);
+  return center_of;
+}
+
+void MapRewrite::prepare_point(const Map& map, const Centers& center_of, MovedPoint& moved) {
+  moved.n_observations = 0;
+  const MapPoint* point = map.find(moved.id);
+  if (!point) return;
+  centers_.clear();
+  for (const Observation& observation : point->observations) {
+    const auto center = center_of.find(observation.keyframe);
+    if (center == center_of.end()) return;  // a keyframe that came meanwhile
+    centers_.push_back(center->second);
   }
+  moved.n_observations = point->observations.size();
+  moved.geometry = map.geometry_at(*point, moved.geometry.position, centers_);
+}
+
+void MapRewrite::prepare(const Map& map) {
+  constexpr std::size_t kSlice = 1024;
+  Centers center_of;
+  {
+    const auto lock = map.read_lock();
+    center_of = centers_of(map);
+  }
+  for (std::size_t begin = 0; begin < points_.size(); begin += kSlice) {
+    const std::size_t end = std::min(begin + kSlice, points_.size());
+    const auto lock = map.read_lock();
+    for (std::size_t i = begin; i < end; ++i) prepare_point(map, center_of, points_[i]);
+  }
+}
+
+void MapRewrite::prepare_locked(const Map& map) {
+  const Centers center_of = centers_of(map);
+  for (MovedPoint& moved : points_) prepare_point(map, center_of, moved);
 }
 
 void MapRewrite::apply(Map& map) const {

@@ -18,9 +18,12 @@ class MapRewrite {
   void move_keyframe(KeyFrameId id, const Pose& T_cw, double rescaled = 1);
   void move_point(MapPointId id, const Eigen::Vector3d& position);
 
-  /// Works out the points' geometry from the new poses, old ones where there is no new one. The
-  /// caller holds a lock.
+  /// Works out the points' geometry from the new poses, old ones where there is no new one. Takes
+  /// the read lock again and again for a short while: tracking notes something in the map at every
+  /// frame and would wait for the whole of a large one.
   void prepare(const Map& map);
+  /// The same in one go. The caller holds a lock.
+  void prepare_locked(const Map& map);
   /// Writes what still lives. Points whose observations have changed since prepare(), or that were
   /// not prepared, are worked out now. The caller holds the write lock.
   void apply(Map& map) const;
@@ -41,9 +44,15 @@ class MapRewrite {
     PointGeometry geometry;
     std::size_t n_observations = 0;  // when it was prepared; 0: it was not
   };
+  using Centers = std::unordered_map<KeyFrameId, Eigen::Vector3d>;
+
+  Centers centers_of(const Map& map) const;
+  void prepare_point(const Map& map, const Centers& center_of, MovedPoint& moved);
+
   std::vector<MovedKeyFrame> keyframes_;
   std::vector<MovedPoint> points_;
   std::unordered_map<KeyFrameId, std::size_t> slot_of_;  // for look-ups only
+  std::vector<Eigen::Vector3d> centers_;                 // of one point at a time
 };
 
 }  // namespace orbslam

@@ -91,14 +91,13 @@ void move_points(const Map& map, const GatheredBundle& bundle, Preparation& prep
   });
 }
 
-/// The caller holds a lock.
+/// Where everything goes, without what follows from it. The caller holds a lock.
 Preparation prepare(const Map& map, const GatheredBundle& bundle) {
   Preparation prepared;
   prepared.structure_version = map.structure_version();
   prepared.geometry_version = map.geometry_version();
   KeyFrameMover(map, bundle, prepared).run();
   move_points(map, bundle, prepared);
-  prepared.rewrite.prepare(map);
   return prepared;
 }
 
@@ -117,11 +116,13 @@ FullBundleCommit commit_full_bundle(Map& map, const GatheredBundle& bundle) {
       if (is_outdated(bundle, map)) return {};
       prepared = prepare(map, bundle);
     }
+    prepared.rewrite.prepare(map);
     const auto lock = map.write_lock();
     if (is_outdated(bundle, map)) return {};
     if (!prepared.fits(map)) {
       if (i < kPreparations) continue;
       prepared = prepare(map, bundle);
+      prepared.rewrite.prepare_locked(map);
     }
     prepared.rewrite.apply(map);
     map.count_big_change();

@@ -326,7 +326,9 @@ def _make_tracking(setup: Setup, back_end: BackEnd, options: SystemOptions) -> T
     else:
         n_features = setup.settings.orb.n_features
         initializer = DepthInitializer(slam_map, vocabulary, mapping, n_features)
-    searching = search(Relocalizer(slam_map, back_end.keyframe_index, seed))
+    searching = search(
+        Relocalizer(slam_map, back_end.keyframe_index, seed, fix_scale=sensor.has_depth)
+    )
     return Tracking(
         slam_map,
         vocabulary,

@@ -36,6 +36,7 @@ class Reason(str, enum.Enum):
     NO_THIRD_VIEW = "no third view agrees with the two that were chosen"
     INITIAL_MAP_FAILED = "the first map was too small or had no depth"
     NOT_FOUND_IN_MAP = "not found in the map"
+    SEVERAL_PLACES = "looks like several places of the map"
     BLURRED = "blurred image, not searched"
     NOT_CONFIRMED = "found again, but not confirmed by the next image"
     SEARCHING_LOADED_MAP = "searching the loaded map"

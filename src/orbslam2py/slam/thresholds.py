@@ -232,6 +232,12 @@ class RelocalizationThresholds:
     """... and the last ones made."""
     verified_poses: int = 20
     """Poses of RANSAC that are optimised and widened for one frame."""
+    rival_share: float = 0.6
+    """A frame that fits elsewhere as well is believed if no other place shows more than this share
+    of the points ..."""
+    support_window: float = 5.0
+    """... of the local map that it shows at the best one, searched in this multiple of the usual
+    radius: as right after relocalization."""
     common_points: int = 15
     """The frame after one found again confirms it with so many points that both see ..."""
     confirming_cosine: float = 0.87

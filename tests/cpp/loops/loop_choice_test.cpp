@@ -219,5 +219,45 @@ TEST_F(Choice, DeadKeyframesLeaveNothing) {
   EXPECT_FALSE(choose({given}));
 }
 
+TEST(MayBeOnePlace, WhatTheErrorOfTwoPosesExplainsIs) {
+  Lap lap;
+  lap.add({0, 0, 0}, 0);
+  lap.walk(20, 0.5);
+  const auto one_place = [&](int a, int b, double moved, double turned) {
+    const Pose T_aw = lap.poses[static_cast<std::size_t>(a)];
+    const Pose there = standing_at(T_aw.center() + Eigen::Vector3d(moved, 0, 0), turned);
+    return may_be_one_place(lap.map, kf(a), T_aw, kf(b), there, true);
+  };
+  // Two measurements may be off by 1.5 * 0.1 * 3 m and 1.5 * 0.1 rad.
+  EXPECT_TRUE(one_place(10, 10, 0.45 - kEps, 0));
+  EXPECT_FALSE(one_place(10, 10, 0.45 + kEps, 0));
+  EXPECT_TRUE(one_place(10, 10, 0, 0.15 - kEps));
+  EXPECT_FALSE(one_place(10, 10, 0, 0.15 + kEps));
+  // 4 % of the 10 m between their keyframes on top, and 0.01 rad per 3 m.
+  EXPECT_TRUE(one_place(20, 0, 0.85 - kEps, 0));
+  EXPECT_FALSE(one_place(20, 0, 0.85 + kEps, 0));
+  EXPECT_TRUE(one_place(20, 0, 0, 0.15 + 0.1 / 3 - kEps));
+  EXPECT_FALSE(one_place(20, 0, 0, 0.15 + 0.1 / 3 + kEps));
+}
+
+TEST(MayBeOnePlace, ScaleDriftsWithoutDepth) {
+  Lap lap;
+  lap.add({0, 0, 0}, 0);
+  lap.walk(20, 0.5);
+  const Pose there = standing_at(lap.poses[0].center() + Eigen::Vector3d(1.2, 0, 0), 0);
+  EXPECT_FALSE(may_be_one_place(lap.map, kf(0), lap.poses[0], kf(20), there, true));
+  EXPECT_TRUE(may_be_one_place(lap.map, kf(0), lap.poses[0], kf(20), there, false));
+}
+
+TEST(MayBeOnePlace, NobodyKnowsWhereDeadKeyframesLie) {
+  Lap lap;
+  lap.add({0, 0, 0}, 0);
+  lap.walk(20, 0.5);
+  const Pose there = standing_at({5, 0, 0}, 0);
+  EXPECT_FALSE(may_be_one_place(lap.map, kf(1), lap.poses[1], kf(5), there, true));
+  ASSERT_TRUE(lap.map.erase_keyframe(kf(5)));
+  EXPECT_TRUE(may_be_one_place(lap.map, kf(1), lap.poses[1], kf(5), there, true));
+}
+
 }  // namespace
 }  // namespace orbslam

@@ -153,7 +153,7 @@ def relocalizer(
 ) -> Relocalizer:
     back_end = world.system.pipeline.back_end
     index = back_end.keyframe_index if words else core.KeyFrameIndex()
-    return Relocalizer(back_end.map, index, 0, limits)
+    return Relocalizer(back_end.map, index, 0, fix_scale=True, thresholds=limits)
 
 
 def test_near_the_place_of_loss_no_word_is_needed(world: MappedWorld) -> None:

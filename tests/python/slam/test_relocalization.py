@@ -149,8 +149,9 @@ def described(world: MappedWorld, shown: Images) -> core.TrackedFrame:
 
 
 def relocalizer(world: MappedWorld, seed: int = 0) -> Relocalizer:
+    back_end = world.system.pipeline.back_end
     return Relocalizer(
-        world.system.pipeline.back_end.map, world.system.pipeline.back_end.keyframe_index, seed
+        back_end.map, back_end.keyframe_index, seed, fix_scale=world.sequence.sensor.has_depth
     )
 
 
@@ -185,5 +186,5 @@ def test_same_seed_same_pose(world: MappedWorld) -> None:
 
 def test_an_empty_map_finds_nothing(world: MappedWorld) -> None:
     frame = described(world, world.sequence.load(40))
-    assert Relocalizer(core.Map(), core.KeyFrameIndex(), 0).relocalize(frame) == 0
+    assert Relocalizer(core.Map(), core.KeyFrameIndex(), 0, fix_scale=True).relocalize(frame) == 0
     assert frame.T_cw is None

@@ -54,9 +54,9 @@ class FirstEstimateInGrowingMap:
         """See `FirstEstimate`."""
         search = self._search
         if lost:
-            estimate = search.by_relocalization(frame)
-            if estimate.found or not search.has_last_frame:
-                return estimate
+            relocalized = search.by_relocalization(frame)
+            if relocalized.found or not search.has_last_frame:
+                return relocalized
         search.follow_map()
         if search.motion.velocity is not None and not search.just_relocalized(frame):
             estimate = search.by_motion_model(frame)
@@ -68,7 +68,7 @@ class FirstEstimateInGrowingMap:
             standing = search.by_motion_model(frame)
             return standing if standing.found else estimate
         if lost and not estimate.found:
-            return estimate.failed(Reason.NOT_FOUND_IN_MAP)
+            return estimate.failed(relocalized.reason)
         return estimate
 
     def reset(self) -> None:

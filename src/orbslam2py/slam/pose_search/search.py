@@ -231,7 +231,8 @@ class PoseSearch:
             core.describe(frame.features, self._vocabulary)
             n_inliers = self._relocalizer.relocalize(frame)
         if n_inliers == 0:
-            return PoseEstimate(not_found)
+            several = self._relocalizer.looks_like_several
+            return PoseEstimate(Reason.SEVERAL_PLACES if several else not_found)
         core.anchor_frame(self._map, frame, self._some_keyframe_around(frame))
         return PoseEstimate(
             n_matches=n_inliers,

@@ -65,6 +65,17 @@ class CandidatePlaces:
         by_place = _taken(near, limits.near_candidates, failures)
         return list(dict.fromkeys(by_words + by_place))
 
+    def alike(self, keyframe: int) -> list[int]:
+        """Keyframes that look like one of the map and share no point with it.
+
+        Ids, the likeliest first, no more than are compared with a frame.
+        """
+        if not self._map.has_keyframe(keyframe):
+            return []
+        found = core.find_loop_candidates(self._keyframe_index, self._map, keyframe, 0.0)
+        ranked = sorted(found, key=lambda place: (-place.group_score, place.keyframe))
+        return [place.keyframe for place in ranked[: self._limits.word_candidates]]
+
     def _by_words(self, frame: core.Frame) -> list[int]:
         """Keyframes that look like this frame or the ones before; the likeliest first.
 

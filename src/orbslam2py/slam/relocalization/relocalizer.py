@@ -11,27 +11,11 @@ import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray, IntArray
-from orbslam2py.slam.front_end import intrinsics
 from orbslam2py.slam.relocalization.candidates import CandidatePlaces
+from orbslam2py.slam.relocalization.fitting import Candidate, Fitting, optimize
 from orbslam2py.slam.relocalization.place_of_loss import PlaceOfLoss
+from orbslam2py.slam.relocalization.rival_places import RivalPlaces
 from orbslam2py.slam.thresholds import RelocalizationThresholds
-
-
-class _Candidate:
-    """A keyframe that looks like the frame: its matches and the RANSAC over them."""
-
-    def __init__(self, keyframe: int, matches: core.TrackedFrame, seed: int) -> None:
-        self.keyframe = keyframe
-        self.matches = matches
-        self.indices = np.flatnonzero(matches.map_points >= 0)
-        features = matches.features
-        self.ransac = core.PnpRansac(
-            matches.positions[self.indices],
-            features.keypoints[self.indices].astype(np.float64),
-            features.sigma2[self.indices].astype(np.float64),
-            intrinsics(features.camera),
-            seed=seed,
-        )
 
 
 class Relocalizer:
@@ -45,6 +29,8 @@ class Relocalizer:
         Which keyframes contain which words.
     seed : int
         Seed of the draws.
+    fix_scale : bool
+        Depth is measured: the map has one scale, which does not drift.
     thresholds : RelocalizationThresholds, optional
         Limits.
     """
@@ -54,13 +40,20 @@ class Relocalizer:
         slam_map: core.Map,
         keyframe_index: core.KeyFrameIndex,
         seed: int,
+        *,
+        fix_scale: bool,
         thresholds: RelocalizationThresholds | None = None,
     ) -> None:
         self._map = slam_map
-        self._seed = seed % 2**64
         self._limits = limits = thresholds or RelocalizationThresholds()
         self._places = CandidatePlaces(slam_map, keyframe_index, limits)
+        self._fitting = Fitting(slam_map, seed, limits)
+        self._rival_places = RivalPlaces(
+            slam_map, self._places, self._fitting, fix_scale=fix_scale, thresholds=limits
+        )
         self.reset()
+        #: Whether the last frame fits at several places, of which none is believed.
+        self.looks_like_several = False
 
     def reset(self) -> None:
         """Forget where tracking was lost: it was found, or the map is another one."""
@@ -83,6 +76,7 @@ class Relocalizer:
         int
             Number of inliers; 0 if the frame was not found, and then it has no associations.
         """
+        self.looks_like_several = False
         n_inliers = self._near_loss(frame)
         if n_inliers == 0:
             n_inliers = self._by_likeness(frame)
@@ -105,21 +99,17 @@ class Relocalizer:
         return 0
 
     def _by_likeness(self, frame: core.TrackedFrame) -> int:
-        limits = self._limits
         candidates = self._candidates(frame)
-        n_verified = 0
-        while candidates and n_verified < limits.verified_poses:
-            remaining = []
-            for candidate in candidates:
-                pose = candidate.ransac.iterate(limits.iterations)
-                if pose is not None and n_verified < limits.verified_poses:
-                    n_verified += 1
-                    n_inliers = self._verify(frame, candidate, pose)
-                    if n_inliers >= limits.enough:
-                        return n_inliers
-                if not candidate.ransac.exhausted:
-                    remaining.append(candidate)
-            candidates = remaining
+        found = self._fitting.first_that_fits(frame, candidates, self._limits.enough)
+        if found is not None:
+            first, n_inliers = found
+            best = self._rival_places.choose(frame, first.keyframe, candidates)
+            if best is frame:
+                return n_inliers
+            if best is not None:
+                frame.take_over(best)
+                return frame.n_associated()
+            self.looks_like_several = True
         frame.clear_associations()
         frame.T_cw = None
         return 0
@@ -161,14 +151,14 @@ class Relocalizer:
                 wider * limits.guess_window,
                 limits.guess_distance,
             )
-            if n_matches < limits.matches or self._optimize(frame) < limits.inliers:
+            if n_matches < limits.matches or optimize(frame) < limits.inliers:
                 continue
             # Again from the better pose, in a narrower window.
             found = np.unique(frame.map_points[frame.map_points >= 0])
             core.match_keyframe_by_projection(
                 self._map, keyframe, frame, found, limits.wide_window, limits.wide_distance
             )
-            n_inliers = self._optimize(frame)
+            n_inliers = optimize(frame)
             if n_inliers >= limits.enough:
                 return n_inliers
         frame.clear_associations()
@@ -187,57 +177,6 @@ class Relocalizer:
         nearest = np.argsort(distances, kind="stable")[: self._limits.guess_keyframes]
         return [int(ids[i]) for i in nearest if np.isfinite(distances[i])]
 
-    def _candidates(self, frame: core.TrackedFrame) -> list[_Candidate]:
-        candidates = []
-        for keyframe in self._places.of(frame.features, self._place, self._failures):
-            matches = core.TrackedFrame(frame.features)
-            n_matches = core.match_keyframe_by_words(
-                self._map, keyframe, matches, self._limits.ratio
-            )
-            if n_matches >= self._limits.matches:
-                seed = core.seed_of(self._seed, frame.id, keyframe)
-                candidates.append(_Candidate(keyframe, matches, seed))
-        return candidates
-
-    def _verify(self, frame: core.TrackedFrame, candidate: _Candidate, pose: core.PnpPose) -> int:
-        """Optimise the pose, add matches by projection; the number of inliers."""
-        limits = self._limits
-        keep = np.zeros(len(frame.features), bool)
-        keep[candidate.indices[pose.inliers != 0]] = True
-        frame.copy_associations(candidate.matches, keep)
-        frame.T_cw = pose.T_cw
-        n_inliers = self._optimize(frame)
-        if n_inliers < limits.inliers or n_inliers >= limits.enough:
-            return n_inliers
-
-        n_inliers = self._widen(
-            frame, candidate, n_inliers, limits.wide_window, limits.wide_distance
-        )
-        if limits.narrow < n_inliers < limits.enough:
-            n_inliers = self._widen(
-                frame, candidate, n_inliers, limits.narrow_window, limits.narrow_distance
-            )
-        return n_inliers
-
-    def _widen(
-        self,
-        frame: core.TrackedFrame,
-        candidate: _Candidate,
-        n_inliers: int,
-        window: float,
-        max_distance: int,
-    ) -> int:
-        ids = frame.map_points
-        found = np.unique(ids[ids >= 0])
-        added = core.match_keyframe_by_projection(
-            self._map, candidate.keyframe, frame, found, window, max_distance
-        )
-        if n_inliers + added < self._limits.enough:
-            return n_inliers
-        return self._optimize(frame)
-
-    @staticmethod
-    def _optimize(frame: core.TrackedFrame) -> int:
-        estimate = core.optimize_pose(frame)
-        frame.discard_outliers()
-        return estimate.n_inliers
+    def _candidates(self, frame: core.TrackedFrame) -> list[Candidate]:
+        keyframes = self._places.of(frame.features, self._place, self._failures)
+        return self._fitting.matched(frame, keyframes)
