@@ -219,6 +219,8 @@ class PoseEstimate:
     """Ids of the points that were matched and thrown out as outliers, ascending."""
     visual_odometry: bool = False
     """The pose hangs on the depths of the frame before more than on the map."""
+    left_map: bool = False
+    """The frame before was in the map, and this one is not."""
     relocalized: bool = False
     """Found without a guess from the frame before."""
     method: PoseMethod = PoseMethod.MOTION_MODEL

@@ -271,12 +271,15 @@ class Tracking:
             strategy = self._in_fixed_map
         with timer("predict"):
             estimate = strategy.estimate(frame, lost=lost)
-        if estimate.visual_odometry or (lost and not estimate.found):
+        if lost and not estimate.found:
             return estimate
         if lost or estimate.relocalized:
             self._search.last_relocalization = frame.id
         with timer("local_map"):
-            return self._belief.refine(frame, estimate, lost=lost)
+            believed = self._belief.refine(frame, estimate, lost=lost)
+        if believed.found:
+            strategy.believe(believed)
+        return believed
 
     def _confirm(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> PoseEstimate:
         """A pose found again waits for the next frame; that one confirms it, or both are wrong."""

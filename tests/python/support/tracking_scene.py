@@ -135,6 +135,7 @@ class FakeCore:
     """The verbs tracking calls; each takes its next answer from a list, or its usual one."""
 
     Pose = _core.Pose
+    FIRST_TEMPORARY_POINT = _core.FIRST_TEMPORARY_POINT
     motion: deque[int] = field(default_factory=deque)
     words: deque[int] = field(default_factory=deque)
     inliers: deque[int] = field(default_factory=deque)
