@@ -150,7 +150,8 @@ class FakeCore:
     discarded: list[np.ndarray] = field(default_factory=list)
     min_observations: list[int] = field(default_factory=list)
     start_poses: list[float] = field(default_factory=list)
-    n_inserted: int = 0
+    #: Ids of the frames that became keyframes.
+    inserted: list[int] = field(default_factory=list)
     #: Rotation of the next small images and their correlation; none: they say nothing.
     aligned: deque[SimpleNamespace] = field(default_factory=deque)
     n_cells: int = 30
@@ -159,6 +160,10 @@ class FakeCore:
     looked_ahead: float = 0.0
     #: Points in view that are not held before the local map is matched.
     n_visible: int = 3
+
+    @property
+    def n_inserted(self) -> int:
+        return len(self.inserted)
 
     def TrackedFrame(self, features: SimpleNamespace) -> FakeFrame:
         version = FakeFrame(features.frame_id)
@@ -253,7 +258,7 @@ class FakeCore:
     def insert_keyframe(self, world: FakeMap, frame: FakeFrame, create_points: bool) -> int:
         assert frame.features.described
         assert create_points
-        self.n_inserted += 1
+        self.inserted.append(frame.id)
         frame.reference_keyframe = 100 + self.n_inserted
         return 100 + self.n_inserted
 
