@@ -155,6 +155,8 @@ class FakeCore:
     #: Rotation of the next small images and their correlation; none: they say nothing.
     aligned: deque[SimpleNamespace] = field(default_factory=deque)
     n_cells: int = 30
+    #: Of what the motion model finds, in localization mode.
+    n_map_points: int = 100
     #: Of the inliers, after three more frames of the present speed; how far that was.
     n_staying: int = 1000
     looked_ahead: float = 0.0
@@ -200,6 +202,12 @@ class FakeCore:
         return self.sharpnesses.popleft() if self.sharpnesses else 1000.0
 
     def add_temporary_points(self, last: FakeFrame, points: str) -> int:
+        return 0
+
+    def count_map_points(self, frame: FakeFrame) -> int:
+        return self.n_map_points
+
+    def discard_temporary(self, frame: FakeFrame) -> int:
         return 0
 
     def match_last_frame(
