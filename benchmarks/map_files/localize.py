@@ -129,7 +129,9 @@ def main() -> None:
             one = run(sequence, 0, n, settings=sequence.settings)
             path = folder / "whole.orbmap"
             one.save_map(path)
-            mapped = one.trajectories()
+            every = one.trajectories()
+            # Numbered as in the file, which does not hold maps that were given up.
+            mapped = [every[living.map_index] for living in one.maps]
             print(f"{sequence.name}, {sequence.sensor}: {localised(sequence, n, path, mapped)}")
             print(f"    extended: {extended(sequence, n, folder, mapped)}", flush=True)
 
