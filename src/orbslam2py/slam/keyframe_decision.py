@@ -22,7 +22,7 @@ class KeyframeClock:
     last_keyframe: int
     last_relocalization: int
     in_loaded_map: bool = False
-    """The map was loaded: it may end where the camera was found, and is extended soon."""
+    """The map was loaded: it may end where the camera was found, and is extended at once."""
 
 
 class KeyframeDecision:
@@ -84,8 +84,8 @@ class KeyframeDecision:
         limits = self.limits
         interval = self._max_keyframe_interval
         n_keyframes = self._map.n_keyframes_of(self._map.active_map)
-        wait = min(interval, limits.wait_in_loaded_map) if last.in_loaded_map else interval
-        if frame.id < last.last_relocalization + wait and n_keyframes > wait:
+        has_just_been_found = frame.id < last.last_relocalization + interval
+        if has_just_been_found and n_keyframes > interval and not last.in_loaded_map:
             return False
 
         n_reference = self._points_of(reference_keyframe, n_keyframes)

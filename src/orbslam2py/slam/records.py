@@ -80,7 +80,7 @@ class PoseMethod(str, enum.Enum):
 
 @dataclass(frozen=True)
 class Evidence:
-    """What speaks for a pose that was found in the map.
+    """What speaks for a pose.
 
     "Usual" is a running mean over the frames before whose evidence was strong; ratios to it are 1
     where there were none.
@@ -95,7 +95,7 @@ class Evidence:
     confirmed: bool
     """Then a second method, which does not begin where this one did, came to the same pose."""
     n_predicted: int
-    """Map points that should be in view."""
+    """Map points that should be in view; in visual odometry, points that the frame before saw."""
     found: float
     """Share of these that were found and accepted, 0 to 1."""
     found_to_usual: float
@@ -170,7 +170,7 @@ class TrackingRecord:
     features: FrameFeatures | None = None
     evidence: Evidence | None = None
     """What speaks for the pose, or, if the reason is `Reason.WEAK_EVIDENCE`, spoke against it; None
-    where no pose was found in the map, and in the frame that begins one."""
+    where no pose was found, and in the frame that begins a map."""
 
     @property
     def T_wc(self) -> FloatArray | None:
@@ -220,6 +220,8 @@ class PoseEstimate:
     """Ids of the points that were matched and thrown out as outliers, ascending."""
     visual_odometry: bool = False
     """The pose hangs on the depths of the frame before more than on the map."""
+    left_map: bool = False
+    """The frame before was in the map, and this one is not."""
     relocalized: bool = False
     """Found without a guess from the frame before."""
     method: PoseMethod = PoseMethod.MOTION_MODEL

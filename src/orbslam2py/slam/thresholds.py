@@ -176,8 +176,6 @@ class KeyframeThresholds:
     """A keyframe needs more inliers than this."""
     queue: int = 3
     """A busy mapper is given a keyframe only if fewer than this wait (stereo, RGB-D)."""
-    wait_in_loaded_map: int = 2
-    """Frames without a keyframe from a relocalization on, in a loaded map; else one second's."""
 
 
 @dataclass(frozen=True)

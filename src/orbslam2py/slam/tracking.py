@@ -115,6 +115,8 @@ class Tracking:
         self._initializer.reset()
         self._blur_watch.reset()
         self._confirmation.reset()
+        # A frame found again that becomes a keyframe with the next one.
+        self._waits_for_confirmation: core.TrackedFrame | None = None
         self._loss.reset()
         self._blurred = False
 
@@ -148,6 +150,7 @@ class Tracking:
         self._belief.reset()
         self._in_fixed_map.reset()
         self._confirmation.reset()
+        self._waits_for_confirmation = None
 
     @property
     def initializing(self) -> bool:
@@ -231,11 +234,16 @@ class Tracking:
         is_keyframe = False
         if localize:
             core.discard_temporary(frame)
+            self._waits_for_confirmation = None
         else:
             with timer("keyframe"):
+                self._insert_confirmed()
                 is_keyframe = self._belief.allows_keyframe(
                     estimate.evidence
                 ) and self._keyframe_wanted(frame, estimate)
+                if is_keyframe and estimate.unconfirmed:
+                    self._waits_for_confirmation = frame
+                    is_keyframe = False
                 if is_keyframe:
                     if estimate.evidence is not None and estimate.evidence.doubted:
                         # Bundle adjustment, which tries them again, would have few inliers to
@@ -271,12 +279,15 @@ class Tracking:
             strategy = self._in_fixed_map
         with timer("predict"):
             estimate = strategy.estimate(frame, lost=lost)
-        if estimate.visual_odometry or (lost and not estimate.found):
+        if lost and not estimate.found:
             return estimate
         if lost or estimate.relocalized:
             self._search.last_relocalization = frame.id
         with timer("local_map"):
-            return self._belief.refine(frame, estimate, lost=lost)
+            believed = self._belief.refine(frame, estimate, lost=lost)
+        if believed.found:
+            strategy.believe(believed)
+        return believed
 
     def _confirm(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> PoseEstimate:
         """A pose found again waits for the next frame; that one confirms it, or both are wrong."""
@@ -348,6 +359,7 @@ class Tracking:
         if was_ok:
             self._search.lose(confirmed=not self._confirmation.waiting)
         self._confirmation.reset()
+        self._waits_for_confirmation = None
         self._in_fixed_map.reset()
         frame.clear_associations()
         frame.T_cw = None
@@ -373,7 +385,7 @@ class Tracking:
 
     # ---- keyframes -------------------------------------------------------------------------------
     def _keyframe_wanted(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> bool:
-        if self._blurred or estimate.unconfirmed:
+        if self._blurred:
             return False
         since = KeyframeClock(
             last_keyframe=self._last_keyframe_frame_id,
@@ -383,6 +395,15 @@ class Tracking:
         return self._keyframe_decision.wanted(
             frame, self.reference_keyframe, estimate.n_inliers, self.motion.velocity, since
         )
+
+    def _insert_confirmed(self) -> None:
+        """Make the frame that was found again a keyframe, now that the next one confirmed it.
+
+        Where the map ends it sees more of it than any frame after it.
+        """
+        found, self._waits_for_confirmation = self._waits_for_confirmation, None
+        if found is not None:
+            self._create_keyframe(found)
 
     def _create_keyframe(self, frame: core.TrackedFrame) -> None:
         core.describe(frame.features, self._vocabulary)

@@ -28,10 +28,33 @@ def test_no_keyframe_until_the_next_frame_confirms_the_pose(scene: Scene) -> Non
     found = scene.track()
     assert (found.state, found.estimate.unconfirmed) == (TrackingState.OK, True)
     assert not found.is_keyframe
+    assert scene.core.n_inserted == 0
     confirmed = scene.track()
     assert not confirmed.estimate.unconfirmed
     assert confirmed.is_keyframe
     assert scene.tracking.n_relocalizations == 1
+
+
+def test_once_confirmed_the_frame_found_is_a_keyframe_first(scene: Scene) -> None:
+    """Where the map ends it sees more of it than those after it."""
+    scene.run(40)
+    lose(scene)
+    scene.core.n_reference = WANTED
+    scene.track()
+    scene.track()
+    found, confirming = scene.frames[-2:]
+    assert scene.core.inserted == [found.id, confirming.id]
+    scene.track()
+    assert scene.core.inserted.count(found.id) == 1
+
+
+def test_a_frame_found_where_the_map_needs_none_stays_a_frame(scene: Scene) -> None:
+    scene.run(40)
+    lose(scene)
+    scene.run(1)
+    scene.core.n_reference = WANTED
+    scene.track()
+    assert scene.core.inserted == [scene.last.id]
 
 
 def not_confirmed(scene: Scene, how: str) -> TrackingOutcome:
@@ -48,11 +71,13 @@ def test_what_is_not_confirmed_is_searched_on_from_the_old_place(scene: Scene, h
     before = scene.tracking.reference_keyframe
     lose(scene)
     scene.core.local_reference = 77  # where it seems to be
+    scene.core.n_reference = WANTED
     found = scene.track()
     assert found.estimate.unconfirmed
     assert scene.tracking.reference_keyframe == 77
     outcome = not_confirmed(scene, how)
     assert outcome.state is TrackingState.LOST
+    assert scene.core.n_inserted == 0
     if how != "lost at once":
         assert outcome.estimate.reason is Reason.NOT_CONFIRMED
     assert scene.last.T_cw is None

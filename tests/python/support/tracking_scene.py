@@ -135,6 +135,7 @@ class FakeCore:
     """The verbs tracking calls; each takes its next answer from a list, or its usual one."""
 
     Pose = _core.Pose
+    FIRST_TEMPORARY_POINT = _core.FIRST_TEMPORARY_POINT
     motion: deque[int] = field(default_factory=deque)
     words: deque[int] = field(default_factory=deque)
     inliers: deque[int] = field(default_factory=deque)
@@ -149,15 +150,22 @@ class FakeCore:
     discarded: list[np.ndarray] = field(default_factory=list)
     min_observations: list[int] = field(default_factory=list)
     start_poses: list[float] = field(default_factory=list)
-    n_inserted: int = 0
+    #: Ids of the frames that became keyframes.
+    inserted: list[int] = field(default_factory=list)
     #: Rotation of the next small images and their correlation; none: they say nothing.
     aligned: deque[SimpleNamespace] = field(default_factory=deque)
     n_cells: int = 30
+    #: Of what the motion model finds, in localization mode.
+    n_map_points: int = 100
     #: Of the inliers, after three more frames of the present speed; how far that was.
     n_staying: int = 1000
     looked_ahead: float = 0.0
     #: Points in view that are not held before the local map is matched.
     n_visible: int = 3
+
+    @property
+    def n_inserted(self) -> int:
+        return len(self.inserted)
 
     def TrackedFrame(self, features: SimpleNamespace) -> FakeFrame:
         version = FakeFrame(features.frame_id)
@@ -194,6 +202,12 @@ class FakeCore:
         return self.sharpnesses.popleft() if self.sharpnesses else 1000.0
 
     def add_temporary_points(self, last: FakeFrame, points: str) -> int:
+        return 0
+
+    def count_map_points(self, frame: FakeFrame) -> int:
+        return self.n_map_points
+
+    def discard_temporary(self, frame: FakeFrame) -> int:
         return 0
 
     def match_last_frame(
@@ -252,7 +266,7 @@ class FakeCore:
     def insert_keyframe(self, world: FakeMap, frame: FakeFrame, create_points: bool) -> int:
         assert frame.features.described
         assert create_points
-        self.n_inserted += 1
+        self.inserted.append(frame.id)
         frame.reference_keyframe = 100 + self.n_inserted
         return 100 + self.n_inserted
 

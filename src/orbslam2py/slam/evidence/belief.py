@@ -11,7 +11,7 @@ from dataclasses import replace
 from orbslam2py import _core as core
 from orbslam2py.slam.evidence.harder_search import HarderSearch, Hypothesis
 from orbslam2py.slam.evidence.judgement import EvidenceJudge
-from orbslam2py.slam.pose_search import PoseSearch
+from orbslam2py.slam.pose_search import PoseSearch, RefinedPose
 from orbslam2py.slam.records import Evidence, PoseEstimate, Reason, Verdict
 
 
@@ -57,12 +57,14 @@ class Belief:
             self.reset()
         estimate, hypothesis = first, None
         if first.found:
-            refined = self._search.in_local_map(frame, first)
+            refined = self._refined(frame, first)
             estimate = refined.estimate
             if estimate.found:
                 evidence = self._judge.weigh(refined, self._search.motion, first.method)
                 hypothesis = Hypothesis(refined, first.method, evidence)
-        doubted = hypothesis is None or self._judge.fell_suddenly(hypothesis.evidence)
+        doubted = (
+            hypothesis is None or first.left_map or self._judge.fell_suddenly(hypothesis.evidence)
+        )
         if doubted and not lost:
             hypothesis = self._harder_search.look_again(frame, hypothesis)
         if hypothesis is None:
@@ -72,6 +74,11 @@ class Belief:
         if doubted:
             hypothesis = replace(hypothesis, evidence=replace(hypothesis.evidence, doubted=True))
         return self._take(frame, hypothesis)
+
+    def _refined(self, frame: core.TrackedFrame, first: PoseEstimate) -> RefinedPose:
+        if first.visual_odometry:
+            return self._search.beyond_the_map(frame, first)
+        return self._search.in_local_map(frame, first)
 
     def _take(self, frame: core.TrackedFrame, hypothesis: Hypothesis) -> PoseEstimate:
         refined, evidence = hypothesis.refined, hypothesis.evidence

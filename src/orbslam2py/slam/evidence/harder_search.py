@@ -80,7 +80,7 @@ class HarderSearch:
         return self._best(found) if found else None
 
     def _ways(self, found: list[Hypothesis]) -> Iterator[tuple[PoseMethod, Way]]:
-        """The ways in the order of their cost; relocalization only if none led anywhere."""
+        """The ways in the order of their cost; relocalization only if none is beyond doubt."""
         limits, search = self._judge.limits, self._search
         yield PoseMethod.ALIGNED_IMAGES, self._by_aligned_images
         yield (
@@ -89,7 +89,7 @@ class HarderSearch:
         )
         if search.motion.velocity is not None:
             yield PoseMethod.WIDE_WINDOW, self._by_wide_window
-        if all(hypothesis.evidence.verdict is Verdict.REFUSED for hypothesis in found):
+        if not any(hypothesis.evidence.verdict is Verdict.STRONG for hypothesis in found):
             yield PoseMethod.RELOCALIZATION, search.by_relocalization
 
     def _by_aligned_images(self, frame: core.TrackedFrame) -> PoseEstimate:

@@ -37,6 +37,10 @@ class FirstEstimate(Protocol):
         """Forget the frames before: tracking was lost, or the map is another one."""
         ...
 
+    def believe(self, estimate: PoseEstimate) -> None:
+        """Take what was made of the estimate, and is believed."""
+        ...
+
 
 class FirstEstimateInGrowingMap:
     """By the motion model, else the reference keyframe; when lost, anywhere in the map.
@@ -72,6 +76,9 @@ class FirstEstimateInGrowingMap:
         return estimate
 
     def reset(self) -> None:
+        """Nothing is kept from frame to frame."""
+
+    def believe(self, estimate: PoseEstimate) -> None:
         """Nothing is kept from frame to frame."""
 
 
@@ -110,9 +117,11 @@ class FirstEstimateInFixedMap:
             estimate = self._by_motion_model(frame)
         else:
             estimate = search.by_reference_keyframe(frame)
-        if estimate.found:
-            self._beyond_the_map = estimate.visual_odometry
-        return estimate
+        return replace(estimate, left_map=estimate.visual_odometry and not self._beyond_the_map)
+
+    def believe(self, estimate: PoseEstimate) -> None:
+        """See `FirstEstimate`."""
+        self._beyond_the_map = estimate.visual_odometry
 
     def _by_motion_model(self, frame: core.TrackedFrame) -> PoseEstimate:
         limits = self._search.limits

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from orbslam2py import _core as core
 from orbslam2py._arrays import IntArray
 from orbslam2py.settings.sensor import Sensor
@@ -24,7 +26,8 @@ class RefinedPose:
     frame: core.TrackedFrame
     """Holds pose and associations."""
     estimate: PoseEstimate
-    local_map: core.LocalMap
+    local_map: core.LocalMap | None
+    """None in visual odometry, which does not look for the map."""
     visible: IntArray
     """Ids of the points in view that the first estimate did not hold."""
     n_predicted: int
@@ -289,10 +292,22 @@ class PoseSearch:
         )
         if estimate.n_inliers < self._local_map_inliers(frame):
             estimate = estimate.failed(Reason.FEW_INLIERS_LOCAL_MAP)
+        elif _n_map_inliers(frame) < self.limits.map_matches:
+            # What the frame before measured speaks for itself, and says nothing of the map.
+            return self.beyond_the_map(frame, replace(estimate, visual_odometry=True))
         return RefinedPose(frame, estimate, local_map, visible, n_held + len(visible))
+
+    def beyond_the_map(self, frame: core.TrackedFrame, odometry: PoseEstimate) -> RefinedPose:
+        """Take a pose that hangs on the depths of the frame before; these should be in view."""
+        assert frame.T_cw is not None
+        n_predicted = core.count_staying(self.motion.last, frame.T_cw)
+        return RefinedPose(frame, odometry, None, np.zeros(0, np.int64), n_predicted)
 
     def settle(self, refined: RefinedPose) -> None:
         """Take a refined pose, found or not, as that of its frame."""
+        if refined.local_map is None:
+            refined.frame.discard_outliers()
+            return
         self.local_map = local_map = refined.local_map
         if local_map.reference_keyframe >= 0:
             self.reference_keyframe = local_map.reference_keyframe
@@ -312,3 +327,10 @@ class PoseSearch:
         if self._sensor is Sensor.RGBD:
             return limits.local_map_window_rgbd
         return limits.local_map_window
+
+
+def _n_map_inliers(frame: core.TrackedFrame) -> int:
+    """Points of the map that the pose was accepted with, without the temporary ones."""
+    ids = frame.map_points
+    of_map = (ids >= 0) & (ids < core.FIRST_TEMPORARY_POINT) & (frame.outlier == 0)
+    return int(np.count_nonzero(of_map))
