@@ -12,7 +12,7 @@ command -v mmdebstrap >/dev/null || {
 rm -rf "$folder"
 mkdir -p "$(dirname "$folder")"
 mmdebstrap --quiet --variant=extract --architectures=arm64 \
-  --include="libc6-dev,libstdc++-12-dev,libopencv-core-dev,libopencv-imgproc-dev,libceres-dev,libgmock-dev" \
+  --include="libc6-dev,libstdc++-12-dev,libopencv-core-dev,libopencv-imgproc-dev,libceres-dev,libhwy-dev,libgmock-dev" \
   bookworm "$folder" "${ORBSLAM2PY_DEBIAN_MIRROR:-http://deb.debian.org/debian}"
 # Links from the root would lead out of the folder; others are made by packages' scripts, which were not run.
 find "$folder" -type l -lname '/*' | while read -r link; do
