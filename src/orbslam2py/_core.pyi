@@ -247,7 +247,7 @@ class OrbExtractor:
     """
     def __init__(self, options: OrbOptions = ..., kernels: str = 'automatic') -> None:
         """
-        `kernels`: 'automatic', 'portable' or 'avx2'; all give the same bytes. Raises SettingsError for kernels this processor cannot run.
+        `kernels`: 'automatic', or one of `vector_units`, or 'portable', the first of them; all give the same bytes. Raises SettingsError for kernels this processor cannot run.
         """
     def extract(self, image: numpy.ndarray, mask: typing.Any = None) -> Extraction:
         """
@@ -260,7 +260,7 @@ class OrbExtractor:
     @property
     def kernel_name(self) -> str:
         """
-        'avx2' or 'portable': the inner loops in use.
+        The vector unit whose inner loops are in use: one of `vector_units`.
         """
     @property
     def options(self) -> OrbOptions:
@@ -3350,6 +3350,10 @@ def triangulate(ray_1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "
 def two_rooms_way(size: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"], passage: typing.SupportsFloat | typing.SupportsIndex) -> Way:
     """
     From the first room of make_two_rooms into the second.
+    """
+def vector_units() -> list[str]:
+    """
+    Names of the vector units that there are kernels for and this processor has, slowest first.
     """
 def verify_loop_candidate(map: Map, current: int, candidate: int, options: LoopVerificationOptions) -> Loop | None:
     """

@@ -12,7 +12,8 @@
 
 // The vectors of SVE have no size while compiling, and cannot be elements of arrays; every
 // processor that has them has NEON.
-#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+#define ORBSLAM2PY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+#define HWY_DISABLED_TARGETS ORBSLAM2PY_DISABLED_TARGETS
 
 // Plain C++ with vectors of 16 bytes, also by GCC before 12.3: the build keeps that compiler from
 // the optimisation that it gets wrong there.

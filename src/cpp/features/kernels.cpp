@@ -364,6 +364,7 @@ void brief(const std::uint8_t* centre, std::ptrdiff_t stride, float cosine, floa
   rotated_offsets(pattern.x2, pattern.y2, cosine, sine, stride, second);
   for (int word = 0; word < 8; ++word) {
     std::uint32_t bits = 0;
+#pragma GCC unroll 8
     for (int i = 32 * word + 31; i >= 32 * word; --i) {
       bits += bits + (centre[first[i]] < centre[second[i]]);
     }
