@@ -73,8 +73,10 @@ HWY_AFTER_NAMESPACE();
 namespace orbslam::stereo {
 
 ShiftedSad shifted_sad_for(VectorUnit unit) {
-  const bool has_avx2 = unit == VectorUnit::avx2 || unit == VectorUnit::avx512;
-  const ShiftedSad found = has_avx2 ? HWY_CHOOSE_AVX2(shifted_sad) : nullptr;
+  ShiftedSad found = nullptr;
+  if (unit == VectorUnit::avx2 || unit == VectorUnit::avx512) {
+    found = HWY_CHOOSE_AVX2(shifted_sad);
+  }
   return found != nullptr ? found : HWY_STATIC_DISPATCH(shifted_sad);
 }
 
