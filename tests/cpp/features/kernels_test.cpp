@@ -28,9 +28,12 @@ TEST(Kernels, EachUnitGivesTheSameFeatures) {
     options.scale_factor = 1.1F + 0.1F * static_cast<float>(seed % 8);
     for (int repeat = 0; repeat < 3; ++repeat, ++seed) {
       const cv::Mat image = random_image(size.width, size.height, seed);
-      const Extraction first = OrbExtractor(options, vector_units().front()).extract(image);
+      OrbExtractor slowest(options, vector_units().front());
+      ASSERT_EQ(slowest.vector_unit(), vector_units().front());
+      const Extraction first = slowest.extract(image);
       EXPECT_GT(first.features.size(), 0U);
       for (const VectorUnit unit : vector_units()) {
+        if (unit == slowest.vector_unit()) continue;
         SCOPED_TRACE(name_of(unit));
         OrbExtractor extractor(options, unit);
         ASSERT_EQ(extractor.vector_unit(), unit);
