@@ -8,8 +8,8 @@ if(ORBSLAM2PY_WERROR)
   target_compile_options(orbslam_options INTERFACE -Werror)
 endif()
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
-  # A portable baseline for every translation unit that sees Eigen types; the AVX2 kernels are
-  # compiled with their own flags and include neither Eigen nor Ceres.
+  # A portable baseline for every translation unit that sees Eigen types; kernels for other vector
+  # units are compiled with their own flags and include neither Eigen nor Ceres.
   include(CheckCXXCompilerFlag)
   check_cxx_compiler_flag(-march=x86-64-v2 ORBSLAM2PY_KNOWS_LEVELS)
   if(ORBSLAM2PY_KNOWS_LEVELS)
@@ -39,10 +39,22 @@ endif()
 # Parsing Eigen is most of what a small file costs the compiler.
 set(ORBSLAM2PY_EIGEN_HEADERS <Eigen/Core> <Eigen/Geometry> <Eigen/LU>)
 
-# orbslam_folder(NAME [SEPARATE] [DEPENDS folder...] [PUBLIC lib...] [PRIVATE lib...] [AVX2 source...])
-# SEPARATE: each source is compiled by itself, also in a unity build.
+# Of sources that Highway compiles for several vector units. Some of those have fused multiply-add,
+# whose results are not those of the others; plain C++ is what GCC's vectoriser got wrong before 12.3
+# (its bug 106322).
+set(ORBSLAM2PY_KERNEL_OPTIONS -ffp-contract=off)
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 12.3)
+  set(ORBSLAM2PY_PLAIN_KERNEL_OPTIONS -fno-tree-vectorize)
+endif()
+if(NOT CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64|aarch64|arm64")
+  list(APPEND ORBSLAM2PY_KERNEL_OPTIONS ${ORBSLAM2PY_PLAIN_KERNEL_OPTIONS})
+endif()
+
+# orbslam_folder(NAME [SEPARATE] [DEPENDS folder...] [PUBLIC lib...] [PRIVATE lib...]
+#                [KERNELS source...] [AVX2 source...])
+# SEPARATE: each source is compiled by itself, also in a unity build. KERNELS: for every vector unit.
 function(orbslam_folder NAME)
-  cmake_parse_arguments(ARG "SEPARATE" "" "DEPENDS;PUBLIC;PRIVATE;AVX2" ${ARGN})
+  cmake_parse_arguments(ARG "SEPARATE" "" "DEPENDS;PUBLIC;PRIVATE;KERNELS;AVX2" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${NAME}/*.cpp)
   list(TRANSFORM ARG_DEPENDS PREPEND orbslam_ OUTPUT_VARIABLE depends)
   if(sources)
@@ -66,6 +78,11 @@ function(orbslam_folder NAME)
     target_link_libraries(orbslam_${NAME} INTERFACE ${depends} ${ARG_PUBLIC})
     target_include_directories(orbslam_${NAME} INTERFACE ${CMAKE_CURRENT_SOURCE_DIR})
   endif()
+  foreach(source ${ARG_KERNELS})
+    set_source_files_properties(${CMAKE_CURRENT_SOURCE_DIR}/${NAME}/${source}
+      PROPERTIES COMPILE_OPTIONS "${ORBSLAM2PY_KERNEL_OPTIONS}"
+      SKIP_PRECOMPILE_HEADERS ON SKIP_UNITY_BUILD_INCLUSION ON)
+  endforeach()
   foreach(source ${ARG_AVX2})
     set_source_files_properties(${CMAKE_CURRENT_SOURCE_DIR}/${NAME}/${source}
       PROPERTIES COMPILE_OPTIONS "-mavx2" SKIP_PRECOMPILE_HEADERS ON SKIP_UNITY_BUILD_INCLUSION ON)

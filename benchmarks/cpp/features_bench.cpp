@@ -67,14 +67,16 @@ int n_features() {
   return named ? std::atoi(named) : 1000;
 }
 
-const Kernels& kernels_of(const benchmark::State& state) {
-  return choose_kernels(state.range(0) == 0 ? KernelChoice::portable : KernelChoice::automatic);
+VectorUnit unit_of(const benchmark::State& state) {
+  return vector_units()[static_cast<std::size_t>(state.range(0))];
 }
 
-/// Names the kernels that the benchmark runs with.
+const Kernels& kernels_of(const benchmark::State& state) { return kernels_for(unit_of(state)); }
+
+/// Names the vector unit that the benchmark runs with.
 template <class Body>
 void measure_kernels(benchmark::State& state, Body body) {
-  state.SetLabel(kernels_of(state).name);
+  state.SetLabel(name_of(unit_of(state)));
   measure(state, body);
 }
 
@@ -87,7 +89,7 @@ struct Prepared {
   std::vector<cv::Mat> blurred;
 
   Prepared() {
-    const Kernels& kernels = choose_kernels(KernelChoice::automatic);
+    const Kernels& kernels = kernels_for(best_vector_unit());
     for (std::size_t level = 0; level < pyramid.levels.size(); ++level) {
       const cv::Mat& grey = pyramid.levels[level];
       corners.push_back(CornerGrid().detect(grey, 20, 7, LevelMask{}, kernels));
@@ -106,8 +108,7 @@ const Prepared& prepared() {
 void extract(benchmark::State& state) {
   OrbOptions options;
   options.n_features = n_features();
-  OrbExtractor extractor(options,
-                         state.range(0) == 0 ? KernelChoice::portable : KernelChoice::automatic);
+  OrbExtractor extractor(options, unit_of(state));
   measure_kernels(state, [&] { benchmark::DoNotOptimize(extractor.extract(image())); });
 }
 
@@ -181,8 +182,11 @@ void descriptors(benchmark::State& state) {
   });
 }
 
-#define ORBSLAM_BENCHMARK(name) \
-  BENCHMARK(name)->ArgName("fast")->Arg(1)->Arg(0)->Unit(benchmark::kMillisecond)
+#define ORBSLAM_BENCHMARK(name)                                    \
+  BENCHMARK(name)                                                  \
+      ->ArgName("unit")                                            \
+      ->DenseRange(0, static_cast<int>(vector_units().size()) - 1) \
+      ->Unit(benchmark::kMillisecond)
 ORBSLAM_BENCHMARK(extract);
 ORBSLAM_BENCHMARK(pyramid);
 ORBSLAM_BENCHMARK(corners);

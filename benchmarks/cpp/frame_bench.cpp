@@ -136,7 +136,10 @@ void features_in_area(benchmark::State& state) {
 }
 BENCHMARK(features_in_area)->Unit(benchmark::kMillisecond);
 
-void shifted_sad(benchmark::State& state, stereo::ShiftedSad kernel) {
+void shifted_sad(benchmark::State& state) {
+  const VectorUnit unit = vector_units()[static_cast<std::size_t>(state.range(0))];
+  const stereo::ShiftedSad kernel = stereo::shifted_sad_for(unit);
+  state.SetLabel(name_of(unit));
   stereo::WindowPair windows{};
   for (int row = 0; row < stereo::kWindow; ++row) {
     for (int column = 0; column < 16; ++column) {
@@ -150,8 +153,7 @@ void shifted_sad(benchmark::State& state, stereo::ShiftedSad kernel) {
     benchmark::DoNotOptimize(sums);
   }
 }
-BENCHMARK_CAPTURE(shifted_sad, portable, stereo::shifted_sad_portable);
-BENCHMARK_CAPTURE(shifted_sad, best, stereo::best_shifted_sad());
+BENCHMARK(shifted_sad)->ArgName("unit")->DenseRange(0, static_cast<int>(vector_units().size()) - 1);
 
 void grey_of_rgb_1241x376(benchmark::State& state) {
   const cv::Mat image(376, 1241, CV_8UC3, cv::Scalar(10, 20, 30));

@@ -43,22 +43,22 @@ def extraction_rows(yardstick: Yardstick) -> Iterator[Row]:
     for image, figure in reference.EXTRACTION.items():
         n_features, _ = reference.YARDSTICK[image]
         options = core.OrbOptions(n_features=n_features)
-        for kernels in ("automatic", "portable"):
+        for kernels in reversed(core.vector_units()):
             extractor = core.OrbExtractor(options, kernels)
             measured = yardstick.compare(partial(extractor.extract, yardstick.images[image]), image)
             stretch = reference.EXTRACTION_STRETCH * (figure.milliseconds or 0)
             reached = "stretch goal reached" if measured.carried <= stretch else ""
-            if kernels == "automatic":
+            if kernels == core.OrbExtractor(options).kernel_name:
                 yield Row(
-                    f"{figure.name} ({extractor.kernel_name})",
+                    f"{figure.name} ({kernels})",
                     figure,
                     measured,
                     reached,
                     not yardstick.exact,
                 )
-            elif extractor.kernel_name != core.OrbExtractor(options).kernel_name:
+            else:
                 untargeted = Figure(figure.name, figure.milliseconds, yardstick=image)
-                yield Row(f"{figure.name} (portable)", untargeted, measured)
+                yield Row(f"{figure.name} ({kernels})", untargeted, measured)
 
 
 def stereo_rows(yardstick: Yardstick) -> Iterator[Row]:

@@ -4,7 +4,8 @@
 # Needs mmdebstrap (Debian's package) and reaches Debian's mirror.
 set -eu
 folder=$1
-[ -e "$folder/complete" ] && exit 0
+packages=libc6-dev,libstdc++-12-dev,libopencv-core-dev,libopencv-imgproc-dev,libceres-dev,libhwy-dev,libgmock-dev
+[ "$(cat "$folder/complete" 2>/dev/null)" = "$packages" ] && exit 0
 command -v mmdebstrap >/dev/null || {
   echo "mmdebstrap is missing: apt-get install mmdebstrap" >&2
   exit 1
@@ -12,7 +13,7 @@ command -v mmdebstrap >/dev/null || {
 rm -rf "$folder"
 mkdir -p "$(dirname "$folder")"
 mmdebstrap --quiet --variant=extract --architectures=arm64 \
-  --include="libc6-dev,libstdc++-12-dev,libopencv-core-dev,libopencv-imgproc-dev,libceres-dev,libgmock-dev" \
+  --include="$packages" \
   bookworm "$folder" "${ORBSLAM2PY_DEBIAN_MIRROR:-http://deb.debian.org/debian}"
 # Links from the root would lead out of the folder; others are made by packages' scripts, which were not run.
 find "$folder" -type l -lname '/*' | while read -r link; do
@@ -26,4 +27,4 @@ done
 # Of what Ceres is linked with, some is named by its place in the system.
 # shellcheck disable=SC2016  # CMake's variable
 sed -i 's#;/usr/lib/#;${CMAKE_SYSROOT}/usr/lib/#g' "$folder/usr/lib/aarch64-linux-gnu/cmake/Ceres/CeresTargets.cmake"
-touch "$folder/complete"
+echo "$packages" >"$folder/complete"

@@ -47,7 +47,8 @@ def fetch_sources(folder: Path, packages: list[str]) -> None:
 
     It is an apt with a state of its own: the machine's list of mirrors stays as it is.
     """
-    if (folder / "complete").exists():
+    complete = folder / "complete"
+    if complete.exists() and complete.read_text().split() == packages:
         return
     for part in ("state/lists/partial", "cache/archives/partial"):
         (folder / part).mkdir(parents=True, exist_ok=True)
@@ -69,7 +70,7 @@ def fetch_sources(folder: Path, packages: list[str]) -> None:
     ]
     subprocess.run([*apt, "update"], check=True)
     subprocess.run([*apt, "source", "--only-source", *packages], check=True, cwd=folder)
-    (folder / "complete").touch()
+    complete.write_text("\n".join(packages))
 
 
 def unpacked(package: str, sources: Path) -> Path:

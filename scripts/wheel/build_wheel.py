@@ -88,6 +88,7 @@ def build(python: Path, source: Path, folder: Path, jobs: int) -> tuple[Path, Pa
         "CMAKE_CXX_FLAGS": "-ffunction-sections -fdata-sections -DEIGEN_MPL2_ONLY",
         "Ceres_DIR": libraries / "lib/cmake/Ceres",
         "OpenCV_DIR": libraries / "lib/cmake/opencv4",
+        "HIGHWAY_INCLUDE_DIR": libraries / "include",
         "Eigen3_DIR": "/usr/share/eigen3/cmake",
         # It is there for CHOLMOD, which Ceres is built without.
         "CMAKE_DISABLE_FIND_PACKAGE_OpenMP": "ON",

@@ -43,13 +43,6 @@ py::array_t<std::uint8_t> image_copy(const cv::Mat& image) {
   return array;
 }
 
-KernelChoice kernel_choice(const std::string& name) {
-  if (name == "automatic") return KernelChoice::automatic;
-  if (name == "portable") return KernelChoice::portable;
-  if (name == "avx2") return KernelChoice::avx2;
-  throw SettingsError("kernels must be automatic, portable or avx2, got '" + name + "'");
-}
-
 /// Also of arrays that are not contiguous, such as a window of a larger image.
 cv::Mat copy_of(const py::array& array, const char* what) {
   return view_uint8(py::array::ensure(array, py::array::c_style), what).clone();
@@ -61,7 +54,7 @@ struct SharedExtractor {
   bool busy = false;  ///< guarded by the interpreter lock
 
   SharedExtractor(const OrbOptions& options, const std::string& kernels)
-      : extractor(options, kernel_choice(kernels)) {}
+      : extractor(options, vector_unit(kernels)) {}
 
   Extraction extract(const py::array& image, const py::object& mask) {
     if (busy) {
@@ -151,10 +144,11 @@ void bind_extractor(py::module_& module) {
 
 One thread at a time per extractor; several extractors may run side by side. The result depends on
 the image and the options only.)")
-      .def(py::init<const OrbOptions&, const std::string&>(), py::arg("options") = OrbOptions{},
-           py::arg("kernels") = "automatic",
-           "`kernels`: 'automatic', 'portable' or 'avx2'; all give the same bytes. Raises "
-           "SettingsError for kernels this processor cannot run.")
+      .def(
+          py::init<const OrbOptions&, const std::string&>(), py::arg("options") = OrbOptions{},
+          py::arg("kernels") = "automatic",
+          "`kernels`: 'automatic', or one of `vector_units`, or 'portable', the first of them; all "
+          "give the same bytes. Raises SettingsError for kernels this processor cannot run.")
       .def("extract", &SharedExtractor::extract, py::arg("image"), py::arg("mask") = py::none(),
            R"(Extracts features.
 
@@ -168,8 +162,9 @@ extractor.)")
           "scales", [](const SharedExtractor& self) { return self.extractor.scales(); },
           "The scale tables.")
       .def_property_readonly(
-          "kernel_name", [](const SharedExtractor& self) { return self.extractor.kernel_name(); },
-          "'avx2' or 'portable': the inner loops in use.");
+          "kernel_name",
+          [](const SharedExtractor& self) { return name_of(self.extractor.vector_unit()); },
+          "The vector unit whose inner loops are in use: one of `vector_units`.");
 }
 
 std::vector<Descriptor> descriptors_of(const Bytes& rows, const char* what) {
@@ -210,6 +205,15 @@ void bind_features(py::module_& module) {
   bind_orb_options(module);
   bind_extraction(module);
   bind_extractor(module);
+  module.def(
+      "vector_units",
+      [] {
+        std::vector<std::string> names;
+        for (const VectorUnit unit : vector_units()) names.emplace_back(name_of(unit));
+        return names;
+      },
+      "Names of the vector units that there are kernels for and this processor has, slowest "
+      "first.");
   module.def("hamming_distances", &hamming_distances, py::arg("a"), py::arg("b"),
              "Number of differing bits row by row: (n, 32) and (n, 32) uint8 to (n,) int32.");
   module.def("hamming_matrix", &hamming_matrix, py::arg("a"), py::arg("b"),

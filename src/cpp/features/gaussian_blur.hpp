@@ -19,8 +19,7 @@ class GaussianBlur {
   cv::Mat blur(const cv::Mat& image, const Kernels& kernels);
 
  private:
-  std::vector<std::uint8_t> padded_;
-  std::vector<std::uint16_t> sums_;  ///< ring of 7 rows
+  std::vector<std::int16_t> sums_;  ///< of the columns, one row
   std::vector<std::uint8_t> blurred_;
 };
 

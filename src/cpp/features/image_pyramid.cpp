@@ -127,7 +127,7 @@ ImagePyramid PyramidBuilder::build(const cv::Mat& grey, const ScalePyramid& scal
 }
 
 ImagePyramid build_pyramid(const cv::Mat& grey, const ScalePyramid& scales) {
-  return PyramidBuilder().build(grey, scales, choose_kernels(KernelChoice::automatic));
+  return PyramidBuilder().build(grey, scales, kernels_for(best_vector_unit()));
 }
 
 }  // namespace orbslam

@@ -4,9 +4,10 @@
 #include <cstddef>
 #include <cstdint>
 
-// The inner loops of the extractor as plain functions over pointers. kernels_avx2.cpp is compiled
-// with its own instruction set, so nothing that defines inline functions or templates may be
-// included here: the linker could pick the AVX2 copy for the whole program.
+#include "base/vector_unit.hpp"
+
+// The inner loops of the extractor as plain functions over pointers. kernels.cpp is their one
+// source, compiled for every vector unit.
 
 namespace orbslam {
 
@@ -41,11 +42,9 @@ struct ResizeColumns {
   const std::uint8_t* block_shuffle = nullptr;
 };
 
-/// One implementation of all inner loops. Every implementation gives the same bytes. What they
-/// compute: docs/method/features.md#pyramid and what follows it.
+/// All inner loops for one vector unit. Each gives the same bytes. What they compute:
+/// docs/method/features.md#pyramid and what follows it.
 struct Kernels {
-  const char* name;
-
   /// FAST-9-16 scores of `count` neighbouring pixels from `centre` on; 0 for pixels that are no
   /// corner at `threshold` (>= 1). Reads 3 pixels around the run.
   void (*fast_scores)(const std::uint8_t* centre, std::ptrdiff_t stride, int count, int threshold,
@@ -63,11 +62,11 @@ struct Kernels {
   void (*resize_blend)(const std::int16_t* upper, const std::int16_t* lower, int upper_weight,
                        int lower_weight, int count, std::uint8_t* out);
 
-  /// Horizontal pass of the blur. `padded` starts 3 pixels left of the row. The order of the sums
-  /// in `out` is the implementation's own; blur_columns of the same implementation undoes it.
-  void (*blur_row)(const std::uint8_t* padded, int count, std::uint16_t* out);
-  /// Vertical pass over 7 rows of sums. May write up to `row_padding` pixels too many.
-  void (*blur_columns)(const std::uint16_t* const rows[7], int count, std::uint8_t* out);
+  /// Vertical pass of the blur: sums over 7 rows in units of 1/256, minus 32768.
+  void (*blur_columns)(const std::uint8_t* const rows[7], int count, std::int16_t* sums);
+  /// Horizontal pass over such sums, which start 3 pixels left of the row. May read and write up to
+  /// `row_padding` too many.
+  void (*blur_row)(const std::int16_t* sums, int count, std::uint8_t* out);
 
   /// First moments of the disc of radius 15: m10 = sum u I, m01 = sum v I.
   /// Reads the 32 x 31 pixels from (-15, -15) on.
@@ -80,17 +79,7 @@ struct Kernels {
                 std::uint8_t* descriptor);
 };
 
-enum class KernelChoice {
-  automatic,  ///< the fastest the processor can run, unless ORBSLAM2PY_PORTABLE_KERNELS=1 is set
-  portable,
-  avx2,
-};
-
-/// Those for any processor.
-const Kernels& portable_kernels();
-/// Null where the library was built without them (not an x86 processor).
-const Kernels* avx2_kernels();
-/// The kernels asked for. Throws SettingsError when that is AVX2 and the processor has none.
-const Kernels& choose_kernels(KernelChoice choice);
+/// Those of a unit that this processor has.
+const Kernels& kernels_for(VectorUnit unit);
 
 }  // namespace orbslam

@@ -65,11 +65,12 @@ void OrbOptions::check() const {
 }
 
 struct OrbExtractor::Impl {
-  Impl(const OrbOptions& wanted, const Kernels& chosen)
+  Impl(const OrbOptions& wanted, VectorUnit chosen)
       : options(wanted),
         scales(wanted.scale_factor, wanted.n_levels, wanted.original_coordinates),
         quota(scales.features_per_level(wanted.n_features)),
-        kernels(&chosen) {}
+        unit(chosen),
+        kernels(&kernels_for(chosen)) {}
 
   void extract_level(const cv::Mat& image, const cv::Mat& mask, int level, Features& features);
   Keypoint keypoint_at(const cv::Mat& image, const Corner& corner, int level) const;
@@ -78,6 +79,7 @@ struct OrbExtractor::Impl {
   OrbOptions options;
   ScalePyramid scales;
   std::vector<int> quota;
+  VectorUnit unit;
   const Kernels* kernels;
   PyramidBuilder pyramid;
   CornerGrid grid;
@@ -129,9 +131,9 @@ Descriptor OrbExtractor::Impl::descriptor_at(const cv::Mat& blurred, const Corne
   return descriptor;
 }
 
-OrbExtractor::OrbExtractor(const OrbOptions& options, KernelChoice kernels) {
+OrbExtractor::OrbExtractor(const OrbOptions& options, VectorUnit unit) {
   options.check();
-  impl_ = std::make_unique<Impl>(options, choose_kernels(kernels));
+  impl_ = std::make_unique<Impl>(options, unit);
 }
 
 OrbExtractor::~OrbExtractor() = default;
@@ -154,6 +156,6 @@ Extraction OrbExtractor::extract(const cv::Mat& grey, const cv::Mat& mask) {
 
 const OrbOptions& OrbExtractor::options() const { return impl_->options; }
 const ScalePyramid& OrbExtractor::scales() const { return impl_->scales; }
-const char* OrbExtractor::kernel_name() const { return impl_->kernels->name; }
+VectorUnit OrbExtractor::vector_unit() const { return impl_->unit; }
 
 }  // namespace orbslam

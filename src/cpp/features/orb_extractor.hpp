@@ -35,9 +35,9 @@ struct Extraction {
 /// on the image and the options only. See docs/method/features.md#pyramid and what follows it.
 class OrbExtractor {
  public:
-  /// `kernels` chooses between implementations that give the same bytes. Throws SettingsError for
-  /// options out of range and for kernels this processor cannot run.
-  explicit OrbExtractor(const OrbOptions& options, KernelChoice kernels = KernelChoice::automatic);
+  /// `unit`: one of `vector_units`; all give the same bytes. Throws SettingsError for options out
+  /// of range.
+  explicit OrbExtractor(const OrbOptions& options, VectorUnit unit = best_vector_unit());
   ~OrbExtractor();
   OrbExtractor(OrbExtractor&&) noexcept;
   OrbExtractor& operator=(OrbExtractor&&) noexcept;
@@ -49,8 +49,8 @@ class OrbExtractor {
 
   const OrbOptions& options() const;
   const ScalePyramid& scales() const;
-  /// "avx2" or "portable".
-  const char* kernel_name() const;
+  /// The unit whose kernels are in use.
+  VectorUnit vector_unit() const;
 
  private:
   struct Impl;

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// No C++ library header here: this file is also read by a source that is compiled for another
-// instruction set, and inline functions shared with it would break the one-definition rule.
+#include "base/vector_unit.hpp"
 
 namespace orbslam::stereo {
 
@@ -24,14 +23,7 @@ struct WindowPair {
 /// that starts at column k of the strip, k = 0..10. See docs/method/frame.md#stereo-matching.
 using ShiftedSad = void (*)(const WindowPair& windows, int* sums);
 
-/// The version for any processor.
-void shifted_sad_portable(const WindowPair& windows, int* sums);
-#if defined(__x86_64__)
-/// Same results as the portable version; needs a CPU with AVX2.
-void shifted_sad_avx2(const WindowPair& windows, int* sums);
-#endif
-
-/// The fastest version this CPU can run.
-ShiftedSad best_shifted_sad();
+/// The one for a unit that this processor has; each gives the same sums.
+ShiftedSad shifted_sad_for(VectorUnit unit);
 
 }  // namespace orbslam::stereo

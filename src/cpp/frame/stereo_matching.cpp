@@ -187,7 +187,7 @@ StereoMatches match_stereo(const Extraction& left, const Extraction& right,
   const float bf32 = static_cast<float>(bf);
   const int rows = left.pyramid.levels[0].rows;
   const RowTable table(right.features.keypoints, scales, rows);
-  const stereo::ShiftedSad shifted_sad = stereo::best_shifted_sad();
+  const stereo::ShiftedSad shifted_sad = stereo::shifted_sad_for(best_vector_unit());
 
   StereoMatches matches;
   matches.right_u.assign(keypoints.size(), kUnmatched);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "features/kernels.hpp"
+#include "base/vector_unit.hpp"
 #include "optimize/bundle_kernels.hpp"
 #include "optimize/bundle_kernels_cholesky.hpp"
 #include "optimize/bundle_kernels_points.hpp"
@@ -17,8 +17,9 @@ const Kernels* avx2_kernels() { return nullptr; }
 #endif
 
 const Kernels& best_kernels() {
-  const bool portable = &choose_kernels(KernelChoice::automatic) == &orbslam::portable_kernels();
-  return portable || avx2_kernels() == nullptr ? portable_kernels() : *avx2_kernels();
+  const VectorUnit unit = best_vector_unit();
+  const bool has_avx2 = unit == VectorUnit::avx2 || unit == VectorUnit::avx512;
+  return has_avx2 && avx2_kernels() != nullptr ? *avx2_kernels() : portable_kernels();
 }
 
 }  // namespace orbslam::bundle_kernels

@@ -2,7 +2,10 @@
 #pragma once
 
 // Four doubles: one register of AVX, or two of what every 64-bit processor has. In an unnamed
-// namespace, because it is compiled for two instruction sets (see bundle_kernels.hpp).
+// namespace, because it is compiled for two instruction sets (see bundle_kernels.hpp). One source
+// already, by the compiler's own vectors and not by Highway as the kernels of images: it is always
+// four lanes, because their number decides the order of sums and so the bytes, and it is
+// arithmetic, which compilers know how to write for each processor.
 
 #include "optimize/bundle_kernels.hpp"
 

@@ -18,23 +18,7 @@ namespace {
 
 using testing::random_image;
 
-const Kernels* avx2_or_null() {
-  try {
-    return &choose_kernels(KernelChoice::avx2);
-  } catch (const std::runtime_error&) {
-    return nullptr;
-  }
-}
-
-/// Both implementations, or the portable one alone.
-std::vector<const Kernels*> all_kernels() {
-  std::vector<const Kernels*> kernels = {&portable_kernels()};
-  if (const Kernels* avx2 = avx2_or_null()) kernels.push_back(avx2);
-  return kernels;
-}
-
-TEST(Kernels, BothGiveTheSameFeatures) {
-  if (avx2_or_null() == nullptr) GTEST_SKIP() << "this processor has no AVX2";
+TEST(Kernels, EachUnitGivesTheSameFeatures) {
   const cv::Size sizes[] = {{640, 480}, {333, 257}, {101, 99},  {62, 62},  {63, 131},
                             {67, 65},   {250, 777}, {777, 250}, {95, 400}, {1241, 376}};
   std::uint64_t seed = 0;
@@ -42,16 +26,24 @@ TEST(Kernels, BothGiveTheSameFeatures) {
     OrbOptions options;
     options.n_features = 700;
     options.scale_factor = 1.1F + 0.1F * static_cast<float>(seed % 8);
-    OrbExtractor portable(options, KernelChoice::portable), avx2(options, KernelChoice::avx2);
-    ASSERT_STREQ(portable.kernel_name(), "portable");
-    ASSERT_STREQ(avx2.kernel_name(), "avx2");
     for (int repeat = 0; repeat < 3; ++repeat, ++seed) {
       const cv::Mat image = random_image(size.width, size.height, seed);
-      const Extraction a = portable.extract(image), b = avx2.extract(image);
-      EXPECT_GT(a.features.size(), 0U);
-      EXPECT_TRUE(testing::same_features(a.features, b.features)) << size << " seed " << seed;
-      for (std::size_t level = 0; level < a.pyramid.levels.size(); ++level) {
-        EXPECT_TRUE(testing::same_pixels(a.pyramid.levels[level], b.pyramid.levels[level]));
+      OrbExtractor slowest(options, vector_units().front());
+      ASSERT_EQ(slowest.vector_unit(), vector_units().front());
+      const Extraction first = slowest.extract(image);
+      EXPECT_GT(first.features.size(), 0U);
+      for (const VectorUnit unit : vector_units()) {
+        if (unit == slowest.vector_unit()) continue;
+        SCOPED_TRACE(name_of(unit));
+        OrbExtractor extractor(options, unit);
+        ASSERT_EQ(extractor.vector_unit(), unit);
+        const Extraction other = extractor.extract(image);
+        EXPECT_TRUE(testing::same_features(first.features, other.features))
+            << size << " seed " << seed;
+        for (std::size_t level = 0; level < first.pyramid.levels.size(); ++level) {
+          EXPECT_TRUE(
+              testing::same_pixels(first.pyramid.levels[level], other.pyramid.levels[level]));
+        }
       }
     }
   }
@@ -59,14 +51,15 @@ TEST(Kernels, BothGiveTheSameFeatures) {
 
 TEST(Kernels, PyramidEqualsOpenCvResize) {
   const cv::Size sizes[] = {{640, 480}, {333, 257}, {39, 21}, {17, 5}, {16, 16}, {128, 64}, {1, 9}};
-  for (const Kernels* kernels : all_kernels()) {
-    SCOPED_TRACE(kernels->name);
+  for (const VectorUnit unit : vector_units()) {
+    SCOPED_TRACE(name_of(unit));
+    const Kernels& kernels = kernels_for(unit);
     for (const cv::Size& size : sizes) {
       for (const float factor : {1.01F, 1.2F, 1.37F, 1.5F, 1.93F, 2.0F}) {
         const cv::Mat image =
             random_image(size.width, size.height, static_cast<std::uint64_t>(size.area()));
         const ScalePyramid scales(factor, 5);
-        const auto levels = PyramidBuilder().build(image, scales, *kernels).levels;
+        const auto levels = PyramidBuilder().build(image, scales, kernels).levels;
         ASSERT_EQ(levels.size(), 5U);
         for (int level = 1; level < 5; ++level) {
           const auto at = static_cast<std::size_t>(level);
@@ -88,18 +81,19 @@ TEST(Kernels, PyramidEqualsOpenCvResize) {
 }
 
 TEST(Kernels, BlurEqualsOpenCvGaussian) {
-  for (const Kernels* kernels : all_kernels()) {
-    SCOPED_TRACE(kernels->name);
+  for (const VectorUnit unit : vector_units()) {
+    SCOPED_TRACE(name_of(unit));
+    const Kernels& kernels = kernels_for(unit);
     GaussianBlur gaussian;
     for (const cv::Size& size : {cv::Size(640, 480), cv::Size(33, 31), cv::Size(65, 7),
                                  cv::Size(7, 65), cv::Size(4, 4), cv::Size(301, 200)}) {
       const cv::Mat image = random_image(size.width, size.height, 3);
       cv::Mat expected;
       cv::GaussianBlur(image, expected, cv::Size(7, 7), 2, 2, cv::BORDER_REFLECT_101);
-      EXPECT_TRUE(testing::same_pixels(gaussian.blur(image, *kernels), expected)) << size;
+      EXPECT_TRUE(testing::same_pixels(gaussian.blur(image, kernels), expected)) << size;
     }
     const cv::Mat white(40, 50, CV_8UC1, cv::Scalar(255));
-    EXPECT_TRUE(testing::same_pixels(gaussian.blur(white, *kernels), white));
+    EXPECT_TRUE(testing::same_pixels(gaussian.blur(white, kernels), white));
   }
 }
 
@@ -123,15 +117,16 @@ bool is_corner(const cv::Mat& image, int x, int y, int threshold) {
 }
 
 TEST(Kernels, FastScoreIsTheLargestThreshold) {
-  for (const Kernels* kernels : all_kernels()) {
-    SCOPED_TRACE(kernels->name);
-    for (const int width : {7, 17, 22, 38, 39, 71}) {
+  for (const VectorUnit unit : vector_units()) {
+    SCOPED_TRACE(name_of(unit));
+    const Kernels& kernels = kernels_for(unit);
+    for (const int width : {7, 17, 22, 38, 39, 69, 71, 135}) {
       const cv::Mat image = random_image(width, 40, static_cast<std::uint64_t>(width));
       const int count = image.cols - 6;
       std::vector<std::uint8_t> scores(static_cast<std::size_t>(count));
       for (int y = 3; y < image.rows - 3; ++y) {
-        kernels->fast_scores(image.ptr(y) + 3, static_cast<std::ptrdiff_t>(image.step[0]), count, 7,
-                             scores.data());
+        kernels.fast_scores(image.ptr(y) + 3, static_cast<std::ptrdiff_t>(image.step[0]), count, 7,
+                            scores.data());
         for (int x = 3; x < image.cols - 3; ++x) {
           const int score = scores[static_cast<std::size_t>(x - 3)];
           if (score == 0) {
@@ -148,8 +143,9 @@ TEST(Kernels, FastScoreIsTheLargestThreshold) {
 }
 
 TEST(Kernels, MomentsOfTheDisc) {
-  for (const Kernels* kernels : all_kernels()) {
-    SCOPED_TRACE(kernels->name);
+  for (const VectorUnit unit : vector_units()) {
+    SCOPED_TRACE(name_of(unit));
+    const Kernels& kernels = kernels_for(unit);
     for (std::uint64_t seed = 0; seed < 20; ++seed) {
       const cv::Mat image =
           seed == 0 ? cv::Mat(41, 41, CV_8UC1, cv::Scalar(255)) : random_image(41, 41, seed);
@@ -166,10 +162,77 @@ TEST(Kernels, MomentsOfTheDisc) {
       }
       EXPECT_EQ(pixels, 749);
       std::int32_t found10 = 1, found01 = 1;
-      kernels->moments(image.ptr(20) + 20, static_cast<std::ptrdiff_t>(image.step[0]), &found10,
-                       &found01);
+      kernels.moments(image.ptr(20) + 20, static_cast<std::ptrdiff_t>(image.step[0]), &found10,
+                      &found01);
       EXPECT_EQ(found10, m10);
       EXPECT_EQ(found01, m01);
+    }
+  }
+}
+
+/// Nearest integers, half to even, of coordinates whose products are rounded to float32 first.
+int rotated_pixel(const cv::Mat& image, float x, float y, float cosine, float sine) {
+  const volatile float xc = x * cosine, ys = y * sine, xs = x * sine, yc = y * cosine;
+  const int column = static_cast<int>(std::nearbyintf(xc - ys));
+  const int row = static_cast<int>(std::nearbyintf(xs + yc));
+  return image.at<std::uint8_t>(20 + row, 20 + column);
+}
+
+TEST(Kernels, RotatedTestsOfBrief) {
+  const cv::Mat image = random_image(41, 41, 8);
+  for (const VectorUnit unit : vector_units()) {
+    SCOPED_TRACE(name_of(unit));
+    for (int step = 0; step < 720; ++step) {
+      // Quarter turns and half pixels among them.
+      const float radians = static_cast<float>(step) * static_cast<float>(CV_PI / 360);
+      const float cosine = step == 0 ? 0.5F : std::cos(radians);
+      const float sine = step == 0 ? 0.5F : std::sin(radians);
+      std::uint8_t found[32];
+      kernels_for(unit).brief(image.ptr(20) + 20, static_cast<std::ptrdiff_t>(image.step[0]),
+                              cosine, sine, found);
+      for (std::size_t i = 0; i < 256; ++i) {
+        const auto& test = orb_pattern[i];
+        const auto at = [&](std::size_t k) {
+          return rotated_pixel(image, static_cast<float>(test[k]), static_cast<float>(test[k + 1]),
+                               cosine, sine);
+        };
+        ASSERT_EQ(found[i / 8] >> (i % 8) & 1, at(0) < at(2)) << step << " bit " << i;
+      }
+    }
+  }
+}
+
+TEST(Kernels, MaximaOfBlocksOfAnyWidth) {
+  for (const VectorUnit unit : vector_units()) {
+    SCOPED_TRACE(name_of(unit));
+    for (const int width : {1, 7, 16, 31, 32, 33, 64, 70}) {
+      const int height = 9;
+      cv::Mat scores(height + 2, width + 2 + row_padding, CV_8UC1, cv::Scalar(0));
+      const cv::Rect block(1, 1, width, height);
+      random_image(width, height, static_cast<std::uint64_t>(width)).copyTo(scores(block));
+      std::vector<std::pair<int, int>> expected, found;
+      for (int y = 1; y <= height; ++y) {
+        for (int x = 1; x <= width; ++x) {
+          bool above = scores.at<std::uint8_t>(y, x) > 0;
+          for (int k = 0; k < 9; ++k) {
+            if (k != 4) {
+              above &= scores.at<std::uint8_t>(y, x) >
+                       scores.at<std::uint8_t>(y + k / 3 - 1, x + k % 3 - 1);
+            }
+          }
+          if (above) expected.emplace_back(x - 1, y - 1);
+        }
+      }
+      std::vector<Corner> corners(static_cast<std::size_t>((width + 1) / 2 * ((height + 1) / 2)));
+      const int n = kernels_for(unit).local_maxima(scores.ptr(1) + 1,
+                                                   static_cast<std::ptrdiff_t>(scores.step[0]),
+                                                   width, height, corners.data());
+      corners.resize(static_cast<std::size_t>(n));
+      for (const Corner& corner : corners) {
+        found.emplace_back(corner.x, corner.y);
+        EXPECT_EQ(corner.response, scores.at<std::uint8_t>(corner.y + 1, corner.x + 1));
+      }
+      EXPECT_EQ(found, expected) << width;
     }
   }
 }

@@ -18,17 +18,13 @@ using testing::read_npy;
 struct Case {
   const char* name;
   int n_features;
-  KernelChoice kernels;
+  VectorUnit unit;
 };
 
 class Golden : public ::testing::TestWithParam<Case> {
  protected:
   void SetUp() override {
-    try {
-      kernels_ = &choose_kernels(GetParam().kernels);
-    } catch (const std::runtime_error& error) {
-      GTEST_SKIP() << error.what();
-    }
+    kernels_ = &kernels_for(GetParam().unit);
     image_ = testing::read_image(path("image"));
   }
   std::string path(const std::string& array) const {
@@ -91,7 +87,7 @@ TEST_P(Golden, Features) {
   OrbOptions options;
   options.n_features = GetParam().n_features;
   options.original_coordinates = true;
-  OrbExtractor extractor(options, GetParam().kernels);
+  OrbExtractor extractor(options, GetParam().unit);
   const Features features = extractor.extract(image_).features;
   const auto keypoints = read_npy<float>(per_count("kp"));
   const auto levels = read_npy<std::int32_t>(per_count("kp_octave"));
@@ -114,18 +110,20 @@ TEST_P(Golden, Quota) {
   EXPECT_EQ(scales_.features_per_level(GetParam().n_features), quota.values);
 }
 
-INSTANTIATE_TEST_SUITE_P(Synthetic, Golden,
-                         ::testing::Values(Case{"synth7", 1000, KernelChoice::avx2},
-                                           Case{"synth7", 2000, KernelChoice::avx2},
-                                           Case{"synth11", 2000, KernelChoice::avx2},
-                                           Case{"synth7", 1000, KernelChoice::portable},
-                                           Case{"synth7", 2000, KernelChoice::portable},
-                                           Case{"synth11", 2000, KernelChoice::portable}),
+std::vector<Case> cases() {
+  std::vector<Case> all;
+  for (const VectorUnit unit : vector_units()) {
+    all.insert(all.end(),
+               {{"synth7", 1000, unit}, {"synth7", 2000, unit}, {"synth11", 2000, unit}});
+  }
+  return all;
+}
+
+INSTANTIATE_TEST_SUITE_P(Synthetic, Golden, ::testing::ValuesIn(cases()),
                          [](const ::testing::TestParamInfo<Case>& chosen) {
                            return std::string(chosen.param.name) + "_" +
-                                  std::to_string(chosen.param.n_features) +
-                                  (chosen.param.kernels == KernelChoice::avx2 ? "_avx2"
-                                                                              : "_portable");
+                                  std::to_string(chosen.param.n_features) + "_" +
+                                  name_of(chosen.param.unit);
                          });
 
 }  // namespace

@@ -29,37 +29,31 @@ WindowPair random_windows(std::mt19937_64& generator, bool extremes) {
   return windows;
 }
 
-TEST(ShiftedSad, PortableVersionFollowsTheDefinition) {
-  std::mt19937_64 generator(1);
-  const WindowPair windows = random_windows(generator, false);
+Sums sums_by_definition(const WindowPair& windows) {
   Sums sums{};
-  shifted_sad_portable(windows, sums.data());
   for (int k = 0; k < kShifts; ++k) {
-    int expected = 0;
     for (int j = 0; j < 11; ++j) {
       for (int i = 0; i < 11; ++i) {
-        expected += std::abs((windows.left[j][i] - windows.left[5][5]) -
-                             (windows.right[j][k + i] - windows.right[5][k + 5]));
+        sums[static_cast<std::size_t>(k)] +=
+            std::abs((windows.left[j][i] - windows.left[5][5]) -
+                     (windows.right[j][k + i] - windows.right[5][k + 5]));
       }
     }
-    EXPECT_EQ(sums[static_cast<std::size_t>(k)], expected);
   }
+  return sums;
 }
 
-TEST(ShiftedSad, AVX2GivesTheSameSums) {
-#if defined(__x86_64__)
-  if (!__builtin_cpu_supports("avx2")) GTEST_SKIP() << "this CPU has no AVX2";
-  std::mt19937_64 generator(2);
-  for (int round = 0; round < 2000; ++round) {
-    const WindowPair windows = random_windows(generator, round % 2 == 1);
-    Sums portable{}, avx2{};
-    shifted_sad_portable(windows, portable.data());
-    shifted_sad_avx2(windows, avx2.data());
-    ASSERT_EQ(portable, avx2) << "round " << round;
+TEST(ShiftedSad, EachUnitFollowsTheDefinition) {
+  for (const VectorUnit unit : vector_units()) {
+    SCOPED_TRACE(name_of(unit));
+    std::mt19937_64 generator(2);
+    for (int round = 0; round < 500; ++round) {
+      const WindowPair windows = random_windows(generator, round % 2 == 1);
+      Sums sums{};
+      shifted_sad_for(unit)(windows, sums.data());
+      ASSERT_EQ(sums, sums_by_definition(windows)) << "round " << round;
+    }
   }
-#else
-  GTEST_SKIP() << "not an x86-64 processor";
-#endif
 }
 
 TEST(ShiftedSad, LargestPossibleSumIsExact) {
@@ -67,11 +61,13 @@ TEST(ShiftedSad, LargestPossibleSumIsExact) {
   for (auto& row : windows.left) std::fill(std::begin(row), std::end(row), 255);
   windows.left[5][5] = 0;
   for (int k = 0; k < kShifts; ++k) windows.right[5][k + 5] = 255;
-  Sums sums{}, portable{};
-  best_shifted_sad()(windows, sums.data());
-  shifted_sad_portable(windows, portable.data());
-  EXPECT_EQ(sums, portable);
-  EXPECT_GT(*std::max_element(sums.begin(), sums.end()), 110 * 510);
+  for (const VectorUnit unit : vector_units()) {
+    SCOPED_TRACE(name_of(unit));
+    Sums sums{};
+    shifted_sad_for(unit)(windows, sums.data());
+    EXPECT_EQ(sums, sums_by_definition(windows));
+    EXPECT_GT(*std::max_element(sums.begin(), sums.end()), 110 * 510);
+  }
 }
 
 }  // namespace

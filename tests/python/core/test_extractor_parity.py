@@ -11,7 +11,7 @@ from support.data import shared_arrays
 
 
 @pytest.mark.shared
-@pytest.mark.parametrize("kernels", ["automatic", "portable"])
+@pytest.mark.parametrize("kernels", _core.vector_units())
 @pytest.mark.parametrize("n_features", [1000, 2000])
 @pytest.mark.parametrize("name", ["euroc_a", "kitti_a", "tum_a", "synth7", "synth11"])
 def test_equals_the_reference(name: str, n_features: int, kernels: str) -> None:

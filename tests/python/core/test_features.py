@@ -86,7 +86,22 @@ def test_portable_kernels_by_environment() -> None:
     run = subprocess.run(
         [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
     )
-    assert run.stdout.strip() == "portable"
+    assert run.stdout.strip() == _core.vector_units()[0]
+
+
+def test_kernels_by_name() -> None:
+    """The names of the vector units, or what they are to somebody who knows none of them."""
+    units = _core.vector_units()
+    image = noise(240, 320)
+    expected = _core.OrbExtractor().extract(image)
+    for kernels in ("portable", *units):
+        extractor = _core.OrbExtractor(kernels=kernels)
+        assert extractor.kernel_name == (units[0] if kernels == "portable" else kernels)
+        result = extractor.extract(image)
+        np.testing.assert_array_equal(result.keypoints, expected.keypoints)
+        np.testing.assert_array_equal(result.descriptors, expected.descriptors)
+    with pytest.raises(SettingsError, match=f"altivec.*portable, {units[0]}"):
+        _core.OrbExtractor(kernels="altivec")
 
 
 def test_one_extractor_refuses_a_second_thread() -> None:
