@@ -237,19 +237,7 @@ class Tracking:
             self._waits_for_confirmation = None
         else:
             with timer("keyframe"):
-                self._insert_confirmed()
-                is_keyframe = self._belief.allows_keyframe(
-                    estimate.evidence
-                ) and self._keyframe_wanted(frame, estimate)
-                if is_keyframe and estimate.unconfirmed:
-                    self._waits_for_confirmation = frame
-                    is_keyframe = False
-                if is_keyframe:
-                    if estimate.evidence is not None and estimate.evidence.doubted:
-                        # Bundle adjustment, which tries them again, would have few inliers to
-                        # tell them by.
-                        frame.discard_outliers()
-                    self._create_keyframe(frame)
+                is_keyframe = self._extend_map(frame, estimate)
         # Outliers went into the keyframe, where bundle adjustment decides about them; the next
         # frame must not start from them.
         frame.discard_outliers()
@@ -384,6 +372,21 @@ class Tracking:
         return bool(n_keyframes <= self._search.limits.small_map)
 
     # ---- keyframes -------------------------------------------------------------------------------
+    def _extend_map(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> bool:
+        """Make a tracked frame a keyframe if the map needs one; whether it was made now."""
+        self._insert_confirmed()
+        allowed = self._belief.allows_keyframe(estimate.evidence)
+        if not (allowed and self._keyframe_wanted(frame, estimate)):
+            return False
+        if estimate.unconfirmed:
+            self._waits_for_confirmation = frame
+            return False
+        if estimate.evidence is not None and estimate.evidence.doubted:
+            # Bundle adjustment, which tries them again, would have few inliers to tell them by.
+            frame.discard_outliers()
+        self._create_keyframe(frame)
+        return True
+
     def _keyframe_wanted(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> bool:
         if self._blurred:
             return False
