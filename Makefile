@@ -84,9 +84,9 @@ docs: install
 
 # Slow (minutes), so not part of `make test`.
 tidy: build/.system-packages
-	@cmake --preset release >/dev/null
+	@cmake --preset release -B build/tidy -DORBSLAM2PY_UNITY=OFF >/dev/null # the flags of each source
 	@find src/cpp -name '*.cpp' -not -path '*/bindings/*' | \
-	  xargs -P $(JOBS) -n 1 clang-tidy -p build/release --quiet
+	  xargs -P $(JOBS) -n 1 clang-tidy -p build/tidy --quiet
 
 sanitize: build/.system-packages
 	@cmake --preset asan >/dev/null && cmake --build build/asan -j $(JOBS)
