@@ -138,7 +138,7 @@ compare-wheel: install
 
 # The core for another processor: libraries are unpacked into build/arm, nothing of arm64 is installed. With
 # ARM_TESTS=all also the tests that take the emulator long.
-ARM_PACKAGES := g++-aarch64-linux-gnu qemu-user-static mmdebstrap
+ARM_PACKAGES := g++-aarch64-linux-gnu qemu-user-static mmdebstrap dpkg-dev
 ARM_TESTS ?= chosen
 test-arm: build/.system-packages
 	@dpkg-query -W $(ARM_PACKAGES) >/dev/null || { echo "apt-get install $(ARM_PACKAGES)" >&2; exit 1; }

@@ -12,18 +12,15 @@ command -v mmdebstrap >/dev/null || {
 rm -rf "$folder"
 mkdir -p "$(dirname "$folder")"
 mmdebstrap --quiet --variant=extract --architectures=arm64 \
-  --include="libc6-dev,libstdc++-12-dev,libopencv-core-dev,libopencv-imgproc-dev,libceres-dev,libgmock-dev" \
+  --include="libc6-dev,libstdc++-12-dev,libopencv-core-dev,libopencv-imgproc-dev,libeigen3-dev,libgmock-dev" \
   bookworm "$folder" "${ORBSLAM2PY_DEBIAN_MIRROR:-http://deb.debian.org/debian}"
 # Links from the root would lead out of the folder; others are made by packages' scripts, which were not run.
 find "$folder" -type l -lname '/*' | while read -r link; do
   ln -sfn "$(realpath --canonicalize-missing --relative-to "$(dirname "$link")" "$folder$(readlink "$link")")" "$link"
 done
-for library in blas lapack; do
+for library in blas lapack; do # OpenCV's
   for name in "lib$library.so" "lib$library.so.3"; do
     ln -sf "$library/lib$library.so.3" "$folder/usr/lib/aarch64-linux-gnu/$name"
   done
 done
-# Of what Ceres is linked with, some is named by its place in the system.
-# shellcheck disable=SC2016  # CMake's variable
-sed -i 's#;/usr/lib/#;${CMAKE_SYSROOT}/usr/lib/#g' "$folder/usr/lib/aarch64-linux-gnu/cmake/Ceres/CeresTargets.cmake"
 touch "$folder/complete"
