@@ -4,8 +4,8 @@
 ``build_libraries.py FOLDER`` takes the compiler in FOLDER/sysroot (fetch_toolchain.sh) and fills
 FOLDER/libraries. What is built, and how, stands in libraries.toml. A run that was interrupted goes
 on where it stood. FOLDER/libraries/notices/manifest.json says what was built from which version,
-under which licence. With --only, --processor and --toolchain it builds one library for another
-processor (scripts/arm/test_arm.sh).
+under which licence. With --only it builds one library, with --toolchain for another processor,
+with --native for this machine (scripts/arm/test_arm.sh).
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def flags_for(library: dict[str, Any], processor: str) -> dict[str, Any]:
 
 
 def build(
-    key: str, cmake: dict[str, Any], source: Path, folder: Path, toolchain: Path, jobs: int
+    key: str, cmake: dict[str, Any], source: Path, folder: Path, toolchain: Path | None, jobs: int
 ) -> None:
     """Configure, compile and install one library."""
     sysroot, objects = folder / "sysroot", folder / "objects" / key
@@ -109,7 +109,8 @@ def build(
     }
     objects.mkdir(parents=True, exist_ok=True)
     configure = ["cmake", "-S", source, "-B", objects, "-GNinja"]
-    configure += [f"--toolchain={toolchain}"]
+    if toolchain is not None:
+        configure += [f"--toolchain={toolchain.resolve()}"]
     configure += [f"-D{name}={value}" for name, value in defines.items()]
     with (folder / f"{key}.log").open("w") as log:
         done = subprocess.run(configure, env=environment, stdout=log, stderr=log, check=False)
@@ -163,7 +164,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
-    parser.add_argument("--toolchain", type=Path, default=HERE / "toolchain.cmake")
+    compiler = parser.add_mutually_exclusive_group()
+    compiler.add_argument("--toolchain", type=Path, default=HERE / "toolchain.cmake")
+    compiler.add_argument("--native", action="store_true", help="with this machine's own compiler")
     parser.add_argument("--processor", default="x86_64", help="whose flags are taken")
     parser.add_argument("--only", metavar="LIBRARY", help="this one, and no manifest")
     arguments = parser.parse_args()
@@ -178,7 +181,8 @@ def main() -> None:
         print(f"Building {library['name']}", flush=True)
         cmake = flags_for(library, arguments.processor)
         source = unpacked(library["source"], sources)
-        build(key, cmake, source, folder, arguments.toolchain.resolve(), arguments.jobs)
+        toolchain = None if arguments.native else arguments.toolchain
+        build(key, cmake, source, folder, toolchain, arguments.jobs)
     if not arguments.only:
         write_manifest(libraries, folder)
 
