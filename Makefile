@@ -84,9 +84,9 @@ docs: install
 
 # Slow (minutes), so not part of `make test`.
 tidy: build/.system-packages
-	@cmake --preset release >/dev/null
+	@cmake --preset release -B build/tidy -DORBSLAM2PY_UNITY=OFF >/dev/null # the flags of each source
 	@find src/cpp -name '*.cpp' -not -path '*/bindings/*' | \
-	  xargs -P $(JOBS) -n 1 clang-tidy -p build/release --quiet
+	  xargs -P $(JOBS) -n 1 clang-tidy -p build/tidy --quiet
 
 sanitize: build/.system-packages
 	@cmake --preset asan >/dev/null && cmake --build build/asan -j $(JOBS)
@@ -138,7 +138,7 @@ compare-wheel: install
 
 # The core for another processor: libraries are unpacked into build/arm, nothing of arm64 is installed. With
 # ARM_TESTS=all also the tests that take the emulator long.
-ARM_PACKAGES := g++-aarch64-linux-gnu qemu-user-static mmdebstrap
+ARM_PACKAGES := g++-aarch64-linux-gnu qemu-user-static mmdebstrap dpkg-dev
 ARM_TESTS ?= chosen
 test-arm: build/.system-packages
 	@dpkg-query -W $(ARM_PACKAGES) >/dev/null || { echo "apt-get install $(ARM_PACKAGES)" >&2; exit 1; }

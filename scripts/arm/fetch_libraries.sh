@@ -4,7 +4,7 @@
 # Needs mmdebstrap (Debian's package) and reaches Debian's mirror.
 set -eu
 folder=$1
-packages=libc6-dev,libstdc++-12-dev,libopencv-core-dev,libopencv-imgproc-dev,libceres-dev,libhwy-dev,libgmock-dev
+packages=libc6-dev,libstdc++-12-dev,libopencv-core-dev,libopencv-imgproc-dev,libeigen3-dev,libhwy-dev,libgmock-dev
 [ "$(cat "$folder/complete" 2>/dev/null)" = "$packages" ] && exit 0
 command -v mmdebstrap >/dev/null || {
   echo "mmdebstrap is missing: apt-get install mmdebstrap" >&2
@@ -19,12 +19,9 @@ mmdebstrap --quiet --variant=extract --architectures=arm64 \
 find "$folder" -type l -lname '/*' | while read -r link; do
   ln -sfn "$(realpath --canonicalize-missing --relative-to "$(dirname "$link")" "$folder$(readlink "$link")")" "$link"
 done
-for library in blas lapack; do
+for library in blas lapack; do # OpenCV's
   for name in "lib$library.so" "lib$library.so.3"; do
     ln -sf "$library/lib$library.so.3" "$folder/usr/lib/aarch64-linux-gnu/$name"
   done
 done
-# Of what Ceres is linked with, some is named by its place in the system.
-# shellcheck disable=SC2016  # CMake's variable
-sed -i 's#;/usr/lib/#;${CMAKE_SYSROOT}/usr/lib/#g' "$folder/usr/lib/aarch64-linux-gnu/cmake/Ceres/CeresTargets.cmake"
 echo "$packages" >"$folder/complete"

@@ -4,7 +4,8 @@
 ``build_libraries.py FOLDER`` takes the compiler in FOLDER/sysroot (fetch_toolchain.sh) and fills
 FOLDER/libraries. What is built, and how, stands in libraries.toml. A run that was interrupted goes
 on where it stood. FOLDER/libraries/notices/manifest.json says what was built from which version,
-under which licence.
+under which licence. With --only it builds one library, with --toolchain for another processor,
+with --native for this machine (scripts/arm/test_arm.sh).
 """
 
 from __future__ import annotations
@@ -79,7 +80,18 @@ def unpacked(package: str, sources: Path) -> Path:
     return folder
 
 
-def build(key: str, cmake: dict[str, Any], source: Path, folder: Path, jobs: int) -> None:
+def flags_for(library: dict[str, Any], processor: str) -> dict[str, Any]:
+    """Give CMake's settings of a library with the compiler's flags for a processor."""
+    settings: dict[str, Any] = dict(library["cmake"])
+    if "processors" in library:
+        flags = (library["processors"][processor], settings.get("CMAKE_CXX_FLAGS", ""))
+        settings["CMAKE_CXX_FLAGS"] = " ".join(filter(None, flags))
+    return settings
+
+
+def build(
+    key: str, cmake: dict[str, Any], source: Path, folder: Path, toolchain: Path | None, jobs: int
+) -> None:
     """Configure, compile and install one library."""
     sysroot, objects = folder / "sysroot", folder / "objects" / key
     defines = COMMON | {"CMAKE_INSTALL_PREFIX": str(folder / "libraries")}
@@ -98,7 +110,8 @@ def build(key: str, cmake: dict[str, Any], source: Path, folder: Path, jobs: int
     }
     objects.mkdir(parents=True, exist_ok=True)
     configure = ["cmake", "-S", source, "-B", objects, "-GNinja"]
-    configure += [f"--toolchain={HERE / 'toolchain.cmake'}"]
+    if toolchain is not None:
+        configure += [f"--toolchain={toolchain.resolve()}"]
     configure += [f"-D{name}={value}" for name, value in defines.items()]
     with (folder / f"{key}.log").open("w") as log:
         done = subprocess.run(configure, env=environment, stdout=log, stderr=log, check=False)
@@ -152,16 +165,27 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    compiler = parser.add_mutually_exclusive_group()
+    compiler.add_argument("--toolchain", type=Path, default=HERE / "toolchain.cmake")
+    compiler.add_argument("--native", action="store_true", help="with this machine's own compiler")
+    parser.add_argument("--processor", default="x86_64", help="whose flags are taken")
+    parser.add_argument("--only", metavar="LIBRARY", help="this one, and no manifest")
     arguments = parser.parse_args()
     folder = arguments.folder.resolve()
     libraries = tomllib.loads((HERE / "libraries.toml").read_text())
     built = {key: library for key, library in libraries.items() if "cmake" in library}
+    if arguments.only:
+        built = {arguments.only: built[arguments.only]}
     sources = folder / "sources"
     fetch_sources(sources, [library["source"] for library in built.values()])
     for key, library in built.items():
         print(f"Building {library['name']}", flush=True)
-        build(key, library["cmake"], unpacked(library["source"], sources), folder, arguments.jobs)
-    write_manifest(libraries, folder)
+        cmake = flags_for(library, arguments.processor)
+        source = unpacked(library["source"], sources)
+        toolchain = None if arguments.native else arguments.toolchain
+        build(key, cmake, source, folder, toolchain, arguments.jobs)
+    if not arguments.only:
+        write_manifest(libraries, folder)
 
 
 if __name__ == "__main__":

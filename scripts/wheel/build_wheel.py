@@ -92,8 +92,9 @@ def build(python: Path, source: Path, folder: Path, jobs: int) -> tuple[Path, Pa
         "Eigen3_DIR": "/usr/share/eigen3/cmake",
         # It is there for CHOLMOD, which Ceres is built without.
         "CMAKE_DISABLE_FIND_PACKAGE_OpenMP": "ON",
-        "ORBSLAM2PY_UNITY": "ON",
         "ORBSLAM2PY_NOTICES": libraries / "notices",
+        # All but the bindings is compiled alike for all Pythons.
+        "ORBSLAM2PY_CCACHE_BASE": folder,
     }
     settings = [f"--config-settings=cmake.define.{name}={value}" for name, value in defines.items()]
     settings += [f"--config-settings=build-dir={objects}"]

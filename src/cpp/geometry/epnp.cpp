@@ -3,13 +3,13 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
+
+#include "geometry/small_solvers.hpp"
 
 namespace orbslam {
 namespace {
@@ -67,10 +67,6 @@ std::optional<ControlFrame> control_frame(const Points& points) {
   return frame;
 }
 
-// Sizes known to be small, but not unrolled: fully unrolled eigen solvers take the compiler minutes
-// and gigabytes under the sanitizers, and are no faster.
-using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 12, 12>;
-
 /// M^T M of the projection equations in the camera coordinates of the control points.
 Eigen::Matrix<double, 12, 12> normal_matrix(const ControlFrame& frame, const Pixels& pixels,
                                             const Pinhole& k) {
@@ -94,17 +90,17 @@ KernelBasis kernel_basis(const ControlFrame& frame, const Pixels& pixels, const 
   const SmallMatrix normal = normal_matrix(frame, pixels, pinhole);
   KernelBasis basis;
   if (frame.planar) {
-    const Eigen::SelfAdjointEigenSolver<SmallMatrix> solver(normal.topLeftCorner(9, 9));
+    const SmallMatrix vectors = symmetric_eigen(normal.topLeftCorner(9, 9)).vectors;
     for (std::size_t k = 0; k < 4; ++k) {
-      const Eigen::Matrix<double, 9, 1> v = solver.eigenvectors().col(static_cast<int>(k));
+      const Eigen::Matrix<double, 9, 1> v = vectors.col(static_cast<int>(k));
       basis[k].leftCols<3>() = Eigen::Map<const Eigen::Matrix3d>(v.data());
       basis[k].col(3) = basis[k].col(0);
     }
     return basis;
   }
-  const Eigen::SelfAdjointEigenSolver<SmallMatrix> solver(normal);
+  const SmallMatrix vectors = symmetric_eigen(normal).vectors;
   for (std::size_t k = 0; k < 4; ++k) {
-    const Eigen::Matrix<double, 12, 1> v = solver.eigenvectors().col(static_cast<int>(k));
+    const Eigen::Matrix<double, 12, 1> v = vectors.col(static_cast<int>(k));
     basis[k] = Eigen::Map<const ControlPoints>(v.data());
   }
   return basis;
@@ -138,13 +134,12 @@ Distances squared_distances(const ControlPoints& control) {
 }
 
 template <int Count>
-Eigen::Matrix<double, Count, 1> least_squares(const DistanceForms& forms,
-                                              const std::array<int, Count>& columns,
-                                              const Distances& rho) {
+Eigen::Matrix<double, Count, 1> fit_products(const DistanceForms& forms,
+                                             const std::array<int, Count>& columns,
+                                             const Distances& rho) {
   SmallMatrix A(6, Count);
   for (int i = 0; i < Count; ++i) A.col(i) = forms.col(columns[static_cast<std::size_t>(i)]);
-  const Eigen::JacobiSVD<SmallMatrix> svd(A, Eigen::ComputeThinU | Eigen::ComputeThinV);
-  return svd.solve(rho);
+  return least_squares(A, rho);
 }
 
 /// b_1 and b_2 from estimates of b11, b12, b22.
@@ -158,17 +153,17 @@ Eigen::Vector2d two_from_products(double b11, double b12, double b22) {
 std::array<Eigen::Vector4d, 3> initial_guesses(const DistanceForms& forms, const Distances& rho) {
   std::array<Eigen::Vector4d, 3> guesses;
   {
-    const Eigen::Vector4d y = least_squares<4>(forms, {0, 1, 3, 6}, rho);
+    const Eigen::Vector4d y = fit_products<4>(forms, {0, 1, 3, 6}, rho);
     const double sign = y[0] < 0 ? -1.0 : 1.0;
     const double b_1 = std::sqrt(sign * y[0]);
     guesses[0] << b_1, sign * y.tail<3>() / b_1;
   }
   {
-    const Eigen::Vector3d y = least_squares<3>(forms, {0, 1, 2}, rho);
+    const Eigen::Vector3d y = fit_products<3>(forms, {0, 1, 2}, rho);
     guesses[1] << two_from_products(y[0], y[1], y[2]), 0, 0;
   }
   {
-    const Eigen::Matrix<double, 5, 1> y = least_squares<5>(forms, {0, 1, 2, 3, 4}, rho);
+    const Eigen::Matrix<double, 5, 1> y = fit_products<5>(forms, {0, 1, 2, 3, 4}, rho);
     const Eigen::Vector2d b = two_from_products(y[0], y[1], y[2]);
     guesses[2] << b, y[3] / b[0], 0;
   }
@@ -192,7 +187,7 @@ Eigen::Vector4d refine(const DistanceForms& forms, const Distances& rho, int ste
     const Eigen::Matrix<double, 6, 4> J = forms * derivatives;
     if (!J.allFinite() || (J.colwise().squaredNorm().array() == 0.0).any()) break;
     // Of minimal norm where the distances do not determine all four (points on a plane).
-    b += J.completeOrthogonalDecomposition().solve(rho - forms * products);
+    b += shortest_least_squares(J, rho - forms * products);
   }
   return b;
 }
@@ -202,11 +197,10 @@ Pose absolute_orientation(const Points& points, const Eigen::Matrix3Xd& camera_p
   const Eigen::Vector3d mean_w = points.rowwise().mean(), mean_c = camera_points.rowwise().mean();
   const Eigen::Matrix3d H =
       (camera_points.colwise() - mean_c) * (points.colwise() - mean_w).transpose();
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(H, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Matrix3d U = svd.matrixU();
+  Svd3 svd = svd_3(H);
   // The least significant direction gives way, which for points on a plane costs nothing.
-  if ((U * svd.matrixV().transpose()).determinant() < 0) U.col(2) = -U.col(2);
-  const Eigen::Matrix3d R = U * svd.matrixV().transpose();
+  if ((svd.U * svd.V.transpose()).determinant() < 0) svd.U.col(2) = -svd.U.col(2);
+  const Eigen::Matrix3d R = svd.U * svd.V.transpose();
   return Pose(R, mean_c - R * mean_w);
 }
 

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "geometry/fundamental.hpp"
 
-#include <Eigen/QR>
-#include <Eigen/SVD>
-
 #include "geometry/model_scoring.hpp"
+#include "geometry/small_solvers.hpp"
 
 namespace orbslam {
 namespace {
@@ -27,9 +25,9 @@ void line_errors(const Eigen::Matrix3d& F, const Eigen::ArrayXd& u, const Eigen:
 }
 
 Eigen::Matrix3d nearest_of_rank_2(const Eigen::Matrix3d& matrix) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d& d = svd.singularValues();
-  return svd.matrixU() * Eigen::Vector3d(d[0], d[1], 0).asDiagonal() * svd.matrixV().transpose();
+  const Svd3 svd = svd_3(matrix);
+  const Eigen::Vector3d& d = svd.values;
+  return svd.U * Eigen::Vector3d(d[0], d[1], 0).asDiagonal() * svd.V.transpose();
 }
 
 }  // namespace
@@ -46,9 +44,8 @@ Eigen::Matrix3d fit_fundamental(const PointPairs& pairs, const EightPairs& sampl
     A.col(static_cast<Eigen::Index>(k)) =
         (Column() << u_2 * u_1, u_2 * v_1, u_2, v_2 * u_1, v_2 * v_1, v_2, u_1, v_1, 1).finished();
   }
-  // Eight equations leave one direction of R^9: the last column of Q is orthogonal to all.
-  const Eigen::HouseholderQR<Eigen::Matrix<double, 9, 8>> qr(A);
-  const Column f = qr.householderQ() * Column::Unit(8);
+  // Eight equations leave one direction of R^9.
+  const Column f = orthogonal_to_columns(A);
   const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> F_normalized(f.data());
   return normalization_2.matrix().transpose() * nearest_of_rank_2(F_normalized) *
          normalization_1.matrix();

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "geometry/homography.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
 #include "geometry/model_scoring.hpp"
+#include "geometry/small_solvers.hpp"
 
 namespace orbslam {
 namespace {
@@ -41,10 +41,7 @@ Eigen::Matrix3d fit_homography(const PointPairs& pairs, const EightPairs& sample
   // The normal matrix costs a third of the SVD of A; in float64 it keeps more digits than the
   // pixels have.
   const Eigen::Matrix<double, 9, 9> normal = A.transpose() * A;
-  // Not unrolled, which would take the compiler minutes under the sanitizers and be no faster.
-  using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 9, 9>;
-  const Eigen::SelfAdjointEigenSolver<SmallMatrix> solver(normal);
-  const Eigen::Matrix<double, 9, 1> h = solver.eigenvectors().col(0);
+  const Eigen::Matrix<double, 9, 1> h = symmetric_eigen(normal).vectors.col(0);
   const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> H_normalized(h.data());
   return normalization_2.inverse() * H_normalized * normalization_1.matrix();
 }

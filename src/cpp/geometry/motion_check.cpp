@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "geometry/motion_check.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+
+#include "geometry/small_solvers.hpp"
 
 namespace orbslam {
 namespace {
@@ -30,8 +31,7 @@ struct CameraPair {
     A.row(2) = (u_2 - pinhole.cx) * P.row(2) - fx * P.row(0);
     A.row(3) = (v_2 - pinhole.cy) * P.row(2) - fy * P.row(1);
     const Eigen::Matrix4d normal = A.transpose() * A;
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(normal);
-    const Eigen::Vector4d point = solver.eigenvectors().col(0);
+    const Eigen::Vector4d point = symmetric_eigenvectors_4(normal).col(0);
     return point.head<3>() / point.w();
   }
 

@@ -2,14 +2,14 @@
 #include "geometry/motion_hypotheses.hpp"
 
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <array>
 #include <cmath>
+
+#include "geometry/small_solvers.hpp"
 
 namespace orbslam {
 namespace {
 
-using Svd = Eigen::JacobiSVD<Eigen::Matrix3d>;
 constexpr double min_singular_ratio = 1.00001;
 
 struct SignPair {
@@ -22,10 +22,9 @@ constexpr std::array<SignPair, 4> sign_pairs{{{1, 1}, {1, -1}, {-1, 1}, {-1, -1}
 }  // namespace
 
 std::vector<Motion> motions_from_homography(const Eigen::Matrix3d& H_21, const Eigen::Matrix3d& K) {
-  const Svd svd(K.inverse() * H_21 * K, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Matrix3d &U = svd.matrixU(), &V = svd.matrixV();
-  const double d_1 = svd.singularValues()[0], d_2 = svd.singularValues()[1],
-               d_3 = svd.singularValues()[2];
+  const Svd3 svd = svd_3(K.inverse() * H_21 * K);
+  const Eigen::Matrix3d &U = svd.U, &V = svd.V;
+  const double d_1 = svd.values[0], d_2 = svd.values[1], d_3 = svd.values[2];
   const bool distinct = d_1 >= min_singular_ratio * d_2 && d_2 >= min_singular_ratio * d_3;
   if (!distinct || !(d_3 > 0)) return {};
 
@@ -64,12 +63,12 @@ std::vector<Motion> motions_from_homography(const Eigen::Matrix3d& H_21, const E
 
 std::vector<Motion> motions_from_fundamental(const Eigen::Matrix3d& F_21,
                                              const Eigen::Matrix3d& K) {
-  const Svd svd(K.transpose() * F_21 * K, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d t = svd.matrixU().col(2).normalized();
+  const Svd3 svd = svd_3(K.transpose() * F_21 * K);
+  const Eigen::Vector3d t = svd.U.col(2).normalized();
   Eigen::Matrix3d W;
   W << 0, -1, 0, 1, 0, 0, 0, 0, 1;
-  Eigen::Matrix3d R_a = svd.matrixU() * W * svd.matrixV().transpose();
-  Eigen::Matrix3d R_b = svd.matrixU() * W.transpose() * svd.matrixV().transpose();
+  Eigen::Matrix3d R_a = svd.U * W * svd.V.transpose();
+  Eigen::Matrix3d R_b = svd.U * W.transpose() * svd.V.transpose();
   if (R_a.determinant() < 0) R_a = -R_a;
   if (R_b.determinant() < 0) R_b = -R_b;
   return {{R_a, t}, {R_b, t}, {R_a, -t}, {R_b, -t}};

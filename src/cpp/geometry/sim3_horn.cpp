@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "geometry/sim3_horn.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+
+#include "geometry/small_solvers.hpp"
 
 namespace orbslam {
 namespace {
@@ -60,8 +61,7 @@ std::optional<Similarity> align_similarity(const Eigen::Ref<const Eigen::Matrix3
     m += (points_2.col(i) - mean_2) * (points_1.col(i) - mean_1).transpose();
   }
   if (!m.allFinite()) return std::nullopt;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(quaternion_matrix(m));
-  const Eigen::Vector4d q = solver.eigenvectors().col(3);
+  const Eigen::Vector4d q = symmetric_eigenvectors_4(quaternion_matrix(m)).col(3);
   const Eigen::Quaterniond rotation = Eigen::Quaterniond(q(0), q(1), q(2), q(3)).normalized();
 
   double scale = 1;
