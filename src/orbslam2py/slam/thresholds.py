@@ -296,5 +296,10 @@ class MergeThresholds:
     """Radians by which it may be turned otherwise."""
     log_scale: float = 0.2
     """Logarithm of the factor by which its scale may differ."""
+    explained: float = 0.17
+    """Of the points that the keyframe should see over there, at least so large a share is found;
+    those count ..."""
+    view_cosine: float = 0.87
+    """... that are seen from where they were seen before: cosine of the angle, 30 degrees."""
     places: int = 5
     """Places in the other map that are compared with the one that was found there."""

@@ -57,6 +57,7 @@ def merging(monkeypatch: pytest.MonkeyPatch) -> MapMerging:
         median_scene_depth=lambda slam_map, keyframe: DEPTH,
     )
     monkeypatch.setattr(map_merging, "core", fakes)
+    monkeypatch.setattr(map_merging, "explained_share", lambda *_: 1.0)
 
     def verify(keyframe: int, candidate: int) -> SimpleNamespace | None:
         near = abs((keyframe - 20) - candidate) <= 1
@@ -68,6 +69,16 @@ def merging(monkeypatch: pytest.MonkeyPatch) -> MapMerging:
 def shown(merging: MapMerging, current: int, matched: int, off: float = 0.0) -> bool:
     found = merging.choose([place(current, matched, off)], lambda: [])  # type: ignore[list-item]
     return found is not None
+
+
+@pytest.mark.parametrize(("share", "believed"), [(0.1, False), (0.2, True)])
+def test_what_should_be_seen_must_be_found(
+    merging: MapMerging, monkeypatch: pytest.MonkeyPatch, share: float, believed: bool
+) -> None:
+    """Walls that repeat: the keyframes around agree on the wrong place, but miss most of it."""
+    monkeypatch.setattr(map_merging, "explained_share", lambda *_: share)
+    assert not shown(merging, 23, 4)
+    assert shown(merging, 25, 5) is believed
 
 
 def test_one_keyframe_and_one_neighbour_are_too_few(merging: MapMerging) -> None:

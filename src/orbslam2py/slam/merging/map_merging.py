@@ -17,6 +17,7 @@ from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py._timing import StageTimer
 from orbslam2py.slam.events import MapsMerged
+from orbslam2py.slam.merging.explanation import explained_share
 from orbslam2py.slam.thresholds import MergeThresholds
 
 _log = logging.getLogger(__name__)
@@ -90,6 +91,10 @@ class MapMerging:
             _log.info("keyframe %d alone shows a place of another map", best.current)
             self._remember(best)
             return None
+        if not self._is_explained(best):
+            _log.info("keyframe %d shows too little of the other map's place", best.current)
+            self._remember(best)
+            return None
         return best
 
     def _is_alone(self, best: core.Loop, others: Sequence[core.Loop]) -> bool:
@@ -138,6 +143,14 @@ class MapMerging:
             if n_agreeing >= limits.confirmations:
                 return True
         return False
+
+    def _is_explained(self, best: core.Loop) -> bool:
+        """Whether enough is found of what should be seen if it is that place.
+
+        Where a wall repeats, the view fits a few metres on as well; what lies behind it does not.
+        """
+        share = explained_share(self._map, best, self._limits.view_cosine)
+        return share >= self._limits.explained
 
     def _place_of(self, keyframe: int, candidates: list[int], far: int) -> FloatArray | None:
         """S_cw (4, 4) of a keyframe in the map of `far`, by one of the candidates there.
