@@ -7,8 +7,8 @@ import shutil
 from pathlib import Path
 
 import pytest
-
 from benchmarks import build_time
+
 from support.data import CHECKOUT
 
 
