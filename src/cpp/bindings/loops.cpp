@@ -114,10 +114,11 @@ void bind_choice(py::module_& module) {
       "choose_merge", &choose_merge, "map"_a, "loops"_a, "fix_scale"_a, Release(),
       "Among places that one keyframe shows in other maps, that with most matches.\n\n"
       "None when there is none, or when two are in different maps or contradict each other.");
-  module.def("may_be_one_place", &may_be_one_place, "map"_a, "a"_a, "T_aw"_a, "b"_a, "T_bw"_a,
-             "fix_scale"_a, Release(),
-             "Whether a camera found at keyframes a and b of a map, with poses T_aw and T_bw, may be\n"
-             "at one place: whether drift between them explains how far the poses are apart.");
+  module.def(
+      "may_be_one_place", &may_be_one_place, "map"_a, "a"_a, "T_aw"_a, "b"_a, "T_bw"_a,
+      "fix_scale"_a, Release(),
+      "Whether a camera found at keyframes a and b of a map, with poses T_aw and T_bw, may be\n"
+      "at one place: whether drift between them explains how far the poses are apart.");
 }
 
 }  // namespace
