@@ -54,10 +54,11 @@ if(NOT CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64|aarch64|arm64")
 endif()
 
 # orbslam_folder(NAME [SEPARATE] [DEPENDS folder...] [PUBLIC lib...] [PRIVATE lib...]
-#                [KERNELS source...] [AVX2 source...])
-# SEPARATE: each source is compiled by itself, also in a unity build. KERNELS: for every vector unit.
+#                [ALONE source...] [KERNELS source...] [AVX2 source...])
+# SEPARATE: each source is compiled by itself, also in a unity build; ALONE: these are. KERNELS: for every
+# vector unit.
 function(orbslam_folder NAME)
-  cmake_parse_arguments(ARG "SEPARATE" "" "DEPENDS;PUBLIC;PRIVATE;KERNELS;AVX2" ${ARGN})
+  cmake_parse_arguments(ARG "SEPARATE" "" "DEPENDS;PUBLIC;PRIVATE;ALONE;KERNELS;AVX2" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${NAME}/*.cpp)
   list(TRANSFORM ARG_DEPENDS PREPEND orbslam_ OUTPUT_VARIABLE depends)
   if(sources)
@@ -81,6 +82,10 @@ function(orbslam_folder NAME)
     target_link_libraries(orbslam_${NAME} INTERFACE ${depends} ${ARG_PUBLIC})
     target_include_directories(orbslam_${NAME} INTERFACE ${CMAKE_CURRENT_SOURCE_DIR})
   endif()
+  foreach(source ${ARG_ALONE})
+    set_source_files_properties(${CMAKE_CURRENT_SOURCE_DIR}/${NAME}/${source}
+      PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+  endforeach()
   foreach(source ${ARG_KERNELS})
     set_source_files_properties(${CMAKE_CURRENT_SOURCE_DIR}/${NAME}/${source}
       PROPERTIES COMPILE_OPTIONS "${ORBSLAM2PY_KERNEL_OPTIONS}"
