@@ -37,7 +37,7 @@ _SHADE = 0.72
 _SHAPE = 1.85
 #: Room for words around the axes, in parts of the picture. Measuring the words instead would take
 #: longer than drawing them.
-_MARGINS = {"left": 0.09, "right": 0.98, "bottom": 0.065, "top": 0.92, "hspace": 0.2}
+_MARGINS = {"left": 0.11, "right": 0.98, "bottom": 0.065, "top": 0.92, "hspace": 0.2}
 
 
 def draw_trajectory(
