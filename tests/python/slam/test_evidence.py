@@ -11,7 +11,7 @@ import pytest
 from orbslam2py import Reason, Sensor, TrackingState
 from orbslam2py.slam.records import PoseMethod, Verdict
 from orbslam2py.slam.thresholds import EvidenceThresholds, TrackingThresholds
-from support.tracking_scene import FakeCore, FakeFrame, Scene, pose
+from support.tracking_scene import FakeCore, FakeFrame, Scene, every_way_ends_elsewhere, pose
 
 #: Frames until the first second after the start, with its own limit of inliers, is over.
 _SETTLED = 40
@@ -41,16 +41,7 @@ def doubted(scene: Scene, first: int, aligned: int, by_words: int, wide: int) ->
 
 def apart(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every way ends somewhere else."""
-    original = scene.core.optimize_pose
-    places = iter(range(1000))
-
-    def elsewhere(frame: FakeFrame) -> SimpleNamespace:
-        estimate = original(frame)
-        frame.T_cw = pose(100.0 * next(places))
-        estimate.covariance = 1e-6 * np.eye(6)
-        return estimate
-
-    monkeypatch.setattr(scene.core, "optimize_pose", elsewhere)
+    monkeypatch.setattr(scene.core, "optimize_pose", every_way_ends_elsewhere(scene.core))
 
 
 def test_an_ordinary_frame_is_searched_once(careful: Scene) -> None:

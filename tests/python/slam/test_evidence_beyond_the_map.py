@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +11,7 @@ import pytest
 from orbslam2py import Reason, Sensor, TrackingState, _core
 from orbslam2py.slam.records import PoseMethod, TrackingOutcome, Verdict
 from orbslam2py.slam.thresholds import EvidenceThresholds, TrackingThresholds
-from support.tracking_scene import FakeCore, FakeFrame, Scene, pose
+from support.tracking_scene import FakeCore, FakeFrame, Scene, every_way_ends_elsewhere
 
 USUAL = 100
 NOT_OF_THE_MAP = _core.FIRST_TEMPORARY_POINT + np.arange(100)
@@ -39,14 +38,7 @@ def scene(core: FakeCore) -> Scene:
 @pytest.fixture
 def apart(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> Callable[..., TrackingOutcome]:
     """Track a frame whose pose every way finds somewhere else, with so many inliers in turn."""
-    original = scene.core.optimize_pose
-    places = iter(range(1000))
-
-    def elsewhere(frame: FakeFrame) -> SimpleNamespace:
-        estimate = original(frame)
-        frame.T_cw = pose(100.0 * next(places))
-        estimate.covariance = 1e-6 * np.eye(6)
-        return estimate
+    elsewhere = every_way_ends_elsewhere(scene.core)
 
     def track(*inliers: int) -> TrackingOutcome:
         scene.core.inliers.extend(inliers)

@@ -10,6 +10,7 @@ import pytest
 
 from orbslam2py import _core as core
 from orbslam2py.slam.merging import MapMerging, map_merging
+from orbslam2py.slam.merging.explanation import explained_share
 
 OLD, YOUNG = 0, 1
 #: Keyframes 0 to 9 are of the old map, 20 to 29 of the young one; each shows a place of its own.
@@ -79,6 +80,11 @@ def test_what_should_be_seen_must_be_found(
     monkeypatch.setattr(map_merging, "explained_share", lambda *_: share)
     assert not shown(merging, 23, 4)
     assert shown(merging, 25, 5) is believed
+
+
+def test_a_keyframe_that_was_culled_meanwhile_shows_nothing() -> None:
+    loop = SimpleNamespace(current=3)
+    assert explained_share(core.Map(), loop, 0.87) == 0.0  # type: ignore[arg-type]
 
 
 def test_one_keyframe_and_one_neighbour_are_too_few(merging: MapMerging) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any
@@ -389,3 +390,17 @@ def lose(scene: Scene) -> TrackingOutcome:
     scene.core.motion.extend([0, 0])
     scene.core.words.append(0)
     return scene.track()
+
+
+def every_way_ends_elsewhere(core: FakeCore) -> Callable[[FakeFrame], SimpleNamespace]:
+    """A pose optimisation that ends far from where any before it did, for `core`'s."""
+    original = core.optimize_pose
+    places = iter(range(1000))
+
+    def elsewhere(frame: FakeFrame) -> SimpleNamespace:
+        estimate = original(frame)
+        frame.T_cw = pose(100.0 * next(places))
+        estimate.covariance = 1e-6 * np.eye(6)
+        return estimate
+
+    return elsewhere

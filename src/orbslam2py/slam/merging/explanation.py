@@ -30,14 +30,16 @@ def explained_share(slam_map: core.Map, loop: core.Loop, view_cosine: float) -> 
         Matches over points that are in the image of the keyframe, within the distances at which
         they can be recognised, and seen from the right side; 0 if there are none.
     """
-    if not slam_map.has_keyframe(loop.current):
+    try:
+        features = slam_map.keyframe_frame(loop.current)
+    except KeyError:  # local mapping has just culled it
         return 0.0
     S_cw = np.asarray(loop.S_cw)
     scale = np.cbrt(np.linalg.det(S_cw[:3, :3]))
     # The keyframe's camera in the other map's world and scale.
     T_cw = np.eye(4)
     T_cw[:3] = S_cw[:3] / scale
-    camera = core.TrackedFrame(slam_map.keyframe_frame(loop.current))
+    camera = core.TrackedFrame(features)
     camera.T_cw = core.Pose.from_matrix(T_cw)
     points = core.gather_points(slam_map, np.unique(loop.loop_points))
     _, cosines, _, visible = core.project_into(camera, points)
