@@ -7,22 +7,10 @@ III-E; ``docs/method/tracking.md#new-keyframes``.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from orbslam2py import _core as core
 from orbslam2py._worker import Worker
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.thresholds import KeyframeThresholds
-
-
-@dataclass(frozen=True)
-class KeyframeClock:
-    """Ids of frames in which something happened last."""
-
-    last_keyframe: int
-    last_relocalization: int
-    in_loaded_map: bool = False
-    """The map was loaded: it may end where the camera was found, and is extended at once."""
 
 
 class KeyframeDecision:
@@ -62,7 +50,7 @@ class KeyframeDecision:
         reference_keyframe: int,
         n_inliers: int,
         velocity: core.Pose | None,
-        last: KeyframeClock,
+        last_keyframe: int,
     ) -> bool:
         """Whether a tracked frame is to become a keyframe now.
 
@@ -76,24 +64,19 @@ class KeyframeDecision:
             Of its pose.
         velocity : Pose or None
             Motion from the frame before, if known.
-        last : KeyframeClock
-            When the last keyframe was made, and the last relocalization.
+        last_keyframe : int
+            Id of the frame that became the last keyframe.
         """
         if self._mapping.pausing:
             return False
         limits = self.limits
-        interval = self._max_keyframe_interval
         n_keyframes = self._map.n_keyframes_of(self._map.active_map)
-        has_just_been_found = frame.id < last.last_relocalization + interval
-        if has_just_been_found and n_keyframes > interval and not last.in_loaded_map:
-            return False
-
         n_reference = self._points_of(reference_keyframe, n_keyframes)
         needs_close_points = self._has_depth and (
             self._lacks_close_points(frame) or self._turns_away(frame, n_inliers, velocity)
         )
         idle = self._mapping.idle
-        one_second_passed = frame.id >= last.last_keyframe + interval
+        one_second_passed = frame.id >= last_keyframe + self._max_keyframe_interval
         tracking_is_weak = self._has_depth and (
             n_inliers < limits.weak_share * n_reference or needs_close_points
         )

@@ -19,7 +19,7 @@ from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._timing import StageTimer
 from orbslam2py.slam.evidence.belief import Belief
 from orbslam2py.slam.initialization import Initializer
-from orbslam2py.slam.keyframe_decision import KeyframeClock, KeyframeDecision
+from orbslam2py.slam.keyframe_decision import KeyframeDecision
 from orbslam2py.slam.local_mapping import LocalMapping
 from orbslam2py.slam.pose_search import (
     FirstEstimate,
@@ -105,7 +105,6 @@ class Tracking:
         self.state = TrackingState.NO_IMAGES_YET
         self._last_keyframe_frame_id = 0
         # Maps that were loaded, and those that localization mode has been on in.
-        self._loaded_maps: set[int] = set()
         self._kept_maps: set[int] = set()
         # Whether the initializer is shown the frames of a loss.
         self._seeks_map = False
@@ -129,7 +128,6 @@ class Tracking:
             ``T_cw`` where the camera may be; tried before all else.
         """
         self.state = TrackingState.LOST
-        self._loaded_maps = set(self._map.maps)
         self._kept_maps = set(self._map.maps)
         self._search.initial_pose = initial_pose
         self._search.searches_loaded_map = True
@@ -390,13 +388,12 @@ class Tracking:
     def _keyframe_wanted(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> bool:
         if self._blurred:
             return False
-        since = KeyframeClock(
-            last_keyframe=self._last_keyframe_frame_id,
-            last_relocalization=self._search.last_relocalization,
-            in_loaded_map=self._map.active_map in self._loaded_maps,
-        )
         return self._keyframe_decision.wanted(
-            frame, self.reference_keyframe, estimate.n_inliers, self.motion.velocity, since
+            frame,
+            self.reference_keyframe,
+            estimate.n_inliers,
+            self.motion.velocity,
+            self._last_keyframe_frame_id,
         )
 
     def _insert_confirmed(self) -> None:
