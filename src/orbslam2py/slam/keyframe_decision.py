@@ -7,10 +7,26 @@ III-E; ``docs/method/tracking.md#new-keyframes``.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from orbslam2py import _core as core
 from orbslam2py._worker import Worker
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.thresholds import KeyframeThresholds
+
+
+@dataclass
+class SinceKeyframe:
+    """What has been tracked since the last keyframe was made."""
+
+    frame_id: int = 0
+    """Of that keyframe."""
+    most_inliers: int = 0
+    """Of one frame; counted anew where the camera is found again."""
+
+    def saw(self, n_inliers: int) -> None:
+        """Count a tracked frame."""
+        self.most_inliers = max(self.most_inliers, n_inliers)
 
 
 class KeyframeDecision:
@@ -50,7 +66,7 @@ class KeyframeDecision:
         reference_keyframe: int,
         n_inliers: int,
         velocity: core.Pose | None,
-        last_keyframe: int,
+        since: SinceKeyframe,
     ) -> bool:
         """Whether a tracked frame is to become a keyframe now.
 
@@ -64,19 +80,22 @@ class KeyframeDecision:
             Of its pose.
         velocity : Pose or None
             Motion from the frame before, if known.
-        last_keyframe : int
-            Id of the frame that became the last keyframe.
+        since : SinceKeyframe
+            What the frames since the last keyframe have seen, this one among them.
         """
         if self._mapping.pausing:
             return False
         limits = self.limits
         n_keyframes = self._map.n_keyframes_of(self._map.active_map)
         n_reference = self._points_of(reference_keyframe, n_keyframes)
+        loses_what_it_saw = n_inliers < limits.kept_share * since.most_inliers
         needs_close_points = self._has_depth and (
-            self._lacks_close_points(frame) or self._turns_away(frame, n_inliers, velocity)
+            loses_what_it_saw
+            or self._lacks_close_points(frame)
+            or self._turns_away(frame, n_inliers, velocity)
         )
         idle = self._mapping.idle
-        one_second_passed = frame.id >= last_keyframe + self._max_keyframe_interval
+        one_second_passed = frame.id >= since.frame_id + self._max_keyframe_interval
         tracking_is_weak = self._has_depth and (
             n_inliers < limits.weak_share * n_reference or needs_close_points
         )

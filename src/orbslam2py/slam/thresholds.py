@@ -167,6 +167,9 @@ class KeyframeThresholds:
     """With fewer close points tracked than this ..."""
     many_untracked_close_points: int = 70
     """... and more close points than this not in the map, a keyframe is needed."""
+    kept_share: float = 0.65
+    """A frame that tracks less than this share of the most that was tracked since the last keyframe
+    leaves what that keyframe saw: another is needed (stereo, RGB-D)."""
     turn_frames: int = 3
     """Where the camera will be after so many frames of the present speed ..."""
     staying_share: float = 0.65

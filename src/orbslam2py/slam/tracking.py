@@ -19,7 +19,7 @@ from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._timing import StageTimer
 from orbslam2py.slam.evidence.belief import Belief
 from orbslam2py.slam.initialization import Initializer
-from orbslam2py.slam.keyframe_decision import KeyframeDecision
+from orbslam2py.slam.keyframe_decision import KeyframeDecision, SinceKeyframe
 from orbslam2py.slam.local_mapping import LocalMapping
 from orbslam2py.slam.pose_search import (
     FirstEstimate,
@@ -103,7 +103,7 @@ class Tracking:
     def reset(self) -> None:
         """Forget the map's past; the map itself is cleared by the pipeline."""
         self.state = TrackingState.NO_IMAGES_YET
-        self._last_keyframe_frame_id = 0
+        self._since_keyframe = SinceKeyframe()
         # Maps that were loaded, and those that localization mode has been on in.
         self._kept_maps: set[int] = set()
         # Whether the initializer is shown the frames of a loss.
@@ -269,6 +269,7 @@ class Tracking:
             return estimate
         if lost or estimate.relocalized:
             self._search.last_relocalization = frame.id
+            self._since_keyframe.most_inliers = 0
         with timer("local_map"):
             believed = self._belief.refine(frame, estimate, lost=lost)
         if believed.found:
@@ -328,7 +329,7 @@ class Tracking:
         self.state = TrackingState.OK
         self._search.reference_keyframe = frame.reference_keyframe
         self._search.motion.remember(frame)
-        self._last_keyframe_frame_id = frame.id
+        self._since_keyframe = SinceKeyframe(frame.id)
         n = frame.n_associated()
         # The first pose is the origin: it is known exactly.
         estimate = PoseEstimate(n_matches=n, n_inliers=n, covariance=np.zeros((6, 6)))
@@ -388,12 +389,13 @@ class Tracking:
     def _keyframe_wanted(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> bool:
         if self._blurred:
             return False
+        self._since_keyframe.saw(estimate.n_inliers)
         return self._keyframe_decision.wanted(
             frame,
             self.reference_keyframe,
             estimate.n_inliers,
             self.motion.velocity,
-            self._last_keyframe_frame_id,
+            self._since_keyframe,
         )
 
     def _insert_confirmed(self) -> None:
@@ -409,5 +411,5 @@ class Tracking:
         core.describe(frame.features, self._vocabulary)
         keyframe = core.insert_keyframe(self._map, frame, create_points=self._has_depth)
         self._search.reference_keyframe = keyframe
-        self._last_keyframe_frame_id = frame.id
+        self._since_keyframe = SinceKeyframe(frame.id)
         self._mapping.insert_keyframe(keyframe)

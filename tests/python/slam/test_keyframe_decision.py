@@ -10,6 +10,7 @@ import pytest
 
 from orbslam2py import Sensor, TrackingState
 from orbslam2py.slam.thresholds import TrackingThresholds
+from orbslam2py.slam.tracking import TrackingOutcome
 from support.tracking_scene import (
     MAX_FRAMES,
     FakeCore,
@@ -109,6 +110,33 @@ def test_the_map_is_extended_as_soon_as_the_camera_was_found(scene: Scene) -> No
     assert scene.track().is_keyframe
     found, confirming = scene.frames[-2:]
     assert scene.core.inserted[n_before:] == [found.id, confirming.id]
+
+
+def track_with(scene: Scene, n_inliers: int) -> TrackingOutcome:
+    """Of the first estimate and in the local map."""
+    scene.core.inliers.extend([n_inliers, n_inliers])
+    return scene.track()
+
+
+@pytest.mark.parametrize(("n_inliers", "keyframe"), [(194, True), (195, False)])
+def test_a_keyframe_when_the_camera_leaves_what_the_last_one_saw(
+    scene: Scene, n_inliers: int, keyframe: bool
+) -> None:
+    """300 inliers at most since then; the reference keyframe would ask for nothing."""
+    scene.run(3)
+    scene.core.n_reference = 100
+    for seen in (200, 300, 250):
+        assert not track_with(scene, seen).is_keyframe
+    assert track_with(scene, n_inliers).is_keyframe == keyframe
+
+
+def test_what_was_seen_before_a_loss_does_not_count(scene: Scene) -> None:
+    scene.run(3)
+    scene.core.n_reference = 100
+    assert not track_with(scene, 300).is_keyframe
+    lose(scene)
+    for _ in range(3):
+        assert not track_with(scene, 120).is_keyframe
 
 
 @pytest.mark.parametrize(
