@@ -104,6 +104,8 @@ def open_workers(
             "distributed.worker.profile.enabled": False,  # it looks at all threads every 10 ms
             # Nobody sees its samples, two a second of which an hour would be kept.
             "distributed.admin.system-monitor.log-length": 60,
+            # Nor its messages and transitions, with all of the run in each of a thousand.
+            "distributed.admin.low-level-log-length": 20,
         }
     ):
         cluster = distributed.LocalCluster(

@@ -9,8 +9,8 @@ from types import SimpleNamespace
 import pytest
 
 from orbslam2py import Sensor, TrackingState
+from orbslam2py.slam.records import TrackingOutcome
 from orbslam2py.slam.thresholds import TrackingThresholds
-from orbslam2py.slam.tracking import TrackingOutcome
 from support.tracking_scene import (
     MAX_FRAMES,
     FakeCore,
