@@ -5,13 +5,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property, lru_cache
 
 import numpy as np
 
 from benchmarks.several_maps.pieces import Order, with_covered
 from orbslam2py import Sensor
 from orbslam2py import _core as core
+from orbslam2py._arrays import FloatArray
+from orbslam2py.datasets import Images
+from orbslam2py.settings import Settings
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
 FPS = 20.0
@@ -29,6 +32,38 @@ class DifferentRooms(SyntheticSequence):
         for rectangle in twins[one_room : 2 * one_room]:
             rectangle.texture = (rectangle.texture ^ 0x5EED) + 1
         return core.World(twins)
+
+
+class Rendered:
+    """A made-up sequence whose images are kept: rendering takes longer than tracking."""
+
+    def __init__(self, source: SyntheticSequence) -> None:
+        self._source = source
+        self._kept = cache(source.load)
+
+    def __len__(self) -> int:
+        return len(self._source)
+
+    @property
+    def settings(self) -> Settings:
+        """Those of its camera."""
+        return self._source.settings
+
+    @property
+    def true_positions(self) -> FloatArray:
+        """Of the camera (n, 3) [m]."""
+        return np.array([self._source.T_wc(i)[:3, 3] for i in range(len(self))])
+
+    def load(self, index: int, /) -> Images:
+        """The images of a frame."""
+        return self._kept(index)
+
+
+@lru_cache(maxsize=1)
+def _rendered(
+    kind: Callable[[SyntheticOptions], SyntheticSequence], options: SyntheticOptions
+) -> Rendered:
+    return Rendered(kind(options))
 
 
 @dataclass(frozen=True)
@@ -61,13 +96,12 @@ class Case:
         """What is seen; the uncut sequence is run once for each."""
         return f"{self.world}{'' if self.source is SyntheticSequence else '-different'}"
 
-    def sequence(self, sensor: Sensor, seed: int) -> SyntheticSequence:
-        """The uncut sequence."""
-        return self.source(
-            SyntheticOptions(
-                world=self.world, sensor=sensor, size=(320, 240), pace=2.0, fps=FPS, seed=seed
-            )
+    def sequence(self, sensor: Sensor, seed: int) -> Rendered:
+        """The uncut sequence; the last one that was asked for is kept."""
+        options = SyntheticOptions(
+            world=self.world, sensor=sensor, size=(320, 240), pace=2.0, fps=FPS, seed=seed
         )
+        return _rendered(self.source, options)
 
 
 def _parts(n: int, *bounds: tuple[float, float]) -> list[range]:

@@ -27,12 +27,11 @@ import numpy as np
 
 from benchmarks.harness.arguments import add_counts, add_sensors, add_width, console_of, new_parser
 from benchmarks.harness.tables import new_table, verdict
-from benchmarks.several_maps.cases import CASES, COVERED, FPS, Case
+from benchmarks.several_maps.cases import CASES, COVERED, FPS, Case, Rendered
 from benchmarks.several_maps.pieces import Found, Order, Pieces, largest_of
 from benchmarks.several_maps.rows import Row, Rows, add_rows
 from orbslam2py import Sensor, System
 from orbslam2py._arrays import FloatArray, IntArray
-from orbslam2py.synthetic import SyntheticSequence
 
 #: Limits: part of the seeds in which the maps have met, error by that of the uncut frames, part of
 #: the visible frames with a pose in any map.
@@ -69,7 +68,7 @@ class Outcome:
         return self.worst > max(FALSE, 3 * self.uncut)
 
 
-def uncut(source: SyntheticSequence, order: Order, sensor: Sensor, seed: int) -> Row:
+def uncut(source: Rendered, order: Order, sensor: Sensor, seed: int) -> Row:
     """A sequence without darkness: frames and positions of its largest map."""
     pieces = Pieces(source, tuple(order), 1 / FPS)
     with System(source.settings, sensor, deterministic=True, seed=seed) as system:
@@ -82,7 +81,7 @@ def run(case: Case, sensor: Sensor, seed: int, whole: Found) -> Outcome:
     """Run one seed in pieces; `whole` is what the uncut run found."""
     source = case.sequence(sensor, seed)
     order = case.order(len(source), np.random.default_rng(seed))
-    truth = np.array([source.T_wc(i)[:3, 3] for i in range(len(source))])
+    truth = source.true_positions
     monocular = sensor is Sensor.MONOCULAR
     pieces = Pieces(source, tuple(order), 1 / FPS)
     with System(source.settings, sensor, deterministic=True, seed=seed) as system:
@@ -151,7 +150,7 @@ def unbroken_error(rows: Rows, case: Case, sensor: Sensor, seed: int) -> float |
     order = case.unbroken(len(source))
     key = f"unbroken {case.name} {sensor} {seed}"
     row = rows.get(key, lambda: uncut(source, order, sensor, seed))
-    truth = np.array([source.T_wc(i)[:3, 3] for i in range(len(source))])
+    truth = source.true_positions
     found = Found(np.array(row["indices"], np.int64), np.array(row["positions"]))
     return found.error(truth, monocular=sensor is Sensor.MONOCULAR)
 
@@ -207,10 +206,11 @@ def main(arguments: list[str] | None = None) -> int:
     cases = [case for case in CASES if case.name in given.cases]
     sensors = [Sensor(sensor) for sensor in given.sensors]
     outcomes: dict[tuple[str, Sensor], list[Outcome]] = {}
-    # Seeds go last: what is interrupted has some of every case.
+    # Seeds go last: what is interrupted has some of every case. Cases of a scene come together,
+    # whose images are kept.
     for seed in range(given.seeds):
-        for case in cases:
-            for sensor in sensors:
+        for sensor in sensors:
+            for case in sorted(cases, key=lambda case: case.scene):
                 outcome = outcome_of(rows, case, sensor, seed)
                 outcomes.setdefault((case.name, sensor), []).append(outcome)
                 console.print(f"{case.name} {sensor} seed {seed}: {outcome}")
