@@ -96,6 +96,8 @@ class LoopClosing:
         )
         self._consistency = core.LoopConsistency()
         self._next_search = 1
+        # A map with a fresh seam, and the keyframe from which on it is adjusted once more.
+        self._seam: tuple[int, int] | None = None
         #: Loops closed so far, over all maps.
         self.loops: list[LoopClosed] = []
         #: Maps that have become part of older ones.
@@ -118,6 +120,7 @@ class LoopClosing:
         self._consistency.clear()
         self._merging.reset()
         self._next_search = 1
+        self._seam = None
         self.last_keyframe = -1
 
     def process(self, keyframe: int) -> None:
@@ -130,6 +133,8 @@ class LoopClosing:
                     self._join(loop, timer)
                 elif loop is not None:
                     self._close(loop, timer)
+                else:
+                    self._adjust_seam(keyframe)
         self.last_keyframe = keyframe
         self.statistics.add({f"loop.{step}": ms for step, ms in timer.milliseconds.items()})
 
@@ -213,6 +218,15 @@ class LoopClosing:
         self._on_merge(merged)
         if self._adjust:
             self._adjustment.start(merged.map_index)
+            self._seam = merged.map_index, self._next_search
+
+    def _adjust_seam(self, keyframe: int) -> None:
+        """Adjust a joined map again when the camera has seen more of what its parts share."""
+        if self._seam is None or keyframe < self._seam[1]:
+            return
+        (map_index, _), self._seam = self._seam, None
+        if self._map.n_keyframes_of(map_index):
+            self._adjustment.start(map_index)
 
     # ---- correction ------------------------------------------------------------------------------
     def _close(self, loop: core.Loop, timer: StageTimer) -> None:
@@ -258,3 +272,4 @@ class LoopClosing:
         self._on_loop(closed)
         if self._adjust:
             self._adjustment.start(closed.map_index)
+            self._seam = None

@@ -13,7 +13,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from orbslam2py import LoopClosed, Sensor, StateError, _core
+from orbslam2py import LoopClosed, MapsMerged, Sensor, StateError, _core
 from orbslam2py._worker import Worker
 from orbslam2py.slam import loop_closing
 from orbslam2py.slam.loop_closing import LoopClosing
@@ -34,7 +34,8 @@ class FakeLoop:
 
 class FakeMap:
     def __init__(self) -> None:
-        self.epoch = 0
+        self.maps: dict[int, int] = {}
+        self.dropped: set[int] = set()
         self.dead: set[int] = set()
         self.leases: list[int] = []
         self.dies_after_lease = False
@@ -56,7 +57,10 @@ class FakeMap:
         return keyframe / 10
 
     def map_of(self, keyframe: int) -> int:
-        return self.epoch
+        return self.maps.get(keyframe, 0)
+
+    def n_keyframes_of(self, map_index: int) -> int:
+        return 0 if map_index in self.dropped else 5
 
 
 class FakeIndex:
@@ -110,6 +114,7 @@ class Scene:
         self.aborted = False
         self.applied = True
         self.events: list[LoopClosed] = []
+        self.merged: list[MapsMerged] = []
         self.mapping: Worker[int] = Worker("local mapping", lambda _: None, threaded=False)
         monkeypatch.setattr(loop_closing, "core", self._core())
         self.adjustment = FakeAdjustment(self.calls)
@@ -121,7 +126,7 @@ class Scene:
             self.adjustment,  # type: ignore[arg-type]
             SystemOptions(deterministic=True, loop_closing=enabled, full_adjustment=adjust, seed=5),
             on_loop=self.events.append,
-            on_merge=lambda merged: pytest.fail(f"{merged} within one map"),
+            on_merge=self.merged.append,
         )
 
     def _core(self) -> SimpleNamespace:
@@ -212,6 +217,7 @@ def test_a_confirmed_loop_is_closed_and_told(scene: Scene) -> None:
     ]
     (closed,) = scene.events
     assert scene.closing.loops == [closed]
+    assert not scene.merged
     assert (closed.current_keyframe, closed.matched_keyframe) == (20, 4)
     assert (closed.current_timestamp, closed.matched_timestamp) == (2.0, 0.4)
     assert (closed.n_inliers, closed.n_matches, closed.n_fused) == (55, 66, 77)
@@ -319,3 +325,64 @@ def test_reset_forgets_the_gap(scene: Scene) -> None:
     assert scene.closing.last_keyframe == -1
     scene.process(5)
     assert [loop.current_keyframe for loop in scene.closing.loops] == [20, 5]
+
+
+class FakeMerging:
+    """Joins with the first place in another map."""
+
+    def __init__(self, world: FakeMap, *_: object, fix_scale: bool) -> None:
+        self.map = world
+
+    def reset(self) -> None:
+        pass
+
+    def choose(self, elsewhere: list[FakeLoop], others: object) -> FakeLoop | None:
+        return elsewhere[0] if elsewhere else None
+
+    def join(self, loop: FakeLoop, *_: object) -> SimpleNamespace:
+        self.map.maps.clear()
+        return SimpleNamespace(map_index=0)
+
+
+@pytest.fixture
+def joined(monkeypatch: pytest.MonkeyPatch) -> Scene:
+    """Keyframe 20 of map 1 has shown the place of keyframe 4 of map 0."""
+    monkeypatch.setattr(loop_closing, "MapMerging", FakeMerging)
+    scene = Scene(monkeypatch)
+    scene.map.maps[20] = 1
+    scene.consistency.consistent.append([4])
+    scene.process(20)
+    assert len(scene.merged) == 1
+    assert scene.calls.count("start adjustment") == 1
+    return scene
+
+
+def test_a_joined_map_is_adjusted_again_when_more_of_the_seam_was_seen(joined: Scene) -> None:
+    joined.process(*range(21, 30))
+    assert joined.calls.count("start adjustment") == 1
+    joined.process(30)
+    assert joined.calls.count("start adjustment") == 2
+    joined.process(*range(31, 60))
+    assert joined.calls.count("start adjustment") == 2
+
+
+def test_a_loop_over_the_seam_is_adjusted_once(joined: Scene) -> None:
+    joined.consistency.consistent.append([4])
+    joined.process(30)
+    assert len(joined.events) == 1
+    joined.process(*range(31, 45))
+    assert joined.calls.count("start adjustment") == 2
+
+
+def test_no_seam_is_adjusted_in_a_map_that_was_dropped(joined: Scene) -> None:
+    joined.map.dropped.add(0)
+    joined.process(30)
+    joined.map.dropped.clear()
+    joined.process(31)
+    assert joined.calls.count("start adjustment") == 1
+
+
+def test_a_reset_forgets_the_seam(joined: Scene) -> None:
+    joined.closing.reset()
+    joined.process(30)
+    assert joined.calls.count("start adjustment") == 1
