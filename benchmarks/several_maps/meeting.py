@@ -146,13 +146,16 @@ def unbroken_error(rows: Rows, case: Case, sensor: Sensor, seed: int) -> float |
     """The error of the same way in one go; None where the uncut sequence is that."""
     if case.unbroken is None:
         return None
-    source = case.sequence(sensor, seed)
-    order = case.unbroken(len(source))
-    key = f"unbroken {case.name} {sensor} {seed}"
-    row = rows.get(key, lambda: uncut(source, order, sensor, seed))
-    truth = source.true_positions
-    found = Found(np.array(row["indices"], np.int64), np.array(row["positions"]))
-    return found.error(truth, monocular=sensor is Sensor.MONOCULAR)
+    way = case.unbroken
+
+    def make() -> Row:
+        source = case.sequence(sensor, seed)
+        row = uncut(source, way(len(source)), sensor, seed)
+        found = Found(np.array(row["indices"], np.int64), np.array(row["positions"]))
+        monocular = sensor is Sensor.MONOCULAR
+        return {"error": found.error(source.true_positions, monocular=monocular)}
+
+    return float(rows.get(f"unbroken {case.name} {sensor} {seed}", make)["error"])
 
 
 def judged(case: Case, outcomes: list[Outcome]) -> tuple[list[str], bool]:
