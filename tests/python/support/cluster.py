@@ -36,9 +36,10 @@ class Cluster:
         self.workers: dict[subprocess.Popen[bytes], tuple[Path, ...]] = {}
         self._scheduler = self._start(
             *("scheduler", "--host", "127.0.0.1", "--port", "0"),
-            *("--no-show", "--dashboard-address", ":0"),
+            *("--no-show", "--dashboard-address", "127.0.0.1:0"),
         )
-        self._wait(self._file.is_file)
+        # It is there before it is written.
+        self._wait(lambda: self._file.is_file() and self._file.read_text().endswith("}"))
         from distributed import Client  # noqa: PLC0415
 
         self._client = Client(self.address, set_as_default=False)
