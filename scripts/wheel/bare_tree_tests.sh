@@ -39,6 +39,7 @@ tests_without_build() {
     cd /srv/checkout
     python -m pytest -q -p no:cacheprovider -m "not shared" tests/python/core tests/python/settings \
       tests/python/trajectory tests/python/vocabulary tests/python/evaluation \
+      tests/python/calibration/test_camera_files.py \
       --ignore=tests/python/trajectory/test_files.py --ignore=tests/python/evaluation/test_metrics.py # need evo
   ) || fails "the tests"
 }
