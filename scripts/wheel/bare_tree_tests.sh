@@ -37,8 +37,9 @@ tests_without_build() {
   python -m pip install -q -c "$PIP_FIND_LINKS/constraints.txt" pytest pytest-benchmark pytest-xdist hypothesis scipy rosbags
   (
     cd /srv/checkout
-    python -m pytest -q -p no:cacheprovider -m "not shared" tests/python/core tests/python/settings \
+    python -m pytest -q -p no:cacheprovider -m "not shared and not slow" tests/python/core tests/python/settings \
       tests/python/trajectory tests/python/vocabulary tests/python/evaluation \
+      tests/python/calibration tests/python/datasets tests/python/recordings \
       --ignore=tests/python/trajectory/test_files.py --ignore=tests/python/evaluation/test_metrics.py # need evo
   ) || fails "the tests"
 }

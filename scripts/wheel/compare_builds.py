@@ -37,7 +37,6 @@ REAL = [
     "kitti_06_head51_stereo stereo",
     "kitti_03_left_head120 mono",
     "euroc_V1_01_keyframes stereo",
-    "rtabmap_samples_loop stereo",
 ]
 SHARED = Path(os.environ.get("ORBSLAM2PY_SHARED", PROJECT.parent / "shared")) / "data/sequences"
 

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 
 from orbslam2py._arguments import cannot_open, path_of
+from orbslam2py._arrays import FloatArray
 from orbslam2py.calibration.camera_model import (
     CameraModel,
     checked_camera_matrix,
@@ -201,8 +202,8 @@ def _opencv(path: Path, text: str) -> CameraModel:
             storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
             if _node(storage, "fisheye_model").real():
                 require_supported(path, "camera model", "fisheye", ("pinhole",))
-            K = _node(storage, "camera_matrix").mat()
-            D = _node(storage, "distortion_coefficients").mat()
+            K = _matrix(_node(storage, "camera_matrix"))
+            D = _matrix(_node(storage, "distortion_coefficients"))
             sizes = [_node(storage, name) for name in ("image_width", "image_height")]
             size = None if any(s.empty() for s in sizes) else [int(s.real()) for s in sizes]
             if size is None and not _node(storage, "image_size").empty():
@@ -216,8 +217,8 @@ def _opencv(path: Path, text: str) -> CameraModel:
             f"{path} has no camera matrix (looked for {names}); is it a file of OpenCV?"
         )
     return CameraModel(
-        checked_camera_matrix(path, np.asarray(K)),
-        five_coefficients(path, np.zeros(0) if D is None else np.asarray(D)),
+        checked_camera_matrix(path, K),
+        five_coefficients(path, np.zeros(0) if D is None else D),
         None if size is None else checked_size(path, size),
     )
 
@@ -228,6 +229,20 @@ def _node(storage: cv2.FileStorage, name: str) -> cv2.FileNode:
         if not node.empty():
             return node
     return storage.getNode(name)
+
+
+def _matrix(node: cv2.FileNode) -> FloatArray | None:
+    """Give what a node holds; None if there is no matrix.
+
+    Number by number, as `mat` of OpenCV 4.11 makes nonsense of whole ones, "0" or "1", between
+    others with a point.
+    """
+    known = node.mat()  # of which the shape is right, and what is no matrix is refused
+    if known is None:
+        return None
+    known, data = np.asarray(known), node.getNode("data")
+    numbers = np.array([data.at(i).real() for i in range(data.size())], dtype=np.float64)
+    return numbers.reshape(known.shape)
 
 
 # ---- COLMAP --------------------------------------------------------------------------------------

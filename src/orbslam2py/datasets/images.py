@@ -6,6 +6,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -16,18 +17,20 @@ from orbslam2py.errors import DatasetError, ImageError
 
 _PNG, _PNG_END = b"\x89PNG", b"IEND"
 _JPEG, _JPEG_END = b"\xff\xd8", b"\xff\xd9"
+_SILENT = 0  # OpenCV's LOG_LEVEL_SILENT
 _TAIL = 4096  # where the end mark must be; some cameras append a few bytes after it
 
 
 @contextlib.contextmanager
 def quiet_opencv() -> Iterator[None]:
     """Keep OpenCV from printing warnings: what goes wrong is said by an exception."""
-    level = cv2.utils.logging.getLogLevel()
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    logging: Any = getattr(cv2.utils, "logging", cv2)  # cv2 4 has its functions itself
+    level = logging.getLogLevel()
+    logging.setLogLevel(_SILENT)
     try:
         yield
     finally:
-        cv2.utils.logging.setLogLevel(level)
+        logging.setLogLevel(level)
 
 
 def read_image(path: Path, *, rgb: bool) -> ByteArray:

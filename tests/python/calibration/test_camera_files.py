@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
 from orbslam2py import Sensor, Settings, SettingsError
-from orbslam2py.calibration import CameraFileFormat, read_camera_file
+from orbslam2py.calibration import CameraFileFormat, camera_files, read_camera_file
 from orbslam2py.settings import CameraSettings
 from support.camera_files import CX, CY, FX, FY, KALIBR, KALIBR_PAIR, OPENCV, ROS, D, written
 
@@ -31,6 +32,31 @@ def test_opencv_xml(tmp_path: Path) -> None:
     storage.release()
     camera = read_camera_file(path).camera
     assert camera == CameraSettings(FX, FY, CX, CY, *D)
+
+
+class WholeNumbersMisread:
+    """A node as OpenCV 4.11 has them: `mat` takes "0" for billions, `real` does not."""
+
+    def __init__(self, node: cv2.FileNode) -> None:
+        self._node = node
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._node, name)
+
+    def mat(self) -> np.ndarray | None:
+        matrix = self._node.mat()
+        if matrix is not None:
+            matrix[matrix == np.round(matrix)] += 2.0**32
+        return matrix
+
+
+def test_whole_numbers_of_opencv(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = written(tmp_path, OPENCV.replace("0.,", "0,").replace("1. ]", "1 ]"))
+    expected = CameraSettings(FX, FY, CX, CY, *D, width=640, height=480)
+    assert read_camera_file(path).camera == expected
+    node = camera_files._node
+    monkeypatch.setattr(camera_files, "_node", lambda *given: WholeNumbersMisread(node(*given)))
+    assert read_camera_file(path).camera == expected
 
 
 @pytest.mark.parametrize(

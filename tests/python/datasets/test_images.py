@@ -11,6 +11,7 @@ import pytest
 
 from orbslam2py import DatasetError, ImageError, Sensor
 from orbslam2py.datasets import open_sequence
+from orbslam2py.datasets.images import quiet_opencv
 from support.small_folders import SIZE, image, save
 
 
@@ -58,6 +59,17 @@ def test_truncated_image_that_the_decoder_completes(
     path.write_bytes(path.read_bytes()[:-20])
     with pytest.raises(ImageError, match="is truncated"):
         sequence.load(0)
+
+
+def test_opencv_4_prints_nothing_either(monkeypatch: pytest.MonkeyPatch) -> None:
+    levels = [3]
+    monkeypatch.delattr(cv2.utils, "logging", raising=False)  # 4 has none
+    monkeypatch.setattr(cv2, "getLogLevel", lambda: levels[-1], raising=False)
+    monkeypatch.setattr(cv2, "setLogLevel", levels.append, raising=False)
+    with pytest.raises(ValueError, match="wrong"), quiet_opencv():
+        assert levels == [3, 0]
+        raise ValueError("wrong")
+    assert levels == [3, 0, 3]
 
 
 def test_file_that_is_no_image(tum: Path) -> None:
