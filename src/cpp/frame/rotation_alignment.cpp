@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <vector>
 
 namespace orbslam {
 namespace {
 
 constexpr double kBlur = 1.5;           // pixels of the small image
+constexpr int kBlurRadius = 6;          // four standard deviations
 constexpr double kSearched = 0.25;      // of width and height, to each side
 constexpr double kLeastContrast = 1.0;  // standard deviation of the blurred image, grey levels
 constexpr int kIterations = 10;
@@ -19,13 +21,37 @@ constexpr double kLeastOverlap = 0.4;  // of the pixels
 using Vector5d = Eigen::Matrix<double, 5, 1>;
 using Matrix5d = Eigen::Matrix<double, 5, 5>;
 
+/// One pass of the blur: along each row of `image`, which comes out turned.
+///
+/// By hand, not by cv::GaussianBlur: that fuses multiplications and additions where OpenCV was
+/// built to use such instructions, and the last bits differ from one build of it to another.
+cv::Mat1f blurred_rows_as_columns(const cv::Mat1f& image, const cv::Mat1f& kernel) {
+  const int radius = kernel.rows / 2, width = image.cols;
+  cv::Mat1f turned(width, image.rows);
+  std::vector<float> padded(static_cast<std::size_t>(width + 2 * radius));
+  for (int y = 0; y < image.rows; ++y) {
+    for (int x = -radius; x < width + radius; ++x) {
+      const int from = cv::borderInterpolate(x, width, cv::BORDER_REFLECT_101);
+      padded[static_cast<std::size_t>(x + radius)] = image(y, from);
+    }
+    for (int x = 0; x < width; ++x) {
+      float sum = 0;
+      for (int k = 0; k < kernel.rows; ++k) {
+        sum += kernel(k, 0) * padded[static_cast<std::size_t>(x + k)];
+      }
+      turned(x, y) = sum;
+    }
+  }
+  return turned;
+}
+
 /// The blurred image with float pixels.
 cv::Mat1f blurred(const SmallImage& small) {
   const cv::Mat1b pixels(small.height, small.width, const_cast<std::uint8_t*>(small.pixels.data()));
-  cv::Mat1f result;
-  pixels.convertTo(result, CV_32F);
-  cv::GaussianBlur(result, result, {0, 0}, kBlur);
-  return result;
+  cv::Mat1f image;
+  pixels.convertTo(image, CV_32F);
+  const cv::Mat1f kernel = cv::getGaussianKernel(2 * kBlurRadius + 1, kBlur, CV_32F);
+  return blurred_rows_as_columns(blurred_rows_as_columns(image, kernel), kernel);
 }
 
 /// Sums over pairs of grey values, and what follows from them.
