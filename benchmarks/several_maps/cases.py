@@ -35,7 +35,7 @@ class DifferentRooms(SyntheticSequence):
 
 
 class Rendered:
-    """A made-up sequence whose images are kept: rendering takes longer than tracking."""
+    """A made-up sequence whose images are kept: rendering takes about as long as tracking."""
 
     def __init__(self, source: SyntheticSequence) -> None:
         self._source = source

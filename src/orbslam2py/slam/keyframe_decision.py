@@ -89,7 +89,7 @@ class KeyframeDecision:
         n_keyframes = self._map.n_keyframes_of(self._map.active_map)
         n_reference = self._points_of(reference_keyframe, n_keyframes)
         loses_what_it_saw = n_inliers < limits.kept_share * since.most_inliers
-        needs_close_points = self._has_depth and (
+        needs_new_points = self._has_depth and (
             loses_what_it_saw
             or self._lacks_close_points(frame)
             or self._turns_away(frame, n_inliers, velocity)
@@ -97,9 +97,9 @@ class KeyframeDecision:
         idle = self._mapping.idle
         one_second_passed = frame.id >= since.frame_id + self._max_keyframe_interval
         tracking_is_weak = self._has_depth and (
-            n_inliers < limits.weak_share * n_reference or needs_close_points
+            n_inliers < limits.weak_share * n_reference or needs_new_points
         )
-        sees_new_things = n_inliers < self._share(n_keyframes) * n_reference or needs_close_points
+        sees_new_things = n_inliers < self._share(n_keyframes) * n_reference or needs_new_points
         wanted = (one_second_passed or idle or tracking_is_weak) and (
             sees_new_things and n_inliers > limits.inliers
         )
