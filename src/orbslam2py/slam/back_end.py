@@ -9,7 +9,7 @@ from typing import Any
 
 from orbslam2py import _core as core
 from orbslam2py._worker import Worker
-from orbslam2py.errors import MapFileError
+from orbslam2py.errors import MapFileError, WorkerError
 from orbslam2py.maps.map_keeper import MapKeeper
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.events import (
@@ -115,10 +115,16 @@ class BackEnd:
             Seconds to wait for each worker.
         keep : callable
             Called with its number when nobody works on it any more, before it is dropped.
+
+        Raises
+        ------
+        WorkerError
+            Naming the worker that has not ended its work in time; the map is as it was.
         """
-        # Only tracking, which waits here, gives them work.
+        # Only tracking, which waits here, gives them work. No keyframe that waits may die.
         for worker in (self.mapping.worker, self.loop_closing.worker):
-            worker.wait_until_idle(timeout, unless_held=True)
+            if not worker.wait_until_idle(timeout):
+                raise WorkerError(f"{worker.name} did not end its work within {timeout} s")
         ended = self.map.active_map
         keep(ended)
         for keyframe in self.map.erase_map(ended).tolist():

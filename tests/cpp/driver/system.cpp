@@ -102,8 +102,8 @@ void System::reset_now() {
 
 /// The active map came to nothing; the others go on. Only this thread gives the workers work.
 void System::drop_map() {
-  mapping_.worker.wait_until_idle();
-  loop_closing_.worker.wait_until_idle();
+  // While one of them is held, keyframes of this map may wait for it; the next frame asks again.
+  if (!mapping_.worker.wait_until_idle() || !loop_closing_.worker.wait_until_idle()) return;
   std::vector<KeyFrameId> died;
   {
     const std::lock_guard lock(trajectory_mutex_);

@@ -152,6 +152,23 @@ def test_a_map_that_is_lost_when_small_is_dropped_alone() -> None:
     assert 0 < np.count_nonzero(~dropped.lost) <= 8, "nothing that was tracked is thrown away"
 
 
+def test_a_map_is_not_dropped_while_its_keyframes_wait() -> None:
+    sequence = cut(corridor("rgbd"), range(30))
+    with orb.System(settings_of(sequence), "rgbd") as slam:
+        track(slam, sequence)
+        assert slam.wait_until_idle(20)
+        back_end = slam.pipeline.back_end
+        worker = back_end.mapping.worker
+        n_keyframes = back_end.map.n_keyframes
+        pause = worker.pause()
+        worker.submit(0)
+        with pytest.raises(orb.WorkerError, match="local mapping did not end its work"):
+            back_end.drop_map(0.05, keep=lambda _: pytest.fail("the map was ended"))
+        assert back_end.map.n_keyframes == n_keyframes
+        worker.reset()  # the job was made up
+        pause.release()
+
+
 def test_patience_is_a_setting() -> None:
     sequence = cut(corridor("rgbd"), range(60), 30, range(200, 230))
     assert len(run(sequence, "rgbd", new_map_after=5.0).slam.maps) == 1
