@@ -120,9 +120,11 @@ fuzz-maps: install
 	  --runs $(FUZZ_RUNS) --first $(FUZZ_FIRST)
 
 # ---- the rest ------------------------------------------------------------------------------------
+# BEFORE names a commit: it is built as well, and its kernels run in turns with ours.
 bench: install
 	@cmake --preset release >/dev/null && cmake --build build/release -j $(JOBS) --target benchmarks
 	@$(BIN)/python -m benchmarks.speed.compare
+	@$(BIN)/python -m benchmarks.versions $(if $(BEFORE),--before $(BEFORE))
 
 # A wheel for the Python that is named, with all libraries inside: minutes the first time, as it builds
 # Ceres and OpenCV. `make test-wheel` tries it on a bare Debian, which needs root.

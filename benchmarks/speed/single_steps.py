@@ -61,27 +61,47 @@ def extraction_rows(yardstick: Yardstick) -> Iterator[Row]:
                 yield Row(f"{figure.name} ({kernels})", untargeted, measured)
 
 
-def stereo_rows(yardstick: Yardstick) -> Iterator[Row]:
+@dataclass(frozen=True)
+class StereoPair:
+    """A rectified pair of images, and what matching needs."""
+
+    left: np.ndarray
+    right: np.ndarray
+    fx: float
+    bf: float
+    n_features: int
+    recorded: bool  #: not a synthetic one in its place
+
+
+def stereo_pair(name: str) -> StereoPair:
+    """One of the pairs of `reference.STEREO`."""
     shared = shared_folder()
+    if shared is not None:
+        file = {"euroc": "stereo_euroc", "kitti": "stereo_kitti06"}[name]
+        arrays = np.load(shared / "golden" / f"{file}.npz")
+    else:
+        arrays = golden("stereo_synth")
+    fx, _, _, _, bf = arrays["K_bf"]
+    n_features = 1200 if name == "euroc" else 2000
+    return StereoPair(
+        arrays["left"], arrays["right"], float(fx), float(bf), n_features, shared is not None
+    )
+
+
+def stereo_rows(yardstick: Yardstick) -> Iterator[Row]:
     for name, figure in reference.STEREO.items():
-        n_features = 1200 if name == "euroc" else 2000
-        if shared is not None:
-            file = {"euroc": "stereo_euroc", "kitti": "stereo_kitti06"}[name]
-            arrays = np.load(shared / "golden" / f"{file}.npz")
-            left, right, (fx, _, _, _, bf) = arrays["left"], arrays["right"], arrays["K_bf"]
-            note = ""
-        else:
-            arrays = golden("stereo_synth")
-            left, right, (fx, _, _, _, bf) = arrays["left"], arrays["right"], arrays["K_bf"]
-            note = "synthetic 640x480 pair instead"
-        options = core.OrbOptions(n_features=n_features)
-        first, second = (core.OrbExtractor(options).extract(image) for image in (left, right))
-        scales = core.ScalePyramid(SCALE_FACTOR, N_LEVELS)
-        measured = yardstick.compare(
-            partial(core.match_stereo, first, second, scales, float(bf), float(fx))
+        pair = stereo_pair(name)
+        options = core.OrbOptions(n_features=pair.n_features)
+        first, second = (
+            core.OrbExtractor(options).extract(image) for image in (pair.left, pair.right)
         )
-        matched = int(np.count_nonzero(core.match_stereo(first, second, scales, bf, fx)[1] > 0))
-        note = note or f"{len(first)} keypoints, {matched} with depth"
+        scales = core.ScalePyramid(SCALE_FACTOR, N_LEVELS)
+        match = partial(core.match_stereo, first, second, scales, pair.bf, pair.fx)
+        measured = yardstick.compare(match)
+        matched = int(np.count_nonzero(match()[1] > 0))
+        note = f"{len(first)} keypoints, {matched} with depth"
+        if not pair.recorded:
+            note = "synthetic 640x480 pair instead"
         yield Row(figure.name, figure, measured, note, not yardstick.exact)
 
 

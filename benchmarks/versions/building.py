@@ -1,12 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Processor time that building from nothing takes, without the compiler cache.
-
-The package as ``pip install .`` configures it, and the C++ part of ``make test``. With ``--before``
-another commit is built as well, on the same machine in the same run.
-
-    python -m benchmarks.build_time
-    python -m benchmarks.build_time --before v0.1.0 --only package
-"""
+"""Processor time that building from nothing takes, without the compiler cache."""
 
 from __future__ import annotations
 
@@ -14,7 +7,6 @@ import os
 import resource
 import subprocess
 import sys
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,10 +17,7 @@ try:
 except ModuleNotFoundError:  # Python 3.10
     from pip._vendor import tomli as tomllib  # type: ignore[no-redef]
 
-from benchmarks.harness.arguments import add_counts, add_width, console_of, new_parser
-from benchmarks.harness.tables import new_table, verdict
-
-CHECKOUT = Path(__file__).resolve().parents[1]
+CHECKOUT = Path(__file__).resolve().parents[2]
 PARTS = ("package", "tests")
 #: Processor minutes of the package; the tests may take so many times that.
 GOAL, TIMES = 4.0, 1.5
@@ -86,35 +75,3 @@ def unpack(commit: str, folder: Path) -> Path:
     source.mkdir()
     subprocess.run(["tar", "xf", archive, "-C", source], check=True)
     return source
-
-
-def main() -> None:
-    """Build and print a table."""
-    parser = new_parser(__doc__)
-    parser.add_argument("--only", nargs="+", choices=PARTS, default=PARTS, help="[all]")
-    parser.add_argument("--before", metavar="COMMIT", help="build it as well")
-    add_counts(
-        parser, jobs=(os.cpu_count() or 1, "compilers at a time"), slowest=(8, "files named")
-    )
-    add_width(parser)
-    arguments = parser.parse_args()
-    console = console_of(arguments)
-    table = new_table("Building", ["what", "version"], ["processor minutes", "goal", "met"])
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        versions = {"this": CHECKOUT}
-        if arguments.before:
-            versions = {arguments.before: unpack(arguments.before, folder)} | versions
-        for part in arguments.only:
-            goal = GOAL if part == "package" else GOAL * TIMES
-            for version, source in versions.items():
-                built = build(part, source, folder / f"{part}-{version}", arguments.jobs)
-                told = f"{goal:.1f}", verdict(built.minutes <= goal)
-                table.add_row(part, version, f"{built.minutes:.1f}", *told)
-                for seconds, file in built.slowest[: arguments.slowest]:
-                    console.print(f"{part}, {version}: {seconds:6.1f} s {file}", highlight=False)
-    console.print(table)
-
-
-if __name__ == "__main__":
-    main()
