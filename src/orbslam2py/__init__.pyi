@@ -28,6 +28,7 @@ from .settings import DepthSettings as DepthSettings
 from .settings import OrbSettings as OrbSettings
 from .settings import Sensor as Sensor
 from .settings import Settings as Settings
+from .slam.effort import Effort as Effort
 from .slam.events import Callbacks as Callbacks
 from .slam.events import KeyframeAdded as KeyframeAdded
 from .slam.events import LoopClosed as LoopClosed

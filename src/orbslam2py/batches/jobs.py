@@ -31,7 +31,7 @@ _SEQUENCE_KEYS = ("path", "name", "sensor", "settings", "topics")
 RUN_OPTIONS = ("start", "stride", "max_frames", "realtime", "final_adjustment")
 SYSTEM_OPTIONS = (
     *("deterministic", "loop_closing", "full_adjustment"),
-    *("full_adjustment_time_limit", "check_calibration", "several_maps", "new_map_after"),
+    *("full_adjustment_time_limit", "check_calibration", "several_maps", "new_map_after", "effort"),
 )
 
 

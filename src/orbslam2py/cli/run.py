@@ -13,6 +13,7 @@ from orbslam2py.cli.run_options import (
     AllowOtherSetupFlag,
     AutosaveOption,
     DeterministicFlag,
+    EffortOption,
     FinalAdjustmentFlag,
     ForceFlag,
     FpsOption,
@@ -49,6 +50,7 @@ from orbslam2py.maps import MapFile
 from orbslam2py.maps.setup_check import check_sensor
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.settings import Settings
+from orbslam2py.slam.effort import Effort
 from orbslam2py.slam.options import SystemOptions
 
 EXAMPLE = """
@@ -100,6 +102,7 @@ def run(
     final_adjustment: FinalAdjustmentFlag = False,
     several_maps: SeveralMapsFlag = True,
     new_map_after: NewMapAfterOption = 2.0,
+    effort: EffortOption = Effort.NORMAL,
     seed: SeedOption = 0,
     video: VideoOption = None,
     record: RecordOption = None,
@@ -132,6 +135,7 @@ def run(
             full_adjustment_time_limit=full_adjustment_time_limit,
             several_maps=several_maps,
             new_map_after=new_map_after,
+            effort=effort,
             keyframe_images=save_images,
             seed=seed,
         ),

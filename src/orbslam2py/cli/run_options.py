@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.effort import Effort
 
 # ---- the images ----------------------------------------------------------------------------------
 SequenceArgument = Annotated[
@@ -110,6 +111,10 @@ SeveralMapsFlag = Annotated[
 NewMapAfterOption = Annotated[
     float,
     typer.Option(help="Seconds that it is lost before another map begins.", metavar="SECONDS"),
+]
+EffortOption = Annotated[
+    Effort,
+    typer.Option(help="How often frames become keyframes: few are fast, many hold better."),
 ]
 SeedOption = Annotated[int, typer.Option(help="Seed of all random draws.", min=0)]
 

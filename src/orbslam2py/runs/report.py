@@ -190,6 +190,7 @@ def options_entry(options: RunOptions) -> dict[str, Any]:
         "full_adjustment": options.system.full_adjustment,
         "several_maps": options.system.several_maps,
         "new_map_after": options.system.new_map_after,
+        "effort": str(options.system.effort),
         "full_adjustment_time_limit": options.system.full_adjustment_time_limit,
     }
 

@@ -41,7 +41,7 @@ class KeyframeDecision:
     sensor : Sensor
         What the images come from.
     max_keyframe_interval : int
-        Largest spacing of keyframes in frames: one second.
+        Frames after which one is wanted even from a busy mapper: one second.
     thresholds : KeyframeThresholds, optional
         Limits.
     """
@@ -59,6 +59,10 @@ class KeyframeDecision:
         self._has_depth = sensor.has_depth
         self._max_keyframe_interval = max_keyframe_interval
         self.limits = thresholds or KeyframeThresholds()
+
+    def due(self, frame_id: int, since: SinceKeyframe) -> bool:
+        """Whether a frame may become a keyframe, however well it is tracked."""
+        return frame_id >= since.frame_id + self.limits.spacing
 
     def wanted(
         self,
@@ -100,7 +104,9 @@ class KeyframeDecision:
             n_inliers < limits.weak_share * n_reference or needs_new_points
         )
         sees_new_things = n_inliers < self._share(n_keyframes) * n_reference or needs_new_points
-        wanted = (one_second_passed or idle or tracking_is_weak) and (
+        # For recorded images mapping has been waited for when one is due: frames alone count.
+        in_turn = idle and self.due(frame.id, since)
+        wanted = (one_second_passed or in_turn or tracking_is_weak) and (
             sees_new_things and n_inliers > limits.inliers
         )
         if not wanted or idle:

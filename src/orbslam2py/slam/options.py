@@ -11,13 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
-from orbslam2py._arguments import choice_of, is_number, seed_of, shown
+from orbslam2py._arguments import choice_of, is_number, member_of, seed_of, shown
 from orbslam2py.errors import SettingsError
 from orbslam2py.maps.map_file import MapFile
 from orbslam2py.maps.saved_map import SavedMap
 from orbslam2py.maps.setup_check import check_camera, check_sensor, check_vocabulary
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings, resolve_settings
+from orbslam2py.slam.effort import Effort
 from orbslam2py.vocabulary.vocabulary import load_vocabulary, vocabulary_name
 
 _SWITCHES = "deterministic", "wait_for_mapping", "loop_closing", "full_adjustment", "several_maps"
@@ -30,9 +31,9 @@ class SystemOptions:
     Raises
     ------
     SettingsError
-        If a switch is not True or False, the seed is no whole number from 0 to 2^64 - 1, the time
-        limit is not more than 0 or given for the deterministic mode, or `new_map_after` is not a
-        number of seconds.
+        If a switch is not True or False, the effort is not a name of `Effort`, the seed is no whole
+        number from 0 to 2^64 - 1, the time limit is not more than 0 or given for the deterministic
+        mode, or `new_map_after` is not a number of seconds.
     """
 
     deterministic: bool = False
@@ -45,9 +46,12 @@ class SystemOptions:
     check_calibration: bool = True
     several_maps: bool = True
     new_map_after: float = 2.0
+    effort: Effort = Effort.NORMAL
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "seed", seed_of(self.seed))
+        effort = member_of(Effort, self.effort, "effort", SettingsError)
+        object.__setattr__(self, "effort", effort)
         for name in _SWITCHES:
             object.__setattr__(self, name, choice_of(getattr(self, name), name))
         if not (is_number(self.new_map_after) and 0 <= self.new_map_after < math.inf):

@@ -187,13 +187,15 @@ class Pipeline:
 
     def _wait_for_mapping(self) -> None:
         worker = self.back_end.mapping.worker
-        if self._sensor.has_depth:
+        if worker.held or (
+            self._sensor.has_depth and not self.tracking.keyframe_due(self._next_frame_id)
+        ):
             worker.wait_until_waiting(at_most=1)
-        elif not worker.held:
-            worker.wait_until_waiting(at_most=0)
-            # New points of a single camera come from mapping alone, and a busy mapper takes no
-            # keyframes: on fast motion the map would end before the mapper is done.
-            worker.wait_until_idle()
+            return
+        worker.wait_until_waiting(at_most=0)
+        # Which frames become keyframes must not depend on the clock; and a single camera gets new
+        # points from mapping alone: on fast motion the map would end before the mapper is done.
+        worker.wait_until_idle(unless_held=True)
 
     def _look_again_at_start(self) -> None:
         """Once a single camera's map has settled, its first frames get better poses in it."""
@@ -336,7 +338,13 @@ def _make_tracking(setup: Setup, back_end: BackEnd, options: SystemOptions) -> T
         initializer=initializer,
         search=searching,
         belief=belief(searching),
-        keyframe_decision=KeyframeDecision(slam_map, mapping.worker, sensor, max_keyframe_interval),
+        keyframe_decision=KeyframeDecision(
+            slam_map,
+            mapping.worker,
+            sensor,
+            max_keyframe_interval,
+            options.effort.keyframes(sensor),
+        ),
         has_depth=sensor.has_depth,
         new_map_after=options.new_map_after if options.several_maps else None,
     )

@@ -29,6 +29,7 @@ from orbslam2py.maps.snapshot import (
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
 from orbslam2py.slam.back_end import abandon
+from orbslam2py.slam.effort import Effort
 from orbslam2py.slam.events import Callbacks, LoopClosed, MapsMerged
 from orbslam2py.slam.frame_source import FrameSource, timed_images, track_images
 from orbslam2py.slam.front_end import Mask, PairMask
@@ -65,10 +66,11 @@ class System:
     deterministic : bool
         Run mapping and loop closing inline after each keyframe: two runs give the same bytes.
     wait_for_mapping : bool
-        For recorded data: a track call waits until at most one keyframe waits for mapping (with a
-        single camera: until mapping is idle), so that mapping keeps up however fast the images are
-        delivered. With a stereo or RGB-D sensor the result still depends a little on the timing of
-        the threads; `deterministic` does not. For live cameras leave it off.
+        For recorded data: a track call waits until at most one keyframe waits for mapping, and
+        until mapping is idle if the image may become a keyframe in its turn (with a single camera
+        every one may), so that mapping keeps up however fast the images are delivered. With a
+        stereo or RGB-D sensor the result still depends a little on the timing of the threads;
+        `deterministic` does not. For live cameras leave it off.
     loop_closing : bool
         Recognise places seen before and take out the drift.
     full_adjustment : bool
@@ -87,6 +89,8 @@ class System:
         Otherwise nothing is mapped until the camera sees the old map again.
     new_map_after : float
         Seconds of time stamps that tracking is lost before another map begins.
+    effort : {"fast", "normal", "thorough"}
+        How often frames become keyframes: fewer take less time, more hold better and err less.
     check_calibration : bool
         Log one warning if the calibration cannot belong to images of the first one's size.
         `orbslam2py.check_calibration` looks into the images, too.
@@ -132,6 +136,7 @@ class System:
         check_calibration: bool = True,
         several_maps: bool = True,
         new_map_after: float = 2.0,
+        effort: Effort | str = Effort.NORMAL,
     ) -> None:
         self.options = SystemOptions(
             deterministic=deterministic,
@@ -144,6 +149,7 @@ class System:
             check_calibration=check_calibration,
             several_maps=several_maps,
             new_map_after=new_map_after,
+            effort=effort,  # type: ignore[arg-type]
         )
         setup = Setup.of(settings, sensor, vocabulary, load_map, initial_pose, allow_other_setup)
         self.sensor, self.settings, self.vocabulary = setup.sensor, setup.settings, setup.vocabulary

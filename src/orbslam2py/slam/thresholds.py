@@ -177,6 +177,8 @@ class KeyframeThresholds:
     the camera has turned away from them (stereo, RGB-D), if many close points are not tracked."""
     inliers: int = 15
     """A keyframe needs more inliers than this."""
+    spacing: int = 1
+    """Frames from one keyframe to the next, where tracking is not weak."""
     queue: int = 3
     """A busy mapper is given a keyframe only if fewer than this wait (stereo, RGB-D)."""
 
