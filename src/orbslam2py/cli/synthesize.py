@@ -62,6 +62,9 @@ Laps = Annotated[
         "[default: 1.2; figure-eight: 1.1]"
     ),
 ]
+Length = Annotated[
+    float | None, typer.Option(help="Metres of the straight street.  [default: 600]")
+]
 Fps = Annotated[float | None, typer.Option(help="Frames per second.  [default: 20; streets: 10]")]
 Speed = Annotated[
     float | None,
@@ -131,6 +134,7 @@ def synthesize(
     frames: Frames = None,
     laps: Laps = None,
     fps: Fps = None,
+    length: Length = None,
     speed: Speed = None,
     pace: Pace = 1.0,
     motion: Motion = SyntheticMotion.SMOOTH,
@@ -162,6 +166,7 @@ def synthesize(
         frames=frames,
         laps=laps,
         fps=fps,
+        length=length,
         speed=speed,
         pace=pace,
         motion=motion,

@@ -36,6 +36,8 @@ class SyntheticOptions:
     laps
         How often to go around, instead of `frames`; only where the way comes back to its start
         (1.2 in corridors and around the block, 1.1 in the figure of eight).
+    length
+        Metres of the straight street (600).
     fps
         Frames per second (20 indoors, 10 in streets).
     speed
@@ -110,6 +112,7 @@ class SyntheticOptions:
     order: tuple[int, ...] | None = None
     gap: float | None = None
     overlap: float | None = None
+    length: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "world", _member(SyntheticWorld, "world", self.world))
@@ -118,6 +121,7 @@ class SyntheticOptions:
         object.__setattr__(self, "corners", _member(Corners, "corners", self.corners))
         _check_range("frames", self.frames, 1, 1_000_000, whole=True)
         _check_range("laps", self.laps, 0.01, 1000)
+        self._check_length()
         _check_range("fps", self.fps, 0.1, 1000)
         _check_range("speed", self.speed, 0.001, 100)
         if self.size is not None:
@@ -146,6 +150,13 @@ class SyntheticOptions:
         if self.corners is Corners.SHARP and self.world not in CORNERED:
             names = ", ".join(map(str, CORNERED))
             raise SettingsError(f"corners are sharp on ways with corners: {names}; take one")
+
+    def _check_length(self) -> None:
+        _check_range("length", self.length, 50, 20_000)
+        if self.length is not None and self.world is not SyntheticWorld.STREET:
+            raise SettingsError(
+                f"length does not apply to the {self.world}, whose size is fixed; take the street"
+            )
 
     def _check_pieces(self) -> None:
         _check_range("pieces", self.pieces, 1, 1000, whole=True)

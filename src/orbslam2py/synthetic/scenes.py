@@ -29,7 +29,7 @@ class SyntheticWorld(str, Enum):
     FIGURE_EIGHT = "figure-eight"
     """Two corridors with a common leg; two loops and a bit."""
     STREET = "street"
-    """A drive of 600 m along a straight street."""
+    """A drive along a straight street, of 600 m or any length."""
     STREET_LAP = "street-lap"
     """A drive around a block of houses; one lap (600 m) and a bit."""
     TWO_ROOMS = "two-rooms"
@@ -148,7 +148,9 @@ _CORRIDOR = {"length": 10.0, "breadth": 8.0, "width": 2.0}  # from outer wall to
 _EIGHT = {"length": 10.0, "breadth": 12.0, "width": 2.0}
 _HEIGHT = 2.6  # of corridors
 _REPEAT = 4.0  # after which the pictures of the repeating corridor come again
-_STREET_LENGTH, _STREET_WIDTH = 600.0, 12.0
+#: Of the straight street.
+STREET_LENGTH = 600.0
+_STREET_WIDTH = 12.0
 _BLOCK = {"length": 208.0, "breadth": 104.0, "width": 14.0}  # between middles of its streets
 _SMALL_BLOCK = {"length": 108.0, "breadth": 64.0, "width": 14.0}
 _PASSAGE = 3.0  # between the two rooms
@@ -190,8 +192,16 @@ WITHOUT_WAY = {
 }
 
 
-def make_scene(world: SyntheticWorld) -> Scene:
-    """Choose the world and the way; the world itself is made later, when the seed is known."""
+def make_scene(world: SyntheticWorld, length: float | None = None) -> Scene:
+    """Choose the world and the way; the world itself is made later, when the seed is known.
+
+    Parameters
+    ----------
+    world
+        Which one.
+    length
+        Metres of the straight street.
+    """
     if world in WITHOUT_WAY:
         return _scene_without_way(world)
     if world in (SyntheticWorld.CORRIDOR, SyntheticWorld.REPEATING_CORRIDOR):
@@ -220,8 +230,8 @@ def make_scene(world: SyntheticWorld) -> Scene:
             outdoors=True,
         )
     return Scene(
-        lambda seed: core.make_street(_STREET_LENGTH, _STREET_WIDTH, seed),
-        core.street_way(_STREET_LENGTH),
+        lambda seed: core.make_street(length or STREET_LENGTH, _STREET_WIDTH, seed),
+        core.street_way(length or STREET_LENGTH),
         speed=10.0,
         outdoors=True,
     )

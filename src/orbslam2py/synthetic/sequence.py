@@ -58,7 +58,7 @@ class SyntheticSequence(FramesInOrder):
         self.options = options
         self._threads = threads
         self._world = SyntheticWorld(options.world)
-        self._scene = make_scene(self._world)
+        self._scene = make_scene(self._world, options.length)
         self._fps = options.fps or (10.0 if self._scene.outdoors else 20.0)
         self._speed = options.speed or self._scene.speed
         self._motion = Motion(SyntheticMotion(options.motion), self._fps, options.seed)

@@ -316,3 +316,19 @@ def test_frames_out_of_range_raise():
     for index in (-1, 3):
         with pytest.raises(IndexError):
             small().load(index)
+
+
+def test_a_street_is_as_long_as_asked_for() -> None:
+    usual = SyntheticSequence(SyntheticOptions(world="street"))
+    longer = SyntheticSequence(SyntheticOptions(world="street", length=1200))
+    assert len(longer) / len(usual) == pytest.approx(2, rel=0.02)
+    truth = longer.ground_truth()
+    assert truth is not None
+    assert np.ptp(truth.T_wc[:, 2, 3]) == pytest.approx(1200, rel=0.02)
+
+
+def test_only_the_street_has_a_length() -> None:
+    with pytest.raises(SettingsError, match="length does not apply to the room"):
+        SyntheticOptions(length=100)
+    with pytest.raises(SettingsError, match="length is 1000000.0; allowed: 50 to 20000"):
+        SyntheticOptions(world="street", length=1e6)
