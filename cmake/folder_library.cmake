@@ -25,7 +25,7 @@ endif()
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
   target_include_directories(orbslam_options SYSTEM BEFORE INTERFACE ${PROJECT_SOURCE_DIR}/cmake/aarch64)
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-    target_compile_options(orbslam_options INTERFACE -Wno-psabi) # notes on GCC 10 and older
+    target_compile_options(orbslam_options INTERFACE -Wno-psabi) # notes on pairs, which GCC before 10.1 passed otherwise
   endif()
 endif()
 # Eigen asks the processor how large its caches are, and adds up long products by parts of that size. What it
