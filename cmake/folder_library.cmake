@@ -19,10 +19,18 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
       -march=x86-64 -mcx16 -msahf -mpopcnt -msse3 -mssse3 -msse4.1 -msse4.2)
   endif()
 else()
-  # Where fused multiply-add is part of the baseline, contraction would change results; Eigen's own
-  # uses of it go by the macro.
-  target_compile_options(orbslam_options INTERFACE -ffp-contract=off -U__ARM_FEATURE_FMA)
+  # Where fused multiply-add is part of the baseline, contraction would change results.
+  target_compile_options(orbslam_options INTERFACE -ffp-contract=off)
 endif()
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
+  target_include_directories(orbslam_options SYSTEM BEFORE INTERFACE ${PROJECT_SOURCE_DIR}/cmake/aarch64)
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    target_compile_options(orbslam_options INTERFACE -Wno-psabi) # notes on pairs, which GCC before 10.1 passed otherwise
+  endif()
+endif()
+# Eigen asks the processor how large its caches are, and adds up long products by parts of that size. What it
+# takes on x86-64 when it cannot ask is what most have.
+target_compile_definitions(orbslam_options INTERFACE EIGEN_NO_CPUID EIGEN_DEFAULT_L1_CACHE_SIZE=32768)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   target_compile_options(orbslam_options INTERFACE -fpch-preprocess) # lets ccache see them
   # Kilobytes that may be in use before the compiler looks for what it could free: a tenth of its time,

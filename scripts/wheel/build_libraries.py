@@ -26,6 +26,7 @@ except ModuleNotFoundError:  # Python 3.10
     from pip._vendor import tomli as tomllib  # type: ignore[no-redef]
 
 HERE = Path(__file__).parent
+PROJECT = HERE.parent.parent.resolve()
 
 #: Nothing is seen from outside; the linker leaves out what is not used.
 SECTIONS = {
@@ -97,7 +98,7 @@ def build(
     defines = COMMON | {"CMAKE_INSTALL_PREFIX": str(folder / "libraries")}
     for name, value in cmake.items():
         text = {True: "ON", False: "OFF"}.get(value, value)
-        defines[name] = text.replace("SYSROOT", str(sysroot))
+        defines[name] = text.replace("SYSROOT", str(sysroot)).replace("PROJECT", str(PROJECT))
     for language in ("C", "CXX"):
         flags = f"CMAKE_{language}_FLAGS"
         defines[flags] = f"{SECTIONS[language]} {defines.get(flags, '')}"

@@ -139,6 +139,9 @@ class Pipeline:
         self._make_ready(timestamp)
         tracking = self.tracking
         timer = StageTimer()
+        with timer("track"):
+            # Features are found while mapping works: they do not depend on the map.
+            frame = core.TrackedFrame(build(self._next_frame_id, timer))
         if self._waits_for_mapping:
             with timer("wait"):
                 self._wait_for_mapping()
@@ -146,7 +149,6 @@ class Pipeline:
         state_before = tracking.state
         watchers = self.frame_watchers
         with timer("track"):
-            frame = core.TrackedFrame(build(self._next_frame_id, timer))
             # From here on the image counts: every id is one image.
             self._next_frame_id += 1
             self._last_timestamp = timestamp

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // The whole system on a made-up sequence that closes a loop, each step after the one before: two
-// runs give the same bytes, two kinds of processors the same path within the rounding of their
-// libraries. Writes what it found, or compares with what another build has written. Exit code 1
-// when the path is wrong or another one.
+// runs give the same bytes, so do two kinds of processors, and other libraries the same path within
+// their rounding. Writes what it found, or compares with what another build has written. Exit code
+// 1 when the path is wrong or another one.
 
 #include <algorithm>
 #include <cmath>
@@ -185,7 +185,7 @@ Results read(const std::string& file) {
 }
 
 /// The first difference must come behind the line `same_through` (unless that is empty), and
-/// numbers must be near; hashes are only named.
+/// numbers must be near, hashes are only named; without a tolerance no difference is allowed.
 bool near(const Results& ours, const Results& others, const std::string& same_through,
           double tolerance) {
   bool must_be_same = !same_through.empty();
@@ -213,7 +213,7 @@ bool near(const Results& ours, const Results& others, const std::string& same_th
   }
   std::printf("first difference: %s; poses at most %.1e apart (%s)\n", first.c_str(), worst,
               worst_at.c_str());
-  return worst <= tolerance;
+  return tolerance > 0 && worst <= tolerance;
 }
 
 }  // namespace
