@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """One version's extension, in a process of its own, doing what it is told line by line.
 
-    PYTHONPATH=PACKAGE python extension_server.py IMAGES.npz
+    PYTHONPATH=PACKAGE python extension_server.py PACKAGE IMAGES.npz
 
 It imports nothing but that version's package and NumPy, as the version may be an old one. It first
 prints the vector units; then, for each line of the input, the milliseconds of processor time that
@@ -14,17 +14,24 @@ this took:
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
-from orbslam2py import _core as core
+# The finder of an installation for development comes before PYTHONPATH.
+sys.meta_path = [one for one in sys.meta_path if "editable" not in type(one).__module__]
+
+from orbslam2py import _core as core  # noqa: E402
 
 N_LEVELS, SCALE_FACTOR = 8, 1.2
 
 
 def main() -> None:
     """Answer until the input ends."""
-    with np.load(sys.argv[1]) as arrays:
+    package, file = sys.argv[1:]
+    if not Path(core.__file__).is_relative_to(package):
+        raise SystemExit(f"{core.__file__} was loaded instead of the extension in {package}")
+    with np.load(file) as arrays:
         images = dict(arrays)
     # Versions before the portable library knew these two.
     old = ["portable", "avx2"] if core.OrbExtractor().kernel_name == "avx2" else ["portable"]

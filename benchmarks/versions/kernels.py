@@ -146,7 +146,7 @@ def start(package: Path, images: Path, kind: str) -> subprocess.Popen[str]:
     if kind == "portable":
         environment["ORBSLAM2PY_PORTABLE_KERNELS"] = "1"
     return subprocess.Popen(
-        [sys.executable, str(Path(__file__).with_name("extension_server.py")), str(images)],
+        [sys.executable, Path(__file__).with_name("extension_server.py"), package, images],
         env=environment,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
