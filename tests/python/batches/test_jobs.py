@@ -25,16 +25,17 @@ def test_product(places: Path) -> None:
     document = {
         "sequences": ["a/*"],
         "sensors": ["mono", "stereo"],
-        "options": {"deterministic": [True, False], "max_frames": 30},
+        "options": {"deterministic": [True, False], "max_frames": 30, "effort": "fast"},
         "seeds": [3, 5],
     }
     jobs = make_jobs(document, places)
     assert len(jobs) == 2 * 2 * 2 * 2
-    assert jobs[0].key == "01-mono-deterministic=true-max_frames=30-seed3"
+    assert jobs[0].key == "01-mono-deterministic=true-effort=fast-max_frames=30-seed3"
     assert jobs[0].setting == jobs[1].setting
     assert len({job.key for job in jobs}) == len({job.fingerprint for job in jobs}) == 16
     options = jobs[0].run_options(orb.Sensor.MONOCULAR)
     assert (options.system.deterministic, options.system.seed, options.max_frames) == (True, 3, 30)
+    assert options.system.effort is orb.Effort.FAST
 
 
 def test_file(places: Path) -> None:
@@ -70,6 +71,7 @@ def test_file(places: Path) -> None:
         ({"sequences": ["a/01"], "options": {"strid": 2}}, "unknown option 'strid'.* stride?"),
         ({"sequences": ["a/01"], "options": [1]}, "options are a list"),
         ({"sequences": ["a/01"], "options": {"deterministic": "no"}}, "deterministic is 'no'"),
+        ({"sequences": ["a/01"], "options": {"effort": "slow"}}, "effort is 'slow'.* fast, normal"),
         ({"sequences": ["a/01"], "sweep": {}}, "sweep is empty"),
         ({"sequences": ["a/01"], "sweep": {"nFeatures": [1]}}, "is no key of the settings; did"),
         ({"sequences": ["a/01"], "sweep": {"ThDepth": ["x"]}}, "ThDepth is .* give a list of num"),
