@@ -181,6 +181,9 @@ def run_jobs(
         rows[job.key] = row
         if progress is not None:
             progress(row, len(rows), len(wanted))
+    if stop.is_set():
+        # A run may have ended just when it was taken back.
+        rows |= results.rows_of([job for job in left if job.key not in rows])
     table = [rows[job.key] for job in wanted if job.key in rows]
     with results.table() as folder:
         files = write_table(folder, table)

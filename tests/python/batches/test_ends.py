@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -126,6 +127,24 @@ def test_interrupted_in_this_process(
     assert done.code == 0
     assert len(begun) == N, "none was made twice"
     assert reproducible(folder) == whole.table
+
+
+def test_what_ended_when_it_was_taken_back_is_in_the_table(
+    jobs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, stop = tmp_path / "out", threading.Event()
+
+    def taken_back(job: Job, *rest: Any, **named: Any) -> Any:
+        row = run_job(job, *rest, **named)
+        if len(finished(folder)) < 2:
+            return row
+        stop.set()
+        return None
+
+    monkeypatch.setattr(sys.modules["orbslam2py.batches.batch"], "run_job", taken_back)
+    done = orb.batch(jobs, folder, workers=0, stop=stop)
+    assert (len(done.rows), done.n_left) == (2, N - 2)
+    assert len(table(folder)) == len(finished(folder)) == 2
 
 
 @pytest.mark.watchdog(150)

@@ -21,6 +21,7 @@ NAMES = {
     "CameraSettings",
     "DatasetError",
     "DepthSettings",
+    "Effort",
     "Evidence",
     "FrameFeatures",
     "FullAdjustmentRecord",
