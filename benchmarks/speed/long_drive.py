@@ -166,6 +166,8 @@ def main() -> None:
     parser.add_argument("--picture", type=Path, default=Path("build/bench/long_drive.png"))
     add_width(parser)
     arguments = parser.parse_args()
+    if arguments.metres < 2 * STRETCH:
+        parser.error(f"a drive takes at least {2 * STRETCH:.0f} metres, to see what grows")
     console = console_of(arguments)
     drives = {}
     for sensor in arguments.sensors:

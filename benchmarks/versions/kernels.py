@@ -117,7 +117,8 @@ def in_turns(
 def write_images(file: Path) -> tuple[dict[str, int], dict[str, int]]:
     """Images of the comparison into a file; numbers of features of single images and of pairs."""
     single = {image: reference.YARDSTICK[image][0] for image in reference.EXTRACTION}
-    arrays = {image: np.asarray(Yardstick().images[image]) for image in single}
+    images = Yardstick().images
+    arrays = {image: np.asarray(images[image]) for image in single}
     pairs = {}
     for name in reference.STEREO:
         pair = stereo_pair(name)
