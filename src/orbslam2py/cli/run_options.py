@@ -114,7 +114,7 @@ NewMapAfterOption = Annotated[
 ]
 EffortOption = Annotated[
     Effort,
-    typer.Option(help="How often frames become keyframes: few are fast, many hold better."),
+    typer.Option(help="How often frames become keyframes: fewer take less time."),
 ]
 SeedOption = Annotated[int, typer.Option(help="Seed of all random draws.", min=0)]
 

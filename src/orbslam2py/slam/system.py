@@ -90,7 +90,8 @@ class System:
     new_map_after : float
         Seconds of time stamps that tracking is lost before another map begins.
     effort : {"fast", "normal", "thorough"}
-        How often frames become keyframes: fewer take less time, more hold better and err less.
+        How often frames become keyframes. Fewer take less time; with a single camera on the move
+        more of them err less.
     check_calibration : bool
         Log one warning if the calibration cannot belong to images of the first one's size.
         `orbslam2py.check_calibration` looks into the images, too.
