@@ -251,6 +251,7 @@ def _draw_errors(axes: Axes, view: View, estimate: _Path, errors: FloatArray, un
     """Colour the path by its distance to the truth; the bar beside it tells the lengths."""
     from matplotlib.collections import LineCollection  # noqa: PLC0415
     from matplotlib.colors import LinearSegmentedColormap  # noqa: PLC0415
+    from matplotlib.ticker import MaxNLocator  # noqa: PLC0415
 
     flat = view.flatten(estimate.positions)
     joined = np.flatnonzero(~estimate.gaps[1:] & np.isfinite(errors[:-1]))
@@ -262,7 +263,10 @@ def _draw_errors(axes: Axes, view: View, estimate: _Path, errors: FloatArray, un
     lines.set_clim(0.0, float(np.nanmax(errors)) or 1.0)
     lines.set_capstyle("round")
     axes.add_collection(lines, autolim=False)
-    bar = axes.figure.colorbar(lines, ax=axes, shrink=0.85, fraction=0.08, pad=0.01)
+    # Few ticks: labels of many digits would push the bar's own label out of the picture.
+    ticks = MaxNLocator(nbins=4, steps=[1, 2, 5, 10])
+    bar = axes.figure.colorbar(lines, ax=axes, shrink=0.85, fraction=0.1, pad=0.01, ticks=ticks)
+    bar.ax.ticklabel_format(axis="y", scilimits=(-3, 5))
     bar.set_label(f"estimate: distance to the ground truth [{unit}]")
 
 

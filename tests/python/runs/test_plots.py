@@ -154,6 +154,15 @@ def test_errors_colour_the_path(tmp_path: Path) -> None:
     assert len(pixels_of(top, plots._ESTIMATE)) < len(pixels_of(plain, plots._ESTIMATE)) / 4
 
 
+@pytest.mark.parametrize("largest", [0.000037, 0.00079, 0.0123, 0.0345, 0.28, 7.5, 123.4, 4567.0])
+def test_labels_of_the_colour_bar_are_in_the_picture(tmp_path: Path, largest: float) -> None:
+    positions = circle()
+    truth = (np.arange(200) / FPS, positions)
+    errors = np.linspace(0, largest, 200)
+    picture = drawn(tmp_path / "p", positions, truth=truth, errors=errors)
+    assert (picture[:, -3:] > 250).all(), "nothing is cut off at the right"
+
+
 def test_a_camera_that_climbs_is_seen_from_behind() -> None:
     climb = np.stack([np.zeros(9), -np.arange(9.0), 0.1 * np.arange(9.0)], axis=1)
     view = choose_view(climb)
