@@ -4,10 +4,14 @@
 // programs disturb; `write_ms` is how long the commit holds the map's write lock.
 #include <benchmark/benchmark.h>
 #include <dlfcn.h>
+#include <malloc.h>
 #include <pthread.h>
 
 #include <chrono>
+#include <fstream>
 #include <memory>
+#include <stdexcept>
+#include <string>
 #include <thread>
 
 #include "measure.hpp"
@@ -45,6 +49,31 @@ class BothClocks {
   double wall_began_ = seconds_of(CLOCK_MONOTONIC);
 };
 
+/// What the process holds at most since this was made, beyond what it held then.
+class PeakMemory {
+ public:
+  PeakMemory() {
+    // Sets the mark of the most that was held to what is held now.
+    std::ofstream("/proc/self/clear_refs") << 5;
+    before_kb_ = held_kb("VmRSS:");
+  }
+  double kilobytes() const { return held_kb("VmHWM:") - before_kb_; }
+
+ private:
+  static double held_kb(const std::string& name) {
+    std::ifstream status("/proc/self/status");
+    for (std::string word; status >> word;) {
+      if (word != name) continue;
+      double kilobytes = 0;
+      status >> kilobytes;
+      return kilobytes;
+    }
+    throw std::runtime_error("/proc/self/status does not tell " + name);
+  }
+
+  double before_kb_ = 0;
+};
+
 LoopMapOptions loop_options(const benchmark::State& state, bool monocular) {
   LoopMapOptions options;
   options.n_keyframes = static_cast<int>(state.range(0));
@@ -63,6 +92,9 @@ void BM_FullBundle(benchmark::State& state, bool monocular, bool robust) {
   for (auto _ : state) {
     LoopMap loop(loop_options(state, monocular));
     state.counters["error_before_m"] = loop.pose_error();
+    // What building the map has freed would hide what the adjustment needs.
+    malloc_trim(0);
+    const PeakMemory memory;
     const BothClocks gathering;
     GatheredBundle bundle = gather_full_bundle(loop.map);
     state.counters["gather_ms"] = 1e3 * gathering.seconds();
@@ -70,6 +102,7 @@ void BM_FullBundle(benchmark::State& state, bool monocular, bool robust) {
     const BundleSummary summary = solve_full_bundle(bundle, bundle_options(robust), nullptr, 1);
     state.counters["solve_s"] = solving.seconds();
     state.counters["solve_wall_s"] = solving.wall_seconds();
+    state.counters["memory_kb"] = memory.kilobytes();
     write_sections = {};
     const BothClocks committing;
     if (!commit_full_bundle(loop.map, bundle).committed) state.SkipWithError("not committed");
@@ -85,10 +118,9 @@ void BM_FullBundle(benchmark::State& state, bool monocular, bool robust) {
   }
 }
 
-#define SIZES Arg(250)->Arg(500)->Arg(1000)->Arg(2000)->Arg(4000)
 #define ONCE UseManualTime()->Iterations(1)->Unit(benchmark::kMillisecond)
-BENCHMARK_CAPTURE(BM_FullBundle, stereo, false, true)->SIZES->ONCE;
-BENCHMARK_CAPTURE(BM_FullBundle, mono, true, true)->SIZES->ONCE;
+BENCHMARK_CAPTURE(BM_FullBundle, stereo, false, true)->ArgsProduct({kMapSizes})->ONCE;
+BENCHMARK_CAPTURE(BM_FullBundle, mono, true, true)->ArgsProduct({kMapSizes})->ONCE;
 BENCHMARK_CAPTURE(BM_FullBundle, stereo_without_kernel, false, false)->Arg(1000)->ONCE;
 
 /// From raising the flag until the solver returns, raised at moments spread over a run.

@@ -60,7 +60,7 @@ void BM_CorrectLoop(benchmark::State& state) {
 }
 BENCHMARK(BM_CorrectLoop)
     ->ArgNames({"keyframes", "monocular"})
-    ->ArgsProduct({{250, 500, 1000, 2000, 4000}, {0, 1}})
+    ->ArgsProduct({kMapSizes, {0, 1}})
     ->UseManualTime()
     ->Unit(benchmark::kMillisecond)
     ->Iterations(6);

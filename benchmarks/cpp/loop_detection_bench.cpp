@@ -84,7 +84,7 @@ void BM_DetectLoop(benchmark::State& state) {
 }
 BENCHMARK(BM_DetectLoop)
     ->ArgNames({"keyframes", "known"})
-    ->ArgsProduct({{250, 500, 1000, 2000, 4000}, {0, 1}})
+    ->ArgsProduct({kMapSizes, {0, 1}})
     ->UseManualTime()
     ->Iterations(300)
     ->Unit(benchmark::kMillisecond);

@@ -53,7 +53,7 @@ BENCHMARK(BM_VerifyLoopCandidate)
     ->Unit(benchmark::kMillisecond);
 
 void sizes_of_map(benchmark::internal::Benchmark* bench) {
-  bench->ArgName("keyframes")->ArgsProduct({{250, 500, 1000, 2000, 4000}});
+  bench->ArgName("keyframes")->ArgsProduct({kMapSizes});
   bench->Iterations(100)->Unit(benchmark::kMillisecond);
 }
 

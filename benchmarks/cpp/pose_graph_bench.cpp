@@ -77,7 +77,7 @@ void BM_OptimizePoseGraph(benchmark::State& state) {
 }
 BENCHMARK(BM_OptimizePoseGraph)
     ->ArgNames({"keyframes", "fix_scale", "eigen"})
-    ->ArgsProduct({{250, 500, 1000, 2000, 4000}, {0, 1}, {0, 1}})
+    ->ArgsProduct({kMapSizes, {0, 1}, {0, 1}})
     ->UseManualTime()
     ->Unit(benchmark::kMillisecond);
 

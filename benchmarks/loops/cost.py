@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What closing a loop costs, by size of the map, and what a full adjustment does to tracking.
 
-Every step runs in made-up maps of 250 to 4000 keyframes; the limits are for 1000. The curve goes to
+Every step runs in made-up maps of 250 to 10 000 keyframes; the limits of the steps are for
+1000, those of the whole correction and of memory for all sizes. The curve goes to
 build/bench/loop_cost.png.
 
     python -m benchmarks.loops.cost
@@ -23,13 +24,17 @@ from benchmarks.harness.folders import how_to_build
 from benchmarks.harness.machine import print_machine
 from benchmarks.harness.runs import Record, benchmark_records, run_module
 from benchmarks.harness.steps import Row, steps_table
-from benchmarks.harness.tables import new_table
+from benchmarks.harness.tables import new_table, verdict
 from benchmarks.harness.yardstick import Times, Yardstick
 from benchmarks.loops.tracking import Measured, tracking_table
 
-SIZES = (250, 500, 1000, 2000, 4000)
+SIZES = (250, 500, 1000, 2000, 4000, 10000)
 LIMIT_SIZE = 1000
-"""Keyframes at which the limits hold."""
+"""Keyframes at which the limits of the steps hold."""
+LIMIT_CORRECTED_S = 5.0
+"""From the end of the verification until the map is corrected, at any size."""
+LIMIT_MEMORY_GROWTH = 1.1
+"""Kilobytes a keyframe of a full adjustment: those of the largest map over those of 1000."""
 
 
 @dataclass
@@ -42,6 +47,8 @@ class Step:
     by_size: dict[int, Times] = field(default_factory=dict)
     row: Row | None = None
     """At the size of the limits."""
+    memory_kb: dict[int, float] = field(default_factory=dict)
+    """Most that was held at once, by size; only of the full adjustment."""
 
     @property
     def name(self) -> str:
@@ -128,6 +135,7 @@ def _full_adjustment(build: Path) -> list[Step]:
         record = found[f"BM_FullBundle/stereo/{n}"]
         around = record["gather_ms"] + record["commit_ms"]
         step.add(n, around + 1e3 * record["solve_wall_s"], around + 1e3 * record["solve_s"])
+        step.memory_kb[n] = record["memory_kb"]
     return [step]
 
 
@@ -174,6 +182,31 @@ def sizes_table(steps: list[Step]) -> object:
     return table
 
 
+def large_maps_table(steps: list[Step]) -> object:
+    """Seconds of the whole correction, and memory of the full adjustment after it."""
+    by_key = {step.key: step for step in steps}
+    memory = by_key["full_adjustment"].memory_kb
+    seconds = {
+        n: 1e-3 * sum(by_key[key].by_size[n].median for key in ("correction", "essential_graph"))
+        for n in SIZES
+    }
+    growth = memory[SIZES[-1]] / SIZES[-1] / (memory[LIMIT_SIZE] / LIMIT_SIZE)
+    table = new_table(
+        "A loop corrected, and the memory of the full adjustment after it",
+        ["what"],
+        [f"{n}\nkeyframes" for n in SIZES] + ["limit", "kept"],
+        "Corrected: correction, fusion and essential graph. Memory: most that was held at once, "
+        f"beyond the map itself; largest map over that of {LIMIT_SIZE}: {growth:.2f} times.",
+    )
+    corrected = [f"{seconds[n]:.2g}" for n in SIZES]
+    kept = verdict(max(seconds.values()) <= LIMIT_CORRECTED_S)
+    table.add_row("corrected [s]", *corrected, f"{LIMIT_CORRECTED_S:g}", kept)
+    held = [f"{memory[n] / n:.0f}" for n in SIZES]
+    kept = verdict(growth <= LIMIT_MEMORY_GROWTH)
+    table.add_row("memory [kB a keyframe]", *held, f"{LIMIT_MEMORY_GROWTH:g} times", kept)
+    return table
+
+
 def draw(steps: list[Step], path: Path) -> None:
     """Cost against size of the map, both logarithmic, into a PNG."""
     figure = Figure(figsize=(8, 5), layout="constrained")
@@ -209,6 +242,7 @@ def loop_tables(yardstick: Yardstick, build: Path, pictures: Path) -> Iterator[o
     rows = [step.row for step in steps if step.row is not None]
     yield steps_table(f"Closing a loop in a map of {LIMIT_SIZE} keyframes", rows)
     yield sizes_table(steps)
+    yield large_maps_table(steps)
     picture = pictures / "loop_cost.png"
     draw(steps, picture)
     yield f"Curve: {picture}"
