@@ -108,6 +108,11 @@ class Evidence:
     """Octaves of depth (1 to 2, 2 to 4, 4 to 8... of the map's units) that hold an inlier."""
     deviation_to_usual: float
     """Standard deviation of the position by the usual one."""
+    match_error: float
+    """Median reprojection error of all that was matched, outliers too, in standard deviations of
+    the keypoints' positions."""
+    error_to_usual: float
+    """That error by the usual one."""
     turn_change: float
     """Degrees by which the camera turned otherwise than from the frame before the last to the
     last; 0 where the motion is not known."""

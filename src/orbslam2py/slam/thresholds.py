@@ -121,6 +121,13 @@ class EvidenceThresholds:
     """With inliers in so few of the 48 cells of the image or fewer it is weak ..."""
     weak_deviation: float = 4.0
     """... and with a position this much less certain than usual."""
+    weak_error: float = 1.5
+    """... and with a median reprojection error so many times the usual one: a part of the image
+    moves by itself, or the matches are wrong."""
+    largest_error: float = 10.0
+    """So many times at most the stated standard deviation grows for it."""
+    slow_gain: float = 0.02
+    """Weight of a frame with such an error in what error is usual: darkness may stay."""
     refused_share: float = 0.3
     """A pose with less than this share of the usual inliers ..."""
     refused_inliers: int = 100

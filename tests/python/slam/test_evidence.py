@@ -161,6 +161,40 @@ def test_inliers_in_one_corner_of_the_image_are_weak(careful: Scene) -> None:
     assert careful.track().is_keyframe
 
 
+def test_matches_that_fit_much_worse_than_usual_are_weak_and_told_as_uncertain(
+    careful: Scene,
+) -> None:
+    careful.core.n_reference = 1000
+    usual = careful.track().estimate
+    careful.core.match_error = 1.2
+    outcome = careful.track()
+    estimate = outcome.estimate
+    assert usual.evidence is not None
+    assert estimate.evidence is not None
+    assert usual.covariance is not None
+    assert estimate.covariance is not None
+    assert estimate.evidence.error_to_usual == pytest.approx(2)
+    assert estimate.evidence.verdict is Verdict.WEAK
+    assert not outcome.is_keyframe
+    # 100 inliers in 30 cells count as 30 observations, twice as wrong as usual.
+    larger = estimate.covariance[0, 0] / usual.covariance[0, 0]
+    assert larger == pytest.approx(2**2 * estimate.n_inliers / 30)
+    careful.core.match_error = 0.8
+    again = careful.track()
+    assert again.is_keyframe
+    assert again.estimate.covariance is not None
+    assert again.estimate.covariance[0, 0] == pytest.approx(usual.covariance[0, 0])
+
+
+def test_an_error_that_stays_becomes_the_usual_one(careful: Scene) -> None:
+    careful.core.match_error = 1.2
+    n_weak = 0
+    while careful.track().estimate.evidence.verdict is Verdict.WEAK:  # type: ignore[union-attr]
+        n_weak += 1
+        assert n_weak < 50
+    assert n_weak > 5
+
+
 def test_a_turn_that_nobody_expected_is_looked_at_again(
     careful: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -69,6 +69,8 @@ def evidence(verdict: Verdict, found: float) -> Evidence:
         n_cells=20,
         n_octaves=3,
         deviation_to_usual=2.0,
+        match_error=0.6,
+        error_to_usual=1.2,
         turn_change=4.0,
         move_change=0.1,
     )

@@ -156,6 +156,7 @@ class FakeCore:
     #: Rotation of the next small images and their correlation; none: they say nothing.
     aligned: deque[SimpleNamespace] = field(default_factory=deque)
     n_cells: int = 30
+    match_error: float = 0.6
     #: Of what the motion model finds, in localization mode.
     n_map_points: int = 100
     #: Of the inliers, after three more frames of the present speed; how far that was.
@@ -179,6 +180,9 @@ class FakeCore:
 
     def spread_of_inliers(self, frame: FakeFrame) -> SimpleNamespace:
         return SimpleNamespace(cells=self.n_cells, octaves=4)
+
+    def median_match_error(self, frame: FakeFrame) -> float:
+        return self.match_error
 
     def count_staying(self, frame: FakeFrame, T_nw: _core.Pose) -> int:
         assert frame.T_cw is not None
@@ -315,6 +319,7 @@ CREDULOUS = EvidenceThresholds(
     weak_share=0,
     weak_cells=-1,
     weak_deviation=math.inf,
+    weak_error=math.inf,
     refused_share=0,
 )
 

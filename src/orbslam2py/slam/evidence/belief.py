@@ -90,9 +90,15 @@ class Belief:
                 self._search.last_relocalization = frame.id
                 self._search.motion.jump(None)
         self._search.settle(refined)
-        estimate = replace(refined.estimate, evidence=evidence, method=hypothesis.method)
+        estimate = replace(
+            refined.estimate,
+            evidence=evidence,
+            method=hypothesis.method,
+            covariance=self._judge.stated_covariance(refined, evidence),
+        )
         if evidence.verdict is Verdict.REFUSED:
             return estimate.failed(Reason.WEAK_EVIDENCE)
+        self._judge.get_used_to_error(evidence)
         if evidence.verdict is Verdict.STRONG or self._may_count(evidence):
             self._judge.get_used_to(refined)
         return estimate

@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass, replace
 
 from orbslam2py import _core as core
+from orbslam2py._arrays import FloatArray
 from orbslam2py.slam.pose_search import MotionModel, RefinedPose
 from orbslam2py.slam.records import Evidence, PoseMethod, Verdict
 from orbslam2py.slam.thresholds import EvidenceThresholds
@@ -56,6 +57,7 @@ class EvidenceJudge:
     def forget(self) -> None:
         """Nothing is usual: the place is another one."""
         self._usual: UsualFigures | None = None
+        self._usual_error: float | None = None
 
     def weigh(self, refined: RefinedPose, motion: MotionModel, method: PoseMethod) -> Evidence:
         """Weigh a refined pose.
@@ -77,6 +79,9 @@ class EvidenceJudge:
         found_to_usual = _ratio(figures.found, usual.found)
         inliers_to_usual = _ratio(estimate.n_inliers, usual.n_inliers)
         deviation_to_usual = _ratio(figures.deviation, usual.deviation)
+        match_error = core.median_match_error(frame)
+        usual_error = match_error if self._usual_error is None else self._usual_error
+        error_to_usual = _ratio(match_error, usual_error)
         limits = self.limits
         verdict = Verdict.STRONG
         if inliers_to_usual < limits.refused_share and estimate.n_inliers < limits.refused_inliers:
@@ -85,6 +90,7 @@ class EvidenceJudge:
             max(inliers_to_usual, found_to_usual) < limits.weak_share
             or spread.cells <= limits.weak_cells
             or deviation_to_usual > limits.weak_deviation
+            or error_to_usual > limits.weak_error
         ):
             verdict = Verdict.WEAK
         return Evidence(
@@ -99,6 +105,8 @@ class EvidenceJudge:
             n_cells=spread.cells,
             n_octaves=spread.octaves,
             deviation_to_usual=deviation_to_usual,
+            match_error=match_error,
+            error_to_usual=error_to_usual,
             turn_change=turn,
             move_change=move,
         )
@@ -136,6 +144,30 @@ class EvidenceJudge:
         figures = _figures(refined)
         usual = self._usual
         self._usual = figures if usual is None else usual.moved_to(figures, self.limits.gain)
+
+    def get_used_to_error(self, evidence: Evidence) -> None:
+        """Let a frame that is believed, strong or weak, move what error is usual."""
+        error = evidence.match_error
+        if not math.isfinite(error):
+            return
+        sudden = evidence.error_to_usual > self.limits.weak_error
+        gain = self.limits.slow_gain if sudden else self.limits.gain
+        usual = error if self._usual_error is None else self._usual_error
+        self._usual_error = usual + gain * (error - usual)
+
+    def stated_covariance(self, refined: RefinedPose, evidence: Evidence) -> FloatArray | None:
+        """The covariance that a pose is told with.
+
+        Errors far beyond the usual ones are not noise of each keypoint: what moves are regions of
+        the image, and the keypoints in one are wrong together. Then each cell with inliers counts
+        as one observation, and errors as large as they are.
+        """
+        covariance = refined.estimate.covariance
+        if covariance is None or evidence.error_to_usual <= self.limits.weak_error:
+            return covariance
+        together = max(1.0, refined.estimate.n_inliers / max(1, evidence.n_cells))
+        larger = min(evidence.error_to_usual, self.limits.largest_error)
+        return covariance * (larger**2 * together)
 
     def _windows(self, degrees: float) -> float:
         """How far a turn moves the image, in search windows of the motion model."""
