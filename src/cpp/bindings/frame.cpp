@@ -12,8 +12,8 @@
 #include "frame/extract_pair.hpp"
 #include "frame/image_input.hpp"
 #include "frame/inlier_spread.hpp"
-#include "frame/match_error.hpp"
 #include "frame/keypoint_colours.hpp"
+#include "frame/match_error.hpp"
 #include "frame/rotation_alignment.hpp"
 #include "frame/sharpness.hpp"
 #include "frame/stereo_matching.hpp"
@@ -431,11 +431,12 @@ void bind_frame(py::module_& module) {
              py::call_guard<py::gil_scoped_release>(),
              "How a frame's inliers are spread over the image and over depth: InlierSpread.\n"
              "Raises StateError without a pose.");
-  module.def("median_match_error", &median_match_error, py::arg("frame"),
-             py::call_guard<py::gil_scoped_release>(),
-             "Median distance between a frame's matched keypoints, outliers too, and the projections\n"
-             "of their points, in standard deviations of the keypoints' levels; 0 without any.\n"
-             "Raises StateError without a pose.");
+  module.def(
+      "median_match_error", &median_match_error, py::arg("frame"),
+      py::call_guard<py::gil_scoped_release>(),
+      "Median distance between a frame's matched keypoints, outliers too, and the projections\n"
+      "of their points, in standard deviations of the keypoints' levels; 0 without any.\n"
+      "Raises StateError without a pose.");
   module.def("sharpness", &sharpness, py::arg("frame"), py::call_guard<py::gil_scoped_release>(),
              "Sum of the corners' responses on the two finest levels, grey levels: what blur takes "
              "away first. To be compared with that of other frames of the same camera.");

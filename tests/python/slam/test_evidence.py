@@ -188,10 +188,13 @@ def test_matches_that_fit_much_worse_than_usual_are_weak_and_told_as_uncertain(
 
 def test_an_error_that_stays_becomes_the_usual_one(careful: Scene) -> None:
     careful.core.match_error = 1.2
-    n_weak = 0
-    while careful.track().estimate.evidence.verdict is Verdict.WEAK:  # type: ignore[union-attr]
-        n_weak += 1
-        assert n_weak < 50
+    verdicts = []
+    for _ in range(50):
+        evidence = careful.track().estimate.evidence
+        assert evidence is not None
+        verdicts.append(evidence.verdict)
+    n_weak = verdicts.index(Verdict.STRONG)
+    assert verdicts == [Verdict.WEAK] * n_weak + [Verdict.STRONG] * (50 - n_weak)
     assert n_weak > 5
 
 
