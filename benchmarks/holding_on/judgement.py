@@ -35,6 +35,9 @@ class Figures:
     """Of these off by more than 5 deviations, and by more than 0.2 m or 1 degree."""
     wrong_keyframes: int
     """Of these keyframes."""
+    wrong_before: int
+    """Of these right by where the frame before lies when this one is told: it was adjustment that
+    moved the map between them."""
     losses: int
     """Losses after which a mapped place came into view ..."""
     found: int
@@ -61,9 +64,14 @@ def judge(played: Played) -> Figures:
     start = judge_start(played) if monocular else StartFigures.of_depth(played)
     compared = consecutive(played)
     scale = local_scale(played, compared) if monocular else np.ones(len(played.posed))
-    error, deviation = errors_between_frames(played, compared, scale)
+    told = relative(played.T_cw, compared)
+    error, deviation = errors_between_frames(played, compared, told, scale)
+    by_now, _ = errors_between_frames(played, compared, played.motion[compared], scale)
     wrong = np.zeros(len(played.posed), bool)
     wrong[compared] = is_wrong(error, deviation)
+    wrong_before = wrong.copy()
+    known = np.isfinite(played.motion[compared]).all(axis=(1, 2))
+    wrong_before[compared] &= known & ~is_wrong(by_now, deviation)
     losses, found = found_again(played)
     trackable = ~played.covered & started_by_now(played, monocular)
     return Figures(
@@ -73,6 +81,7 @@ def judge(played: Played) -> Figures:
         compared=len(compared),
         wrong=int(wrong.sum()),
         wrong_keyframes=int((wrong & played.keyframe).sum()),
+        wrong_before=int(wrong_before.sum()),
         losses=losses,
         found=found,
         rotation_spread=spread(error[:, :3], deviation[:, :3, :3]),
@@ -128,14 +137,14 @@ def local_scale(played: Played, frames: NDArray[np.int64]) -> Floats:
 
 
 def errors_between_frames(
-    played: Played, frames: NDArray[np.int64], scale: Floats
+    played: Played, frames: NDArray[np.int64], motion: Floats, scale: Floats
 ) -> tuple[Floats, Floats]:
-    """Errors (m, 6) of the motions from the frames before, and their stated covariance (m, 6, 6).
+    """Errors (m, 6) of motions from the frames before, and their stated covariance (m, 6, 6).
 
     Rotation [rad], then translation [m], in the camera's frame. The covariance is that of this
     pose and of the one before, carried over: a frame's own says how well it lies in the map.
     """
-    told, true = relative(played.T_cw, frames), relative(played.truth, frames)
+    told, true = motion.copy(), relative(played.truth, frames)
     told[:, :3, 3] *= scale[frames, None]
     gap = true @ inverse_poses(told)
     error = np.zeros((len(frames), 6))

@@ -35,6 +35,8 @@ class Played:
         Frames with a pose, (n,).
     T_cw
         Poses as they were told at once, (n, 4, 4); NaN without one.
+    motion
+        From the frame before, as that one lies in the map by now, (n, 4, 4); NaN where not known.
     covariance
         (n, 6, 6) rotation, translation; NaN without one.
     keyframe
@@ -55,6 +57,7 @@ class Played:
     truth: Floats
     posed: Flags
     T_cw: Floats
+    motion: Floats
     covariance: Floats
     keyframe: Flags
     map_index: NDArray[np.int64]
@@ -72,22 +75,27 @@ def play(case: Case) -> Played:
     n = len(sequence)
     records: list[TrackingRecord] = []
     changes = np.zeros(n, np.int64)
+    nowhere, unknown = np.full((4, 4), np.nan), np.full((6, 6), np.nan)
+    motion = np.tile(nowhere, (n, 1, 1))
     settings = case.settings(sequence)
     system = orb.System(settings, case.sensor, deterministic=True, seed=case.seed)
     with system as slam:
         for i, timestamp in enumerate(sequence.timestamps):
             records.append(_tracked(slam, sequence.load(i), float(timestamp)))
             changes[i] = slam.pipeline.back_end.map.big_change_index
+            velocity = slam.pipeline.tracking.motion.velocity
+            if velocity is not None:
+                motion[i] = velocity.matrix
     path = np.full((n, 4, 4), np.nan)
     last = system.trajectory()
     path[_indices(sequence, last.timestamps)] = last.T_wc
     path[_indices(sequence, last.timestamps[last.lost])] = np.nan
-    nowhere, unknown = np.full((4, 4), np.nan), np.full((6, 6), np.nan)
     return Played(
         sequence=sequence,
         truth=inverse_poses(sequence.ground_truth().T_wc),
         posed=np.array([r.T_cw is not None for r in records]),
         T_cw=np.stack([nowhere if r.T_cw is None else r.T_cw for r in records]),
+        motion=motion,
         covariance=np.stack([unknown if r.covariance is None else r.covariance for r in records]),
         keyframe=np.array([r.is_keyframe for r in records]),
         map_index=np.array([r.map_index for r in records]),

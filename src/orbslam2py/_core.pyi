@@ -662,6 +662,12 @@ class InlierSpread:
         Of 48 cells of the image that hold an inlier.
         """
     @property
+    def correlation(self) -> float:
+        """
+        Variance of the residuals between the cells by that of all: what a covariance
+        of independent residuals is to be multiplied by.
+        """
+    @property
     def octaves(self) -> int:
         """
         Of depth that hold an inlier.

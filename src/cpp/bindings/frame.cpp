@@ -426,7 +426,11 @@ void bind_frame(py::module_& module) {
       "None where the images are missing or say nothing.");
   py::class_<InlierSpread>(module, "InlierSpread", "Result of spread_of_inliers().")
       .def_readonly("cells", &InlierSpread::cells, "Of 48 cells of the image that hold an inlier.")
-      .def_readonly("octaves", &InlierSpread::octaves, "Of depth that hold an inlier.");
+      .def_readonly("octaves", &InlierSpread::octaves, "Of depth that hold an inlier.")
+      .def_readonly(
+          "correlation", &InlierSpread::correlation,
+          "Variance of the residuals between the cells by that of all: what a covariance\n"
+          "of independent residuals is to be multiplied by.");
   module.def("spread_of_inliers", &spread_of_inliers, py::arg("frame"),
              py::call_guard<py::gil_scoped_release>(),
              "How a frame's inliers are spread over the image and over depth: InlierSpread.\n"

@@ -2,12 +2,49 @@
 #include "frame/inlier_spread.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bitset>
 #include <cmath>
 
 #include "base/errors.hpp"
 
 namespace orbslam {
+namespace {
+
+constexpr int kSpreadCells = kSpreadColumns * kSpreadRows;
+constexpr int kPoseParameters = 6;
+
+/// Whitened residuals of one cell.
+struct CellResiduals {
+  int n = 0;
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  double squares = 0;
+
+  void add(const Eigen::Vector2d& residual) {
+    n += 1;
+    sum += residual;
+    squares += residual.squaredNorm();
+  }
+};
+
+/// Analysis of variance: that between the cells that hold several residuals, by that of all.
+double correlation(const std::array<CellResiduals, kSpreadCells>& cells) {
+  double between = 0, within = 0;
+  int n_between = -kPoseParameters, n_within = 0;
+  for (const CellResiduals& cell : cells) {
+    if (cell.n < 2) continue;
+    const double common = cell.sum.squaredNorm() / cell.n;
+    between += common;
+    within += cell.squares - common;
+    n_between += 2;
+    n_within += 2 * (cell.n - 1);
+  }
+  const double all = between + within;
+  if (n_between <= 0 || !(all > 0) || !std::isfinite(all)) return 1;
+  return (between / n_between) / (all / (n_between + n_within));
+}
+
+}  // namespace
 
 InlierSpread spread_of_inliers(const TrackedFrame& tracked) {
   if (!tracked.T_cw) {
@@ -17,25 +54,31 @@ InlierSpread spread_of_inliers(const TrackedFrame& tracked) {
   const ImageBounds& bounds = frame.camera->bounds();
   const float across = kSpreadColumns / (bounds.max_x - bounds.min_x);
   const float down = kSpreadRows / (bounds.max_y - bounds.min_y);
-  const Eigen::RowVector3d axis = tracked.T_cw->rotation_matrix().row(2);
-  const double z0 = tracked.T_cw->translation().z();
+  const Pinhole& pinhole = frame.camera->pinhole();
+  const Eigen::Matrix3d R = tracked.T_cw->rotation_matrix();
 
   constexpr int kOctaves = 64;
-  std::bitset<kSpreadColumns * kSpreadRows> cells;
+  std::bitset<kSpreadCells> cells;
   std::bitset<kOctaves> octaves;
+  std::array<CellResiduals, kSpreadCells> residuals;
   for (std::size_t i = 0; i < frame.size(); ++i) {
     if (!tracked.map_points[i].valid() || tracked.outlier[i]) continue;
     const Keypoint& keypoint = frame.keypoints[i];
     const int column = static_cast<int>((keypoint.x - bounds.min_x) * across);
     const int row = static_cast<int>((keypoint.y - bounds.min_y) * down);
-    cells.set(static_cast<std::size_t>(std::clamp(row, 0, kSpreadRows - 1) * kSpreadColumns +
-                                       std::clamp(column, 0, kSpreadColumns - 1)));
-    const double depth = axis.dot(tracked.positions[i]) + z0;
-    if (!(depth > 0)) continue;
+    const auto cell =
+        static_cast<std::size_t>(std::clamp(row, 0, kSpreadRows - 1) * kSpreadColumns +
+                                 std::clamp(column, 0, kSpreadColumns - 1));
+    cells.set(cell);
+    const Eigen::Vector3d p = R * tracked.positions[i] + tracked.T_cw->translation();
+    if (!(p.z() > 0)) continue;
     octaves.set(
-        static_cast<std::size_t>(std::clamp(std::ilogb(depth) + kOctaves / 2, 0, kOctaves - 1)));
+        static_cast<std::size_t>(std::clamp(std::ilogb(p.z()) + kOctaves / 2, 0, kOctaves - 1)));
+    const double weight = std::sqrt(frame.scales->inverse_sigma2(keypoint.level));
+    residuals[cell].add(weight * (pinhole.project(p) - Eigen::Vector2d(keypoint.x, keypoint.y)));
   }
-  return {static_cast<int>(cells.count()), static_cast<int>(octaves.count())};
+  return {static_cast<int>(cells.count()), static_cast<int>(octaves.count()),
+          correlation(residuals)};
 }
 
 int count_staying(const TrackedFrame& tracked, const Pose& T_nw) {

@@ -12,10 +12,14 @@ inline constexpr int kSpreadRows = 6;
 struct InlierSpread {
   int cells = 0;    ///< of kSpreadColumns x kSpreadRows that hold one
   int octaves = 0;  ///< of depth that hold one: [1, 2), [2, 4), [4, 8)... of the map's units
+  /// Variance of the residuals between these cells by that of all: 1 where neighbours are
+  /// independent, more where they are wrong together. A covariance that takes them for independent
+  /// is too small by this factor.
+  double correlation = 1;
 };
 
-/// Over the associated keypoints that are no outliers; zero without any. Throws StateError when the
-/// frame has no pose. See docs/method/tracking.md#evidence.
+/// Over the associated keypoints that are no outliers; no cells without any. Throws StateError when
+/// the frame has no pose. See docs/method/tracking.md#evidence.
 InlierSpread spread_of_inliers(const TrackedFrame& frame);
 
 /// How many of these keypoints show points that a camera at `T_nw` would still have in its image:

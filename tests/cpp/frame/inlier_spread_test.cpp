@@ -51,6 +51,45 @@ TEST(InlierSpread, LeavesOutliersOut) {
   EXPECT_EQ(spread_of_inliers(frame).cells, 0);
 }
 
+/// Four keypoints in each of twelve cells, off by so many pixels where a test says so.
+TrackedFrame tracked_frame_off_by(double noise, double left, double right) {
+  std::vector<std::pair<float, float>> pixels;
+  for (int cell = 0; cell < 12; ++cell) {
+    for (int k = 0; k < 4; ++k) {
+      pixels.emplace_back(4.0F + 20.0F * static_cast<float>(cell % 4) + static_cast<float>(k % 2),
+                          4.0F + 20.0F * static_cast<float>(cell / 4) + static_cast<float>(k / 2));
+    }
+  }
+  TrackedFrame frame = tracked_frame_at(pixels);
+  frame.T_cw = Pose();
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    const double off = (pixels[i].first < 40 ? left : right) + (i % 2 == 0 ? noise : -noise);
+    const double u = static_cast<double>(pixels[i].first) + off;
+    const double v = static_cast<double>(pixels[i].second);
+    frame.associate(i, MapPointId(static_cast<std::int64_t>(i)),
+                    {(u - 40) / 50 * 2, (v - 30) / 50 * 2, 2});
+  }
+  return frame;
+}
+
+TEST(InlierSpread, TellsNeighboursThatAreWrongTogether) {
+  // Noise alone: nothing in common within a cell.
+  EXPECT_NEAR(spread_of_inliers(tracked_frame_off_by(0.5, 0, 0)).correlation, 0, 1e-9);
+  // Two halves that slide apart: 48 squares of 1 between 24 - 6, 48 of 0.25 in 72 within.
+  EXPECT_NEAR(spread_of_inliers(tracked_frame_off_by(0.5, -1, 1)).correlation,
+              (48.0 / 18) / (60.0 / 90), 1e-6);
+  // Nothing but that: as many observations as cells, less what the pose takes.
+  EXPECT_NEAR(spread_of_inliers(tracked_frame_off_by(0, -1, 1)).correlation, 90.0 / 18, 1e-6);
+}
+
+TEST(InlierSpread, SaysNothingOfNeighboursWithFewCells) {
+  TrackedFrame frame = tracked_frame_off_by(0.5, -1, 1);
+  for (std::size_t i = 0; i < 48; ++i) frame.outlier[i] = i % 4 == 0 ? 0 : 1;  // one in each cell
+  EXPECT_EQ(spread_of_inliers(frame).correlation, 1);
+  for (std::size_t i = 0; i < 48; ++i) frame.outlier[i] = i < 12 ? 0 : 1;  // three cells
+  EXPECT_EQ(spread_of_inliers(frame).correlation, 1);
+}
+
 TEST(CountStaying, LeavesOutWhatATurnTakesOutOfView) {
   TrackedFrame frame = tracked_frame_at({{10, 30}, {40, 30}, {70, 30}, {40, 50}});
   frame.T_cw = Pose();

@@ -38,11 +38,13 @@ def honest_run(**options) -> Played:
     random = np.random.default_rng(0)
     deviations = np.array([ROTATION] * 3 + [TRANSLATION] * 3)
     noise = random.standard_normal((N, 6)) * deviations
+    T_cw = np.stack([small_pose(e) @ T for e, T in zip(noise, truth, strict=True)])
     return Played(
         sequence=sequence,
         truth=truth,
         posed=np.ones(N, bool),
-        T_cw=np.stack([small_pose(e) @ T for e, T in zip(noise, truth, strict=True)]),
+        T_cw=T_cw,
+        motion=motions(T_cw),
         covariance=np.tile(np.diag(deviations**2), (N, 1, 1)),
         keyframe=np.arange(N) % 10 == 0,
         map_index=np.zeros(N, np.int64),
@@ -54,10 +56,16 @@ def honest_run(**options) -> Played:
     )
 
 
+def motions(T_cw: np.ndarray) -> np.ndarray:
+    """From frame to frame, in a map that stays as it is."""
+    nowhere = np.full((1, 4, 4), np.nan)
+    return np.concatenate([nowhere, T_cw[1:] @ np.linalg.inv(T_cw[:-1])])
+
+
 def moved(played: Played, frames: slice, vector: np.ndarray) -> Played:
     T_cw = played.T_cw.copy()
     T_cw[frames] = small_pose(vector) @ T_cw[frames]
-    return dataclasses.replace(played, T_cw=T_cw)
+    return dataclasses.replace(played, T_cw=T_cw, motion=motions(T_cw))
 
 
 def without(played: Played, frames: slice) -> Played:
@@ -80,7 +88,16 @@ def test_an_honest_run_has_no_wrong_pose_and_a_spread_of_one():
 )
 def test_a_jump_is_wrong_where_it_begins(vector):
     figures = judge(moved(honest_run(), slice(50, None), vector))
-    assert (figures.wrong, figures.wrong_keyframes) == (1, 1)
+    assert (figures.wrong, figures.wrong_keyframes, figures.wrong_before) == (1, 1, 0)
+
+
+def test_a_jump_of_the_map_is_told_apart_from_a_wrong_pose():
+    still = honest_run()
+    jumping = moved(still, slice(50, None), np.array([0, 0.03, 0, 0, 0, 0.0]))
+    figures = judge(dataclasses.replace(jumping, motion=still.motion))
+    assert (figures.wrong, figures.wrong_before) == (1, 1)
+    unknown = np.full_like(still.motion, np.nan)
+    assert judge(dataclasses.replace(jumping, motion=unknown)).wrong_before == 0
 
 
 def test_a_jump_that_the_covariance_admits_or_that_is_small_is_not_wrong():

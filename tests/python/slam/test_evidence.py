@@ -186,6 +186,21 @@ def test_matches_that_fit_much_worse_than_usual_are_weak_and_told_as_uncertain(
     assert again.estimate.covariance[0, 0] == pytest.approx(usual.covariance[0, 0])
 
 
+@pytest.mark.parametrize(("correlation", "factor"), [(2.5, 2.5), (0.6, 1.0)])
+def test_neighbours_that_are_wrong_together_count_as_fewer(
+    careful: Scene, correlation: float, factor: float
+) -> None:
+    usual = careful.track().estimate
+    careful.core.correlation = correlation
+    estimate = careful.track().estimate
+    assert usual.covariance is not None
+    assert estimate.covariance is not None
+    assert usual.evidence is not None
+    assert estimate.evidence is not None
+    assert estimate.covariance[0, 0] == pytest.approx(factor * usual.covariance[0, 0])
+    assert estimate.evidence.verdict is usual.evidence.verdict
+
+
 def test_an_error_that_stays_becomes_the_usual_one(careful: Scene) -> None:
     careful.core.match_error = 1.2
     verdicts = []

@@ -156,6 +156,7 @@ class FakeCore:
     #: Rotation of the next small images and their correlation; none: they say nothing.
     aligned: deque[SimpleNamespace] = field(default_factory=deque)
     n_cells: int = 30
+    correlation: float = 1.0
     match_error: float = 0.6
     #: Of what the motion model finds, in localization mode.
     n_map_points: int = 100
@@ -179,7 +180,7 @@ class FakeCore:
         return self.aligned.popleft() if self.aligned else None
 
     def spread_of_inliers(self, frame: FakeFrame) -> SimpleNamespace:
-        return SimpleNamespace(cells=self.n_cells, octaves=4)
+        return SimpleNamespace(cells=self.n_cells, octaves=4, correlation=self.correlation)
 
     def median_match_error(self, frame: FakeFrame) -> float:
         return self.match_error

@@ -158,14 +158,18 @@ class EvidenceJudge:
     def stated_covariance(self, refined: RefinedPose, evidence: Evidence) -> FloatArray | None:
         """The covariance that a pose is told with.
 
-        Errors far beyond the usual ones are not noise of each keypoint: what moves are regions of
-        the image, and the keypoints in one are wrong together. Then each cell with inliers counts
-        as one observation, and errors as large as they are.
+        Keypoints that are near each other are wrong together: by a blur, a map point in the wrong
+        place, a lens that is not as stated. As far as that shows they count as fewer. Errors far
+        beyond the usual ones are those of whole regions that move: then each cell with inliers
+        counts as one observation, and errors as large as they are.
         """
         covariance = refined.estimate.covariance
-        if covariance is None or evidence.error_to_usual <= self.limits.weak_error:
-            return covariance
-        together = max(1.0, refined.estimate.n_inliers / max(1, evidence.n_cells))
+        if covariance is None:
+            return None
+        together = max(1.0, core.spread_of_inliers(refined.frame).correlation)
+        if evidence.error_to_usual <= self.limits.weak_error:
+            return covariance * together
+        together = max(together, refined.estimate.n_inliers / max(1, evidence.n_cells))
         larger = min(evidence.error_to_usual, self.limits.largest_error)
         return covariance * (larger**2 * together)
 
