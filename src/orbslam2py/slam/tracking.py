@@ -145,7 +145,7 @@ class Tracking:
     def _leave_map(self) -> None:
         """Forget the frames before: what follows is in another map."""
         self._search.reset()
-        self._belief.reset()
+        self._belief.go_elsewhere()
         self._in_fixed_map.reset()
         self._confirmation.reset()
         self._waits_for_confirmation = None

@@ -251,3 +251,20 @@ def test_what_is_usual_is_forgotten_with_the_place(careful: Scene) -> None:
     assert outcome.state is TrackingState.OK
     assert outcome.estimate.evidence is not None
     assert outcome.estimate.evidence.inliers_to_usual == 1
+
+
+def test_how_well_matches_fit_is_known_in_another_place_too(careful: Scene) -> None:
+    careful.core.n_reference = 1000
+    usual = careful.track().estimate.evidence
+    careful.core.motion.extend([0] * 4)
+    careful.core.words.extend([0] * 4)
+    assert careful.track().state is TrackingState.LOST
+    careful.core.motion.clear()
+    careful.core.words.clear()
+    careful.core.match_error = 4.2
+    found = careful.track().estimate.evidence
+    assert usual is not None
+    assert found is not None
+    assert usual.match_error == pytest.approx(0.6)
+    assert found.error_to_usual == pytest.approx(7)
+    assert found.verdict is Verdict.WEAK

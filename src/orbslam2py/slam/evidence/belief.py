@@ -38,7 +38,12 @@ class Belief:
 
     def reset(self) -> None:
         """Forget the frames before."""
-        self._judge.forget()
+        self._judge.reset()
+        self._n_weak = 0
+
+    def go_elsewhere(self) -> None:
+        """What follows is in another place, or in another map."""
+        self._judge.go_elsewhere()
         self._n_weak = 0
 
     def refine(self, frame: core.TrackedFrame, first: PoseEstimate, *, lost: bool) -> PoseEstimate:
@@ -54,7 +59,7 @@ class Belief:
             The frame before has no pose.
         """
         if lost or first.relocalized:
-            self.reset()
+            self.go_elsewhere()
         estimate, hypothesis = first, None
         if first.found:
             refined = self._refined(frame, first)

@@ -52,12 +52,19 @@ class EvidenceJudge:
         self.limits = thresholds or EvidenceThresholds()
         self._window = window
         self._focal_length = focal_length
-        self.forget()
+        self.reset()
 
-    def forget(self) -> None:
-        """Nothing is usual: the place is another one."""
+    def reset(self) -> None:
+        """Nothing is usual yet."""
         self._usual: UsualFigures | None = None
         self._usual_error: float | None = None
+
+    def go_elsewhere(self) -> None:
+        """What is seen is not usual any more: the place is another one.
+
+        How well it fits is: that goes by the camera and its images.
+        """
+        self._usual = None
 
     def weigh(self, refined: RefinedPose, motion: MotionModel, method: PoseMethod) -> Evidence:
         """Weigh a refined pose.
