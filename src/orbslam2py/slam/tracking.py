@@ -268,7 +268,7 @@ class Tracking:
         if lost and not estimate.found:
             return estimate
         if lost or estimate.relocalized:
-            self._search.last_relocalization = frame.id
+            self._search.found_again(frame)
             self._since_keyframe.most_inliers = 0
         with timer("local_map"):
             believed = self._belief.refine(frame, estimate, lost=lost)

@@ -92,7 +92,7 @@ class Belief:
             refined = replace(refined, frame=frame)
             if refined.estimate.relocalized:
                 # Found without regard to where the camera was: the way from there is no speed.
-                self._search.last_relocalization = frame.id
+                self._search.found_again(frame)
                 self._search.motion.jump(None)
         self._search.settle(refined)
         estimate = replace(

@@ -62,7 +62,7 @@ class PoseSearch:
         Where the last frame was refined, None before the first.
     last_relocalization : int
         Id of the frame in which the camera was last found again. 0 at the beginning, as if the
-        first frame had been: a young map has to prove itself.
+        first frame had been: a single camera's young map has to prove itself.
     searches_loaded_map : bool
         The camera was not found yet in the map that was loaded.
     initial_pose : Pose or None
@@ -93,6 +93,7 @@ class PoseSearch:
         self.reference_keyframe = -1
         self.local_map: core.LocalMap | None = None
         self.last_relocalization = 0
+        self._was_found_again = False
         self.initial_pose: core.Pose | None = None
         self.searches_loaded_map = False
         self._place_of_loss: PlaceOfLoss | None = None
@@ -137,6 +138,11 @@ class PoseSearch:
         """Bring the last frame and the reference keyframe up to date with the map."""
         self.motion.follow_map(self._map)
         self.reference_keyframe = self._map.living(self.reference_keyframe)
+
+    def found_again(self, frame: core.TrackedFrame) -> None:
+        """The camera was found again in this frame."""
+        self.last_relocalization = frame.id
+        self._was_found_again = True
 
     def just_relocalized(self, frame: core.TrackedFrame) -> bool:
         """Whether the camera was found again in this frame or right before it."""
@@ -316,7 +322,9 @@ class PoseSearch:
             refined.frame.discard_outliers()
 
     def _local_map_inliers(self, frame: core.TrackedFrame) -> int:
-        if frame.id < self.last_relocalization + self._max_keyframe_interval:
+        # A map that begins with depths has its points where they are: nothing has to be proven.
+        in_doubt = self._was_found_again or not self._sensor.has_depth
+        if in_doubt and frame.id < self.last_relocalization + self._max_keyframe_interval:
             return self.limits.local_map_inliers_after_relocalization
         return self.limits.local_map_inliers
 
