@@ -217,7 +217,11 @@ void bind_tracked_frame(py::module_& module) {
       .def_property_readonly(
           "timestamp", [](const TrackedFrame& t) { return t.frame->timestamp; },
           "Seconds, as given by the caller.")
-      .def_readwrite("T_cw", &TrackedFrame::T_cw, "World to camera; None while unknown.")
+      // A copy: what is read stays what it was when the frame follows the map.
+      .def_property(
+          "T_cw", [](const TrackedFrame& t) { return t.T_cw; },
+          [](TrackedFrame& t, const std::optional<Pose>& T_cw) { t.T_cw = T_cw; },
+          "World to camera; None while unknown.")
       .def_property_readonly("reference_keyframe", &TrackedFrame::reference_keyframe,
                              "The keyframe that the pose is relative to; -1: none.")
       .def(
@@ -444,6 +448,10 @@ void bind_frame(py::module_& module) {
   module.def("sharpness", &sharpness, py::arg("frame"), py::call_guard<py::gil_scoped_release>(),
              "Sum of the corners' responses on the two finest levels, grey levels: what blur takes "
              "away first. To be compared with that of other frames of the same camera.");
+  module.def("fine_detail", &fine_detail, py::arg("frame"),
+             py::call_guard<py::gil_scoped_release>(),
+             "Mean response of the corners on the two finest levels by that of the corners from\n"
+             "level 4 on; 0 without any. Contrast and texture move both, blur takes the former.");
   module.def("count_staying", &count_staying, py::arg("frame"), py::arg("T_nw"),
              py::call_guard<py::gil_scoped_release>(),
              "How many inliers of a frame a camera at `T_nw` would still have in its image.");

@@ -10,4 +10,9 @@ namespace orbslam {
 /// of other frames of the same camera only. See docs/method/relocalization.md#blurred-frames.
 double sharpness(const Frame& frame);
 
+/// Mean response of the corners on the two finest levels by that of the corners from level 4 on; 0
+/// if there are none. Contrast and texture move both, blur takes away the former first. See
+/// docs/method/tracking.md#evidence.
+double fine_detail(const Frame& frame);
+
 }  // namespace orbslam

@@ -113,6 +113,9 @@ class Evidence:
     the keypoints' positions."""
     error_to_usual: float
     """That error by the usual one."""
+    smear: float
+    """How far the image is smeared by motion, pixels: estimated from its fine detail by that of
+    the sharpest images before."""
     turn_change: float
     """Degrees by which the camera turned otherwise than from the frame before the last to the
     last; 0 where the motion is not known."""

@@ -128,6 +128,10 @@ class EvidenceThresholds:
     """So many times at most the stated standard deviation grows for it."""
     slow_gain: float = 0.02
     """Weight of a frame with such an error in what error is usual: darkness may stay."""
+    smear: float = 3.2
+    """Pixels that an image is smeared with 0.7 of the fine detail of the sharpest ones ..."""
+    fading: float = 0.995
+    """... whose detail counts so many times with every further frame."""
     refused_share: float = 0.3
     """A pose with less than this share of the usual inliers ..."""
     refused_inliers: int = 100

@@ -24,15 +24,17 @@ cv::Mat texture() {
   return image;
 }
 
-double sharpness_of(const cv::Mat& image) {
+std::shared_ptr<const Frame> frame_of(const cv::Mat& image) {
   CameraOptions options;
   options.pinhole = {300, 300, 160, 120};
   options.image_size = {320, 240};
   OrbExtractor extractor{OrbOptions{}};
   const FrameContext context{std::make_shared<Camera>(options),
                              std::make_shared<ScalePyramid>(extractor.scales())};
-  return sharpness(*build_monocular_frame(context, 0, 0, extractor.extract(image).features));
+  return build_monocular_frame(context, 0, 0, extractor.extract(image).features);
 }
+
+double sharpness_of(const cv::Mat& image) { return sharpness(*frame_of(image)); }
 
 TEST(Sharpness, FallsWithEveryBlur) {
   const cv::Mat image = texture();
@@ -49,6 +51,26 @@ TEST(Sharpness, FallsWithEveryBlur) {
 
 TEST(Sharpness, WithoutCornersItIsZero) {
   EXPECT_EQ(sharpness_of(cv::Mat(240, 320, CV_8UC1, cv::Scalar(90))), 0);
+}
+
+TEST(FineDetail, FallsWithEveryBlurAndNotWithContrast) {
+  const cv::Mat image = texture();
+  const double sharp = fine_detail(*frame_of(image));
+  cv::Mat darker;
+  image.convertTo(darker, CV_8UC1, 0.6, 20);
+  EXPECT_NEAR(fine_detail(*frame_of(darker)), sharp, 0.1 * sharp);
+  double last = sharp;
+  for (const int length : {5, 11, 21}) {
+    cv::Mat blurred;
+    cv::blur(image, blurred, {length, 1});
+    const double next = fine_detail(*frame_of(blurred));
+    EXPECT_LT(next, 0.9 * last) << length;
+    last = next;
+  }
+}
+
+TEST(FineDetail, WithoutCornersItIsZero) {
+  EXPECT_EQ(fine_detail(*frame_of(cv::Mat(240, 320, CV_8UC1, cv::Scalar(90)))), 0);
 }
 
 }  // namespace

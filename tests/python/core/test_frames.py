@@ -191,6 +191,9 @@ def test_tracked_frame() -> None:
     assert tracked.reference_keyframe == -1
     tracked.T_cw = core.Pose()
     np.testing.assert_array_equal(tracked.T_cw.matrix, np.eye(4))
+    read = tracked.T_cw
+    tracked.T_cw = core.Pose([0, 0, 0, 1], [1, 2, 3])
+    np.testing.assert_array_equal(read.matrix, np.eye(4), "what was read stays")
     tracked.T_cw = None
     assert tracked.T_cw is None
     world = core.Map()

@@ -10,7 +10,7 @@ import pytest
 from orbslam2py import Sensor, System
 from orbslam2py._worker import Worker
 from orbslam2py.slam import keyframe_decision, tracking
-from orbslam2py.slam.evidence import harder_search, judgement
+from orbslam2py.slam.evidence import harder_search, judgement, smear
 from orbslam2py.slam.pose_search import first_estimate, motion_model, search
 from orbslam2py.slam.relocalization import blur
 from support.interleaving import LIMIT, Stage
@@ -51,7 +51,7 @@ def core(monkeypatch: pytest.MonkeyPatch) -> FakeCore:
     core = FakeCore()
     for module in (
         *(tracking, first_estimate, motion_model, search, keyframe_decision),
-        *(harder_search, judgement, blur),
+        *(harder_search, judgement, smear, blur),
     ):
         monkeypatch.setattr(module, "core", core)
     return core

@@ -201,6 +201,62 @@ def test_neighbours_that_are_wrong_together_count_as_fewer(
     assert estimate.evidence.verdict is usual.evidence.verdict
 
 
+def test_keypoints_on_a_smear_are_wrong_together(careful: Scene) -> None:
+    usual = careful.track().estimate
+    careful.core.fine_detail_of_images = 0.7
+    blurred = careful.track().estimate
+    careful.core.fine_detail_of_images = 1.4
+    sharp = careful.track().estimate
+    assert usual.covariance is not None
+    assert blurred.covariance is not None
+    assert sharp.covariance is not None
+    assert usual.evidence is not None
+    assert blurred.evidence is not None
+    limits = EvidenceThresholds()
+    assert blurred.evidence.smear == pytest.approx(limits.smear * (2**2 - 1))
+    assert usual.evidence.smear == 0
+    # 100 inliers in 30 cells, each with a variance of 2.
+    variance = blurred.evidence.smear**2 / 12 / 2
+    larger = blurred.covariance[0, 0] / usual.covariance[0, 0]
+    assert larger == pytest.approx(1 + 100 / 30 * variance)
+    assert blurred.evidence.verdict is Verdict.STRONG
+    assert sharp.covariance[0, 0] == pytest.approx(usual.covariance[0, 0])
+
+
+def test_a_lasting_lack_of_detail_is_the_scene(careful: Scene) -> None:
+    careful.core.fine_detail_of_images = 1.2
+    lengths = []
+    for _ in range(80):
+        evidence = careful.track().estimate.evidence
+        assert evidence is not None
+        lengths.append(evidence.smear)
+    assert lengths[0] > 0
+    assert lengths == sorted(lengths, reverse=True)
+    assert lengths[-1] == 0
+
+
+def test_a_map_that_moved_was_off_by_as_much(careful: Scene) -> None:
+    usual = careful.track().estimate.covariance
+    careful.map.keyframe_x += 0.5
+    moved = careful.track().estimate.covariance
+    later = careful.track().estimate.covariance
+    assert usual is not None
+    assert moved is not None
+    assert later is not None
+    np.testing.assert_allclose(np.diag(moved - usual), [0, 0, 0, 0.25, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(later, usual)
+
+
+def test_a_loop_that_moved_the_map_says_nothing_of_now(careful: Scene) -> None:
+    usual = careful.track().estimate.covariance
+    careful.map.keyframe_x += 0.5
+    careful.map.big_change_index += 1
+    moved = careful.track().estimate.covariance
+    assert usual is not None
+    assert moved is not None
+    np.testing.assert_allclose(moved, usual)
+
+
 def test_an_error_that_stays_becomes_the_usual_one(careful: Scene) -> None:
     careful.core.match_error = 1.2
     verdicts = []

@@ -38,7 +38,11 @@ class FakeFrame:
         self.id = frame_id
         self.timestamp = frame_id / 30
         self.features = SimpleNamespace(
-            size=1000, depth=np.ones(1000, np.float32), described=False, frame_id=frame_id
+            size=1000,
+            depth=np.ones(1000, np.float32),
+            sigma2=np.full(100, 2.0, np.float32),
+            described=False,
+            frame_id=frame_id,
         )
         self.T_cw: _core.Pose | None = None
         self.reference_keyframe = -1
@@ -158,6 +162,7 @@ class FakeCore:
     n_cells: int = 30
     correlation: float = 1.0
     match_error: float = 0.6
+    fine_detail_of_images: float = 1.4
     #: Of what the motion model finds, in localization mode.
     n_map_points: int = 100
     #: Of the inliers, after three more frames of the present speed; how far that was.
@@ -184,6 +189,9 @@ class FakeCore:
 
     def median_match_error(self, frame: FakeFrame) -> float:
         return self.match_error
+
+    def fine_detail(self, features: object) -> float:
+        return self.fine_detail_of_images
 
     def count_staying(self, frame: FakeFrame, T_nw: _core.Pose) -> int:
         assert frame.T_cw is not None

@@ -99,11 +99,11 @@ class Belief:
             refined.estimate,
             evidence=evidence,
             method=hypothesis.method,
-            covariance=self._judge.stated_covariance(refined, evidence),
+            covariance=self._judge.stated_covariance(refined, evidence, self._search.motion),
         )
         if evidence.verdict is Verdict.REFUSED:
             return estimate.failed(Reason.WEAK_EVIDENCE)
-        self._judge.get_used_to_error(evidence)
+        self._judge.get_used_to_image(refined, evidence)
         if evidence.verdict is Verdict.STRONG or self._may_count(evidence):
             self._judge.get_used_to(refined)
         return estimate

@@ -9,8 +9,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
+from orbslam2py.slam.evidence.smear import Smear
 from orbslam2py.slam.pose_search import MotionModel, RefinedPose
 from orbslam2py.slam.records import Evidence, PoseMethod, Verdict
 from orbslam2py.slam.thresholds import EvidenceThresholds
@@ -58,6 +61,7 @@ class EvidenceJudge:
         """Nothing is usual yet."""
         self._usual: UsualFigures | None = None
         self._usual_error: float | None = None
+        self._smear = Smear(self.limits)
 
     def go_elsewhere(self) -> None:
         """What is seen is not usual any more: the place is another one.
@@ -114,6 +118,7 @@ class EvidenceJudge:
             deviation_to_usual=deviation_to_usual,
             match_error=match_error,
             error_to_usual=error_to_usual,
+            smear=self._smear.length(frame.features),
             turn_change=turn,
             move_change=move,
         )
@@ -152,8 +157,9 @@ class EvidenceJudge:
         usual = self._usual
         self._usual = figures if usual is None else usual.moved_to(figures, self.limits.gain)
 
-    def get_used_to_error(self, evidence: Evidence) -> None:
-        """Let a frame that is believed, strong or weak, move what error is usual."""
+    def get_used_to_image(self, refined: RefinedPose, evidence: Evidence) -> None:
+        """Let a frame that is believed, strong or weak, move what error and detail are usual."""
+        self._smear.see(refined.frame.features)
         error = evidence.match_error
         if not math.isfinite(error):
             return
@@ -162,23 +168,32 @@ class EvidenceJudge:
         usual = error if self._usual_error is None else self._usual_error
         self._usual_error = usual + gain * (error - usual)
 
-    def stated_covariance(self, refined: RefinedPose, evidence: Evidence) -> FloatArray | None:
+    def stated_covariance(
+        self, refined: RefinedPose, evidence: Evidence, motion: MotionModel
+    ) -> FloatArray | None:
         """The covariance that a pose is told with.
 
-        Keypoints that are near each other are wrong together: by a blur, a map point in the wrong
-        place, a lens that is not as stated. As far as that shows they count as fewer. Errors far
-        beyond the usual ones are those of whole regions that move: then each cell with inliers
-        counts as one observation, and errors as large as they are.
+        Keypoints that are near each other are wrong together: by a map point in the wrong place, a
+        lens that is not as stated, and on the way that a blurred image is smeared. As far as that
+        shows they count as fewer. Errors far beyond the usual ones are those of whole regions that
+        move: then each cell with inliers counts as one observation, and errors as large as they
+        are. And where the map moved since the frame before, it was off by as much.
         """
         covariance = refined.estimate.covariance
         if covariance is None:
             return None
-        together = max(1.0, core.spread_of_inliers(refined.frame).correlation)
-        if evidence.error_to_usual <= self.limits.weak_error:
-            return covariance * together
-        together = max(together, refined.estimate.n_inliers / max(1, evidence.n_cells))
-        larger = min(evidence.error_to_usual, self.limits.largest_error)
-        return covariance * (larger**2 * together)
+        per_cell = refined.estimate.n_inliers / max(1, evidence.n_cells)
+        together = max(
+            1.0,
+            core.spread_of_inliers(refined.frame).correlation,
+            1.0 + per_cell * _variance_of_smear(refined.frame, evidence.smear),
+        )
+        if evidence.error_to_usual > self.limits.weak_error:
+            larger = min(evidence.error_to_usual, self.limits.largest_error)
+            together = larger**2 * max(together, per_cell)
+        covariance = covariance * together
+        move = motion.move_of_map(refined.frame)
+        return covariance if move is None else covariance + np.outer(move, move)
 
     def _windows(self, degrees: float) -> float:
         """How far a turn moves the image, in search windows of the motion model."""
@@ -202,6 +217,16 @@ def _position_deviation(refined: RefinedPose) -> float:
         return 0.0
     # Three numbers: NumPy's functions take longer than what they do here, and in each frame.
     return math.sqrt(max(0.0, float(covariance[3, 3] + covariance[4, 4] + covariance[5, 5])))
+
+
+def _variance_of_smear(frame: core.TrackedFrame, length: float) -> float:
+    """Variance of places anywhere on a smear, by that of a frame's inliers as they are taken."""
+    if length <= 0:
+        return 0.0
+    inliers = (frame.map_points >= 0) & (frame.outlier == 0)
+    if not inliers.any():
+        return 0.0
+    return length**2 / 12 / float(frame.features.sigma2[inliers].mean())
 
 
 def _ratio(value: float, usual: float) -> float:

@@ -28,6 +28,7 @@ class MotionModel:
         self.last_points = core.PointBatch()
         self._last: core.TrackedFrame | None = None
         self._last_tracked = False
+        self._moved: core.Pose | None = None
 
     @property
     def has_last(self) -> bool:
@@ -42,12 +43,31 @@ class MotionModel:
 
     def follow_map(self, slam_map: core.Map) -> None:
         """Bring the last frame up to date with the map, which mapping and loop closing move."""
-        self.last_points, stretched = core.follow_map(slam_map, self.last)
+        last = self.last
+        before, big_change = last.T_cw, last.big_change
+        self.last_points, stretched = core.follow_map(slam_map, last)
+        if last.big_change != big_change:
+            # By a loop: that is told otherwise, and takes out an error of long before.
+            self._moved = None
+        elif before is not None and last.T_cw is not None:
+            moved = last.T_cw @ before.inverse()
+            self._moved = moved if self._moved is None else moved @ self._moved
         if self.velocity is not None and stretched != 1.0:
             # A single camera's loop took out a drift of scale, in which the speed was measured.
             self.velocity = core.Pose(
                 self.velocity.quaternion_xyzw, stretched * self.velocity.translation
             )
+
+    def move_of_map(self, frame: core.TrackedFrame) -> FloatArray | None:
+        """How far adjustment moved the map under the last frame, (6,) rotation [rad] and way.
+
+        In the camera's axes of `frame`, since the last one was tracked; None where it did not.
+        """
+        if self._moved is None or frame.T_cw is None or self.last.T_cw is None:
+            return None
+        T_cl = frame.T_cw @ self.last.T_cw.inverse()
+        move: FloatArray = (T_cl @ self._moved @ T_cl.inverse()).log()
+        return move
 
     def predict(self, frame: core.TrackedFrame) -> None:
         """Give a frame the pose that the speed leads to, or the last frame's without a speed."""
@@ -90,6 +110,7 @@ class MotionModel:
         """Make a tracked frame the last one."""
         self._last = frame
         self._last_tracked = True
+        self._moved = None
 
     def update_velocity(self, frame: core.TrackedFrame) -> None:
         """Measure the motion from the last frame to this one, if they follow each other."""

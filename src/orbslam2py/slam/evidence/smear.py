@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How far images are smeared by motion; ``docs/method/tracking.md#evidence``."""
+
+from __future__ import annotations
+
+from orbslam2py import _core as core
+from orbslam2py.slam.thresholds import EvidenceThresholds
+
+
+class Smear:
+    """Measures motion blur by the fine detail that the camera's sharpest images had.
+
+    Parameters
+    ----------
+    thresholds : EvidenceThresholds
+        Limits.
+    """
+
+    def __init__(self, thresholds: EvidenceThresholds) -> None:
+        self._limits = thresholds
+        self._finest = 0.0
+
+    def length(self, frame: core.Frame) -> float:
+        """How far the image of a frame is smeared [px]; 0 while no image is known.
+
+        Parameters
+        ----------
+        frame : orbslam2py._core.Frame
+            With its keypoints.
+        """
+        detail = core.fine_detail(frame)
+        if detail <= 0 or self._finest <= detail:
+            return 0.0
+        return self._limits.smear * ((self._finest / detail) ** 2 - 1)
+
+    def see(self, frame: core.Frame) -> None:
+        """Let the next frame be one of those that others are compared with."""
+        self._finest = max(core.fine_detail(frame), self._limits.fading * self._finest)
