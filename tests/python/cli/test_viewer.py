@@ -118,7 +118,9 @@ def ended(process: subprocess.Popen[str]) -> tuple[int, str]:
 
 
 def test_a_recorded_run_is_held_stepped_and_stopped_in_the_page(tmp_path: Path) -> None:
-    arguments = ("demo", "--sensor", "rgbd", "--viewer", "--viewer-port", "0")
+    """Far more images than it takes to press the buttons, on any computer."""
+    images = ("--frames", "5000")
+    arguments = ("demo", "--sensor", "rgbd", *images, "--viewer", "--viewer-port", "0")
     process, address = started(arguments, tmp_path)
     with Browser() as browser:
         page = open_viewer(browser, address)
