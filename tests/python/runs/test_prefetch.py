@@ -79,7 +79,7 @@ def test_an_item_that_never_comes_holds_nobody_up(caplog: pytest.LogCaptureFixtu
     threading.Timer(0.1, stop.set).start()
     begin = time.perf_counter()
     assert list(items) == []
-    assert time.perf_counter() - begin < 2
+    assert time.perf_counter() - begin < 10  # the item takes 15
     assert "an image is still being read" in caplog.text
     release.set()
 
