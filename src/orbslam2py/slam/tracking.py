@@ -355,7 +355,11 @@ class Tracking:
         frame.clear_associations()
         frame.T_cw = None
         # A map that was loaded, or used for localization, is the user's, however small.
-        given_up = self._is_small and self._map.active_map not in self._kept_maps
+        small = self._is_small and self._map.active_map not in self._kept_maps
+        # Others are given up for one that begins. Under a hand none does, and the camera may be
+        # found behind it; a blurred frame was not even searched.
+        another = self._initializer.shows_enough(frame) and estimate.reason is not Reason.BLURRED
+        given_up = small and another
         return TrackingOutcome(self.state, estimate, reset_needed=given_up)
 
     def _stay(self, frame: core.TrackedFrame) -> None:

@@ -119,7 +119,8 @@ def test_a_map_that_comes_to_nothing_throws_no_frames_away() -> None:
     sequence = SyntheticSequence(
         SyntheticOptions(world="corridor", sensor="mono", size=(320, 240), noise=1, frames=60)
     )
-    elsewhere = np.full((240, 320), 128, np.uint8)
+    options = dataclasses.replace(sequence.options, world="table-top")
+    elsewhere = SyntheticSequence(options).load(0).image
     records = []
     with System(sequence.settings, "mono", deterministic=True) as system:
         i = 0

@@ -6,8 +6,10 @@ from __future__ import annotations
 import pytest
 
 from orbslam2py import Reason, TrackingState
+from orbslam2py.slam.tracking import TrackingOutcome
 from support.tracking_scene import (
     MAX_FRAMES,
+    FakeFrame,
     Scene,
     lose,
 )
@@ -37,6 +39,39 @@ def test_a_small_map_is_given_up(scene: Scene, n_keyframes: int, reset: bool) ->
     scene.run(3)
     scene.map.n_keyframes = n_keyframes
     assert lose(scene).reset_needed == reset
+
+
+def test_a_small_map_is_kept_in_the_dark_and_given_up_in_the_light(scene: Scene) -> None:
+    scene.run(3)
+    scene.map.n_keyframes = 3
+
+    def look(n_keypoints: int) -> TrackingOutcome:
+        scene.core.motion.extend([0, 0])
+        scene.core.words.append(0)
+        features = FakeFrame(len(scene.frames)).features
+        features.size = n_keypoints
+        return scene.track(features=features)
+
+    for _ in range(4):
+        outcome = look(n_keypoints=20)
+        assert outcome.state is TrackingState.LOST
+        assert not outcome.reset_needed, "no map begins in the dark"
+    assert look(n_keypoints=1000).reset_needed
+
+
+def test_a_small_map_that_shows_again_after_the_dark_goes_on(scene: Scene) -> None:
+    scene.run(3)
+    scene.map.n_keyframes = 3
+    scene.core.motion.extend([0, 0])
+    scene.core.words.append(0)
+    features = FakeFrame(3).features
+    features.size = 20
+    assert not scene.track(features=features).reset_needed
+    scene.core.motion.clear()
+    scene.core.words.clear()
+    outcome = scene.track()
+    assert outcome.state is TrackingState.OK
+    assert not outcome.reset_needed
 
 
 def test_a_small_map_that_was_used_for_localization_is_kept(scene: Scene) -> None:

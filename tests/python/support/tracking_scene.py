@@ -308,6 +308,9 @@ class FakeInitializer:
     def reset(self) -> None:
         self.refusals = 0
 
+    def shows_enough(self, frame: FakeFrame) -> bool:
+        return bool(frame.features.size > 100)
+
     def lines(self) -> None:
         """None: one frame is enough."""
 

@@ -86,9 +86,13 @@ class DepthInitializer:
         """None: one frame is enough."""
         return None
 
+    def shows_enough(self, frame: core.TrackedFrame) -> bool:
+        """Whether a frame has the keypoints that a map needs to begin."""
+        return frame.features.size > self._least
+
     def try_initialize(self, frame: core.TrackedFrame) -> Reason:
         """Make the frame the first keyframe, with a point for every depth; or say why not."""
-        if frame.features.size <= self._least:
+        if not self.shows_enough(frame):
             return Reason.TOO_FEW_KEYPOINTS
         if int(np.count_nonzero(frame.features.depth > 0)) < self._limits.depths:
             return Reason.TOO_FEW_DEPTHS

@@ -133,10 +133,14 @@ class MonocularInitializer:
         """Versions of the frames of the start, with their poses in the map as it is now."""
         return self._earlier.look_again(frames, self._map)
 
+    def shows_enough(self, frame: core.TrackedFrame) -> bool:
+        """Whether a frame has the keypoints that a map needs to begin."""
+        return frame.features.size > self._limits.keypoints
+
     def try_initialize(self, frame: core.TrackedFrame) -> Reason:
         """Begin the map with this frame as second view; or say why not."""
         self._n_waiting += 1
-        if frame.features.size <= self._limits.keypoints:
+        if not self.shows_enough(frame):
             self._kept.clear()
             self._last = self._shown = None
             return Reason.TOO_FEW_KEYPOINTS

@@ -38,6 +38,10 @@ class Initializer(Protocol):
         """
         ...
 
+    def shows_enough(self, frame: core.TrackedFrame) -> bool:
+        """Whether a frame has the keypoints that a map needs to begin."""
+        ...
+
     def try_initialize(self, frame: core.TrackedFrame) -> Reason:
         """Begin the map with this frame; or say why not (`Reason.NONE`: it has begun)."""
         ...
