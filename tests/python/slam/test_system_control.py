@@ -10,7 +10,7 @@ import pytest
 
 from orbslam2py import Reason, Sensor, StateError, TrackingState, WorkerError, _core
 from support.scripts import run_to_the_end
-from support.small_sequences import ate, black, new_system, play, sequence, track
+from support.small_sequences import ate, black, elsewhere, new_system, play, sequence, track
 from support.watchdog import worker_threads
 
 pytestmark = pytest.mark.watchdog(30)
@@ -170,7 +170,7 @@ def test_reset_while_lost(sensor: Sensor) -> None:
 def test_a_young_map_is_given_up_when_lost(sensor: Sensor) -> None:
     with new_system(sensor, deterministic=True) as system:
         play(system, 5)
-        assert track(system, 5, shown=black(sensor)).state is TrackingState.LOST
+        assert track(system, 5, shown=elsewhere(sensor)).state is TrackingState.LOST
         record = track(system, 6, shown=black(sensor))
         assert record.state is TrackingState.NOT_INITIALIZED
         assert record.reason is Reason.TOO_FEW_KEYPOINTS
@@ -178,6 +178,17 @@ def test_a_young_map_is_given_up_when_lost(sensor: Sensor) -> None:
         assert track(system, 7).state is TrackingState.OK
         assert system.n_resets == 1
         assert [len(t) for t in system.trajectories()] == [5, 1]
+
+
+def test_a_young_map_outlives_the_dark(sensor: Sensor) -> None:
+    with new_system(sensor, deterministic=True) as system:
+        play(system, 5)
+        for i in (5, 6):
+            assert track(system, i, shown=black(sensor)).state is TrackingState.LOST
+        record = track(system, 7)
+        assert (record.state, record.map_index) == (TrackingState.OK, 0)
+        assert system.n_resets == 0
+        assert [len(t) for t in system.trajectories()] == [8]
 
 
 # ---- a worker that fails -------------------------------------------------------------------------

@@ -64,6 +64,13 @@ def black(sensor: Sensor) -> Images:
     return blackened(images(sensor, 0))
 
 
+@lru_cache
+def elsewhere(sensor: Sensor) -> Images:
+    """Images of another place, with as much to be seen."""
+    options = SyntheticOptions(world="table-top", sensor=sensor, frames=10, size=SIZE)
+    return SyntheticSequence(options).load(0)
+
+
 def ate(system: System) -> float:
     truth = sequence(system.sensor).ground_truth()
     return float(evaluate_trajectory(system.trajectory(), truth).as_dict()["ate_rmse_m"])
