@@ -18,7 +18,7 @@ import typer.core
 import typer.main
 from rich.console import Console
 
-from orbslam2py._version import __version__
+import orbslam2py
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.messages import print_error, tell_repeated
 from orbslam2py.errors import OrbSlamError
@@ -175,7 +175,7 @@ app = typer.Typer(
 
 def _show_version(value: bool) -> None:
     if value:
-        typer.echo(f"orbslam2py {__version__}")
+        typer.echo(f"orbslam2py {orbslam2py.__version__}")
         raise typer.Exit
 
 
