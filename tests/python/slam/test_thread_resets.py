@@ -7,7 +7,7 @@ import pytest
 
 from orbslam2py import Sensor, System, TrackingState, _core
 from support.interleaving import LIMIT, Call, Stage, last_keyframe, refine, settle
-from support.small_sequences import black, new_system, play, track
+from support.small_sequences import elsewhere, new_system, play, track
 
 pytestmark = pytest.mark.watchdog(60)
 
@@ -82,7 +82,7 @@ def test_a_reset_of_a_spoilt_beginning_while_an_adjustment_is_written(stage: Sta
         )
         refine(system)
         commit.wait_entered()
-        lost = Call(track, system, 5, shown=black(Sensor.RGBD)).result()
+        lost = Call(track, system, 5, shown=elsewhere(Sensor.RGBD)).result()
         assert lost.state is TrackingState.LOST, "the frame waits for nobody"
         waiting = stage.entering(system.pipeline.back_end.adjustment.worker, "wait_until")
         call = Call(track, system, 6)
