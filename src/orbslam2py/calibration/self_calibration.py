@@ -140,11 +140,13 @@ def _with_depth(pair: PointPair) -> PointPair:
 # ---- the solver --------------------------------------------------------------------------------
 def _slopes(problem: Problem, state: State, free: tuple[int, ...]) -> FloatArray:
     """Derivatives of the residuals (p, n, m, pose and free changes), by differences."""
-    columns = []
-    for k in range(problem.n_pose):
-        step = np.zeros((len(state.R), problem.n_pose))
-        step[:, k] = _STEP
-        columns.append(residuals_of(problem, *move(state.R, state.t, step), state.changes))
+    k_pose, n_pairs = problem.n_pose, len(state.R)
+    steps = np.repeat(_STEP * np.eye(k_pose), n_pairs, axis=0)
+    R, t = move(np.tile(state.R, (k_pose, 1, 1)), np.tile(state.t, (k_pose, 1)), steps)
+    shape = k_pose, n_pairs
+    columns = list(
+        residuals_of(problem, R.reshape(*shape, 3, 3), t.reshape(*shape, 3), state.changes)
+    )
     for k in free:
         changes = state.changes.copy()
         changes[k] += _STEP

@@ -165,12 +165,15 @@ def _changed(rays: FloatArray, changes: FloatArray) -> _Rays:
 
 
 def residuals_of(problem: Problem, R: FloatArray, t: FloatArray, changes: FloatArray) -> FloatArray:
-    """Residuals (p, n, 1 or 2) in pixels of the images as they are, whatever the changes."""
+    """Residuals (..., p, n, 1 or 2) in pixels of the images as they are, whatever the changes.
+
+    Poses (..., p, 3, 3) and (..., p, 3): many at a time take hardly longer than one.
+    """
     first, second = _changed(problem.first, changes), _changed(problem.second, changes)
     if problem.depths is None:
         return np.asarray(_sampson(first, second, R, t) * problem.focal)
     rays = np.concatenate([first.points, np.ones_like(first.along)], axis=-1)
-    seen = (rays * problem.depths[..., None]) @ R.transpose(0, 2, 1) + t[:, None]
+    seen = (rays * problem.depths[..., None]) @ R.swapaxes(-1, -2) + t[..., None, :]
     z = np.where(np.abs(seen[..., 2:]) < 1e-6, 1e-6, seen[..., 2:])
     errors = second.back(seen[..., :2] / z - second.points) * problem.focal
     return np.asarray(np.clip(errors, -1e4, 1e4))
@@ -178,8 +181,8 @@ def residuals_of(problem: Problem, R: FloatArray, t: FloatArray, changes: FloatA
 
 def _sampson(first: _Rays, second: _Rays, R: FloatArray, t: FloatArray) -> FloatArray:
     E = _cross(t) @ R
-    a = first.points @ E[:, :, :2].transpose(0, 2, 1) + E[:, None, :, 2]
-    b = second.points @ E[:, :2, :] + E[:, None, 2, :]
+    a = first.points @ E[..., :, :2].swapaxes(-1, -2) + E[..., None, :, 2]
+    b = second.points @ E[..., :2, :] + E[..., None, 2, :]
     error = (second.points * a[..., :2]).sum(axis=-1) + a[..., 2]
     by_second, by_first = second.slopes(a[..., :2]), first.slopes(b[..., :2])
     slope = (by_second**2).sum(axis=-1) + (by_first**2).sum(axis=-1)
@@ -194,9 +197,11 @@ def evaluate(problem: Problem, R: FloatArray, t: FloatArray, changes: FloatArray
 
 
 def _cross(v: FloatArray) -> FloatArray:
-    zero = np.zeros(len(v))
-    rows = [[zero, -v[:, 2], v[:, 1]], [v[:, 2], zero, -v[:, 0]], [-v[:, 1], v[:, 0], zero]]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    matrices = np.zeros((*v.shape, 3))
+    x, y, z = v[..., 0], v[..., 1], v[..., 2]
+    matrices[..., 0, 1], matrices[..., 0, 2], matrices[..., 1, 2] = -z, y, -x
+    matrices[..., 1, 0], matrices[..., 2, 0], matrices[..., 2, 1] = z, -y, x
+    return matrices
 
 
 def _rotations(w: FloatArray) -> FloatArray:

@@ -34,6 +34,17 @@ def test_pairs_come_at_even_distances_and_are_exact() -> None:
     assert frames == [(0, 3), (0, 6), (3, 6)]
 
 
+def test_points_are_followed_wherever_they_go() -> None:
+    """Also where one turns back, and was expected elsewhere."""
+    tracker = PointTracker(every=4)
+    places = [0.0, 6.0, 12.0, 8.0, 4.0, 16.0, 28.0, 16.0, 4.0]
+    found = {}
+    for place in places:
+        for pair in tracker.add(wallpaper(place)):
+            found[pair.frames] = float(np.median(pair.second[:, 0] - pair.first[:, 0]))
+    assert found == pytest.approx({(0, 4): 4, (0, 8): 4, (4, 8): 0}, abs=0.1)
+
+
 def test_nothing_to_follow_gives_no_pairs() -> None:
     tracker = PointTracker(every=1)
     black = np.zeros((240, 320), np.uint8)
