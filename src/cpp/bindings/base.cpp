@@ -97,6 +97,15 @@ Tangent vectors are (6,) float64: rotation (radians) first, then translation; th
                   "ValueError unless it is finite and its last row is 0 0 0 1.")
       .def_static("exp", &Pose::exp, py::arg("xi"), "Exponential map of a tangent vector (6,).")
       .def("log", &Pose::log, "Tangent vector (6,); rotation angle in [0, pi].")
+      .def(
+          "difference",
+          [](const Pose& pose, const Pose& other) {
+            const double turn = (pose * other.inverse()).log().head<3>().norm();
+            return py::make_tuple(turn, (pose.center() - other.center()).norm());
+          },
+          py::arg("other"),
+          "Between two poses of one camera, world to camera: angle [rad] and distance of the "
+          "centres.")
       .def_property_readonly("matrix", &Pose::matrix, "4x4 homogeneous matrix, float64.")
       .def_property_readonly("rotation_matrix", &Pose::rotation_matrix, "3x3 rotation, float64.")
       .def_property_readonly(

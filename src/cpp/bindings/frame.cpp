@@ -87,7 +87,13 @@ int opencv_depth(const py::array& array) {
   return -1;
 }
 
-py::array depth_metres_of(const py::array& raw, double factor) {
+struct DepthView {
+  py::array values;  ///< what the image is a header over
+  cv::Mat image;
+};
+
+/// Of numbers of any kind; those that OpenCV does not know are copied.
+DepthView view_depth(const py::array& raw) {
   py::array values = normal_form(raw);
   int depth = opencv_depth(values);
   if (depth < 0) {
@@ -99,7 +105,13 @@ py::array depth_metres_of(const py::array& raw, double factor) {
     values = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(values);
     depth = CV_64F;
   }
-  const cv::Mat source = view_image(values, depth);
+  cv::Mat image = view_image(values, depth);
+  return {std::move(values), std::move(image)};
+}
+
+py::array depth_metres_of(const py::array& raw, double factor) {
+  const DepthView view = view_depth(raw);
+  const cv::Mat& source = view.image;
   py::array_t<float> result({source.rows, source.cols});
   cv::Mat metres(source.rows, source.cols, CV_32FC1, result.mutable_data());
   {
@@ -292,6 +304,8 @@ void bind_tracked_frame(py::module_& module) {
           "Dissociates the outliers; ids (int64) of their points, ascending.")
       .def("n_associated", &TrackedFrame::n_associated,
            "Number of keypoints with a map point, outliers included.")
+      .def("n_map_inliers", &TrackedFrame::n_map_inliers,
+           "Number of inliers that are points of the map, not temporary ones.")
       .def(
           "n_close_tracked_untracked",
           [](const TrackedFrame& t) {
@@ -327,19 +341,16 @@ void bind_builders(py::module_& module) {
   module.def(
       "build_rgbd_frame",
       [](const FrameContext& context, FrameId id, double timestamp, const Extraction& extraction,
-         const py::array& depth) {
-        if (!holds<float>(depth)) {
-          throw ImageError("depth image must be float32 metres; use to_depth_metres");
-        }
-        const py::array metres = normal_form(depth);
-        const cv::Mat view = view_image(metres, CV_32F);
+         const py::array& depth, double factor) {
+        const DepthView raw = view_depth(depth);
         const py::gil_scoped_release release;
-        return build_rgbd_frame(context, id, timestamp, extraction.features, view);
+        return build_rgbd_frame(context, id, timestamp, extraction.features, raw.image, factor);
       },
       py::arg("context"), py::arg("id"), py::arg("timestamp"), py::arg("extraction"),
-      py::arg("depth"),
-      "Frame of an image with registered depth (h, w) float32 [m]; <= 0, NaN and inf: none. "
-      "Raises ImageError when the depth image has another size or type.");
+      py::arg("depth"), py::arg("factor") = 1.0,
+      "Frame of an image with registered depth (h, w), any kind of number: raw / factor is metres; "
+      "<= 0, NaN and inf: none. Raises ImageError when the depth image has another size or is not "
+      "numeric, SettingsError for a negative factor.");
 }
 
 }  // namespace
@@ -434,7 +445,9 @@ void bind_frame(py::module_& module) {
       .def_readonly(
           "correlation", &InlierSpread::correlation,
           "Variance of the residuals between the cells by that of all: what a covariance\n"
-          "of independent residuals is to be multiplied by.");
+          "of independent residuals is to be multiplied by.")
+      .def_readonly("variance", &InlierSpread::variance,
+                    "Mean of the inliers' own, by their levels [square pixels]; 0 without any.");
   module.def("spread_of_inliers", &spread_of_inliers, py::arg("frame"),
              py::call_guard<py::gil_scoped_release>(),
              "How a frame's inliers are spread over the image and over depth: InlierSpread.\n"

@@ -26,11 +26,12 @@ std::shared_ptr<Frame> build_monocular_frame(const FrameContext& context, FrameI
 std::shared_ptr<Frame> build_stereo_frame(const FrameContext& context, FrameId id, double timestamp,
                                           Extraction left, const Extraction& right);
 
-/// Frame of a colour image with registered depth (CV_32FC1, metres; <= 0, infinite or NaN: no
-/// depth), which is read at the pixel of the distorted keypoint. Throws ImageError when the depth
-/// image has another size or type, StateError for a camera without a (virtual) baseline. See
-/// docs/method/frame.md#rgb-d-depth.
+/// Frame of a colour image with registered depth (one channel; divided by `factor` as in
+/// to_depth_metres() it is metres; <= 0, infinite or NaN: no depth), which is read at the pixel of
+/// the distorted keypoint. Throws ImageError when the depth image has another size or several
+/// channels, SettingsError for a bad factor, StateError for a camera without a (virtual) baseline.
+/// See docs/method/frame.md#rgb-d-depth.
 std::shared_ptr<Frame> build_rgbd_frame(const FrameContext& context, FrameId id, double timestamp,
-                                        Features features, const cv::Mat& depth);
+                                        Features features, const cv::Mat& depth, double factor = 1);
 
 }  // namespace orbslam

@@ -43,6 +43,14 @@ std::size_t TrackedFrame::n_associated() const {
                                                 [](MapPointId point) { return point.valid(); }));
 }
 
+std::size_t TrackedFrame::n_map_inliers() const {
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < map_points.size(); ++i) {
+    n += map_points[i].valid() && !is_temporary(map_points[i]) && outlier[i] == 0 ? 1 : 0;
+  }
+  return n;
+}
+
 CloseCounts TrackedFrame::n_close_tracked_untracked() const {
   CloseCounts counts;
   for (std::size_t i = 0; i < frame->size(); ++i) {

@@ -106,6 +106,8 @@ struct TrackedFrame {
 
   /// Keypoints with a map point, outliers included.
   std::size_t n_associated() const;
+  /// Inliers among them that are points of the map, not temporary ones.
+  std::size_t n_map_inliers() const;
   /// Over the close keypoints; both 0 without depth. Tells whether a keyframe is needed to bring
   /// new close points into the map.
   CloseCounts n_close_tracked_untracked() const;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "frame/image_input.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <string>
@@ -42,6 +43,19 @@ bool is_metres(const cv::Mat& raw, float scale) {
   return raw.depth() == CV_32F && std::abs(scale - 1.0F) <= static_cast<float>(kSmallestFactor);
 }
 
+/// Some rows at a time, few enough that OpenCV does them in this thread: those of its pool wait
+/// busily for more work, which costs the other threads more than they save.
+void convert(const cv::Mat& image, int code, cv::Mat& grey) {
+  constexpr int kPixels = 1 << 15;
+  grey.create(image.size(), CV_8UC1);
+  const int step = std::max(1, kPixels / image.cols);
+  for (int row = 0; row < image.rows; row += step) {
+    const cv::Range rows(row, std::min(row + step, image.rows));
+    cv::Mat part = grey.rowRange(rows);
+    cv::cvtColor(image.rowRange(rows), part, code);
+  }
+}
+
 }  // namespace
 
 cv::Mat to_grey(const cv::Mat& image, bool is_rgb) {
@@ -56,10 +70,10 @@ void to_grey(const cv::Mat& image, bool is_rgb, cv::Mat& grey) {
   check_image(image);
   switch (image.channels()) {
     case 3:
-      cv::cvtColor(image, grey, is_rgb ? cv::COLOR_RGB2GRAY : cv::COLOR_BGR2GRAY);
+      convert(image, is_rgb ? cv::COLOR_RGB2GRAY : cv::COLOR_BGR2GRAY, grey);
       break;
     case 4:
-      cv::cvtColor(image, grey, is_rgb ? cv::COLOR_RGBA2GRAY : cv::COLOR_BGRA2GRAY);
+      convert(image, is_rgb ? cv::COLOR_RGBA2GRAY : cv::COLOR_BGRA2GRAY, grey);
       break;
     default:
       image.copyTo(grey);

@@ -61,9 +61,13 @@ InlierSpread spread_of_inliers(const TrackedFrame& tracked) {
   std::bitset<kSpreadCells> cells;
   std::bitset<kOctaves> octaves;
   std::array<CellResiduals, kSpreadCells> residuals;
+  int n = 0;
+  double variances = 0;
   for (std::size_t i = 0; i < frame.size(); ++i) {
     if (!tracked.map_points[i].valid() || tracked.outlier[i]) continue;
     const Keypoint& keypoint = frame.keypoints[i];
+    n += 1;
+    variances += frame.scales->sigma2(keypoint.level);
     const int column = static_cast<int>((keypoint.x - bounds.min_x) * across);
     const int row = static_cast<int>((keypoint.y - bounds.min_y) * down);
     const auto cell =
@@ -78,7 +82,7 @@ InlierSpread spread_of_inliers(const TrackedFrame& tracked) {
     residuals[cell].add(weight * (pinhole.project(p) - Eigen::Vector2d(keypoint.x, keypoint.y)));
   }
   return {static_cast<int>(cells.count()), static_cast<int>(octaves.count()),
-          correlation(residuals)};
+          correlation(residuals), n > 0 ? variances / n : 0};
 }
 
 int count_staying(const TrackedFrame& tracked, const Pose& T_nw) {

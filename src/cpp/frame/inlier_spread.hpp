@@ -16,6 +16,7 @@ struct InlierSpread {
   /// independent, more where they are wrong together. A covariance that takes them for independent
   /// is too small by this factor.
   double correlation = 1;
+  double variance = 0;  ///< of these keypoints by their levels, mean [square pixels]; 0 without any
 };
 
 /// Over the associated keypoints that are no outliers; no cells without any. Throws StateError when

@@ -19,6 +19,8 @@ _PNG, _PNG_END = b"\x89PNG", b"IEND"
 _JPEG, _JPEG_END = b"\xff\xd8", b"\xff\xd9"
 _SILENT = 0  # OpenCV's LOG_LEVEL_SILENT
 _TAIL = 4096  # where the end mark must be; some cameras append a few bytes after it
+#: Pixels that OpenCV converts without its pool: it cuts images into parts of 65536.
+_PIXELS = 1 << 15
 
 
 @contextlib.contextmanager
@@ -62,9 +64,23 @@ def read_image(path: Path, *, rgb: bool) -> ByteArray:
     if image.ndim == 3 and image.shape[2] == 1:
         image = image[:, :, 0]
     if rgb and image.ndim == 3:
-        code = cv2.COLOR_BGR2RGB if image.shape[2] == 3 else cv2.COLOR_BGRA2RGBA
-        image = np.asarray(cv2.cvtColor(image, code), dtype=np.uint8)
+        return _swap_red_and_blue(image)
     return np.ascontiguousarray(image)
+
+
+def _swap_red_and_blue(image: ByteArray) -> ByteArray:
+    """BGR to RGB, with alpha or without.
+
+    Some rows at a time, few enough that OpenCV does them in this thread: those of its pool wait
+    busily for more work, which costs the threads that track more than it saves here.
+    """
+    code = cv2.COLOR_BGR2RGB if image.shape[2] == 3 else cv2.COLOR_BGRA2RGBA
+    swapped = np.empty_like(image)
+    n_rows = max(1, _PIXELS // image.shape[1])
+    for row in range(0, len(image), n_rows):
+        part = slice(row, row + n_rows)
+        cv2.cvtColor(image[part], code, dst=swapped[part])
+    return swapped
 
 
 def read_depth(path: Path) -> NDArray[np.generic]:

@@ -157,8 +157,9 @@ class FrontEnd:
             grey = core.to_grey(image, self._settings.camera.rgb)
             extraction = self._extractor.extract(grey, mask)
         with timer("stereo"):
-            metres = core.to_depth_metres(depth, self._settings.depth_factor)
-            frame = core.build_rgbd_frame(context, frame_id, timestamp, extraction, metres)
+            frame = core.build_rgbd_frame(
+                context, frame_id, timestamp, extraction, depth, self._settings.depth_factor
+            )
             return self._finished(frame, image, grey)
 
     def _finished(

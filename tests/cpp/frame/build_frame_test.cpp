@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "base/errors.hpp"
+#include "frame/image_input.hpp"
 #include "frame/stereo_matching.hpp"
 #include "frame/stereo_pair.hpp"
 
@@ -187,9 +188,28 @@ TEST(BuildFrame, WrongDepthImagesAreImageErrors) {
   const Features features = features_at({{10, 10}});
   for (const cv::Mat& depth :
        {cv::Mat(480, 320, CV_32FC1, cv::Scalar(1)), cv::Mat(479, 640, CV_32FC1, cv::Scalar(1)),
-        cv::Mat(480, 640, CV_16UC1, cv::Scalar(1)), cv::Mat(480, 640, CV_32FC3), cv::Mat()}) {
+        cv::Mat(480, 640, CV_16UC3), cv::Mat(480, 640, CV_32FC3), cv::Mat()}) {
     EXPECT_THROW(build_rgbd_frame(context, 0, 0, features, depth), ImageError);
   }
+}
+
+// As the whole image converted, to the bit.
+TEST(BuildFrame, RawDepthIsDividedByTheFactor) {
+  cv::Mat raw(480, 640, CV_16UC1);
+  cv::randu(raw, 0, 65536);
+  std::vector<std::pair<float, float>> points;
+  for (int i = 0; i < 47; ++i) {
+    points.emplace_back(13.0F * static_cast<float>(i), 5.0F + 9.0F * static_cast<float>(i));
+  }
+  const FrameContext context = context_of(rectified_options());
+  for (const double factor : {5000.0, 1000.0, 0.3, 0.0}) {
+    const auto frame = build_rgbd_frame(context, 0, 0, features_at(points), raw, factor);
+    const auto same =
+        build_rgbd_frame(context, 0, 0, features_at(points), to_depth_metres(raw, factor));
+    EXPECT_EQ(frame->depth, same->depth) << factor;
+    EXPECT_EQ(frame->right_u, same->right_u) << factor;
+  }
+  EXPECT_THROW(build_rgbd_frame(context, 0, 0, features_at(points), raw, -1), SettingsError);
 }
 
 TEST(BuildFrame, DepthNeedsABaseline) {

@@ -89,6 +89,16 @@ TEST(TrackedFrame, CopiesChosenAssociationsOfAnotherVersionOfItsFrame) {
   EXPECT_THROW(to.copy_associations(from, {1}), StateError);
 }
 
+TEST(TrackedFrame, InliersOfTheMapAreNeitherOutliersNorTemporary) {
+  TrackedFrame tracked(frame_with_depths({1, 2, 3, 4}));
+  EXPECT_EQ(tracked.n_map_inliers(), 0U);
+  tracked.associate(0, MapPointId(0), {0, 0, 1});
+  tracked.associate(1, MapPointId(5), {0, 0, 1});
+  tracked.associate(2, kFirstTemporaryPoint, {0, 0, 1});
+  tracked.outlier[1] = 1;
+  EXPECT_EQ(tracked.n_map_inliers(), 1U);
+}
+
 TEST(TrackedFrame, CloseCountsTellInliersFromTheRest) {
   //                                        none  close  close  close  limit  far
   TrackedFrame tracked(frame_with_depths({-1.0F, 1.0F, 2.0F, 2.9F, 3.0F, 9.0F}));

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "base/errors.hpp"
 #include "frame/build_frame.hpp"
 
@@ -49,6 +51,29 @@ TEST(InlierSpread, LeavesOutliersOut) {
   EXPECT_EQ(spread_of_inliers(frame).octaves, 1);
   frame.clear_associations();
   EXPECT_EQ(spread_of_inliers(frame).cells, 0);
+}
+
+TEST(InlierSpread, TellsTheMeanVarianceOfTheInliersLevels) {
+  Features features;
+  for (const int level : {0, 3, 7, 5}) {
+    Keypoint keypoint;
+    keypoint.level = level;
+    features.keypoints.push_back(keypoint);
+    features.descriptors.emplace_back();
+  }
+  CameraOptions options;
+  options.pinhole = {50, 50, 40, 30};
+  options.image_size = {80, 60};
+  const FrameContext context{std::make_shared<Camera>(options),
+                             std::make_shared<ScalePyramid>(1.2F, 8)};
+  TrackedFrame frame(build_monocular_frame(context, 0, 0, std::move(features)));
+  frame.T_cw = Pose();
+  EXPECT_EQ(spread_of_inliers(frame).variance, 0);
+  for (std::size_t i = 0; i < 3; ++i) {
+    frame.associate(i, MapPointId(static_cast<std::int64_t>(i)), {0, 0, 2});
+  }
+  frame.outlier[2] = 1;
+  EXPECT_NEAR(spread_of_inliers(frame).variance, (1 + std::pow(1.2, 6)) / 2, 1e-5);
 }
 
 /// Four keypoints in each of twelve cells, off by so many pixels where a test says so.

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import threading
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -55,6 +56,12 @@ def test_grey_of_colour_images() -> None:
     assert (core.to_grey(red[..., ::-1], is_rgb=False) == 60).all()  # not contiguous
     alpha = np.dstack([red, np.full((4, 5), 7, dtype=np.uint8)])
     assert (core.to_grey(alpha, is_rgb=True) == 60).all()
+
+
+def test_grey_of_a_large_image_is_opencvs() -> None:
+    image = np.random.default_rng(3).integers(0, 256, (301, 467, 3), np.uint8)
+    grey = core.to_grey(image, is_rgb=True)
+    np.testing.assert_array_equal(grey, cv2.cvtColor(image, cv2.COLOR_RGB2GRAY))
 
 
 def test_grey_images_stay_as_they_are() -> None:
@@ -121,10 +128,19 @@ def test_rgbd_frame() -> None:
 def test_wrong_depth_size_is_an_image_error() -> None:
     with pytest.raises(ImageError, match="320x240"):
         core.build_rgbd_frame(context(), 0, 0.0, extraction(), np.ones((9, 9), dtype=np.float32))
-    with pytest.raises(ImageError):
+    with pytest.raises(ImageError, match="numeric, got bool"):
         core.build_rgbd_frame(
-            context(), 0, 0.0, extraction(), np.ones((HEIGHT, WIDTH), dtype=np.uint16)
+            context(), 0, 0.0, extraction(), np.ones((HEIGHT, WIDTH), dtype=np.bool_)
         )
+
+
+@pytest.mark.parametrize("kind", ["<u2", ">u2", "i4", "u4", "f2", "f4", "f8"])
+def test_raw_depth_is_divided_by_the_factor(kind: str) -> None:
+    found = extraction()
+    raw = np.tile(np.arange(WIDTH), (HEIGHT, 1)).astype(kind)
+    frame = core.build_rgbd_frame(context(), 0, 0.0, found, raw, 50.0)
+    columns = (frame.raw_keypoints[:, 0] + 0.5).astype(int)
+    np.testing.assert_allclose(frame.depth, columns / 50.0, rtol=1e-6)
 
 
 def test_stereo_frame_of_a_shifted_pair() -> None:

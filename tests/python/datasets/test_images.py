@@ -11,7 +11,7 @@ import pytest
 
 from orbslam2py import DatasetError, ImageError, Sensor
 from orbslam2py.datasets import open_sequence
-from orbslam2py.datasets.images import quiet_opencv
+from orbslam2py.datasets.images import quiet_opencv, read_image
 from support.small_folders import SIZE, image, save
 
 
@@ -93,3 +93,14 @@ def test_wrong_kinds_of_pixels(tum: Path) -> None:
         sequence.load(1)
     with pytest.raises(ImageError, match="has 3 channels; depth images have one"):
         sequence.load(0)
+
+
+@pytest.mark.parametrize("n_channels", [3, 4])
+def test_colours_come_in_the_order_that_is_wanted(tmp_path: Path, n_channels: int) -> None:
+    pixels = np.random.default_rng(n_channels).integers(0, 256, (203, 641, n_channels), np.uint8)
+    path = tmp_path / "colours.png"
+    cv2.imwrite(str(path), pixels)
+    np.testing.assert_array_equal(read_image(path, rgb=False), pixels)
+    rgb = read_image(path, rgb=True)
+    np.testing.assert_array_equal(rgb[..., :3], pixels[..., 2::-1])
+    np.testing.assert_array_equal(rgb[..., 3:], pixels[..., 3:])

@@ -40,7 +40,6 @@ class FakeFrame:
         self.features = SimpleNamespace(
             size=1000,
             depth=np.ones(1000, np.float32),
-            sigma2=np.full(100, 2.0, np.float32),
             described=False,
             frame_id=frame_id,
         )
@@ -73,6 +72,10 @@ class FakeFrame:
 
     def n_associated(self) -> int:
         return 321
+
+    def n_map_inliers(self) -> int:
+        of_map = (self.map_points >= 0) & (self.map_points < _core.FIRST_TEMPORARY_POINT)
+        return int(np.count_nonzero(of_map & (self.outlier == 0)))
 
     def n_close_tracked_untracked(self) -> tuple[int, int]:
         return self.close_counts
@@ -185,7 +188,9 @@ class FakeCore:
         return self.aligned.popleft() if self.aligned else None
 
     def spread_of_inliers(self, frame: FakeFrame) -> SimpleNamespace:
-        return SimpleNamespace(cells=self.n_cells, octaves=4, correlation=self.correlation)
+        return SimpleNamespace(
+            cells=self.n_cells, octaves=4, correlation=self.correlation, variance=2.0
+        )
 
     def median_match_error(self, frame: FakeFrame) -> float:
         return self.match_error

@@ -183,17 +183,16 @@ class EvidenceJudge:
         if covariance is None:
             return None
         per_cell = refined.estimate.n_inliers / max(1, evidence.n_cells)
-        together = max(
-            1.0,
-            core.spread_of_inliers(refined.frame).correlation,
-            1.0 + per_cell * _variance_of_smear(refined.frame, evidence.smear),
-        )
+        spread = core.spread_of_inliers(refined.frame)
+        # Places anywhere on a smear vary by as much, in terms of what the inliers are taken for.
+        smeared = evidence.smear**2 / 12 / spread.variance if spread.variance > 0 else 0.0
+        together = max(1.0, spread.correlation, 1.0 + per_cell * smeared)
         if evidence.error_to_usual > self.limits.weak_error:
             larger = min(evidence.error_to_usual, self.limits.largest_error)
             together = larger**2 * max(together, per_cell)
         covariance = covariance * together
         move = motion.move_of_map(refined.frame)
-        return covariance if move is None else covariance + np.outer(move, move)
+        return covariance if move is None else covariance + move[:, None] * move
 
     def _windows(self, degrees: float) -> float:
         """How far a turn moves the image, in search windows of the motion model."""
@@ -219,16 +218,6 @@ def _position_deviation(refined: RefinedPose) -> float:
     return math.sqrt(max(0.0, float(covariance[3, 3] + covariance[4, 4] + covariance[5, 5])))
 
 
-def _variance_of_smear(frame: core.TrackedFrame, length: float) -> float:
-    """Variance of places anywhere on a smear, by that of a frame's inliers as they are taken."""
-    if length <= 0:
-        return 0.0
-    inliers = (frame.map_points >= 0) & (frame.outlier == 0)
-    if not inliers.any():
-        return 0.0
-    return length**2 / 12 / float(frame.features.sigma2[inliers].mean())
-
-
 def _ratio(value: float, usual: float) -> float:
     return value / usual if usual > 0 else 1.0
 
@@ -245,5 +234,5 @@ def _changes(frame: core.TrackedFrame, motion: MotionModel) -> tuple[float, floa
 
 def difference(T_aw: core.Pose, T_bw: core.Pose) -> tuple[float, float]:
     """Degrees and metres between two poses of one camera."""
-    turn = (T_aw @ T_bw.inverse()).log()[:3].tolist()
-    return math.degrees(math.hypot(*turn)), math.dist(T_aw.center.tolist(), T_bw.center.tolist())
+    turn, move = T_aw.difference(T_bw)
+    return math.degrees(turn), move

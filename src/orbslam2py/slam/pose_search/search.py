@@ -298,7 +298,7 @@ class PoseSearch:
         )
         if estimate.n_inliers < self._local_map_inliers(frame):
             estimate = estimate.failed(Reason.FEW_INLIERS_LOCAL_MAP)
-        elif _n_map_inliers(frame) < self.limits.map_matches:
+        elif frame.n_map_inliers() < self.limits.map_matches:
             # What the frame before measured speaks for itself, and says nothing of the map.
             return self.beyond_the_map(frame, replace(estimate, visual_odometry=True))
         return RefinedPose(frame, estimate, local_map, visible, n_held + len(visible))
@@ -335,10 +335,3 @@ class PoseSearch:
         if self._sensor is Sensor.RGBD:
             return limits.local_map_window_rgbd
         return limits.local_map_window
-
-
-def _n_map_inliers(frame: core.TrackedFrame) -> int:
-    """Points of the map that the pose was accepted with, without the temporary ones."""
-    ids = frame.map_points
-    of_map = (ids >= 0) & (ids < core.FIRST_TEMPORARY_POINT) & (frame.outlier == 0)
-    return int(np.count_nonzero(of_map))
