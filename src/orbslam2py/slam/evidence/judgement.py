@@ -9,8 +9,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py.slam.evidence.smear import Smear
