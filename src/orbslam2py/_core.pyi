@@ -59,6 +59,10 @@ class Pose:
         ...
     def __setstate__(self, arg0: tuple) -> None:
         ...
+    def difference(self, other: Pose) -> tuple[float, float]:
+        """
+        Between two poses of one camera, world to camera: angle [rad] and distance of the centres.
+        """
     def inverse(self) -> Pose:
         """
         The inverse transform: `T_ab` gives `T_ba`.
@@ -554,6 +558,10 @@ class TrackedFrame:
         """
         (with, without) an inlier map point, over the close keypoints.
         """
+    def n_map_inliers(self) -> int:
+        """
+        Number of inliers that are points of the map, not temporary ones.
+        """
     def share_anchor(self, other: TrackedFrame) -> None:
         """
         The pose was predicted from that of another frame.
@@ -671,6 +679,11 @@ class InlierSpread:
     def octaves(self) -> int:
         """
         Of depth that hold an inlier.
+        """
+    @property
+    def variance(self) -> float:
+        """
+        Mean of the inliers' own, by their levels [square pixels]; 0 without any.
         """
 class Map:
     """
@@ -2877,9 +2890,9 @@ def build_monocular_frame(context: FrameContext, id: typing.SupportsInt | typing
     """
     Frame of a single camera: undistorted keypoints, no depth.
     """
-def build_rgbd_frame(context: FrameContext, id: typing.SupportsInt | typing.SupportsIndex, timestamp: typing.SupportsFloat | typing.SupportsIndex, extraction: Extraction, depth: numpy.ndarray) -> Frame:
+def build_rgbd_frame(context: FrameContext, id: typing.SupportsInt | typing.SupportsIndex, timestamp: typing.SupportsFloat | typing.SupportsIndex, extraction: Extraction, depth: numpy.ndarray, factor: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> Frame:
     """
-    Frame of an image with registered depth (h, w) float32 [m]; <= 0, NaN and inf: none. Raises ImageError when the depth image has another size or type.
+    Frame of an image with registered depth (h, w), any kind of number: raw / factor is metres; <= 0, NaN and inf: none. Raises ImageError when the depth image has another size or is not numeric, SettingsError for a negative factor.
     """
 def build_stereo_frame(context: FrameContext, id: typing.SupportsInt | typing.SupportsIndex, timestamp: typing.SupportsFloat | typing.SupportsIndex, left: Extraction, right: Extraction) -> Frame:
     """
