@@ -165,9 +165,7 @@ def test_the_background_says_the_same() -> None:
 
 
 def test_what_goes_wrong_in_the_background_is_told_at_the_end() -> None:
-    watch = CalibrationWatch(
-        world(Sensor.MONOCULAR).settings, Sensor.MONOCULAR, in_background=True
-    )
+    watch = CalibrationWatch(world(Sensor.MONOCULAR).settings, Sensor.MONOCULAR, in_background=True)
     for one in images(Sensor.MONOCULAR)[:3]:
         watch.look(one)
     watch.look(Images(np.zeros((3, 5), np.uint8)))
