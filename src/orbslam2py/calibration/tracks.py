@@ -15,10 +15,6 @@ from orbslam2py._arrays import ByteArray, FloatArray
 
 #: Size of the window in which a point is followed [pixels], and how often images are halved.
 _WINDOW, _HALVINGS = (15, 15), 3
-#: How often where it is known how a point moved before.
-_HALVINGS_OF_MOVING = 1
-#: Share of points that are not found there, from which on the camera moves otherwise than before.
-_MANY_MISSED = 0.25
 #: Points that do not come back to their beginning to so many pixels are dropped.
 _THERE_AND_BACK = 0.5
 #: Corners are looked for in so many parts of an image by row and column, so that a single thing
@@ -83,12 +79,7 @@ def find_corners(grey: ByteArray, n_points: int, mask: ByteArray | None = None) 
 
 
 def follow_points(
-    before: ByteArray,
-    after: ByteArray,
-    points: FloatArray,
-    *,
-    halvings: int,
-    motion: FloatArray | None = None,
+    before: ByteArray, after: ByteArray, points: FloatArray, *, halvings: int
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Find points (n, 2) of one image in another one, and back again.
 
@@ -100,8 +91,6 @@ def follow_points(
         Pixels in the first image.
     halvings : int
         How often the images are halved: a point is found over some 8 pixels at the top level.
-    motion : array, (n, 2), optional
-        How far the points are expected to move [pixels]; not at all if not given.
 
     Returns
     -------
@@ -111,29 +100,18 @@ def follow_points(
     if not len(points):
         return np.zeros((0, 2)), np.zeros(0, np.bool_)
     begin = points.astype(np.float32)
-    expected = np.zeros_like(begin) if motion is None else motion.astype(np.float32)
-    there, found = _flow(before, after, begin, begin + expected, halvings)
-    # From where it leads to, not from the beginning: that would always be found again.
-    back, found_back = _flow(after, before, there, there - expected, halvings)
+    there, found = _flow(before, after, begin, halvings)
+    back, found_back = _flow(after, before, there, halvings)
     same = np.abs(back - begin).max(axis=1) < _THERE_AND_BACK
     return there.astype(np.float64), found & found_back & same
 
 
 def _flow(
-    before: ByteArray,
-    after: ByteArray,
-    points: NDArray[np.float32],
-    guess: NDArray[np.float32],
-    halvings: int,
+    before: ByteArray, after: ByteArray, points: NDArray[np.float32], halvings: int
 ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    guess = points.copy()
     there, found, _ = cv2.calcOpticalFlowPyrLK(
-        before,
-        after,
-        points,
-        guess.copy(),
-        winSize=_WINDOW,
-        maxLevel=halvings,
-        flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
+        before, after, points, guess, winSize=_WINDOW, maxLevel=halvings
     )
     return np.asarray(there, np.float32), np.asarray(found).ravel() == 1
 
@@ -143,8 +121,6 @@ class _Points:
     frame: int
     start: FloatArray
     now: FloatArray
-    motion: FloatArray
-    """Since the image before, (n, 2)."""
 
 
 class PointTracker:
@@ -196,29 +172,20 @@ class PointTracker:
         if self._frame % self._every == 0:
             start = find_corners(grey, self._n_points, mask)
             if len(start):
-                still = np.zeros_like(start)
-                self._sets.append(_Points(self._frame, start, start.copy(), still))
+                self._sets.append(_Points(self._frame, start, start.copy()))
         self._previous = grey
         self._frame += 1
         return pairs
 
     def _follow(self, before: ByteArray, grey: ByteArray) -> None:
         now = np.concatenate([points.now for points in self._sets])
-        motion = np.concatenate([points.motion for points in self._sets])
-        # Most points go on as they moved before, and are found with half of the work.
-        there, good = follow_points(before, grey, now, halvings=_HALVINGS_OF_MOVING, motion=motion)
-        missed = ~good
-        if np.count_nonzero(missed) > _MANY_MISSED * len(missed):
-            there[missed], good[missed] = follow_points(
-                before, grey, now[missed], halvings=_HALVINGS
-            )
+        there, good = follow_points(before, grey, now, halvings=_HALVINGS)
         begin = 0
         kept = []
         for points in self._sets:
             part = slice(begin, begin + len(points.now))
             begin = part.stop
             points.start = points.start[good[part]]
-            points.motion = (there[part] - points.now)[good[part]]
             points.now = there[part][good[part]]
             if len(points.now) >= self._least:
                 kept.append(points)
