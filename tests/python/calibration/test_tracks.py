@@ -35,7 +35,7 @@ def test_pairs_come_at_even_distances_and_are_exact() -> None:
 
 
 def test_points_are_followed_wherever_they_go() -> None:
-    """Also where one turns back, and was expected elsewhere."""
+    """Also where one turns back."""
     tracker = PointTracker(every=4)
     places = [0.0, 6.0, 12.0, 8.0, 4.0, 16.0, 28.0, 16.0, 4.0]
     found = {}
