@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import itertools
 import logging
-from concurrent.futures import Future, ThreadPoolExecutor
+import threading
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,8 +58,7 @@ class CalibrationWatch:
     known : Settings, optional
         The calibration that comes with the images, if one does.
     in_background : bool
-        Look and judge in a thread of its own, since the next image does not wait. It keeps the
-        images until then: nobody may write into them.
+        Judge the points in a thread of its own, since the next image does not wait.
     thresholds : FitThresholds, optional
         The limits.
 
@@ -83,9 +82,9 @@ class CalibrationWatch:
         self._settings, self._sensor, self._known = settings, sensor, known
         self._limits = thresholds or FitThresholds()
         self._tracker = PointTracker(every=_EVERY, least=_LEAST_POINTS)
-        self._thread = ThreadPoolExecutor(1, "calibration watch") if in_background else None
-        self._looks: list[Future[None]] = []
-        self._n_given = self._n_seen = 0
+        self._in_background = in_background
+        self._thread: threading.Thread | None = None
+        self._n_seen = 0
         self._size = (0, 0)
         self._begun: dict[int, Images] = {}
         self.rows: list[PairRows] = []
@@ -96,35 +95,24 @@ class CalibrationWatch:
 
     def look(self, images: Images) -> None:
         """Take the next images of the run; they have been tracked, so they are good ones."""
-        if self._done or self._n_given >= N_IMAGES:
-            return
-        if self._n_given == 0:
-            self._size = images.image.shape[1], images.image.shape[0]
-            self._tell(self._misfit_of_size())
-        self._n_given += 1
-        if self._thread is None:
-            self._take(images)
-        else:
-            self._looks.append(self._thread.submit(self._take, images))
-
-    def finish(self) -> Misfit | None:
-        """Judge what there is, if fewer images came, and say what did not fit."""
-        if self._thread is not None:
-            self._thread.shutdown()
-            looks, self._looks = self._looks, []
-            for look in looks:
-                look.result()
-        if not self._done:
-            self._judge()
-        return self._misfit
-
-    def _take(self, images: Images) -> None:
         if self._done:
             return
-        self._follow(images)
+        if self._n_seen == 0:
+            self._size = images.image.shape[1], images.image.shape[0]
+            self._tell(self._misfit_of_size())
+        if not self._done:
+            self._follow(images)
         self._n_seen += 1
         if self._n_seen >= N_IMAGES and not self._done:
             self._judge()
+
+    def finish(self) -> Misfit | None:
+        """Judge what there is, if fewer images came, and say what did not fit."""
+        if not self._done:
+            self._judge()
+        if self._thread is not None:
+            self._thread.join()
+        return self._misfit
 
     def _misfit_of_size(self) -> Misfit | None:
         if self._known is not None and self._known != self._settings:
@@ -167,7 +155,11 @@ class CalibrationWatch:
             self._tell(find_pair_misfit(self.rows, self._limits))
         if self._misfit is not None or len(self._pairs) < self._limits.least_pairs:
             return
-        self._judge_points()
+        if self._in_background:
+            self._thread = threading.Thread(target=self._judge_points, name="calibration watch")
+            self._thread.start()
+        else:
+            self._judge_points()
 
     def _judge_points(self) -> None:
         most = sorted(self._pairs, key=lambda pair: (-pair.motion, pair.frames))[:_N_PAIRS]

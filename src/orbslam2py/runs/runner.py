@@ -126,7 +126,7 @@ class SequenceRunner:
         in_time = options.realtime or self._feed.is_live
         # Told by the watch, which knows more, or by nobody.
         how = replace(options.system, wait_for_mapping=not in_time, check_calibration=False)
-        self._watch = self._calibration_watch()
+        self._watch = self._calibration_watch(in_time)
         system = System(
             result.settings,
             options.sensor,
@@ -175,23 +175,18 @@ class SequenceRunner:
             _log.warning("%s", doubt)
             result.warnings.append(doubt)
 
-    def _calibration_watch(self) -> CalibrationWatch | None:
+    def _calibration_watch(self, in_time: bool) -> CalibrationWatch | None:
         if not self._options.system.check_calibration:
             return None
         return CalibrationWatch(
             self.result.settings,
             self._options.sensor,
             known=settings_beside(self.result.sequence),
-            in_background=not self._options.system.deterministic,
+            in_background=in_time,
         )
 
     def _calibration_warnings(self, system: System) -> list[str]:
-        misfit = None
-        try:
-            misfit = None if self._watch is None else self._watch.finish()
-        except Exception as error:
-            if self.result.error is None:
-                self._take_note(error)
+        misfit = None if self._watch is None else self._watch.finish()
         found = [None if misfit is None else str(misfit), system.pipeline.front_end.depth_warning]
         return [warning for warning in found if warning is not None]
 
