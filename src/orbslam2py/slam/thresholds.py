@@ -124,8 +124,11 @@ class EvidenceThresholds:
     weak_error: float = 1.5
     """... and with a median reprojection error so many times the usual one: a part of the image
     moves by itself, or the matches are wrong."""
+    honest_error: float = 0.65
+    """Up to this median error, in standard deviations of keypoints, the stated covariance is that
+    of the keypoints' noise; beyond it the standard deviations grow with the error ..."""
     largest_error: float = 10.0
-    """So many times at most the stated standard deviation grows for it."""
+    """... at most so many times, as they do for an error that is not the usual one."""
     slow_gain: float = 0.02
     """Weight of a frame with such an error in what error is usual: darkness may stay."""
     smear: float = 3.2

@@ -179,11 +179,25 @@ def test_matches_that_fit_much_worse_than_usual_are_weak_and_told_as_uncertain(
     # 100 inliers in 30 cells count as 30 observations, twice as wrong as usual.
     larger = estimate.covariance[0, 0] / usual.covariance[0, 0]
     assert larger == pytest.approx(2**2 * estimate.n_inliers / 30)
-    careful.core.match_error = 0.8
+    careful.core.match_error = 0.6
     again = careful.track()
     assert again.is_keyframe
     assert again.estimate.covariance is not None
     assert again.estimate.covariance[0, 0] == pytest.approx(usual.covariance[0, 0])
+
+
+@pytest.mark.parametrize(("error", "factor"), [(0.4, 1.0), (0.8, (0.8 / 0.65) ** 2)])
+def test_a_pose_is_as_uncertain_as_its_matches_are_off(
+    careful: Scene, error: float, factor: float
+) -> None:
+    usual = careful.track().estimate
+    careful.core.match_error = error
+    estimate = careful.track().estimate
+    assert usual.covariance is not None
+    assert estimate.covariance is not None
+    assert estimate.evidence is not None
+    assert estimate.evidence.verdict is Verdict.STRONG
+    assert estimate.covariance[0, 0] == pytest.approx(factor * usual.covariance[0, 0])
 
 
 @pytest.mark.parametrize(("correlation", "factor"), [(2.5, 2.5), (0.6, 1.0)])

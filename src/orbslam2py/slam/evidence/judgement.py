@@ -171,24 +171,28 @@ class EvidenceJudge:
     ) -> FloatArray | None:
         """The covariance that a pose is told with.
 
-        Keypoints that are near each other are wrong together: by a map point in the wrong place, a
-        lens that is not as stated, and on the way that a blurred image is smeared. As far as that
-        shows they count as fewer. Errors far beyond the usual ones are those of whole regions that
-        move: then each cell with inliers counts as one observation, and errors as large as they
-        are. And where the map moved since the frame before, it was off by as much.
+        Keypoints that are off by more than they are taken for make a pose that is less certain.
+        Those near each other are wrong together: by a map point in the wrong place, a lens that is
+        not as stated, and on the way that a blurred image is smeared. As far as that shows they
+        count as fewer. Errors far beyond the usual ones are those of whole regions that move: then
+        each cell with inliers counts as one observation, and errors as large as they are. And
+        where the map moved since the frame before, it was off by as much.
         """
         covariance = refined.estimate.covariance
         if covariance is None:
             return None
+        limits = self.limits
         per_cell = refined.estimate.n_inliers / max(1, evidence.n_cells)
         spread = core.spread_of_inliers(refined.frame)
         # Places anywhere on a smear vary by as much, in terms of what the inliers are taken for.
         smeared = evidence.smear**2 / 12 / spread.variance if spread.variance > 0 else 0.0
         together = max(1.0, spread.correlation, 1.0 + per_cell * smeared)
-        if evidence.error_to_usual > self.limits.weak_error:
-            larger = min(evidence.error_to_usual, self.limits.largest_error)
-            together = larger**2 * max(together, per_cell)
-        covariance = covariance * together
+        larger = max(1.0, evidence.match_error / limits.honest_error)
+        factor = min(larger, limits.largest_error) ** 2 * together
+        if evidence.error_to_usual > limits.weak_error:
+            larger = min(evidence.error_to_usual, limits.largest_error)
+            factor = max(factor, larger**2 * max(together, per_cell))
+        covariance = covariance * factor
         move = motion.move_of_map(refined.frame)
         return covariance if move is None else covariance + move[:, None] * move
 
