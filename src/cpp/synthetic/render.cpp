@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
-#include <cstring>
+#include <cmath>
 #include <limits>
 #include <thread>
 
 #include "base/errors.hpp"
 #include "synthetic/hash.hpp"
+#include "synthetic/row_kernels.hpp"
 #include "synthetic/texture.hpp"
 #include "synthetic/world.hpp"
 
@@ -17,13 +18,6 @@ constexpr double kFarthest = 10000.0;  // metres
 // Neighbouring rectangles overlap by this much, so that no ray slips between them.
 constexpr double kEdgeTolerance = 1e-6;  // metres
 constexpr float kSky = 205;              // grey level where nothing is hit
-constexpr int kMaxTaps = 4;
-
-/// value(x) = at_zero + slope * x along one image row.
-struct Line {
-  double at_zero, slope;
-  double operator()(int x) const { return at_zero + slope * x; }
-};
 
 /// A quantity that is affine in the pixel coordinates: dot(coefficients, (x, y, 1)).
 struct Affine {
@@ -119,139 +113,77 @@ Span covered_span(const Facet& facet, int y, int width) {
   return span;
 }
 
-/// log2 for positive normal numbers, linear between powers of two (error below 0.09).
-float rough_log2(float value) {
-  std::uint32_t bits = 0;
-  std::memcpy(&bits, &value, sizeof(bits));
-  return static_cast<float>(bits) * 0x1p-23F - 127.0F;
-}
-
-float trilinear(const Texture& texture, float detail, float u, float v) {
-  if (detail <= 0) return texture.sample(0, u, v);
-  const int level = static_cast<int>(detail);
-  if (level + 1 >= texture.levels()) return texture.sample(texture.levels() - 1, u, v);
-  const float fine = texture.sample(level, u, v);
-  return fine + (detail - static_cast<float>(level)) * (texture.sample(level + 1, u, v) - fine);
-}
-
-/// Mean of the texture over the footprint of a pixel, the parallelogram spanned by (ux, vx) and
-/// (uy, vy) [texels]: a few samples along its longer side, each over a square of the shorter one.
-float filtered(const Texture& texture, float u, float v, float ux, float vx, float uy, float vy) {
-  const float length_x = std::sqrt(ux * ux + vx * vx);
-  const float length_y = std::sqrt(uy * uy + vy * vy);
-  const float longer = std::max(length_x, length_y);
-  if (longer <= 1) return texture.sample(0, u, v);
-  const float shorter = std::abs(ux * vy - uy * vx) / longer;
-  const int taps = longer >= kMaxTaps * shorter
-                       ? kMaxTaps
-                       : std::max(1, static_cast<int>(longer / shorter + 0.5F));
-  const auto count = static_cast<float>(taps);
-  const float detail = rough_log2(std::max(shorter, longer / count));
-  if (taps == 1) return trilinear(texture, detail, u, v);
-  const float du = (length_x > length_y ? ux : uy) / count;
-  const float dv = (length_x > length_y ? vx : vy) / count;
-  float sum = 0;
-  for (int i = 0; i < taps; ++i) {
-    const float offset = static_cast<float>(i) - 0.5F * (count - 1);
-    sum += trilinear(texture, detail, u + offset * du, v + offset * dv);
-  }
-  return sum / count;
-}
-
-/// Normal noise from the bits of one hash: the sum of four uniform 16-bit numbers.
-float unit_noise(std::uint64_t seed, int x, int y) {
-  const auto pixel = (static_cast<std::uint64_t>(static_cast<std::uint32_t>(y)) << 32) |
-                     static_cast<std::uint32_t>(x);
-  const std::uint64_t bits = mix(seed + pixel * 0x9e3779b97f4a7c15ULL);
-  const std::uint64_t sum =
-      (bits & 0xffff) + ((bits >> 16) & 0xffff) + ((bits >> 32) & 0xffff) + (bits >> 48);
-  constexpr float kMean = 2 * 65535.0F;
-  constexpr float kDeviation = 37837.2F;  // sqrt(4 * (65536^2 - 1) / 12)
-  return (static_cast<float>(sum) - kMean) / kDeviation;
-}
-
 class RowCaster {
  public:
   RowCaster(const std::vector<Facet>& facets, const RenderOptions& options)
       : facets_(facets),
         options_(options),
+        kernels_(row_kernels_for(best_vector_unit())),
         noise_seed_(mix(options.noise_seed)),
         nearest_(static_cast<std::size_t>(options.size.width)),
-        owner_(nearest_.size()),
-        values_(nearest_.size()) {}
+        owners_(nearest_.size()),
+        values_(nearest_.size() + kRowPadding),
+        depth_(values_.size()),
+        grey_(values_.size()) {}
 
   void cast(int y, std::uint8_t* grey, float* depth) {
     const int width = options_.size.width;
     find_owners(y);
     for (int x = 0; x < width;) {
-      const int owner = owner_[static_cast<std::size_t>(x)];
+      const std::int64_t owner = owners_[static_cast<std::size_t>(x)];
       int end = x + 1;
-      while (end < width && owner_[static_cast<std::size_t>(end)] == owner) ++end;
-      shade(owner, y, x, end, depth);
+      while (end < width && owners_[static_cast<std::size_t>(end)] == owner) ++end;
+      shade(owner, y, x, end);
       x = end;
     }
-    const auto exposure = static_cast<float>(options_.exposure);
-    const auto noise = static_cast<float>(options_.noise);
-    for (int x = 0; x < width; ++x) {
-      float value = values_[static_cast<std::size_t>(x)] * exposure;
-      if (noise > 0) value += noise * unit_noise(noise_seed_, x, y);
-      value = std::min(std::max(value, 0.0F), 255.0F);
-      grey[x] = static_cast<std::uint8_t>(value + 0.5F);
-    }
+    kernels_.expose(values_.data(), width, static_cast<float>(options_.exposure),
+                    static_cast<float>(options_.noise), noise_seed_, static_cast<std::uint32_t>(y),
+                    grey_.data());
+    std::copy_n(grey_.begin(), width, grey);
+    std::copy_n(depth_.begin(), width, depth);
   }
 
  private:
   void find_owners(int y) {
     std::fill(nearest_.begin(), nearest_.end(), 0.0);
-    std::fill(owner_.begin(), owner_.end(), -1);
+    std::fill(owners_.begin(), owners_.end(), kNobody);
     for (std::size_t i = 0; i < facets_.size(); ++i) {
       const Span span = covered_span(facets_[i], y, options_.size.width);
       if (!(span.first <= span.last)) continue;
-      const Line inverse_depth = facets_[i].inverse_depth.row(y);
-      const int end = static_cast<int>(std::floor(span.last));
-      for (int x = static_cast<int>(std::ceil(span.first)); x <= end; ++x) {
-        const double w = inverse_depth(x);
-        if (w > nearest_[static_cast<std::size_t>(x)]) {
-          nearest_[static_cast<std::size_t>(x)] = w;
-          owner_[static_cast<std::size_t>(x)] = static_cast<int>(i);
-        }
-      }
+      kernels_.claim(facets_[i].inverse_depth.row(y), static_cast<int>(std::ceil(span.first)),
+                     static_cast<int>(std::floor(span.last)), static_cast<std::int64_t>(i),
+                     nearest_.data(), owners_.data());
     }
   }
 
-  void shade(int owner, int y, int begin, int end, float* depth) {
-    if (owner < 0) {
-      std::fill(depth + begin, depth + end, 0.0F);
+  void shade(std::int64_t owner, int y, int begin, int end) {
+    if (owner == kNobody) {
+      std::fill(depth_.begin() + begin, depth_.begin() + end, 0.0F);
       std::fill(values_.begin() + begin, values_.begin() + end, kSky);
       return;
     }
     const Facet& facet = facets_[static_cast<std::size_t>(owner)];
-    const Line a = facet.a.row(y);
-    const Line b = facet.b.row(y);
-    const double per_texel = 1 / facet.texture->texel();
-    for (int x = begin; x < end; ++x) {
-      const double z = 1 / nearest_[static_cast<std::size_t>(x)];
-      depth[x] = static_cast<float>(z);
-      const double u = a(x) * z;
-      const double v = b(x) * z;
-      const double scale = z * per_texel;
-      const auto slope = [scale](double value, double of_value, double of_depth) {
-        return static_cast<float>((of_value - value * of_depth) * scale);
-      };
-      const Affine& w = facet.inverse_depth;
-      values_[static_cast<std::size_t>(x)] =
-          filtered(*facet.texture, static_cast<float>(u * per_texel),
-                   static_cast<float>(v * per_texel), slope(u, facet.a.x, w.x),
-                   slope(v, facet.b.x, w.x), slope(u, facet.a.y, w.y), slope(v, facet.b.y, w.y));
-    }
+    const TexturedRow row{facet.inverse_depth.row(y),
+                          facet.a.row(y),
+                          facet.b.row(y),
+                          facet.inverse_depth.y,
+                          facet.a.y,
+                          facet.b.y,
+                          1 / facet.texture->texel(),
+                          &facet.texture->levels()};
+    kernels_.shade(row, begin, end, values_.data(), depth_.data());
   }
+
+  static constexpr std::int64_t kNobody = -1;
 
   const std::vector<Facet>& facets_;
   const RenderOptions& options_;
+  const RowKernels& kernels_;
   std::uint64_t noise_seed_;
   std::vector<double> nearest_;  // inverse depth
-  std::vector<int> owner_;
-  std::vector<float> values_;
+  std::vector<std::int64_t> owners_;
+  std::vector<float> values_, depth_;  // of one row
+  std::vector<std::uint8_t> grey_;
 };
 
 void check(const RenderOptions& options) {

@@ -226,25 +226,26 @@ Texture::Texture(const Rectangle& rectangle) : texel_(rectangle.texel) {
     pixels = halved(pixels, width, height);
     add_level(width, height, pixels);
   }
+  pixels_.resize(pixels_.size() + 3);
+  levels_.pixels = pixels_.data();
 }
 
 void Texture::add_level(int width, int height, const std::vector<std::uint8_t>& pixels) {
-  Level level{};
-  level.width = width;
-  level.height = height;
-  level.stride = static_cast<std::size_t>(width) + 1;
-  level.scale = std::ldexp(1.0F, -levels());
-  level.max_x = static_cast<float>(width - 1);
-  level.max_y = static_cast<float>(height - 1);
-  level.data.resize(level.stride * (static_cast<std::size_t>(height) + 1));
+  const auto level = static_cast<std::size_t>(levels_.count++);
+  const std::size_t begin = pixels_.size();
+  const std::size_t stride = static_cast<std::size_t>(width) + 1;
+  pixels_.resize(begin + stride * (static_cast<std::size_t>(height) + 1));
   for (int y = 0; y <= height; ++y) {
     const std::uint8_t* source =
         pixels.data() + static_cast<std::ptrdiff_t>(std::min(y, height - 1)) * width;
-    std::uint8_t* row = level.data.data() + static_cast<std::size_t>(y) * level.stride;
+    std::uint8_t* row = pixels_.data() + begin + static_cast<std::size_t>(y) * stride;
     std::copy(source, source + width, row);
     row[width] = source[width - 1];
   }
-  levels_.push_back(std::move(level));
+  levels_.offset[level] = static_cast<std::int32_t>(begin);
+  levels_.stride[level] = static_cast<std::int32_t>(stride);
+  levels_.max_x[level] = static_cast<float>(width - 1);
+  levels_.max_y[level] = static_cast<float>(height - 1);
 }
 
 }  // namespace orbslam::synthetic

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "synthetic/row_kernels.hpp"
 #include "synthetic/world.hpp"
 
 namespace orbslam::synthetic {
@@ -19,36 +20,30 @@ class Texture {
  public:
   explicit Texture(const Rectangle& rectangle);
 
-  int levels() const { return static_cast<int>(levels_.size()); }
+  Texture(const Texture&) = delete;  // levels() points into it
+  Texture& operator=(const Texture&) = delete;
+
+  const TextureLevels& levels() const { return levels_; }
   double texel() const { return texel_; }
 
   /// Bilinear value [grey levels] of bitmap `level` at (u, v) [texels of level 0 from the
   /// rectangle's origin]; the border is repeated outwards.
   float sample(int level, float u, float v) const {
-    const Level& bitmap = levels_[static_cast<std::size_t>(level)];
-    const float x = clamp(u * bitmap.scale - 0.5F, bitmap.max_x);
-    const float y = clamp(v * bitmap.scale - 0.5F, bitmap.max_y);
+    const float scale = std::ldexp(1.0F, -level);
+    const float x = clamp(u * scale - 0.5F, levels_.max_x[level]);
+    const float y = clamp(v * scale - 0.5F, levels_.max_y[level]);
     const int x0 = static_cast<int>(x);
     const int y0 = static_cast<int>(y);
     const float fx = x - static_cast<float>(x0);
     const float fy = y - static_cast<float>(y0);
-    const std::uint8_t* row = bitmap.data.data() + static_cast<std::size_t>(y0) * bitmap.stride +
-                              static_cast<std::size_t>(x0);
-    const std::uint8_t* below = row + bitmap.stride;
+    const std::uint8_t* row =
+        levels_.pixels + levels_.offset[level] + y0 * levels_.stride[level] + x0;
+    const std::uint8_t* below = row + levels_.stride[level];
     const float top = mixed(row[0], row[1], fx);
     return top + fy * (mixed(below[0], below[1], fx) - top);
   }
 
  private:
-  // Bitmaps carry one more row and column than they show, so that the right and lower neighbour
-  // of the last pixel can be read.
-  struct Level {
-    int width, height;
-    std::size_t stride;
-    float scale, max_x, max_y;
-    std::vector<std::uint8_t> data;
-  };
-
   static float clamp(float value, float high) {
     return value < 0 ? 0.0F : (value > high ? high : value);
   }
@@ -57,10 +52,13 @@ class Texture {
            f * static_cast<float>(static_cast<int>(b) - static_cast<int>(a));
   }
 
+  // Bitmaps carry one more row and column than they show, so that the right and lower neighbour
+  // of the last pixel can be read.
   void add_level(int width, int height, const std::vector<std::uint8_t>& pixels);
 
   double texel_;
-  std::vector<Level> levels_;
+  std::vector<std::uint8_t> pixels_;
+  TextureLevels levels_{};
 };
 
 }  // namespace orbslam::synthetic

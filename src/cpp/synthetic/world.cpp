@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "synthetic/world.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
@@ -37,7 +38,7 @@ World::World(std::vector<Rectangle> rectangles) : rectangles_(std::move(rectangl
   for (std::size_t i = 0; i < rectangles_.size(); ++i) {
     const Rectangle& r = rectangles_[i];
     check(r, i);
-    texels += (r.width / r.texel) * (r.height / r.texel);
+    texels += std::max(2.0, r.width / r.texel) * std::max(2.0, r.height / r.texel);
   }
   if (!(texels < kMostTexels)) {
     throw SettingsError("World: the pictures would need more than 2^29 texels; use larger texels");

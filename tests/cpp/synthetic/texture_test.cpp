@@ -59,7 +59,7 @@ TEST(Texture, CoarseLevelsAreMeansOfFineOnes) {
   for (int y = 0; y < 256; ++y) {
     for (int x = 0; x < 256; ++x) mean += texel(texture, x, y);
   }
-  EXPECT_NEAR(texture.sample(texture.levels() - 1, 128, 128), mean / 65536, 3);
+  EXPECT_NEAR(texture.sample(texture.levels().count - 1, 128, 128), mean / 65536, 3);
   for (int y = 0; y < 16; ++y) {
     for (int x = 0; x < 16; ++x) {
       double block = 0;

@@ -304,6 +304,8 @@ TEST(World, RefusesWhatCannotBe) {
   Rectangle endless = facing_wall(3);
   endless.width = 1e9;
   EXPECT_THROW(World({endless}), SettingsError);
+  endless.height = 1e-9;  // a thread of one texel's breadth
+  EXPECT_THROW(World({endless}), SettingsError);
   EXPECT_THROW(make_corridor(4, 10, 2, 2, 1), SettingsError);
   EXPECT_THROW(make_room({0, 3, 3}, 1, 1), SettingsError);
   EXPECT_THROW(make_street(5, 12, 1), SettingsError);
