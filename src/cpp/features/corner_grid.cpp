@@ -49,8 +49,8 @@ struct CornerGrid::Layout {
 
 bool LevelMask::allows(int x, int y) const {
   if (mask == nullptr) return true;
-  const float u = placement.to_image(static_cast<float>(x));
-  const float v = placement.to_image(static_cast<float>(y));
+  const float u = placement.x.to_image(static_cast<float>(x));
+  const float v = placement.y.to_image(static_cast<float>(y));
   const int left = std::min(static_cast<int>(std::floor(u)), mask->cols - 1);
   const int right = std::min(static_cast<int>(std::ceil(u)), mask->cols - 1);
   const int top = std::min(static_cast<int>(std::floor(v)), mask->rows - 1);

@@ -72,8 +72,10 @@ struct OrbExtractor::Impl {
         unit(chosen),
         kernels(&kernels_for(chosen)) {}
 
-  void extract_level(const cv::Mat& image, const cv::Mat& mask, int level, Features& features);
-  Keypoint keypoint_at(const cv::Mat& image, const Corner& corner, int level) const;
+  void extract_level(const cv::Mat& image, const cv::Mat& mask, int level,
+                     const LevelPlacement& placement, Features& features);
+  Keypoint keypoint_at(const cv::Mat& image, const Corner& corner, int level,
+                       const LevelPlacement& placement) const;
   Descriptor descriptor_at(const cv::Mat& blurred, const Corner& corner, float angle) const;
 
   OrbOptions options;
@@ -88,8 +90,8 @@ struct OrbExtractor::Impl {
 };
 
 void OrbExtractor::Impl::extract_level(const cv::Mat& image, const cv::Mat& mask, int level,
-                                       Features& features) {
-  const LevelMask allowed{mask.empty() ? nullptr : &mask, LevelPlacement(scales, level)};
+                                       const LevelPlacement& placement, Features& features) {
+  const LevelMask allowed{mask.empty() ? nullptr : &mask, placement};
   const auto& corners =
       grid.detect(image, options.initial_threshold, options.minimum_threshold, allowed, *kernels);
   const auto& kept =
@@ -98,21 +100,20 @@ void OrbExtractor::Impl::extract_level(const cv::Mat& image, const cv::Mat& mask
   if (kept.empty()) return;
   const cv::Mat blurred = gaussian.blur(image, *kernels);
   for (const Corner& corner : kept) {
-    features.keypoints.push_back(keypoint_at(image, corner, level));
+    features.keypoints.push_back(keypoint_at(image, corner, level, placement));
     features.descriptors.push_back(descriptor_at(blurred, corner, features.keypoints.back().angle));
   }
 }
 
-Keypoint OrbExtractor::Impl::keypoint_at(const cv::Mat& image, const Corner& corner,
-                                         int level) const {
+Keypoint OrbExtractor::Impl::keypoint_at(const cv::Mat& image, const Corner& corner, int level,
+                                         const LevelPlacement& placement) const {
   const int x = corner.x + corner_origin, y = corner.y + corner_origin;
   std::int32_t m10 = 0, m01 = 0;
   kernels->moments(image.ptr<std::uint8_t>(y) + x, static_cast<std::ptrdiff_t>(image.step[0]), &m10,
                    &m01);
-  const LevelPlacement placement(scales, level);
   Keypoint keypoint;
-  keypoint.x = placement.to_image(static_cast<float>(x));
-  keypoint.y = placement.to_image(static_cast<float>(y));
+  keypoint.x = placement.x.to_image(static_cast<float>(x));
+  keypoint.y = placement.y.to_image(static_cast<float>(y));
   keypoint.size = std::trunc(static_cast<float>(patch_size) * scales.scale(level));
   keypoint.angle = fast_atan2_degrees(static_cast<float>(m01), static_cast<float>(m10));
   keypoint.response = static_cast<float>(corner.response);
@@ -149,6 +150,7 @@ Extraction OrbExtractor::extract(const cv::Mat& grey, const cv::Mat& mask) {
   result.features.descriptors.reserve(expected);
   for (int level = 0; level < impl_->scales.levels(); ++level) {
     impl_->extract_level(result.pyramid.levels[static_cast<std::size_t>(level)], mask, level,
+                         LevelPlacement(impl_->scales, level, {grey.cols, grey.rows}),
                          result.features);
   }
   return result;

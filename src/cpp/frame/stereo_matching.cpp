@@ -6,6 +6,7 @@
 #include <cstring>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "base/errors.hpp"
 #include "features/level_placement.hpp"
@@ -114,13 +115,13 @@ bool cut_windows(const cv::Mat& left, const cv::Mat& right, int x_left, int x_ri
 
 // Slides the left window along the right image and fits a parabola through the best three sums.
 bool refine(const Keypoint& keypoint, float coarse_u, const ImagePyramid& left,
-            const ImagePyramid& right, const ScalePyramid& scales, stereo::ShiftedSad shifted_sad,
-            stereo::WindowPair& windows, Refined& refined) {
+            const ImagePyramid& right, const std::vector<LevelPlacement>& placements,
+            stereo::ShiftedSad shifted_sad, stereo::WindowPair& windows, Refined& refined) {
   const auto level = static_cast<std::size_t>(keypoint.level);
-  const LevelPlacement placement(scales, keypoint.level);
-  const int x_left = static_cast<int>(std::round(placement.to_level(keypoint.x)));
-  const int y = static_cast<int>(std::round(placement.to_level(keypoint.y)));
-  const int x_right = static_cast<int>(std::round(placement.to_level(coarse_u)));
+  const LevelPlacement& placement = placements[level];
+  const int x_left = static_cast<int>(std::round(placement.x.to_level(keypoint.x)));
+  const int y = static_cast<int>(std::round(placement.y.to_level(keypoint.y)));
+  const int x_right = static_cast<int>(std::round(placement.x.to_level(coarse_u)));
   if (!cut_windows(left.levels[level], right.levels[level], x_left, x_right, y, windows)) {
     return false;
   }
@@ -134,10 +135,20 @@ bool refine(const Keypoint& keypoint, float coarse_u, const ImagePyramid& left,
   const float at = static_cast<float>(sums[best]);
   const float after = static_cast<float>(sums[best + 1]);
   const float delta = (before - after) / (2.0F * (before + after - 2.0F * at));
-  refined.right_u = placement.to_image(static_cast<float>(x_right) +
-                                       static_cast<float>(best - kHalfSearch) + delta);
+  refined.right_u = placement.x.to_image(static_cast<float>(x_right) +
+                                         static_cast<float>(best - kHalfSearch) + delta);
   refined.sad = sums[best];
   return true;
+}
+
+std::vector<LevelPlacement> placements_of(const ImagePyramid& pyramid, const ScalePyramid& scales) {
+  const ImageSize size{pyramid.levels[0].cols, pyramid.levels[0].rows};
+  std::vector<LevelPlacement> placements;
+  placements.reserve(pyramid.levels.size());
+  for (int level = 0; level < static_cast<int>(pyramid.levels.size()); ++level) {
+    placements.emplace_back(scales, level, size);
+  }
+  return placements;
 }
 
 // Removes the matches whose windows differ much more than those of the typical match.
@@ -186,6 +197,7 @@ StereoMatches match_stereo(const Extraction& left, const Extraction& right,
   const float max_d = static_cast<float>(max_disparity);
   const float bf32 = static_cast<float>(bf);
   const int rows = left.pyramid.levels[0].rows;
+  const auto placements = placements_of(left.pyramid, scales);
   const RowTable table(right.features.keypoints, scales, rows);
   const stereo::ShiftedSad shifted_sad = stereo::shifted_sad_for(best_vector_unit());
 
@@ -204,8 +216,8 @@ StereoMatches match_stereo(const Extraction& left, const Extraction& right,
                                              right.features.descriptors, max_d);
     if (match == kNoMatch) continue;
     Refined refined{};
-    if (!refine(keypoint, right.features.keypoints[match].x, left.pyramid, right.pyramid, scales,
-                shifted_sad, windows, refined)) {
+    if (!refine(keypoint, right.features.keypoints[match].x, left.pyramid, right.pyramid,
+                placements, shifted_sad, windows, refined)) {
       continue;
     }
     float disparity = keypoint.x - refined.right_u;

@@ -70,11 +70,11 @@ TEST(OrbExtractor, KeypointsKeepTheirDistanceAndTheirQuota) {
       for (const Keypoint& keypoint : result.features.keypoints) {
         const cv::Mat& level = result.pyramid.levels[static_cast<std::size_t>(keypoint.level)];
         const float scale = scales.scale(keypoint.level);
-        const LevelPlacement placement(scales, keypoint.level);
-        const float x = std::round(placement.to_level(keypoint.x));
-        const float y = std::round(placement.to_level(keypoint.y));
-        EXPECT_EQ(placement.to_image(x), keypoint.x);
-        EXPECT_EQ(placement.to_image(y), keypoint.y);
+        const LevelPlacement placement(scales, keypoint.level, {size.width, size.height});
+        const float x = std::round(placement.x.to_level(keypoint.x));
+        const float y = std::round(placement.y.to_level(keypoint.y));
+        EXPECT_EQ(placement.x.to_image(x), keypoint.x);
+        EXPECT_EQ(placement.y.to_image(y), keypoint.y);
         EXPECT_GE(std::min(x, y), 19);
         EXPECT_LE(x, level.cols - 20);
         EXPECT_LE(y, level.rows - 20);
@@ -108,20 +108,59 @@ TEST(LevelPlacement, ALevelsPixelsLieWhereTheirGreyValuesComeFrom) {
   const ImagePyramid pyramid = build_pyramid(ramp, scales);
   for (int level = 0; level < 8; ++level) {
     const cv::Mat& image = pyramid.levels[static_cast<std::size_t>(level)];
-    const LevelPlacement placement(scales, level);
-    // Further right the rounded sizes of the levels show, and the ramp ends.
-    constexpr int kColumns = 12;
+    const LevelPlacement placement(scales, level, {ramp.cols, ramp.rows});
+    constexpr int kColumns = 12;  // further right the ramp ends
     float off = 0;
     for (int x = 1; x <= kColumns; ++x) {
       const float came_from = static_cast<float>(image.at<std::uint8_t>(10, x)) / kSlope;
-      off += (placement.to_image(static_cast<float>(x)) - came_from) / kColumns;
+      off += (placement.x.to_image(static_cast<float>(x)) - came_from) / kColumns;
     }
     EXPECT_NEAR(off, 0, 0.3) << level;
-    EXPECT_FLOAT_EQ(placement.to_level(placement.to_image(21)), 21);
+    EXPECT_FLOAT_EQ(placement.x.to_level(placement.x.to_image(21)), 21);
   }
 }
 
-TEST(LevelPlacement, TheOriginalsIsHalfAPixelLessAtBothScales) {
+// Sizes of levels are whole numbers: by the scale alone the far border would be off by over a
+// pixel.
+TEST(LevelPlacement, TheFarBordersOfALevelLieAtThoseOfTheImage) {
+  const ScalePyramid scales(1.2F, 8);
+  float farthest = 0;
+  for (const ImageSize image : {ImageSize{640, 480}, ImageSize{1241, 376}, ImageSize{320, 240}}) {
+    for (int level = 0; level < 8; ++level) {
+      const ImageSize size = scales.level_size(image, level);
+      const LevelPlacement placement(scales, level, image);
+      const float right = static_cast<float>(size.width) - 0.5F;
+      const float bottom = static_cast<float>(size.height) - 0.5F;
+      EXPECT_NEAR(placement.x.to_image(right), static_cast<float>(image.width) - 0.5F, 1e-3);
+      EXPECT_NEAR(placement.y.to_image(bottom), static_cast<float>(image.height) - 0.5F, 1e-3);
+      EXPECT_NEAR(placement.x.to_image(-0.5F), -0.5F, 1e-6);
+      farthest = std::max(farthest, std::abs((right + 0.5F) * scales.scale(level) -
+                                             static_cast<float>(image.width)));
+    }
+  }
+  EXPECT_GT(farthest, 1);
+}
+
+TEST(LevelPlacement, WhatLiesAtTheFarBorderIsFoundThereOnEveryLevel) {
+  cv::Mat bar(120, 1241, CV_8UC1, cv::Scalar(0));
+  bar.colRange(1190, 1206).setTo(240);
+  constexpr float kMiddle = 1197.5F;
+  const ScalePyramid scales(1.2F, 8);
+  const ImagePyramid pyramid = build_pyramid(bar, scales);
+  for (int level = 0; level < 8; ++level) {
+    const cv::Mat& image = pyramid.levels[static_cast<std::size_t>(level)];
+    float weights = 0, sum = 0;
+    for (int x = 0; x < image.cols; ++x) {
+      const float grey = image.at<std::uint8_t>(10, x);
+      weights += grey;
+      sum += grey * static_cast<float>(x);
+    }
+    const LevelPlacement placement(scales, level, {bar.cols, bar.rows});
+    EXPECT_NEAR(placement.x.to_image(sum / weights), kMiddle, 0.2) << level;
+  }
+}
+
+TEST(LevelPlacement, TheOriginalsIsAMultipleOfTheScale) {
   OrbOptions options = options_of(1000);
   const cv::Mat image = random_image(640, 480, 7);
   const Features here = OrbExtractor(options).extract(image).features;
@@ -132,9 +171,14 @@ TEST(LevelPlacement, TheOriginalsIsHalfAPixelLessAtBothScales) {
   ASSERT_EQ(here.size(), there.size());
   for (std::size_t i = 0; i < here.size(); ++i) {
     const float scale = original.scales().scale(here.keypoints[i].level);
-    EXPECT_NEAR(here.keypoints[i].x - there.keypoints[i].x, (scale - 1) / 2, 1e-4);
-    EXPECT_NEAR(here.keypoints[i].y - there.keypoints[i].y, (scale - 1) / 2, 1e-4);
-    EXPECT_EQ(there.keypoints[i].x, scale * std::round(there.keypoints[i].x / scale));
+    const ImageSize size = original.scales().level_size({640, 480}, here.keypoints[i].level);
+    const float x = std::round(there.keypoints[i].x / scale);
+    const float y = std::round(there.keypoints[i].y / scale);
+    EXPECT_NEAR(here.keypoints[i].x, (x + 0.5F) * 640 / static_cast<float>(size.width) - 0.5F,
+                1e-3);
+    EXPECT_NEAR(here.keypoints[i].y, (y + 0.5F) * 480 / static_cast<float>(size.height) - 0.5F,
+                1e-3);
+    EXPECT_EQ(there.keypoints[i].x, scale * x);
     EXPECT_EQ(here.descriptors[i].words, there.descriptors[i].words);
   }
 }

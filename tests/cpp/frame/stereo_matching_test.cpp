@@ -51,15 +51,15 @@ ShiftedPair shifted_pair(int shift, int level = 0) {
       resized_pyramid(texture(cv::Rect(shift, 0, width, height)).clone(), scales());
   std::mt19937_64 generator(6);
   const float scale = scales().scale(level);
-  const LevelPlacement placement(scales(), level);
+  const LevelPlacement placement(scales(), level, {width, height});
   const int first = 20;
   for (int y = first; static_cast<float>(y) * scale < static_cast<float>(height) - 20 * scale;
        y += 20) {
     for (int x = first; static_cast<float>(x) * scale < static_cast<float>(width) - 20 * scale;
          x += 20) {
       Keypoint keypoint;
-      keypoint.x = placement.to_image(static_cast<float>(x));
-      keypoint.y = placement.to_image(static_cast<float>(y));
+      keypoint.x = placement.x.to_image(static_cast<float>(x));
+      keypoint.y = placement.y.to_image(static_cast<float>(y));
       keypoint.level = level;
       Descriptor descriptor;
       for (auto& word : descriptor.words) word = generator();
