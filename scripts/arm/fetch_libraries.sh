@@ -4,7 +4,7 @@
 # Needs mmdebstrap (Debian's package) and reaches Debian's mirror.
 set -eu
 folder=$1
-packages=libc6-dev,libstdc++-12-dev,libopencv-core-dev,libopencv-imgproc-dev,libeigen3-dev,libhwy-dev,libgmock-dev
+packages=libc6-dev,libstdc++-12-dev,libopencv-core-dev,libopencv-imgproc-dev,libeigen3-dev,libhwy-dev,libdeflate-dev,libgmock-dev
 [ "$(cat "$folder/complete" 2>/dev/null)" = "$packages" ] && exit 0
 command -v mmdebstrap >/dev/null || {
   echo "mmdebstrap is missing: apt-get install mmdebstrap" >&2

@@ -79,7 +79,7 @@ def unpack_sdist(python: Path, folder: Path, output: Path) -> Path:
 
 def build(python: Path, source: Path, folder: Path, jobs: int) -> tuple[Path, Path]:
     """Build the package; gives the wheel, not yet repaired, and the folder of its objects."""
-    libraries = folder / "libraries"
+    libraries, sysroot = folder / "libraries", folder / "sysroot"
     objects = folder / "objects" / f"package-{sys.implementation.cache_tag}"
     raw = folder / f"raw-{sys.implementation.cache_tag}"
     shutil.rmtree(raw, ignore_errors=True)
@@ -89,6 +89,8 @@ def build(python: Path, source: Path, folder: Path, jobs: int) -> tuple[Path, Pa
         "Ceres_DIR": libraries / "lib/cmake/Ceres",
         "OpenCV_DIR": libraries / "lib/cmake/opencv4",
         "HIGHWAY_INCLUDE_DIR": libraries / "include",
+        "LIBDEFLATE_INCLUDE_DIR": sysroot / "usr/include",
+        "LIBDEFLATE_LIBRARY": sysroot / "usr/lib/x86_64-linux-gnu/libdeflate.a",
         "Eigen3_DIR": "/usr/share/eigen3/cmake",
         # It is there for CHOLMOD, which Ceres is built without.
         "CMAKE_DISABLE_FIND_PACKAGE_OpenMP": "ON",
@@ -99,7 +101,7 @@ def build(python: Path, source: Path, folder: Path, jobs: int) -> tuple[Path, Pa
     settings = [f"--config-settings=cmake.define.{name}={value}" for name, value in defines.items()]
     settings += [f"--config-settings=build-dir={objects}"]
     environment = os.environ | {
-        "ORBSLAM2PY_SYSROOT": str(folder / "sysroot"),
+        "ORBSLAM2PY_SYSROOT": str(sysroot),
         "CMAKE_BUILD_PARALLEL_LEVEL": str(jobs),
         "CMAKE_GENERATOR": "Ninja",
     }

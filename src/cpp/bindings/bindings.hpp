@@ -11,6 +11,7 @@ using Release = pybind11::call_guard<pybind11::gil_scoped_release>;
 // One function per folder of src/cpp, defined in the file of the same name.
 void bind_base(pybind11::module_& module);
 void bind_stop_flag(pybind11::module_& module);
+void bind_images(pybind11::module_& module);
 void bind_features(pybind11::module_& module);
 void bind_camera(pybind11::module_& module);
 void bind_frame(pybind11::module_& module);

@@ -7,6 +7,7 @@ PYBIND11_MODULE(_core, module) {
   // Bottom to top, so that every signature finds its types registered.
   bind_base(module);
   bind_stop_flag(module);
+  bind_images(module);
   bind_features(module);
   bind_camera(module);
   bind_frame(module);
