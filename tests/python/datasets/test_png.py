@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""PNG files: the package's own decoder gives what OpenCV gives, and leaves it what it does not know."""
+"""PNG files: what the package decodes itself equals OpenCV's, and the rest is left to it."""
 
 from __future__ import annotations
 
