@@ -42,6 +42,8 @@ class Figures:
     """Losses after which a mapped place came into view ..."""
     found: int
     """... and that were over within a second of that."""
+    left_view: int
+    """Of the others, those in which no mapped place was in view for the whole of that second."""
     rotation_spread: float
     """Spread of the error from frame to frame in units of its stated deviation (1: honest)."""
     translation_spread: float
@@ -72,7 +74,7 @@ def judge(played: Played) -> Figures:
     wrong_before = wrong.copy()
     known = np.isfinite(played.motion[compared]).all(axis=(1, 2))
     wrong_before[compared] &= known & ~is_wrong(by_now, deviation)
-    losses, found = found_again(played)
+    losses, found, left_view = found_again(played)
     trackable = ~played.covered & started_by_now(played, monocular)
     return Figures(
         frames=len(played.posed),
@@ -84,6 +86,7 @@ def judge(played: Played) -> Figures:
         wrong_before=int(wrong_before.sum()),
         losses=losses,
         found=found,
+        left_view=left_view,
         rotation_spread=spread(error[:, :3], deviation[:, :3, :3]),
         translation_spread=spread(error[:, 3:], deviation[:, 3:, 3:]),
         maps=len(np.unique(played.map_index[played.posed])),
@@ -205,11 +208,14 @@ _NEAR = {True: 5.0, False: 0.5}  # metres, outdoors and indoors
 _ALIKE = np.cos(np.radians(20.0))
 
 
-def found_again(played: Played) -> tuple[int, int]:
-    """Losses after which a mapped place came into view, and how many were over within a second."""
+def found_again(played: Played) -> tuple[int, int, int]:
+    """Losses after which a mapped place came into view, and how many were over within a second.
+
+    Last, how many were not, of which no mapped place stayed in view for that second.
+    """
     fps = round(played.sequence.camera.fps)
     n = len(played.posed)
-    losses = found = 0
+    losses = found = left_view = 0
     for k in np.flatnonzero(played.posed[:-1] & ~played.posed[1:]) + 1:
         in_view = [
             j for j in range(k, n) if not played.covered[j] and mapped_place(played, int(k), j)
@@ -222,7 +228,9 @@ def found_again(played: Played) -> tuple[int, int]:
             continue  # the sequence ended first
         losses += 1
         found += bool(again.any())
-    return losses, found
+        stayed = in_view[: fps + 1] == list(range(in_view[0], until))
+        left_view += not again.any() and not stayed
+    return losses, found, left_view
 
 
 def mapped_place(played: Played, lost: int, frame: int) -> bool:

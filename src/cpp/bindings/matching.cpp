@@ -115,6 +115,12 @@ void bind_by_words(py::module_& module) {
              "Replaces the frame's associations; returns their number. `ratio`: best over second\n"
              "best distance must be less. Raises StateError without words.");
   module.def(
+      "match_keyframe_by_descriptors", &match_keyframe_by_descriptors, "map"_a, "keyframe"_a,
+      "frame"_a, "ratio"_a, Release(),
+      "Match a keyframe's points to a frame, each compared with all of its keypoints.\n\n"
+      "Matches are most alike on both sides. Otherwise as match_keyframe_by_words(); needs no\n"
+      "words, and takes longer.");
+  module.def(
       "match_keyframes_by_words",
       [](const Map& map, KeyFrameId a, KeyFrameId b, float ratio) {
         return to_pair_array(released([&] { return match_keyframes_by_words(map, a, b, ratio); }));

@@ -71,6 +71,58 @@ void match_nodes(const KeyFrameFeatures& a, const Frame& frame_b, float ratio, U
   });
 }
 
+// Of one feature: the feature of the other side that is most alike, the first of equals, and by how
+// many bits it and the second best differ.
+struct Nearest {
+  std::uint32_t match = 0;
+  int best = kFarthest, second = kFarthest;
+
+  void offer(std::uint32_t other, int distance) {
+    if (distance < best) {
+      second = best;
+      best = distance;
+      match = other;
+    } else if (distance < second) {
+      second = distance;
+    }
+  }
+};
+
+// Pairs that are most alike on both sides: every feature of a with a point against all of b.
+void match_all(const KeyFrameFeatures& a, const Frame& frame_b, float ratio,
+               std::vector<std::pair<std::uint32_t, std::uint32_t>>& pairs) {
+  const Frame& frame_a = *a.frame;
+  thread_local std::vector<Nearest> of_a, of_b;
+  of_a.assign(frame_a.size(), {});
+  of_b.assign(frame_b.size(), {});
+  const auto n_a = static_cast<std::uint32_t>(frame_a.size());
+  const auto n_b = static_cast<std::uint32_t>(frame_b.size());
+  for (std::uint32_t i = 0; i < n_a; ++i) {
+    if (!a.points[i].valid()) continue;
+    for (std::uint32_t j = 0; j < n_b; ++j) {
+      const int distance = hamming_distance(frame_a.descriptors[i], frame_b.descriptors[j]);
+      of_a[i].offer(j, distance);
+      of_b[j].offer(i, distance);
+    }
+  }
+  pairs.clear();
+  for (std::uint32_t i = 0; i < n_a; ++i) {
+    const Nearest& nearest = of_a[i];
+    const bool alike =
+        nearest.best <= kDescriptorUnguided &&
+        static_cast<float>(nearest.best) < ratio * static_cast<float>(nearest.second);
+    if (alike && of_b[nearest.match].match == i) pairs.emplace_back(i, nearest.match);
+  }
+}
+
+void associate(const KeyFrameFeatures& features,
+               const std::vector<std::pair<std::uint32_t, std::uint32_t>>& pairs,
+               TrackedFrame& frame) {
+  for (const auto& [i, j] : pairs) {
+    frame.associate(j, features.points[i], features.positions[i]);
+  }
+}
+
 // Drops the pairs whose rotation disagrees with the majority and sorts the rest by feature of a.
 void keep_consistent(const Frame& frame_a, const Frame& frame_b,
                      std::vector<std::pair<std::uint32_t, std::uint32_t>>& pairs) {
@@ -106,9 +158,24 @@ int match_keyframe_by_words(const Map& map, KeyFrameId keyframe, TrackedFrame& f
   match_nodes(
       features, *frame.frame, ratio, [](std::uint32_t) { return true; }, pairs);
   keep_consistent(*features.frame, *frame.frame, pairs);
-  for (const auto& [i, j] : pairs) {
-    frame.associate(j, features.points[i], features.positions[i]);
+  associate(features, pairs, frame);
+  return static_cast<int>(pairs.size());
+}
+
+int match_keyframe_by_descriptors(const Map& map, KeyFrameId keyframe, TrackedFrame& frame,
+                                  float ratio) {
+  KeyFrameFeatures features;
+  {
+    const auto lock = map.read_lock();
+    gather(map, keyframe, true, features);
   }
+  frame.clear_associations();
+  if (!features.frame) return 0;
+
+  thread_local std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
+  match_all(features, *frame.frame, ratio, pairs);
+  keep_consistent(*features.frame, *frame.frame, pairs);
+  associate(features, pairs, frame);
   return static_cast<int>(pairs.size());
 }
 

@@ -18,7 +18,19 @@ namespace orbslam {
 /// docs/method/words.md#matching-by-words.
 int match_keyframe_by_words(const Map& map, KeyFrameId keyframe, TrackedFrame& frame, float ratio);
 
-/// The same between two keyframes, only for features with living points on both sides: pairs
+inline constexpr int kDescriptorUnguided =
+    64;  ///< most differing bits of those most alike on both sides
+
+/// Matches the points of a keyframe to a frame without words: each feature that has a living point
+/// is compared with all of the frame's. Those match that are most alike on both sides, by
+/// kDescriptorUnguided bits at most and fewer than `ratio` times those of the second best. It takes
+/// a hundred times as long as by words, and finds what looks too different by now to fall under the
+/// same node. The rest is as by words; needs no description. See
+/// docs/method/words.md#without-words.
+int match_keyframe_by_descriptors(const Map& map, KeyFrameId keyframe, TrackedFrame& frame,
+                                  float ratio);
+
+/// By words between two keyframes, only for features with living points on both sides: pairs
 /// (feature of a, feature of b), ascending feature of a, one to one. Empty when one is dead.
 std::vector<std::pair<std::uint32_t, std::uint32_t>> match_keyframes_by_words(const Map& map,
                                                                               KeyFrameId a,

@@ -36,7 +36,11 @@ from orbslam2py.slam.options import Setup, SystemOptions
 from orbslam2py.slam.pose_search import PoseSearch
 from orbslam2py.slam.records import Reason, TrackingOutcome, TrackingRecord, TrackingState
 from orbslam2py.slam.relocalization import Relocalizer
-from orbslam2py.slam.thresholds import InitializationThresholds, TrackingThresholds
+from orbslam2py.slam.thresholds import (
+    InitializationThresholds,
+    RelocalizationThresholds,
+    TrackingThresholds,
+)
 from orbslam2py.slam.tracking import Tracking
 from orbslam2py.slam.watched_frame import FrameWatcher, WatchedFrame, frame_features
 
@@ -306,6 +310,7 @@ def _make_tracking(setup: Setup, back_end: BackEnd, options: SystemOptions) -> T
     sensor, vocabulary = setup.sensor, setup.vocabulary
     max_keyframe_interval = setup.settings.max_keyframe_interval
     slam_map, mapping = back_end.map, back_end.mapping
+    n_features = setup.settings.orb.n_features
 
     def search(relocalizer: Relocalizer | None) -> PoseSearch:
         return PoseSearch(
@@ -314,7 +319,7 @@ def _make_tracking(setup: Setup, back_end: BackEnd, options: SystemOptions) -> T
             sensor,
             max_keyframe_interval,
             relocalizer,
-            TrackingThresholds(),
+            TrackingThresholds().for_features(n_features),
         )
 
     def belief(searching: PoseSearch) -> Belief:
@@ -328,10 +333,15 @@ def _make_tracking(setup: Setup, back_end: BackEnd, options: SystemOptions) -> T
             slam_map, vocabulary, mapping, seed, EarlierFrames(earlier, belief(earlier))
         )
     else:
-        n_features = setup.settings.orb.n_features
         initializer = DepthInitializer(slam_map, vocabulary, mapping, n_features)
     searching = search(
-        Relocalizer(slam_map, back_end.keyframe_index, seed, fix_scale=sensor.has_depth)
+        Relocalizer(
+            slam_map,
+            back_end.keyframe_index,
+            seed,
+            fix_scale=sensor.has_depth,
+            thresholds=RelocalizationThresholds().for_features(n_features),
+        )
     )
     return Tracking(
         slam_map,

@@ -73,6 +73,7 @@ class PoseMethod(str, enum.Enum):
     ALIGNED_IMAGES = "aligned images"
     KEYFRAMES_AROUND = "keyframes around"
     WIDE_WINDOW = "wide window"
+    ALL_KEYPOINTS = "all keypoints"
 
     def __str__(self) -> str:
         return self.value

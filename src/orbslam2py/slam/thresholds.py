@@ -7,7 +7,22 @@ by chapter where each comes from.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
+
+#: Features of an image for which numbers of inliers are stated ...
+USUAL_FEATURES = 1000
+#: ... and the least share of them that is asked for where images have fewer.
+LEAST_SHARE = 0.6
+
+
+def _for_features(n_inliers: int, n_features: int) -> int:
+    """Inliers that say as much of an image with fewer features.
+
+    Fewer points meet fewer keypoints by chance, and fewer can be found of them.
+    """
+    share = min(1.0, max(LEAST_SHARE, n_features / USUAL_FEATURES))
+    return math.ceil(share * n_inliers)
 
 
 @dataclass(frozen=True)
@@ -100,6 +115,15 @@ class TrackingThresholds:
     small_map: int = 5
     """A map with so few keyframes is given up when tracking is lost, and a new one is begun."""
 
+    def for_features(self, n_features: int) -> TrackingThresholds:
+        """These limits for images with so many features: of few ones fewer are asked for."""
+        after = self.local_map_inliers_after_relocalization
+        return replace(
+            self,
+            local_map_inliers=_for_features(self.local_map_inliers, n_features),
+            local_map_inliers_after_relocalization=_for_features(after, n_features),
+        )
+
 
 @dataclass(frozen=True)
 class EvidenceThresholds:
@@ -129,6 +153,11 @@ class EvidenceThresholds:
     of the keypoints' noise; beyond it the standard deviations grow with the error ..."""
     largest_error: float = 10.0
     """... at most so many times, as they do for an error that is not the usual one."""
+    surprise_pixels: float = 15.0
+    """A camera that turned otherwise than before by so many pixels of the image is told with twice
+    the variance, by twice as many with five times, ..."""
+    usual_deviation: float = 1.3
+    """... and a position beyond so many times the usual deviation with as much more variance."""
     slow_gain: float = 0.02
     """Weight of a frame with such an error in what error is usual: darkness may stay."""
     smear: float = 3.2
@@ -205,6 +234,12 @@ class RelocalizationThresholds:
     """Best by second best descriptor distance, matching by words."""
     matches: int = 15
     """Fewest matches by words that make a candidate."""
+    thorough_ratio: float = 0.85
+    """Best by second best distance, where each point is compared with every keypoint ..."""
+    thorough_matches: int = 12
+    """... and fewest such matches."""
+    thorough_keyframes: int = 2
+    """So many keyframes near the place of the loss are compared so, for `motion_frames` frames."""
     iterations: int = 5
     """RANSAC iterations that each candidate gets per turn."""
     inliers: int = 10
@@ -259,6 +294,14 @@ class RelocalizationThresholds:
     """The frame after one found again confirms it with so many points that both see ..."""
     confirming_cosine: float = 0.87
     """... if the camera turned by no more than this in between: cosine of the angle, 30 degrees."""
+
+    def for_features(self, n_features: int) -> RelocalizationThresholds:
+        """These limits for images with so many features: of few ones fewer are asked for."""
+        return replace(
+            self,
+            enough=_for_features(self.enough, n_features),
+            narrow=_for_features(self.narrow, n_features),
+        )
 
 
 @dataclass(frozen=True)

@@ -120,6 +120,41 @@ TEST(MatchKeyFrameByWords, RotationMustAgreeWithTheMajority) {
   EXPECT_FALSE(tracked.map_points[8].valid());
 }
 
+TEST(MatchKeyFrameByDescriptors, NodesDoNotCount) {
+  Map map;
+  const KeyFrameId keyframe = add_full(map, frame_of({10, 200}, {2, 9}));
+  TrackedFrame tracked(frame_of({200, 10, 90}, {1, 5, 7}));
+  tracked.associate(2, MapPointId(55), {9, 9, 9});
+  EXPECT_EQ(match_keyframe_by_descriptors(map, keyframe, tracked, 0.7F), 2);
+  EXPECT_THAT(tracked.map_points, ElementsAre(MapPointId(1), MapPointId(0), MapPointId()));
+  EXPECT_EQ(tracked.positions[0], Eigen::Vector3d(0, 0, 6));
+  EXPECT_EQ(match_keyframe_by_descriptors(map, KeyFrameId(17), tracked, 0.7F), 0);
+  EXPECT_THAT(tracked.map_points, Each(MapPointId()));
+}
+
+TEST(MatchKeyFrameByDescriptors, AlikeOnBothSidesWithinLimitAndRatio) {
+  const auto matches = [](const std::vector<int>& of_keyframe, const std::vector<int>& of_frame) {
+    Map map;
+    const KeyFrameId keyframe = add_full(map, frame_of(of_keyframe));
+    TrackedFrame tracked(frame_of(of_frame));
+    match_keyframe_by_descriptors(map, keyframe, tracked, 0.75F);
+    return tracked.map_points;
+  };
+  EXPECT_THAT(matches({0}, {64}), ElementsAre(MapPointId(0)));
+  EXPECT_THAT(matches({0}, {65}), ElementsAre(MapPointId()));
+  EXPECT_THAT(matches({0}, {29, 40}), ElementsAre(MapPointId(0), MapPointId()));
+  EXPECT_THAT(matches({0}, {30, 40}), Each(MapPointId()));
+  // The frame's feature is nearer to the second one of the keyframe.
+  EXPECT_THAT(matches({0, 18}, {10, 100}), ElementsAre(MapPointId(1), MapPointId()));
+}
+
+TEST(MatchKeyFrameByDescriptors, NeedsNoWords) {
+  Map map;
+  const KeyFrameId keyframe = add_full(map, make_raster_frame(0, 5));
+  TrackedFrame tracked(make_raster_frame(0, 5));
+  EXPECT_NO_THROW(match_keyframe_by_descriptors(map, keyframe, tracked, 0.7F));
+}
+
 TEST(MatchKeyFrameByWords, NeedsWords) {
   Map map;
   const KeyFrameId keyframe = add_full(map, frame_of({0}));

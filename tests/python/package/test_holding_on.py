@@ -124,8 +124,11 @@ def test_a_loss_counts_as_found_within_a_second_of_seeing_a_mapped_place():
     assert (judge(without(played, slice(60, 70))).losses) == 1
     assert (judge(without(played, slice(60, 70))).found) == 1
     assert (judge(without(played, slice(60, 90))).found) == 0
+    assert judge(without(played, slice(60, 90))).left_view == 0, "it stands where it was"
     away = honest_run(motion="turn-on-the-spot", pace=4.0)
-    assert judge(without(away, slice(5, None))).losses <= 1
+    figures = judge(without(away, slice(5, None)))
+    assert figures.losses <= 1
+    assert figures.left_view == figures.losses
 
 
 def test_frames_under_a_hand_need_no_pose():

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from orbslam2py import Reason, Sensor, TrackingState
+from orbslam2py.slam.evidence import judgement
 from orbslam2py.slam.records import PoseMethod, Verdict
 from orbslam2py.slam.thresholds import EvidenceThresholds, TrackingThresholds
 from support.tracking_scene import FakeCore, FakeFrame, Scene, every_way_ends_elsewhere, pose
@@ -235,6 +236,39 @@ def test_keypoints_on_a_smear_are_wrong_together(careful: Scene) -> None:
     assert larger == pytest.approx(1 + 100 / 30 * variance)
     assert blurred.evidence.verdict is Verdict.STRONG
     assert sharp.covariance[0, 0] == pytest.approx(usual.covariance[0, 0])
+
+
+def test_a_turn_that_nobody_expected_makes_a_pose_less_certain(
+    careful: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    usual = careful.track().estimate
+    turn = 0.02  # radians; the scene's focal length is 500 pixels
+    monkeypatch.setattr(judgement, "_changes", lambda frame, motion: (np.degrees(turn), 0.0))
+    turned_otherwise = careful.track().estimate
+    assert usual.covariance is not None
+    assert turned_otherwise.covariance is not None
+    larger = turned_otherwise.covariance[0, 0] / usual.covariance[0, 0]
+    assert larger == pytest.approx(1 + (500 * turn / EvidenceThresholds().surprise_pixels) ** 2)
+
+
+@pytest.mark.parametrize(("looser", "factor"), [(1.2, 1.0), (2.0, 2.0 / 1.3)])
+def test_a_pose_that_is_held_loosely_is_less_certain_still(
+    careful: Scene, monkeypatch: pytest.MonkeyPatch, looser: float, factor: float
+) -> None:
+    usual = careful.track().estimate
+    optimize = careful.core.optimize_pose
+
+    def loosely(frame: FakeFrame) -> SimpleNamespace:
+        found = optimize(frame)
+        found.covariance = looser**2 * found.covariance
+        return found
+
+    monkeypatch.setattr(careful.core, "optimize_pose", loosely)
+    estimate = careful.track().estimate
+    assert usual.covariance is not None
+    assert estimate.covariance is not None
+    larger = estimate.covariance[0, 0] / usual.covariance[0, 0]
+    assert larger == pytest.approx(looser**2 * factor)
 
 
 def test_a_lasting_lack_of_detail_is_the_scene(careful: Scene) -> None:

@@ -90,6 +90,8 @@ class HarderSearch:
         if search.motion.velocity is not None:
             yield PoseMethod.WIDE_WINDOW, self._by_wide_window
         if not any(hypothesis.evidence.verdict is Verdict.STRONG for hypothesis in found):
+            yield PoseMethod.ALL_KEYPOINTS, search.by_all_keypoints
+        if not any(hypothesis.evidence.verdict is Verdict.STRONG for hypothesis in found):
             yield PoseMethod.RELOCALIZATION, search.by_relocalization
 
     def _by_aligned_images(self, frame: core.TrackedFrame) -> PoseEstimate:

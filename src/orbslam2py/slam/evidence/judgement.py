@@ -175,8 +175,10 @@ class EvidenceJudge:
         Those near each other are wrong together: by a map point in the wrong place, a lens that is
         not as stated, and on the way that a blurred image is smeared. As far as that shows they
         count as fewer. Errors far beyond the usual ones are those of whole regions that move: then
-        each cell with inliers counts as one observation, and errors as large as they are. And
-        where the map moved since the frame before, it was off by as much.
+        each cell with inliers counts as one observation, and errors as large as they are. A camera
+        that suddenly turns otherwise smears and bends its images while they are taken, and matches
+        that hold a pose less firmly than usual let it be pulled further by what is wrong in all of
+        them. And where the map moved since the frame before, it was off by as much.
         """
         covariance = refined.estimate.covariance
         if covariance is None:
@@ -192,13 +194,19 @@ class EvidenceJudge:
         if evidence.error_to_usual > limits.weak_error:
             larger = min(evidence.error_to_usual, limits.largest_error)
             factor = max(factor, larger**2 * max(together, per_cell))
-        covariance = covariance * factor
+        surprise = self._pixels(evidence.turn_change) / limits.surprise_pixels
+        looseness = max(1.0, evidence.deviation_to_usual / limits.usual_deviation)
+        covariance = covariance * (factor * (1.0 + surprise**2) * looseness)
         move = motion.move_of_map(refined.frame)
         return covariance if move is None else covariance + move[:, None] * move
 
     def _windows(self, degrees: float) -> float:
         """How far a turn moves the image, in search windows of the motion model."""
-        return self._focal_length * math.radians(degrees) / self._window
+        return self._pixels(degrees) / self._window
+
+    def _pixels(self, degrees: float) -> float:
+        """How far a turn moves the image, in pixels."""
+        return self._focal_length * math.radians(degrees)
 
 
 def _figures(refined: RefinedPose) -> UsualFigures:

@@ -226,6 +226,23 @@ class PoseSearch:
             return PoseEstimate(Reason.FEW_MATCHES_REFERENCE, n_best)
         return self._optimize(frame, n_best, Reason.FEW_INLIERS_REFERENCE)
 
+    def by_all_keypoints(self, frame: core.TrackedFrame) -> PoseEstimate:
+        """From the reference keyframe's points, each compared with every keypoint of the frame.
+
+        Finds the way from one frame to the next where nothing is known of it, and what was seen
+        looks different by now: in the second frame of a map that begins in a fast car.
+        """
+        failed = PoseEstimate(Reason.FEW_MATCHES_REFERENCE)
+        if self._relocalizer is None or self.reference_keyframe < 0:
+            return failed
+        n_inliers = self._relocalizer.compare_with(frame, [self.reference_keyframe])
+        if n_inliers == 0:
+            return failed
+        frame.share_anchor(self.motion.last)
+        return PoseEstimate(
+            n_matches=n_inliers, n_inliers=n_inliers, method=PoseMethod.ALL_KEYPOINTS
+        )
+
     def by_relocalization(self, frame: core.TrackedFrame) -> PoseEstimate:
         """From the user's guess, if any; else from any keyframe that looks like the frame."""
         not_found = Reason.NOT_FOUND_IN_MAP

@@ -56,15 +56,30 @@ class Fitting:
         self._seed = seed % 2**64
         self._limits = thresholds
 
-    def matched(self, frame: core.TrackedFrame, keyframes: list[int]) -> list[Candidate]:
-        """Those of some keyframes that share enough words with a frame."""
+    def matched(
+        self, frame: core.TrackedFrame, keyframes: list[int], *, thoroughly: bool = False
+    ) -> list[Candidate]:
+        """Those of some keyframes that share enough words with a frame.
+
+        Parameters
+        ----------
+        frame : orbslam2py._core.TrackedFrame
+            Described, unless it is matched thoroughly.
+        keyframes : list of int
+            Ids.
+        thoroughly : bool
+            Without words: every point is compared with every keypoint, which takes longer.
+        """
+        limits = self._limits
+        match, ratio, fewest = core.match_keyframe_by_words, limits.ratio, limits.matches
+        if thoroughly:
+            match = core.match_keyframe_by_descriptors
+            ratio, fewest = limits.thorough_ratio, limits.thorough_matches
         candidates = []
         for keyframe in keyframes:
             matches = core.TrackedFrame(frame.features)
-            n_matches = core.match_keyframe_by_words(
-                self._map, keyframe, matches, self._limits.ratio
-            )
-            if n_matches >= self._limits.matches:
+            n_matches = match(self._map, keyframe, matches, ratio)
+            if n_matches >= fewest:
                 seed = core.seed_of(self._seed, frame.id, keyframe)
                 candidates.append(Candidate(keyframe, matches, seed))
         return candidates

@@ -96,7 +96,10 @@ class Relocalizer:
             n_inliers = self._near(frame, guess, self._nearest(guess, ids, T_wc), wider)
             if n_inliers > 0:
                 return n_inliers
-        return 0
+        if frame.id - place.last.id > limits.motion_frames:
+            return 0
+        likeliest = [int(keyframe) for keyframe in ids[: limits.thorough_keyframes]]
+        return self._compare_with(frame, likeliest, limits.enough)
 
     def _by_likeness(self, frame: core.TrackedFrame) -> int:
         candidates = self._candidates(frame)
@@ -134,6 +137,29 @@ class Relocalizer:
         """
         every = core.snapshot_keyframes(self._map)
         return self._near(frame, T_cw, self._nearest(T_cw, every.ids, every.T_wc), 1.0)
+
+    def compare_with(self, frame: core.TrackedFrame, keyframes: list[int]) -> int:
+        """Find pose and associations of a frame by all keypoints of keyframes that it may show.
+
+        Neither words nor a guess are needed: points are matched by their descriptors alone, and
+        RANSAC tells which matches agree.
+
+        Returns
+        -------
+        int
+            Number of inliers, at least `RelocalizationThresholds.inliers`; 0 if the frame was not
+            found, and then it has no associations.
+        """
+        return self._compare_with(frame, keyframes, self._limits.inliers)
+
+    def _compare_with(self, frame: core.TrackedFrame, keyframes: list[int], enough: int) -> int:
+        candidates = self._fitting.matched(frame, keyframes, thoroughly=True)
+        found = self._fitting.first_that_fits(frame, candidates, enough)
+        if found is not None:
+            return found[1]
+        frame.clear_associations()
+        frame.T_cw = None
+        return 0
 
     def _near(
         self, frame: core.TrackedFrame, T_cw: core.Pose, keyframes: list[int], wider: float
