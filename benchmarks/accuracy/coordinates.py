@@ -3,14 +3,18 @@
 
 Every sequence that has a ground truth is run with both, deterministic, with every sensor that its
 folder serves: the ATE, and the error over one frame, in which the place of a keypoint shows most.
-Runs that begin a few frames later say how much a figure varies by itself.
+Runs that begin a few frames later say how much a figure varies by itself. Recordings have a
+calibration and a truth that are off themselves; `--made-up` takes streets whose truth is exact,
+with as many seeds as `--starts` says.
 
     python -m benchmarks.accuracy.coordinates --starts 3
+    python -m benchmarks.accuracy.coordinates --made-up --starts 5 --sensors stereo
     python -m benchmarks.accuracy.coordinates --sequences ~/rgbd_dataset_freiburg1_desk
 """
 
 from __future__ import annotations
 
+import argparse
 import statistics
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -26,8 +30,10 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py.datasets import Sequence
 from orbslam2py.evaluation import align, match_poses, relative_errors
 from orbslam2py.settings import Settings
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
 _FEWEST = 5  # poses that say something
+_MADE_UP_SIZES = ((1241, 376), (640, 480), (620, 188))
 _FOLLOWS = 1.5  # a pose belongs to the next image if it comes within so many median intervals
 
 
@@ -92,11 +98,20 @@ def _rms(values: FloatArray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def rows_of(sequence: Sequence, name: str, n_starts: int) -> Iterator[tuple[str, ...]]:
-    """One row for each convention, then the ratio of the medians."""
+def rows_of(name: str, begun: list[tuple[Sequence, int]]) -> Iterator[tuple[str, ...]]:
+    """One row for each convention, then the ratio of the medians.
+
+    Parameters
+    ----------
+    name : str
+        Of the sequences.
+    begun : list of Sequence, int
+        What is run, and from which frame.
+    """
     medians = []
+    sequence = begun[0][0]
     for original in (True, False):
-        runs = [errors_of(sequence, start, original=original) for start in range(n_starts)]
+        runs = [errors_of(each, start, original=original) for each, start in begun]
         judged = [run for run in runs if run is not None]
         if not judged:
             yield (name, str(sequence.sensor), _named(original), "no path")
@@ -141,26 +156,48 @@ def judged_sequences(folders: Iterable[Path], sensors: Iterable[str]) -> Iterato
                 yield sequence
 
 
+def made_up_streets(sensors: Iterable[str], n_seeds: int) -> Iterator[tuple[str, list[Sequence]]]:
+    """Names and sequences of made-up streets, each with several seeds."""
+    for sensor in sensors:
+        for width, height in _MADE_UP_SIZES:
+            options = SyntheticOptions(
+                world="street", sensor=sensor, frames=50, size=(width, height), noise=1.5
+            )
+            seeds = [SyntheticSequence(replace(options, seed=seed)) for seed in range(n_seeds)]
+            yield f"street, {width} x {height}", list(seeds)
+
+
 def main() -> None:
     parser = new_parser(__doc__)
     add_counts(parser, starts=(1, "first frames that runs begin with"))
     parser.add_argument(
         "--sequences", nargs="+", type=Path, help="folders [those shared by the tests]"
     )
+    parser.add_argument("--made-up", action="store_true", help="made-up streets instead")
     add_sensors(parser)
     add_width(parser)
     arguments = parser.parse_args()
     console = console_of(arguments)
-    folders = arguments.sequences or sorted((needed_shared_folder() / "sequences").iterdir())
     table = new_table(
         "Places of keypoints: RMSE against the truth, median (least..most)",
         ["sequence", "sensor", "keypoints"],
         ["ATE [m]", "over one\nframe [m]", "over one\nframe [deg]", "tracked", "keyframes"],
     )
-    for sequence in judged_sequences(folders, arguments.sensors):
-        for row in rows_of(sequence, sequence.name, arguments.starts):
+    for name, begun in chosen(arguments):
+        for row in rows_of(name, begun):
             table.add_row(*row)
     console.print(table)
+
+
+def chosen(arguments: argparse.Namespace) -> Iterator[tuple[str, list[tuple[Sequence, int]]]]:
+    """Names, and what is run under each."""
+    if arguments.made_up:
+        for name, sequences in made_up_streets(arguments.sensors, arguments.starts):
+            yield name, [(sequence, 0) for sequence in sequences]
+        return
+    folders = arguments.sequences or sorted((needed_shared_folder() / "sequences").iterdir())
+    for sequence in judged_sequences(folders, arguments.sensors):
+        yield sequence.name, [(sequence, start) for start in range(arguments.starts)]
 
 
 if __name__ == "__main__":
