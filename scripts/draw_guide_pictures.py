@@ -118,11 +118,11 @@ def draw_inliers(axes: Axes, result: RunResult, title: str) -> None:
 
 
 def draw_lost(path: Path) -> None:
-    """The same race with every third image, and with all of them."""
+    """The same race with every fourth image, and with all of them."""
     figure = Figure(figsize=(9, 3.4), dpi=110, layout="constrained")
     FigureCanvasAgg(figure)
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
-    draw_inliers(left, race(3), "every third image")
+    draw_inliers(left, race(4), "every fourth image")
     draw_inliers(right, race(1), "all images")
     left.set_ylabel("inliers")
     figure.savefig(path)

@@ -173,7 +173,7 @@ def test_the_window_grows_with_every_failure(world: MappedWorld) -> None:
     """Beside the path, where the first window does not reach."""
     motion = world.system.pipeline.tracking.motion
     limits = RelocalizationThresholds(
-        guess_window=0.5, widening=10.0, widest=40.0, near_candidates=0
+        guess_window=0.5, widening=10.0, widest=40.0, near_candidates=0, thorough_keyframes=0
     )
     found = relocalizer(world, limits, words=False)
     reference = world.system.pipeline.tracking.reference_keyframe
@@ -181,6 +181,17 @@ def test_the_window_grows_with_every_failure(world: MappedWorld) -> None:
     tries = [found.relocalize(described(world, N_MAPPED + 6)) for _ in range(6)]
     assert tries[0] == 0
     assert tries[-1] >= 50
+
+
+def test_where_no_window_reaches_all_keypoints_are_compared(world: MappedWorld) -> None:
+    motion = world.system.pipeline.tracking.motion
+    limits = RelocalizationThresholds(guess_window=0.5, widening=0.0, near_candidates=0)
+    found = relocalizer(world, limits, words=False)
+    reference = world.system.pipeline.tracking.reference_keyframe
+    found.lose(PlaceOfLoss(motion.last, None, reference))
+    frame = described(world, N_MAPPED + 6)
+    assert found.relocalize(frame) >= limits.enough
+    assert frame.T_cw is not None
 
 
 def test_poses_that_are_verified_are_counted(world: MappedWorld) -> None:
