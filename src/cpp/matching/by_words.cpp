@@ -115,14 +115,6 @@ void match_all(const KeyFrameFeatures& a, const Frame& frame_b, float ratio,
   }
 }
 
-void associate(const KeyFrameFeatures& features,
-               const std::vector<std::pair<std::uint32_t, std::uint32_t>>& pairs,
-               TrackedFrame& frame) {
-  for (const auto& [i, j] : pairs) {
-    frame.associate(j, features.points[i], features.positions[i]);
-  }
-}
-
 // Drops the pairs whose rotation disagrees with the majority and sorts the rest by feature of a.
 void keep_consistent(const Frame& frame_a, const Frame& frame_b,
                      std::vector<std::pair<std::uint32_t, std::uint32_t>>& pairs) {
@@ -143,9 +135,10 @@ void keep_consistent(const Frame& frame_a, const Frame& frame_b,
   pairs.resize(kept);
 }
 
-}  // namespace
-
-int match_keyframe_by_words(const Map& map, KeyFrameId keyframe, TrackedFrame& frame, float ratio) {
+// Associates a frame with the points of a keyframe: `match(features of the keyframe, pairs)` fills
+// the pairs.
+template <class Match>
+int match_keyframe(const Map& map, KeyFrameId keyframe, TrackedFrame& frame, Match&& match) {
   KeyFrameFeatures features;
   {
     const auto lock = map.read_lock();
@@ -155,28 +148,28 @@ int match_keyframe_by_words(const Map& map, KeyFrameId keyframe, TrackedFrame& f
   if (!features.frame) return 0;
 
   thread_local std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
-  match_nodes(
-      features, *frame.frame, ratio, [](std::uint32_t) { return true; }, pairs);
+  match(features, pairs);
   keep_consistent(*features.frame, *frame.frame, pairs);
-  associate(features, pairs, frame);
+  for (const auto& [i, j] : pairs) {
+    frame.associate(j, features.points[i], features.positions[i]);
+  }
   return static_cast<int>(pairs.size());
+}
+
+}  // namespace
+
+int match_keyframe_by_words(const Map& map, KeyFrameId keyframe, TrackedFrame& frame, float ratio) {
+  return match_keyframe(map, keyframe, frame, [&](const KeyFrameFeatures& features, auto& pairs) {
+    match_nodes(
+        features, *frame.frame, ratio, [](std::uint32_t) { return true; }, pairs);
+  });
 }
 
 int match_keyframe_by_descriptors(const Map& map, KeyFrameId keyframe, TrackedFrame& frame,
                                   float ratio) {
-  KeyFrameFeatures features;
-  {
-    const auto lock = map.read_lock();
-    gather(map, keyframe, true, features);
-  }
-  frame.clear_associations();
-  if (!features.frame) return 0;
-
-  thread_local std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs;
-  match_all(features, *frame.frame, ratio, pairs);
-  keep_consistent(*features.frame, *frame.frame, pairs);
-  associate(features, pairs, frame);
-  return static_cast<int>(pairs.size());
+  return match_keyframe(map, keyframe, frame, [&](const KeyFrameFeatures& features, auto& pairs) {
+    match_all(features, *frame.frame, ratio, pairs);
+  });
 }
 
 std::vector<std::pair<std::uint32_t, std::uint32_t>> match_keyframes_by_words(const Map& map,
