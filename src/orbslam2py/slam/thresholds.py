@@ -147,7 +147,10 @@ class EvidenceThresholds:
     """... and with a position this much less certain than usual."""
     weak_error: float = 1.5
     """... and with a median reprojection error so many times the usual one: a part of the image
-    moves by itself, or the matches are wrong."""
+    moves by itself, or the matches are wrong ..."""
+    weak_error_spreads: float = 3.0
+    """... unless errors vary as much from image to image: above the usual by so many times their
+    mean deviation from it, as between images that are far apart."""
     honest_error: float = 0.65
     """Up to this median error, in standard deviations of keypoints, the stated covariance is that
     of the keypoints' noise; beyond it the standard deviations grow with the error ..."""
@@ -158,6 +161,15 @@ class EvidenceThresholds:
     the variance, by twice as many with five times, ..."""
     usual_deviation: float = 1.3
     """... and a position beyond so many times the usual deviation with as much more variance."""
+    usual_changes: float = 2.0
+    """A pose farther from where the motion led than so many times what is usual ..."""
+    mistaken_share: float = 0.04
+    """... is told as one that is off by what is beyond it with this probability: either the camera
+    changed its motion or the pose is mistaken."""
+    changes_seen: int = 3
+    """So many changes of motion tell what is usual ..."""
+    sudden_change: float = 3.0
+    """... to which one counts as at most so many times the usual."""
     slow_gain: float = 0.02
     """Weight of a frame with such an error in what error is usual: darkness may stay."""
     smear: float = 3.2

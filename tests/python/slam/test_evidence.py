@@ -187,6 +187,22 @@ def test_matches_that_fit_much_worse_than_usual_are_weak_and_told_as_uncertain(
     assert again.estimate.covariance[0, 0] == pytest.approx(usual.covariance[0, 0])
 
 
+def test_where_errors_vary_from_image_to_image_a_larger_one_is_not_sudden(careful: Scene) -> None:
+    # Images that are far apart fit one time well and one time badly.
+    for error in (0.8, 0.5, 0.9, 0.5, 0.9, 0.45, 0.9, 0.45, 0.9, 0.5):
+        careful.core.match_error = error
+        careful.track()
+    careful.core.match_error = 1.1
+    evidence = careful.track().estimate.evidence
+    assert evidence is not None
+    assert evidence.error_to_usual > EvidenceThresholds().weak_error
+    assert evidence.verdict is Verdict.STRONG
+    careful.core.match_error = 4.0
+    evidence = careful.track().estimate.evidence
+    assert evidence is not None
+    assert evidence.verdict is Verdict.WEAK
+
+
 @pytest.mark.parametrize(("error", "factor"), [(0.4, 1.0), (0.8, (0.8 / 0.65) ** 2)])
 def test_a_pose_is_as_uncertain_as_its_matches_are_off(
     careful: Scene, error: float, factor: float

@@ -103,7 +103,7 @@ class Belief:
         )
         if evidence.verdict is Verdict.REFUSED:
             return estimate.failed(Reason.WEAK_EVIDENCE)
-        self._judge.get_used_to_image(refined, evidence)
+        self._judge.get_used_to_frame(refined, evidence, self._search.motion)
         if evidence.verdict is Verdict.STRONG or self._may_count(evidence):
             self._judge.get_used_to(refined)
         return estimate

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py.slam.evidence.smear import Smear
+from orbslam2py.slam.evidence.usual_change import UsualChange
 from orbslam2py.slam.pose_search import MotionModel, RefinedPose
 from orbslam2py.slam.records import Evidence, PoseMethod, Verdict
 from orbslam2py.slam.thresholds import EvidenceThresholds
@@ -59,7 +60,9 @@ class EvidenceJudge:
         """Nothing is usual yet."""
         self._usual: UsualFigures | None = None
         self._usual_error: float | None = None
+        self._error_spread = 0.0
         self._smear = Smear(self.limits)
+        self._change = UsualChange(self.limits)
 
     def go_elsewhere(self) -> None:
         """What is seen is not usual any more: the place is another one.
@@ -67,6 +70,8 @@ class EvidenceJudge:
         How well it fits is: that goes by the camera and its images.
         """
         self._usual = None
+        # Another map of a single camera has another scale.
+        self._change = UsualChange(self.limits)
 
     def weigh(self, refined: RefinedPose, motion: MotionModel, method: PoseMethod) -> Evidence:
         """Weigh a refined pose.
@@ -99,7 +104,7 @@ class EvidenceJudge:
             max(inliers_to_usual, found_to_usual) < limits.weak_share
             or spread.cells <= limits.weak_cells
             or deviation_to_usual > limits.weak_deviation
-            or error_to_usual > limits.weak_error
+            or self._errs_suddenly(match_error)
         ):
             verdict = Verdict.WEAK
         return Evidence(
@@ -155,16 +160,21 @@ class EvidenceJudge:
         usual = self._usual
         self._usual = figures if usual is None else usual.moved_to(figures, self.limits.gain)
 
-    def get_used_to_image(self, refined: RefinedPose, evidence: Evidence) -> None:
-        """Let a frame that is believed, strong or weak, move what error and detail are usual."""
+    def get_used_to_frame(
+        self, refined: RefinedPose, evidence: Evidence, motion: MotionModel
+    ) -> None:
+        """Let a frame that is believed, strong or weak, move what is usual of image and motion."""
         self._smear.see(refined.frame.features)
+        change = motion.change(refined.frame)
+        if change is not None:
+            self._change.see(change)
         error = evidence.match_error
         if not math.isfinite(error):
             return
-        sudden = evidence.error_to_usual > self.limits.weak_error
-        gain = self.limits.slow_gain if sudden else self.limits.gain
+        gain = self.limits.slow_gain if self._errs_suddenly(error) else self.limits.gain
         usual = error if self._usual_error is None else self._usual_error
         self._usual_error = usual + gain * (error - usual)
+        self._error_spread += gain * (abs(error - usual) - self._error_spread)
 
     def stated_covariance(
         self, refined: RefinedPose, evidence: Evidence, motion: MotionModel
@@ -178,7 +188,8 @@ class EvidenceJudge:
         each cell with inliers counts as one observation, and errors as large as they are. A camera
         that suddenly turns otherwise smears and bends its images while they are taken, and matches
         that hold a pose less firmly than usual let it be pulled further by what is wrong in all of
-        them. And where the map moved since the frame before, it was off by as much.
+        them. Where the map moved since the frame before, it was off by as much. And a pose far from
+        where the motion led may be a mistake, however well it fits.
         """
         covariance = refined.estimate.covariance
         if covariance is None:
@@ -191,14 +202,30 @@ class EvidenceJudge:
         together = max(1.0, spread.correlation, 1.0 + per_cell * smeared)
         larger = max(1.0, evidence.match_error / limits.honest_error)
         factor = min(larger, limits.largest_error) ** 2 * together
-        if evidence.error_to_usual > limits.weak_error:
+        if self._errs_suddenly(evidence.match_error):
             larger = min(evidence.error_to_usual, limits.largest_error)
             factor = max(factor, larger**2 * max(together, per_cell))
         surprise = self._pixels(evidence.turn_change) / limits.surprise_pixels
         looseness = max(1.0, evidence.deviation_to_usual / limits.usual_deviation)
         covariance = covariance * (factor * (1.0 + surprise**2) * looseness)
         move = motion.move_of_map(refined.frame)
-        return covariance if move is None else covariance + move[:, None] * move
+        if move is not None:
+            covariance = covariance + move[:, None] * move
+        change = motion.change(refined.frame)
+        beyond = None if change is None else self._change.beyond(change)
+        if beyond is not None:
+            covariance = covariance + limits.mistaken_share * beyond[:, None] * beyond
+        return covariance
+
+    def _errs_suddenly(self, error: float) -> bool:
+        """Whether a median error is larger than that of images before, and than it varies."""
+        usual = self._usual_error
+        if usual is None or usual <= 0:
+            return False
+        limits = self.limits
+        return error > max(
+            limits.weak_error * usual, usual + limits.weak_error_spreads * self._error_spread
+        )
 
     def _windows(self, degrees: float) -> float:
         """How far a turn moves the image, in search windows of the motion model."""

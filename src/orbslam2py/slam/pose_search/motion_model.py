@@ -69,6 +69,24 @@ class MotionModel:
         move: FloatArray = (T_cl @ self._moved @ T_cl.inverse()).log()
         return move
 
+    def change(self, frame: core.TrackedFrame) -> FloatArray | None:
+        """From a frame's pose to the one that the speed leads to, (6,) rotation [rad] and way.
+
+        None where no speed is known.
+
+        Parameters
+        ----------
+        frame : orbslam2py._core.TrackedFrame
+            The frame after the last one, with its pose.
+        """
+        if self.velocity is None or self._last is None or frame.T_cw is None:
+            return None
+        T_lw = self._last.T_cw
+        if T_lw is None:
+            return None
+        change: FloatArray = (self.velocity @ T_lw @ frame.T_cw.inverse()).log()
+        return change
+
     def predict(self, frame: core.TrackedFrame) -> None:
         """Give a frame the pose that the speed leads to, or the last frame's without a speed."""
         T_lw = self.last.T_cw

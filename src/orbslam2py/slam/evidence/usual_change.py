@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How a camera usually changes its motion; ``docs/method/tracking.md#evidence``."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from orbslam2py._arrays import FloatArray
+from orbslam2py.slam.thresholds import EvidenceThresholds
+
+
+class UsualChange:
+    """How far poses usually lie from where the motion before them led.
+
+    A change is the tangent (6,), rotation [rad] and translation, from a frame's pose to the one
+    that the motion led to. Turns and ways are weighed apart: their units differ.
+
+    Parameters
+    ----------
+    thresholds : EvidenceThresholds
+        Limits.
+    """
+
+    def __init__(self, thresholds: EvidenceThresholds) -> None:
+        self._limits = thresholds
+        self._turn = 0.0
+        self._way = 0.0
+        self._n_seen = 0
+
+    def beyond(self, change: FloatArray) -> FloatArray | None:
+        """The part (6,) of a change that is beyond the usual; None where there is none.
+
+        The share is that of the turn or of the way, whichever exceeds its usual by more: a turn
+        that is a mistake is paid for by a way that is one.
+
+        Parameters
+        ----------
+        change : array of float64, (6,)
+            The frame's.
+        """
+        limits = self._limits
+        if self._n_seen < limits.changes_seen:
+            return None
+        turn, way = _squares(change)
+        least = min(_by(self._turn, turn), _by(self._way, way))
+        share = 1.0 - limits.usual_changes * math.sqrt(least)
+        return None if share <= 0 else share * change
+
+    def see(self, change: FloatArray) -> None:
+        """Let a frame that is believed move what is usual; a sudden change moves it little.
+
+        Parameters
+        ----------
+        change : array of float64, (6,)
+            The frame's.
+        """
+        turn, way = _squares(change)
+        if self._n_seen > 0:
+            most = self._limits.sudden_change**2
+            turn, way = min(turn, most * self._turn), min(way, most * self._way)
+        gain = max(self._limits.gain, 1.0 / (self._n_seen + 1))
+        self._turn += gain * (turn - self._turn)
+        self._way += gain * (way - self._way)
+        self._n_seen += 1
+
+
+def _squares(change: FloatArray) -> tuple[float, float]:
+    return float(np.dot(change[:3], change[:3])), float(np.dot(change[3:], change[3:]))
+
+
+def _by(usual: float, now: float) -> float:
+    """The usual square by this one's; infinite for none, which is never unusual."""
+    return usual / now if now > 0 else math.inf
