@@ -158,9 +158,11 @@ class EvidenceThresholds:
     """... at most so many times, as they do for an error that is not the usual one."""
     surprise_pixels: float = 15.0
     """A camera that turned otherwise than before by so many pixels of the image is told with twice
-    the variance, by twice as many with five times, ..."""
+    the variance, by twice as many ..."""
+    largest_surprise: float = 2.0
+    """... or more with five times; images far apart turn by any angle."""
     usual_deviation: float = 1.3
-    """... and a position beyond so many times the usual deviation with as much more variance."""
+    """A position beyond so many times the usual deviation is told with as much more variance."""
     usual_changes: float = 2.0
     """A pose farther from where the motion led than so many times what is usual ..."""
     mistaken_share: float = 0.04

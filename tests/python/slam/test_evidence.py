@@ -254,17 +254,18 @@ def test_keypoints_on_a_smear_are_wrong_together(careful: Scene) -> None:
     assert sharp.covariance[0, 0] == pytest.approx(usual.covariance[0, 0])
 
 
+@pytest.mark.parametrize(("turn", "factor"), [(0.02, 1 + (10 / 15) ** 2), (0.5, 1 + 2**2)])
 def test_a_turn_that_nobody_expected_makes_a_pose_less_certain(
-    careful: Scene, monkeypatch: pytest.MonkeyPatch
+    careful: Scene, monkeypatch: pytest.MonkeyPatch, turn: float, factor: float
 ) -> None:
+    # Radians; the scene's focal length is 500 pixels.
     usual = careful.track().estimate
-    turn = 0.02  # radians; the scene's focal length is 500 pixels
     monkeypatch.setattr(judgement, "_changes", lambda frame, motion: (np.degrees(turn), 0.0))
     turned_otherwise = careful.track().estimate
     assert usual.covariance is not None
     assert turned_otherwise.covariance is not None
     larger = turned_otherwise.covariance[0, 0] / usual.covariance[0, 0]
-    assert larger == pytest.approx(1 + (500 * turn / EvidenceThresholds().surprise_pixels) ** 2)
+    assert larger == pytest.approx(factor)
 
 
 @pytest.mark.parametrize(("looser", "factor"), [(1.2, 1.0), (2.0, 2.0 / 1.3)])

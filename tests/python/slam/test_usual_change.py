@@ -103,9 +103,7 @@ def test_the_change_is_from_the_pose_to_where_the_motion_led() -> None:
 def test_a_pose_far_from_where_the_motion_led_may_be_a_mistake(
     core: FakeCore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scene = Scene(
-        Sensor.STEREO, core, TrackingThresholds(local_map_inliers=10), evidence=LIMITS
-    )
+    scene = Scene(Sensor.STEREO, core, TrackingThresholds(local_map_inliers=10), evidence=LIMITS)
     scene.run(40)
     usual = scene.track().estimate.covariance
     optimize = core.optimize_pose

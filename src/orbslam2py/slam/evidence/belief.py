@@ -95,15 +95,15 @@ class Belief:
                 self._search.found_again(frame)
                 self._search.motion.jump(None)
         self._search.settle(refined)
+        motion = self._search.motion
+        change = motion.change(frame)
+        covariance = self._judge.stated_covariance(refined, evidence, motion, change)
         estimate = replace(
-            refined.estimate,
-            evidence=evidence,
-            method=hypothesis.method,
-            covariance=self._judge.stated_covariance(refined, evidence, self._search.motion),
+            refined.estimate, evidence=evidence, method=hypothesis.method, covariance=covariance
         )
         if evidence.verdict is Verdict.REFUSED:
             return estimate.failed(Reason.WEAK_EVIDENCE)
-        self._judge.get_used_to_frame(refined, evidence, self._search.motion)
+        self._judge.get_used_to_frame(refined, evidence, change)
         if evidence.verdict is Verdict.STRONG or self._may_count(evidence):
             self._judge.get_used_to(refined)
         return estimate

@@ -161,11 +161,10 @@ class EvidenceJudge:
         self._usual = figures if usual is None else usual.moved_to(figures, self.limits.gain)
 
     def get_used_to_frame(
-        self, refined: RefinedPose, evidence: Evidence, motion: MotionModel
+        self, refined: RefinedPose, evidence: Evidence, change: FloatArray | None
     ) -> None:
         """Let a frame that is believed, strong or weak, move what is usual of image and motion."""
         self._smear.see(refined.frame.features)
-        change = motion.change(refined.frame)
         if change is not None:
             self._change.see(change)
         error = evidence.match_error
@@ -177,7 +176,11 @@ class EvidenceJudge:
         self._error_spread += gain * (abs(error - usual) - self._error_spread)
 
     def stated_covariance(
-        self, refined: RefinedPose, evidence: Evidence, motion: MotionModel
+        self,
+        refined: RefinedPose,
+        evidence: Evidence,
+        motion: MotionModel,
+        change: FloatArray | None,
     ) -> FloatArray | None:
         """The covariance that a pose is told with.
 
@@ -206,12 +209,12 @@ class EvidenceJudge:
             larger = min(evidence.error_to_usual, limits.largest_error)
             factor = max(factor, larger**2 * max(together, per_cell))
         surprise = self._pixels(evidence.turn_change) / limits.surprise_pixels
+        surprise = min(surprise, limits.largest_surprise)
         looseness = max(1.0, evidence.deviation_to_usual / limits.usual_deviation)
         covariance = covariance * (factor * (1.0 + surprise**2) * looseness)
         move = motion.move_of_map(refined.frame)
         if move is not None:
             covariance = covariance + move[:, None] * move
-        change = motion.change(refined.frame)
         beyond = None if change is None else self._change.beyond(change)
         if beyond is not None:
             covariance = covariance + limits.mistaken_share * beyond[:, None] * beyond
