@@ -152,19 +152,28 @@ void leave_out_hidden(Group& group, const Pose& T_cw) {
   }
 }
 
-/// Inverse of the inliers' normal matrix times their residual variance; zero when undetermined.
+/// Inverse of the normal matrix of the observations in use, for residuals with a variance of 1;
+/// zero when undetermined. `cost` becomes their sum of squares.
+Matrix6d unit_covariance(const Workspace& w, const Projection& projection, const Pose& T_cw,
+                         double& cost) {
+  NormalEquations equations;
+  cost = evaluate(w, projection, T_cw, false, &equations);
+  const Eigen::LLT<Matrix6d> factor(equations.H);
+  if (factor.info() != Eigen::Success) return Matrix6d::Zero();
+  const Matrix6d inverse = factor.solve(Matrix6d::Identity());
+  if (!inverse.allFinite()) return Matrix6d::Zero();
+  return 0.5 * (inverse + inverse.transpose());
+}
+
+/// The same times the variance that the inliers' residuals have.
 Matrix6d covariance(const Workspace& w, const Projection& projection, const Pose& T_cw) {
   int n_residuals = 0;
   for (const double weight : w.mono.weight) n_residuals += weight > 0 ? 2 : 0;
   for (const double weight : w.stereo.weight) n_residuals += weight > 0 ? 3 : 0;
   if (n_residuals <= 6) return Matrix6d::Zero();
-  NormalEquations equations;
-  const double cost = evaluate(w, projection, T_cw, false, &equations);
-  const Eigen::LLT<Matrix6d> factor(equations.H);
-  if (factor.info() != Eigen::Success) return Matrix6d::Zero();
-  const Matrix6d inverse = factor.solve(Matrix6d::Identity());
-  if (!inverse.allFinite()) return Matrix6d::Zero();
-  return 0.5 * (inverse + inverse.transpose()) * (cost / (n_residuals - 6));
+  double cost = 0;
+  const Matrix6d unit = unit_covariance(w, projection, T_cw, cost);
+  return unit * (cost / (n_residuals - 6));
 }
 
 /// The rounds over a filled workspace. `outlier` has one flag per slot, preset by the caller;
@@ -187,6 +196,14 @@ void run_rounds(Workspace& w, const Projection& projection, const Pose& T_cw_ini
     if (n_observations < kFewObservations || estimate.n_inliers < kMinObservations) break;
   }
   estimate.covariance = covariance(w, projection, estimate.T_cw);
+}
+
+/// Adds what keypoint i is associated with; false, and nothing added, for broken numbers.
+bool add_association(Workspace& w, const TrackedFrame& frame, std::size_t i) {
+  const Frame& f = *frame.frame;
+  const Keypoint& keypoint = f.keypoints[i];
+  return w.add(frame.positions[i], keypoint.x, keypoint.y, f.right_u[i],
+               f.scales->inverse_sigma2(keypoint.level), f.has_depth(i), i);
 }
 
 }  // namespace
@@ -216,15 +233,29 @@ PoseEstimate optimize_pose(TrackedFrame& frame) {
   for (std::size_t i = 0; i < f.size(); ++i) {
     frame.outlier[i] = 0;
     if (!frame.map_points[i].valid()) continue;
-    const Keypoint& keypoint = f.keypoints[i];
-    const bool usable = w.add(frame.positions[i], keypoint.x, keypoint.y, f.right_u[i],
-                              f.scales->inverse_sigma2(keypoint.level), f.has_depth(i), i);
-    frame.outlier[i] = usable ? 0 : 1;
+    frame.outlier[i] = add_association(w, frame, i) ? 0 : 1;
   }
   PoseEstimate estimate;
   run_rounds(w, {f.camera->pinhole(), f.camera->bf()}, *frame.T_cw, estimate, frame.outlier.data());
   frame.T_cw = estimate.T_cw;
   return estimate;
+}
+
+Matrix6d pose_covariance(const TrackedFrame& frame) {
+  if (!frame.T_cw) {
+    throw StateError("pose_covariance: the frame has no pose; set T_cw first");
+  }
+  const Frame& f = *frame.frame;
+  Workspace& w = workspace();
+  w.clear();
+  for (std::size_t i = 0; i < f.size(); ++i) {
+    if (frame.map_points[i].valid() && frame.outlier[i] == 0) add_association(w, frame, i);
+  }
+  if (w.size() < kMinObservations) return Matrix6d::Zero();
+  w.mono.pad();
+  w.stereo.pad();
+  double cost = 0;
+  return unit_covariance(w, {f.camera->pinhole(), f.camera->bf()}, *frame.T_cw, cost);
 }
 
 }  // namespace orbslam

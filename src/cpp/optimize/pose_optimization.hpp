@@ -42,4 +42,10 @@ PoseEstimate optimize_pose(const Pose& T_cw_initial, const Pinhole& pinhole, dou
 /// after a thread's first do not allocate. Throws StateError when the frame has no pose.
 PoseEstimate optimize_pose(TrackedFrame& frame);
 
+/// Covariance (rotation, translation; left perturbation) of the pose that a frame has, for
+/// associations that are off by as much as their keypoints are taken for: a frame whose keypoints
+/// became the points fits them without error, and tells nothing of that noise. Outliers take no
+/// part; zero where fewer than 3 associations are left. Throws StateError without a pose.
+Matrix6d pose_covariance(const TrackedFrame& frame);
+
 }  // namespace orbslam

@@ -335,8 +335,9 @@ class Tracking:
         self._search.motion.remember(frame)
         self._since_keyframe = SinceKeyframe(frame.id)
         n = frame.n_associated()
-        # The first pose is the origin: it is known exactly.
-        estimate = PoseEstimate(n_matches=n, n_inliers=n, covariance=np.zeros((6, 6)))
+        # It is the origin, and yet lies in its map no better than the keypoints that became points.
+        covariance = core.pose_covariance(frame)
+        estimate = PoseEstimate(n_matches=n, n_inliers=n, covariance=covariance)
         earlier = self._initializer.take_earlier()
         return TrackingOutcome(self.state, estimate, is_keyframe=True, earlier=earlier)
 

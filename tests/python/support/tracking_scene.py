@@ -259,6 +259,10 @@ class FakeCore:
         n = self.inliers.popleft() if self.inliers else 100
         return SimpleNamespace(n_inliers=n, covariance=np.eye(6) * n)
 
+    def pose_covariance(self, frame: FakeFrame) -> np.ndarray:
+        assert frame.T_cw is not None
+        return np.diag([1.0, 1, 1, 2, 2, 2])
+
     def select_local_map(self, world: FakeMap, frame: FakeFrame) -> SimpleNamespace:
         self.calls.append("local map")
         if self.local_reference >= 0:
