@@ -17,6 +17,8 @@ from orbslam2py._arrays import ByteArray, FloatArray
 _WINDOW, _HALVINGS = (15, 15), 3
 #: Points that do not come back to their beginning to so many pixels are dropped.
 _THERE_AND_BACK = 0.5
+#: A tracker looks back over so many images at once, each of which adds an error of its own.
+_CHECK_EVERY, _BACK_OVER_SOME = 2, 0.75
 #: Corners are looked for in so many parts of an image by row and column, so that a single thing
 #: with much texture does not take them all; least quality by the best of a part, and distance.
 _N_PARTS, _QUALITY, _APART = 4, 0.05, 7
@@ -101,11 +103,24 @@ def follow_points(
         return np.zeros((0, 2)), np.zeros(0, np.bool_)
     begin = points.astype(np.float32)
     there, found = _flow(before, after, begin, begin, halvings)
-    # Back from where it began, halved once: what is right stays there. Through all halvings the
-    # way is found again, which takes three times as long and tells the same.
-    back, found_back = _flow(after, before, there, begin, 1)
-    same = np.abs(back - begin).max(axis=1) < _THERE_AND_BACK
-    return there.astype(np.float64), found & found_back & same
+    return there.astype(np.float64), found & _lead_back(
+        before, after, begin, there, _THERE_AND_BACK
+    )
+
+
+def _lead_back(
+    before: ByteArray,
+    after: ByteArray,
+    begin: NDArray[np.float32],
+    there: NDArray[np.float32],
+    within: float,
+) -> NDArray[np.bool_]:
+    """Which points (n, 2) of the later image lead back to where they were in the earlier one."""
+    # From where it began, halved once: what is right stays there. Through all halvings the way is
+    # found again, which takes three times as long and tells the same.
+    back, found = _flow(after, before, there, begin, 1)
+    same: NDArray[np.bool_] = found & (np.abs(back - begin).max(axis=1) < within)
+    return same
 
 
 def _flow(
@@ -131,7 +146,12 @@ def _flow(
 class _Points:
     frame: int
     start: FloatArray
-    now: FloatArray
+    checked: NDArray[np.float32]
+    """Where they were in the image that was checked last."""
+    now: NDArray[np.float32]
+
+    def keep(self, good: NDArray[np.bool_]) -> None:
+        self.start, self.checked, self.now = self.start[good], self.checked[good], self.now[good]
 
 
 class PointTracker:
@@ -159,6 +179,7 @@ class PointTracker:
         self._every, self._spans = every, spans
         self._n_points, self._least = n_points, least
         self._previous: ByteArray | None = None
+        self._checked: ByteArray | None = None
         self._sets: list[_Points] = []
         self._frame = 0
 
@@ -179,33 +200,52 @@ class PointTracker:
         """
         if self._previous is not None and self._sets:
             self._follow(self._previous, grey)
+        # Also where points begin and pairs are made.
+        if self._frame % self._every % _CHECK_EVERY == 0:
+            if self._checked is not None and self._sets:
+                self._check(self._checked, grey)
+            self._checked = grey
         pairs = list(self._pairs())
         if self._frame % self._every == 0:
             start = find_corners(grey, self._n_points, mask)
             if len(start):
-                self._sets.append(_Points(self._frame, start, start.copy()))
+                begin = start.astype(np.float32)
+                self._sets.append(_Points(self._frame, start, begin, begin))
         self._previous = grey
         self._frame += 1
         return pairs
 
     def _follow(self, before: ByteArray, grey: ByteArray) -> None:
         now = np.concatenate([points.now for points in self._sets])
-        there, good = follow_points(before, grey, now, halvings=_HALVINGS)
-        begin = 0
-        kept = []
-        for points in self._sets:
-            part = slice(begin, begin + len(points.now))
-            begin = part.stop
-            points.start = points.start[good[part]]
-            points.now = there[part][good[part]]
-            if len(points.now) >= self._least:
-                kept.append(points)
-        self._sets = kept
+        there, found = _flow(before, grey, now, now, _HALVINGS)
+        for points, part in self._parts():
+            points.now = there[part]
+            points.keep(found[part])
+        self._drop_small_sets()
+
+    def _check(self, before: ByteArray, grey: ByteArray) -> None:
+        begin = np.concatenate([points.checked for points in self._sets])
+        now = np.concatenate([points.now for points in self._sets])
+        good = _lead_back(before, grey, begin, now, _BACK_OVER_SOME)
+        for points, part in self._parts():
+            points.keep(good[part])
+            points.checked = points.now
+        self._drop_small_sets()
+
+    def _parts(self) -> list[tuple[_Points, slice]]:
+        """Each set, and where its points lie among those of all."""
+        ends = np.cumsum([len(points.now) for points in self._sets]).tolist()
+        begins = [0, *ends[:-1]]
+        return [(p, slice(a, b)) for p, a, b in zip(self._sets, begins, ends, strict=True)]
+
+    def _drop_small_sets(self) -> None:
+        self._sets = [points for points in self._sets if len(points.now) >= self._least]
 
     def _pairs(self) -> Iterator[TrackedPair]:
         for points in list(self._sets):
             age = self._frame - points.frame
             if age and age % self._every == 0:
-                yield TrackedPair(points.start, points.now, (points.frame, self._frame))
+                now = points.now.astype(np.float64)
+                yield TrackedPair(points.start, now, (points.frame, self._frame))
             if age == self._every * self._spans:
                 self._sets.remove(points)

@@ -126,7 +126,9 @@ class SequenceRunner:
         in_time = options.realtime or self._feed.is_live
         # Told by the watch, which knows more, or by nobody.
         how = replace(options.system, wait_for_mapping=not in_time, check_calibration=False)
-        self._watch = self._calibration_watch(in_time)
+        self._watch = self._calibration_watch(
+            in_background=in_time or not options.system.deterministic
+        )
         system = System(
             result.settings,
             options.sensor,
@@ -175,14 +177,14 @@ class SequenceRunner:
             _log.warning("%s", doubt)
             result.warnings.append(doubt)
 
-    def _calibration_watch(self, in_time: bool) -> CalibrationWatch | None:
+    def _calibration_watch(self, *, in_background: bool) -> CalibrationWatch | None:
         if not self._options.system.check_calibration:
             return None
         return CalibrationWatch(
             self.result.settings,
             self._options.sensor,
             known=settings_beside(self.result.sequence),
-            in_background=in_time,
+            in_background=in_background,
         )
 
     def _calibration_warnings(self, system: System) -> list[str]:
