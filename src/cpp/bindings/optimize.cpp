@@ -67,12 +67,12 @@ void bind_pose_optimization(py::module_& module) {
       "outlier flags. Four rounds of damped least squares with a Huber kernel (off in the last);\n"
       "outliers are judged anew after each. Fewer than 3 associations: pose unchanged, no\n"
       "inliers. Raises StateError when the frame has no pose.");
-  module.def("pose_covariance", &pose_covariance, "frame"_a,
-             py::call_guard<py::gil_scoped_release>(),
-             "Covariance (6, 6) float64 of the pose that a frame has, rotation [rad] and\n"
-             "translation, left perturbation, for associations that are off by as much as their\n"
-             "keypoints are taken for. Outliers take no part; zero with fewer than 3 others. Raises\n"
-             "StateError when the frame has no pose.");
+  module.def(
+      "pose_covariance", &pose_covariance, "frame"_a, py::call_guard<py::gil_scoped_release>(),
+      "Covariance (6, 6) float64 of the pose that a frame has, rotation [rad] and\n"
+      "translation, left perturbation, for associations that are off by as much as their\n"
+      "keypoints are taken for. Outliers take no part; zero with fewer than 3 others. Raises\n"
+      "StateError when the frame has no pose.");
   module.def(
       "optimize_pose",
       [](const Pose& T_cw, const Eigen::Vector4d& intrinsics, double bf,

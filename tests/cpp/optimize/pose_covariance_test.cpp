@@ -17,7 +17,8 @@ TrackedFrame frame_with_pose(float noise) {
   Features features;
   std::vector<Eigen::Vector3d> points;
   for (int i = 0; i < 48; ++i) {
-    const Eigen::Vector3d point((i % 8 - 3.5) * 0.2, (i / 8 - 2.5) * 0.2, 2 + i % 3);
+    const int column = i % 8, row = i / 8;
+    const Eigen::Vector3d point((column - 3.5) * 0.2, (row - 2.5) * 0.2, 2 + i % 3);
     const Eigen::Vector2d pixel = options.pinhole.project(point);
     Keypoint keypoint;
     keypoint.x = static_cast<float>(pixel.x()) + (i % 2 == 0 ? noise : -noise);
