@@ -163,9 +163,9 @@ class EvidenceThresholds:
     """... or more with five times; images far apart turn by any angle."""
     usual_deviation: float = 1.3
     """A position beyond so many times the usual deviation is told with as much more variance."""
-    usual_changes: float = 2.0
+    usual_changes: float = 1.5
     """A pose farther from where the motion led than so many times what is usual ..."""
-    mistaken_share: float = 0.04
+    mistaken_share: float = 0.06
     """... is told as one that is off by what is beyond it with this probability: either the camera
     changed its motion or the pose is mistaken."""
     changes_seen: int = 3

@@ -35,18 +35,19 @@ def test_nothing_is_unusual_before_a_few_changes_are_known() -> None:
     assert usual.beyond(100 * ORDINARY) is not None
 
 
-def test_up_to_twice_the_usual_change_nothing_is_beyond_it() -> None:
-    usual = used_to(ORDINARY)
+def test_up_to_some_times_the_usual_change_nothing_is_beyond_it() -> None:
+    usual, most = used_to(ORDINARY), LIMITS.usual_changes
     assert usual.beyond(0 * ORDINARY) is None
-    assert usual.beyond(1.99 * ORDINARY) is None
-    np.testing.assert_allclose(usual.beyond(3 * ORDINARY), ORDINARY)
+    assert usual.beyond(0.99 * most * ORDINARY) is None
+    np.testing.assert_allclose(usual.beyond((most + 1) * ORDINARY), ORDINARY)
 
 
 @pytest.mark.parametrize("larger", [slice(0, 3), slice(3, 6)])
 def test_a_turn_or_a_way_alone_is_enough(larger: slice) -> None:
     change = ORDINARY.copy()
     change[larger] *= 8
-    np.testing.assert_allclose(used_to(ORDINARY).beyond(change), 0.75 * change)
+    share = 1 - LIMITS.usual_changes / 8
+    np.testing.assert_allclose(used_to(ORDINARY).beyond(change), share * change)
 
 
 def test_after_a_rest_any_change_is_beyond_the_usual() -> None:
