@@ -68,6 +68,8 @@ def load() -> ModuleType:
     ImportError
         Saying what is missing: instructions of the processor, a module for this Python and this
         machine, or a library of the system.
+    KeyboardInterrupt
+        On Ctrl-C, also where loading was what it interrupted.
     """
     machine = platform.machine()
     if machine in ("x86_64", "AMD64") and (lacking := missing_instructions(_first_processor())):
@@ -81,6 +83,9 @@ def load() -> ModuleType:
     try:
         return importlib.import_module(NAME)
     except ImportError as error:
+        if isinstance(error.__cause__, KeyboardInterrupt):
+            # Ctrl-C while it was loaded, which pybind11 tells as a failure to load.
+            raise KeyboardInterrupt from error
         folder = Path(__file__).parent
         names = sorted(path.name for path in folder.glob("_core.*.so"))
         python = f"{sys.implementation.name} {sys.version_info.major}.{sys.version_info.minor}"

@@ -79,3 +79,17 @@ def test_other_import_errors_are_not_taken_for_it(copied: Path) -> None:
     done = run_in(copied, "-c", "import orbslam2py; orbslam2py.nothing")
     assert "AttributeError" in done.stderr
     assert "compiled part" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("cause", "raised"), [(KeyboardInterrupt(), KeyboardInterrupt), (OSError(), ImportError)]
+)
+def test_an_interrupt_while_it_is_loaded_is_an_interrupt(
+    monkeypatch: pytest.MonkeyPatch, cause: BaseException, raised: type[BaseException]
+) -> None:
+    def interrupted(name: str) -> None:
+        raise ImportError("initialization failed") from cause
+
+    monkeypatch.setattr(_extension.importlib, "import_module", interrupted)
+    with pytest.raises(raised):
+        _extension.load()
