@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import shutil
 import subprocess
@@ -90,6 +91,6 @@ def test_an_interrupt_while_it_is_loaded_is_an_interrupt(
     def interrupted(name: str) -> None:
         raise ImportError("initialization failed") from cause
 
-    monkeypatch.setattr(_extension.importlib, "import_module", interrupted)
+    monkeypatch.setattr(importlib, "import_module", interrupted)
     with pytest.raises(raised):
         _extension.load()
