@@ -54,6 +54,13 @@ def test_after_a_rest_any_change_is_beyond_the_usual() -> None:
     np.testing.assert_array_equal(used_to(0 * ORDINARY).beyond(ORDINARY), ORDINARY)
 
 
+def test_a_camera_that_was_at_rest_from_the_first_image_on_is_got_used_to() -> None:
+    usual = used_to(0 * ORDINARY)
+    for _ in range(30):
+        usual.see(ORDINARY)
+    assert usual.beyond(ORDINARY) is None
+
+
 def test_one_sudden_change_does_not_make_the_next_usual() -> None:
     usual = used_to(ORDINARY)
     usual.see(1000 * ORDINARY)

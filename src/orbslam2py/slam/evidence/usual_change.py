@@ -57,9 +57,10 @@ class UsualChange:
             The frame's.
         """
         turn, way = _squares(change)
-        if self._n_seen > 0:
-            most = self._limits.sudden_change**2
-            turn, way = min(turn, most * self._turn), min(way, most * self._way)
+        # After complete rest nothing is usual: several times nothing would stay so for ever.
+        most = self._limits.sudden_change**2
+        turn = min(turn, most * self._turn) if self._turn > 0 else turn
+        way = min(way, most * self._way) if self._way > 0 else way
         gain = max(self._limits.gain, 1.0 / (self._n_seen + 1))
         self._turn += gain * (turn - self._turn)
         self._way += gain * (way - self._way)
