@@ -72,24 +72,53 @@ std::vector<KeyFrameId> outer_keyframes(const std::vector<const MapPoint*>& poin
   return outer;
 }
 
-/// Fixes the oldest free keyframes until the problem has the fixed poses that determine its frame
-/// (and, for a single camera, its scale), as long as more than one stays free.
-void fix_gauge(GatheredBundle& bundle, bool monocular) {
+/// Fixes the oldest keyframe where nothing else is, as long as another one stays free.
+void fix_gauge(GatheredBundle& bundle) {
   auto& cameras = bundle.problem.cameras;
-  const int needed = monocular ? 2 : 1;
-  int n_fixed = bundle.n_fixed();
-  int n_free = static_cast<int>(cameras.size()) - n_fixed;
-  for (auto& camera : cameras) {  // the local ones come first, oldest first
-    if (n_fixed >= needed || n_free <= 1) return;
-    if (camera.fixed) continue;
-    camera.fixed = true;
-    ++n_fixed;
-    --n_free;
-  }
+  if (cameras.size() > 1 && bundle.n_fixed() == 0) cameras.front().fixed = true;
 }
 
-GatheredBundle gather(const Map& map, KeyFrameId current, bool monocular,
-                      LocalBundleResult& result) {
+/// Holds the scale of what a single camera saw, where only one pose is fixed: images do not tell
+/// it, so it may be put back after the solution at no cost. A second fixed pose would hold it as
+/// well, and bend the map around what was known of that one at first.
+class ScaleGauge {
+ public:
+  ScaleGauge(const GatheredBundle& bundle, bool monocular) {
+    if (!monocular || bundle.n_fixed() != 1) return;
+    for (const auto& camera : bundle.problem.cameras) {
+      if (camera.fixed) origin_ = camera.T_cw.center();
+    }
+    size_ = size_of(bundle.problem);
+  }
+
+  void restore(BundleProblem& problem) const {
+    const double size = size_of(problem);
+    if (!(size_ > 0 && size > 0)) return;
+    const double factor = size_ / size;
+    for (auto& camera : problem.cameras) {
+      if (camera.fixed) continue;
+      const Eigen::Vector3d center = scaled(camera.T_cw.center(), factor);
+      camera.T_cw = Pose(camera.T_cw.rotation(), -(camera.T_cw.rotation() * center));
+    }
+    for (Eigen::Vector3d& point : problem.points) point = scaled(point, factor);
+  }
+
+ private:
+  /// Sum of the distances of all cameras from the fixed one.
+  double size_of(const BundleProblem& problem) const {
+    double sum = 0;
+    for (const auto& camera : problem.cameras) sum += (camera.T_cw.center() - origin_).norm();
+    return sum;
+  }
+  Eigen::Vector3d scaled(const Eigen::Vector3d& position, double factor) const {
+    return origin_ + factor * (position - origin_);
+  }
+
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
+  double size_ = 0;  ///< 0: the scale is fixed, or measured
+};
+
+GatheredBundle gather(const Map& map, KeyFrameId current, LocalBundleResult& result) {
   const auto lock = map.read_lock();
   GatheredBundle bundle(map);
   const KeyFrame* keyframe = map.find(current);
@@ -104,7 +133,7 @@ GatheredBundle gather(const Map& map, KeyFrameId current, bool monocular,
     bundle.add_camera(*map.find(id), true);
   }
   bundle.add_points(points, map);
-  fix_gauge(bundle, monocular);
+  fix_gauge(bundle);
   result.n_local_keyframes = static_cast<int>(local.size());
   result.n_fixed_keyframes = bundle.n_fixed();
   result.n_points = static_cast<int>(bundle.points.size());
@@ -122,15 +151,17 @@ LocalBundleResult local_bundle_adjustment(Map& map, KeyFrameId current,
     result.summary.aborted = true;
     return result;
   }
-  GatheredBundle bundle = gather(map, current, monocular, result);
+  GatheredBundle bundle = gather(map, current, result);
   if (bundle.problem.observations.empty()) return result;
   BundleOptions options;
   options.n_threads = n_threads;
   options.solver = solver;
+  const ScaleGauge scale(bundle, monocular);
   result.summary = solve_bundle(bundle.problem, options, abort);
   // Every accepted step lowers the cost; without one there is nothing to write.
   const bool moved = result.summary.iterations > 0;
   if (!moved && !result.summary.stage_one_done) return result;
+  if (moved) scale.restore(bundle.problem);
 
   const auto lock = map.write_lock();
   if (map.epoch() != bundle.epoch) return result;

@@ -23,11 +23,11 @@ struct LocalBundleResult {
 /// one write section that re-checks what has died meanwhile. An epoch change in between drops the
 /// result, and a dead or unknown `current` gives an empty one (a reset may have been faster).
 ///
-/// Fixed are the root of the map, the outer observers and, where that leaves fewer fixed poses than
-/// the gauge needs (two for a single camera because of the scale, else one), the oldest local
-/// keyframes. `abort` is polled once per iteration; nullptr: never. After an abort the progress is
-/// written; observations are erased only if the first stage was finished. See
-/// docs/method/mapping.md#local-bundle-adjustment and
+/// Fixed are the root of the map, the outer observers and, where there are none, the oldest local
+/// keyframe. With a single camera and one fixed pose the scale is kept as well: the distances of
+/// the others from that one have the same sum as before. `abort` is polled once per iteration;
+/// nullptr: never. After an abort the progress is written; observations are erased only if the
+/// first stage was finished. See docs/method/mapping.md#local-bundle-adjustment and
 /// docs/method/adjustment.md#local-bundle-adjustment.
 LocalBundleResult local_bundle_adjustment(Map& map, KeyFrameId current,
                                           const std::atomic<bool>* abort, bool monocular = false,
