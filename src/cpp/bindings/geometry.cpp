@@ -163,6 +163,27 @@ void bind_two_view(py::module_& module) {
       "for bad shapes, indices or options.");
 }
 
+void bind_place_points(py::module_& module) {
+  module.def(
+      "place_points",
+      [](const Input<float>& initial, const Input<float>& current,
+         const Input<std::int32_t>& matches, const Eigen::Vector4d& intrinsics, const Pose& T_21,
+         double sigma) {
+        if (matches.ndim() != 1) throw py::value_error("matches must have the shape (n,)");
+        const auto points_1 = positions_of(initial, "initial");
+        const auto points_2 = positions_of(current, "current");
+        const std::vector<int> indices(matches.data(), matches.data() + matches.size());
+        const TwoViewInput input{points_1, points_2, indices, pinhole_of(intrinsics)};
+        const py::gil_scoped_release release;
+        return place_points(input, T_21, sigma);
+      },
+      "initial"_a, "current"_a, "matches"_a, "intrinsics"_a, "T_21"_a, "sigma"_a = 1.0,
+      "What a motion that is known already places: a TwoViewMotion with all matches that fit it,\n"
+      "by the rules of reconstruct_two_views. `T_21`: Pose, camera 1 to camera 2; the length of\n"
+      "its translation becomes 1. The others as there. Raises ValueError for bad shapes or\n"
+      "indices, and for a translation of 0.");
+}
+
 PnpProblem pnp_problem(const Input<double>& points, const Input<double>& pixels,
                        const Input<double>& sigma2, const Eigen::Vector4d& intrinsics) {
   const auto n = static_cast<Eigen::Index>(rows_of(points, 3, "points"));
@@ -250,6 +271,7 @@ void bind_geometry(py::module_& module) {
              "The (3, 3) matrix F_12 with x_1^T F_12 x_2 = 0 for pixels (u, v, 1) of cameras with\n"
              "calibration matrices K_1 and K_2.");
   bind_two_view(module);
+  bind_place_points(module);
   bind_epnp(module);
   bind_pnp_ransac(module);
 }

@@ -124,6 +124,13 @@ void report_models(const Models& models, const std::vector<int>& matches, TwoVie
   result.fundamental_inlier = spread<std::uint8_t>(models.fundamental.inliers, matches, 0);
 }
 
+TwoViewMotion placed(const Motion& motion, const MotionSupport& support,
+                     const std::vector<int>& matches) {
+  return {Pose(motion.R, motion.t), support.parallax,
+          spread<Eigen::Vector3d>(support.points, matches, Eigen::Vector3d::Zero()),
+          spread<std::uint8_t>(support.triangulated, matches, 0)};
+}
+
 std::vector<TwoViewMotion> alternatives(const std::vector<Motion>& motions,
                                         const std::vector<MotionSupport>& supports,
                                         std::size_t best, const TwoViewInput& input) {
@@ -132,10 +139,7 @@ std::vector<TwoViewMotion> alternatives(const std::vector<Motion>& motions,
   for (std::size_t i = 0; i < motions.size(); ++i) {
     const MotionSupport& support = supports[i];
     if (static_cast<double>(support.n_good) < least) continue;
-    found.push_back(
-        {Pose(motions[i].R, motions[i].t), support.parallax,
-         spread<Eigen::Vector3d>(support.points, input.matches, Eigen::Vector3d::Zero()),
-         spread<std::uint8_t>(support.triangulated, input.matches, 0)});
+    found.push_back(placed(motions[i], support, input.matches));
   }
   return found;
 }
@@ -243,6 +247,19 @@ TwoViewResult reconstruct_two_views(const TwoViewInput& input, const TwoViewOpti
     check_samples(samples, n_matches);
     return samples;
   });
+}
+
+TwoViewMotion place_points(const TwoViewInput& input, const Pose& T_21, double sigma) {
+  const double length = T_21.translation().norm();
+  if (!(length > 0)) {
+    throw std::invalid_argument("a motion without a translation places no points");
+  }
+  const PointPairs pairs = gather_pairs(input.initial, input.current, input.matches);
+  const Motion motion{T_21.rotation().toRotationMatrix(), T_21.translation() / length};
+  const std::vector<std::uint8_t> all(pairs.size(), 1);
+  const MotionSupport support =
+      check_motion(motion, pairs, all, input.pinhole, max_chi2 * sigma * sigma);
+  return placed(motion, support, input.matches);
 }
 
 }  // namespace orbslam

@@ -87,4 +87,9 @@ TwoViewResult reconstruct_two_views(const TwoViewInput& input, const TwoViewOpti
 TwoViewResult reconstruct_two_views(const TwoViewInput& input, const TwoViewOptions& options,
                                     const std::vector<EightPairs>& samples, WorkerThread* helper);
 
+/// What a motion that is known already places: all matches that fit it, by the rules of
+/// reconstruct_two_views. The length of T_21's translation becomes 1; throws std::invalid_argument
+/// when it is 0, and for matches that do not fit the points.
+TwoViewMotion place_points(const TwoViewInput& input, const Pose& T_21, double sigma);
+
 }  // namespace orbslam

@@ -63,6 +63,15 @@ class InitializationThresholds:
     clearly_worse: float = 2.0
     """Of motions that two views cannot tell apart, the others must fit a third view worse than
     the right one by this factor."""
+    further_draws: int = 5
+    """So many more draws give motions that all views are asked to compare. One whose direction
+    differs ..."""
+    other_direction: float = 30.0
+    """... by so many degrees from the best ..."""
+    clearly_worse_direction: float = 1.1
+    """... must fit worse by this factor, or the map waits for more parallax ..."""
+    points: int = 100
+    """... as it does as long as fewer points can be placed than a first map must have."""
     feature_factor: int = 2
     """Extracted features while a single camera starts, in multiples of the settings' number ..."""
     raised_feature_factor: int = 4

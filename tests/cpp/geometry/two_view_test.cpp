@@ -155,6 +155,28 @@ TEST(TwoViews, ResultsBelongToTheInitialKeypoints) {
   }
 }
 
+TEST(TwoViews, AKnownMotionPlacesWhatTheReconstructionPlaced) {
+  const auto scene = make_two_view_scene(SceneShape::general, sideways_motion(), 200, 0.3, 2);
+  const TwoViewResult found = reconstruct(scene);
+  ASSERT_TRUE(found.success());
+  const TwoViewInput input{scene.initial, scene.current, scene.matches, scene.pinhole};
+  // Of any length: it becomes 1.
+  const Pose longer(found.T_21.rotation(), 3.0 * found.T_21.translation());
+  const TwoViewMotion placed = place_points(input, longer, 1.0);
+  EXPECT_NEAR(placed.T_21.translation().norm(), 1, 1e-12);
+  EXPECT_NEAR(placed.parallax, found.parallax, 0.2);
+  ASSERT_EQ(placed.triangulated.size(), found.triangulated.size());
+  for (std::size_t i = 0; i < placed.points.size(); ++i) {
+    // The matrix' inliers are asked there, all matches here.
+    EXPECT_GE(placed.triangulated[i], found.triangulated[i]);
+    if (found.triangulated[i] == 1) {
+      EXPECT_LT((placed.points[i] - found.points[i]).norm(), 1e-9 * found.points[i].norm());
+    }
+  }
+  const Pose still(found.T_21.rotation(), Eigen::Vector3d::Zero());
+  EXPECT_THROW(place_points(input, still, 1.0), std::invalid_argument);
+}
+
 // OD-64: no score above 0 is no model. OD-67: keypoints in one column are degenerate.
 TEST(TwoViews, DegenerateInputsFailWithAReason) {
   auto scene = make_two_view_scene(SceneShape::general, sideways_motion(), 150, 0.3, 1);

@@ -17,6 +17,7 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py.slam.front_end import intrinsics
 from orbslam2py.slam.initialization.earlier_frames import EarlierFrames
 from orbslam2py.slam.initialization.kept_views import KeptViews, View
+from orbslam2py.slam.initialization.several_views import SeveralViews
 from orbslam2py.slam.initialization.third_view import (
     Candidate,
     Motion,
@@ -179,10 +180,14 @@ class MonocularInitializer:
                 reason = _REASONS[result.outcome.name]
         for candidate in sorted(candidates, key=lambda candidate: -candidate.worth):
             motion = confirmed_motion(candidate, self._kept.views, frame.features, self._limits)
-            if motion is not None:
-                return self._build_map(candidate.view, motion, frame)
-            if candidate.is_clear:
-                reason = Reason.NO_THIRD_VIEW
+            if motion is None:
+                reason = Reason.NO_THIRD_VIEW if candidate.is_clear else reason
+                continue
+            together = SeveralViews(candidate, self._kept.views, frame.features, self._limits)
+            best = together.best_motion(motion, self._seed)
+            if best is not None:
+                return self._build_map(candidate.view, best, frame)
+            reason = Reason.AMBIGUOUS_MOTION
         return reason
 
     def _tried_views(self) -> list[View]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
@@ -17,8 +18,10 @@ from orbslam2py.slam.thresholds import InitializationThresholds
 
 Motion: TypeAlias = core.TwoViewResult | core.TwoViewMotion
 
-_FEWEST_COMMON = 30  # points that a third view must see to be asked
-_INLIER_CHI2 = 5.991  # 95 %, two degrees of freedom
+#: Points that a third view must see to be asked.
+FEWEST_COMMON = 30
+#: Limit of squared errors over their variance: 95 %, two degrees of freedom.
+INLIER_CHI2 = 5.991
 _MOST_PARALLAX = 5.0  # degrees that count: more does not make a better start
 
 
@@ -66,7 +69,7 @@ def confirmed_motion(
     A view that lies so near to one of the two that any motion would suit it is not asked. Where
     two motions are left, the right one must fit much better than the next best.
     """
-    thirds = [third for third in views if _says_something(candidate.view, third, limits)]
+    thirds = other_views(candidate.view, views, limits)
     verdicts = [_verdicts(candidate, third, last) for third in thirds]
     asked = np.array([verdict for verdict in verdicts if verdict is not None])
     if not len(asked):
@@ -84,9 +87,14 @@ def confirmed_motion(
     return candidate.motions[best]
 
 
-def _says_something(view: View, third: View, limits: InitializationThresholds) -> bool:
-    between = min(third.displacement, abs(view.displacement - third.displacement))
-    return third is not view and between >= limits.third_view_share * view.displacement
+def other_views(view: View, views: Sequence[View], limits: InitializationThresholds) -> list[View]:
+    """Those that have moved enough from a view and from the last frame to say something."""
+
+    def says_something(third: View) -> bool:
+        between = min(third.displacement, abs(view.displacement - third.displacement))
+        return third is not view and between >= limits.third_view_share * view.displacement
+
+    return [third for third in views if says_something(third)]
 
 
 def _verdicts(candidate: Candidate, third: View, last: core.Frame) -> FloatArray | None:
@@ -100,41 +108,70 @@ def _verdicts(candidate: Candidate, third: View, last: core.Frame) -> FloatArray
     for motion in candidate.motions:
         placed = placed_matches(candidate.view, motion) >= 0
         common = np.flatnonzero(placed & (partners >= 0))
-        if len(common) < _FEWEST_COMMON:
+        if len(common) < FEWEST_COMMON:
             return None
         seen = partners[common]
-        chi2 = _squared_errors(
-            motion, motion.points[common], third.keypoints[seen], 1 / third.frame.sigma2[seen], last
+        _, chi2 = pose_of_view(
+            motion.T_21,
+            motion.points[common],
+            third.keypoints[seen],
+            1 / third.frame.sigma2[seen],
+            intrinsics(last.camera),
         )
-        verdicts.append([np.mean(chi2 < _INLIER_CHI2), np.mean(np.minimum(chi2, _INLIER_CHI2))])
+        verdicts.append([np.mean(chi2 < INLIER_CHI2), np.mean(np.minimum(chi2, INLIER_CHI2))])
     return np.array(verdicts)
 
 
-def _squared_errors(
-    motion: Motion,
+def pose_of_view(
+    T_21: core.Pose,
     points: FloatArray,
-    keypoints: np.ndarray,
-    inverse_sigma2: np.ndarray,
-    last: core.Frame,
-) -> FloatArray:
-    """Squared distances (n,) of points from where a view sees them, in units of the variance.
+    keypoints: npt.NDArray[np.floating],
+    inverse_sigma2: npt.NDArray[np.floating],
+    camera: FloatArray,
+) -> tuple[core.Pose, FloatArray]:
+    """Pose of a view that sees points, and their squared errors (n,) in units of the variance.
 
-    The view's pose is estimated from them, beginning on the way from the first view to the last.
+    Parameters
+    ----------
+    T_21
+        From the first view, whose frame the points are in, to the last; the estimate begins on the
+        way between the two.
+    points
+        (n, 3).
+    keypoints
+        Where the view sees them, (n, 2) pixels.
+    inverse_sigma2
+        (n,) [px^-2].
+    camera
+        fx, fy, cx, cy.
     """
-    fx, fy, cx, cy = intrinsics(last.camera)
+    points = np.ascontiguousarray(points)
     pixels = np.full((len(points), 3), np.nan)
     pixels[:, :2] = keypoints
-    best = np.full(len(points), np.inf)
+    poses, errors = [], []
     for share in (0.5, 0.0, 1.0):
-        start = core.Pose.exp(share * motion.T_21.log())
-        found = core.optimize_pose(
-            start, intrinsics(last.camera), 0.0, points, pixels, inverse_sigma2
-        )
-        x, y, z = (found.T_cw @ np.ascontiguousarray(points)).T
-        ahead = z > 0
-        z = np.where(ahead, z, 1.0)
-        error = np.stack([fx * x / z + cx, fy * y / z + cy], axis=1) - keypoints
-        chi2 = np.where(ahead, np.sum(error**2, axis=1) * inverse_sigma2, np.inf)
-        if np.minimum(chi2, _INLIER_CHI2).sum() < np.minimum(best, _INLIER_CHI2).sum():
-            best = chi2
-    return best
+        start = core.Pose.exp(share * T_21.log())
+        found = core.optimize_pose(start, camera, 0.0, points, pixels, inverse_sigma2)
+        poses.append(found.T_cw)
+        errors.append(squared_errors(found.T_cw, points, keypoints, inverse_sigma2, camera))
+    best = int(np.argmin([np.minimum(chi2, INLIER_CHI2).sum() for chi2 in errors]))
+    return poses[best], errors[best]
+
+
+def squared_errors(
+    T_cw: core.Pose,
+    points: FloatArray,
+    keypoints: npt.NDArray[np.floating],
+    inverse_sigma2: npt.NDArray[np.floating],
+    camera: FloatArray,
+) -> FloatArray:
+    """Squared distances (n,) of points (n, 3) from where they are seen, over the variance.
+
+    Infinite behind the camera.
+    """
+    fx, fy, cx, cy = camera
+    x, y, z = (T_cw @ np.ascontiguousarray(points)).T
+    ahead = z > 0
+    z = np.where(ahead, z, 1.0)
+    error = np.stack([fx * x / z + cx, fy * y / z + cy], axis=1) - keypoints
+    return np.where(ahead, np.sum(error**2, axis=1) * inverse_sigma2, np.inf)
