@@ -1,21 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <array>
 #include <vector>
 
 #include "base/pose.hpp"
 #include "camera/camera.hpp"
+#include "optimize/pose_sums.hpp"
 
 namespace orbslam::pose_kernels {
 
-/// Points closer to the camera's plane than this are not projected.
-inline constexpr double kTinyDepth = 1e-9;
+using pose_sums::kTinyDepth;
 
 /// Observations of one kind (all with, or all without a right column) as flat arrays. Padded to a
 /// multiple of kLanes with weight 0, so that the loops have no remainder.
 struct Group {
-  static constexpr std::size_t kLanes = 2;
+  static constexpr std::size_t kLanes = pose_sums::kLanes;
 
   std::vector<double> x, y, z;        ///< world
   std::vector<double> u, v, right_u;  ///< pixels; right_u only in the group with depth

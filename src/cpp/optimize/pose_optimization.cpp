@@ -26,10 +26,20 @@ constexpr int kFewObservations = 10;  // below: one round only
 /// Everything a call needs; one per thread, so that calls after the first allocate nothing.
 struct Workspace {
   Group mono, stereo;
+  std::vector<double> used_mono, used_stereo;  ///< weights of the last round
 
   void clear() {
     mono.clear();
     stereo.clear();
+    used_mono.clear();
+    used_stereo.clear();
+  }
+  /// Notes the weights that a round is about to use; false if they are those of the last one.
+  bool note_weights() {
+    const bool same = used_mono == mono.weight && used_stereo == stereo.weight;
+    used_mono = mono.weight;
+    used_stereo = stereo.weight;
+    return !same;
   }
   /// False, and nothing added, for a broken number: it must not reach the sums.
   bool add(const Eigen::Vector3d& position, double u, double v, double right_u,
@@ -189,6 +199,8 @@ void run_rounds(Workspace& w, const Projection& projection, const Pose& T_cw_ini
     Pose T_cw = T_cw_initial;
     leave_out_hidden(w.mono, T_cw);
     leave_out_hidden(w.stereo, T_cw);
+    // The same problem from the same pose ends as before.
+    if (!w.note_weights() && round != kPlainRound) continue;
     estimate.iterations += minimise(w, projection, round != kPlainRound, T_cw);
     estimate.T_cw = T_cw;
     estimate.n_inliers = classify(w.mono, false, projection, T_cw, outlier) +
