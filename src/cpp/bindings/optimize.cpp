@@ -10,6 +10,7 @@
 #include "bindings/bindings.hpp"
 #include "bindings/stop_flag.hpp"
 #include "optimize/bundle_adjustment.hpp"
+#include "optimize/frame_sightings.hpp"
 #include "optimize/full_bundle_adjustment.hpp"
 #include "optimize/local_bundle_adjustment.hpp"
 #include "optimize/monocular_map.hpp"
@@ -46,6 +47,24 @@ std::vector<PoseObservation> pose_observations(const Input<double>& points,
     o.inverse_sigma2 = weight(i);
   }
   return observations;
+}
+
+void bind_frame_sightings(py::module_& module) {
+  using Release = py::call_guard<py::gil_scoped_release>;
+  py::class_<FrameSightings>(module, "FrameSightings",
+                             "What frames saw of the map, so that their poses can follow its "
+                             "points.")
+      .def(py::init<>(), "Nothing kept.")
+      .def("__len__", &FrameSightings::size)
+      .def("keep", &FrameSightings::keep, "frame"_a, Release(),
+           "Keep the inliers of a frame, in place of what was kept of it before.")
+      .def("forget", &FrameSightings::forget, "frame"_a, "Drop what a frame (its id) saw.")
+      .def("clear", &FrameSightings::clear, "Drop everything.")
+      .def("settle", &FrameSightings::settle, "map"_a, "recorder"_a, "n_youngest"_a = 0, Release(),
+           "Estimate the recorded poses of all but the youngest frames anew from the points as\n"
+           "they are now, and forget those frames. Lost frames, those of living keyframes and\n"
+           "those that no longer agree with half of what they saw stay as they were recorded.\n"
+           "Returns how many have a new pose.");
 }
 
 void bind_pose_optimization(py::module_& module) {
@@ -369,6 +388,7 @@ void bind_monocular_map(py::module_& module) {
 
 void bind_optimize(py::module_& module) {
   bind_pose_optimization(module);
+  bind_frame_sightings(module);
   bind_bundle(module);
   bind_local_bundle(module);
   bind_full_bundle(module);

@@ -18,6 +18,18 @@ void insert(std::vector<Item>& items, std::size_t at, const Item& item) {
 
 }  // namespace
 
+/// `T_cr` at a keyframe's present scale as it is at its first one.
+TrajectoryRecorder::RelativePose TrajectoryRecorder::relative_pose(const Pose& T_cr, double scale) {
+  const Eigen::Quaterniond& q = T_cr.rotation();
+  const Eigen::Vector3d t = T_cr.translation() / scale;
+  return {q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z()};
+}
+
+/// The way back.
+Pose TrajectoryRecorder::pose_of(const RelativePose& r, double scale) {
+  return {Eigen::Quaterniond(r.qw, r.qx, r.qy, r.qz), scale * Eigen::Vector3d(r.x, r.y, r.z)};
+}
+
 void TrajectoryRecorder::check_epoch(const Map& map) const {
   if (size() == 0 || map.epoch() == epoch_) return;
   throw StateError(
@@ -42,10 +54,7 @@ void TrajectoryRecorder::record(const Map& map, const TrackedFrame& frame, bool 
     const Anchor& anchor = frame.anchor;
     if (frame.T_cw && anchor.keyframe.valid()) {
       reference = anchor.keyframe;
-      const Pose pose = *frame.T_cw * anchor.T_kw.inverse();
-      const Eigen::Quaterniond& q = pose.rotation();
-      const Eigen::Vector3d t = pose.translation() / anchor.scale;
-      T_cr = {q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z()};
+      T_cr = relative_pose(*frame.T_cw * anchor.T_kw.inverse(), anchor.scale);
     } else if (at > 0) {
       reference = references_[at - 1];
       T_cr = T_cr_[at - 1];
@@ -63,6 +72,29 @@ void TrajectoryRecorder::record(const Map& map, const TrackedFrame& frame, bool 
   insert(references_, at, reference);
   insert(frames_, at, frame.frame->id);
   insert(lost_, at, is_lost);
+}
+
+/// Where a frame that has a pose is; size() for any other.
+std::size_t TrajectoryRecorder::place_with_pose(FrameId frame) const {
+  const std::size_t at = place_of(frame);
+  const bool known = at < size() && frames_[at] == frame;
+  return known && lost_[at] == 0 && references_[at].valid() ? at : size();
+}
+
+std::optional<Pose> TrajectoryRecorder::T_cw(const Map& map, FrameId frame) const {
+  check_epoch(map);
+  const std::size_t at = place_with_pose(frame);
+  if (at == size()) return std::nullopt;
+  const ScaledPose reference = map.scaled_pose(references_[at]);
+  return pose_of(T_cr_[at], reference.scale) * reference.T_cw;
+}
+
+void TrajectoryRecorder::move(const Map& map, FrameId frame, const Pose& T_cw) {
+  check_epoch(map);
+  const std::size_t at = place_with_pose(frame);
+  if (at == size()) return;
+  const ScaledPose reference = map.scaled_pose(references_[at]);
+  T_cr_[at] = relative_pose(T_cw * reference.T_cw.inverse(), reference.scale);
 }
 
 /// The map of every frame. The caller holds a lock.
@@ -107,10 +139,7 @@ Trajectory TrajectoryRecorder::rebuild(const Map& map, MapIndex which) const {
       T_rw = map.scaled_pose(reference);
       T_0r = T_0w * T_rw.T_cw.inverse();
     }
-    const RelativePose& r = T_cr_[i];
-    const Pose T_cr(Eigen::Quaterniond(r.qw, r.qx, r.qy, r.qz),
-                    T_rw.scale * Eigen::Vector3d(r.x, r.y, r.z));
-    trajectory.T_wc.push_back(row_major(T_0r * T_cr.inverse()));
+    trajectory.T_wc.push_back(row_major(T_0r * pose_of(T_cr_[i], T_rw.scale).inverse()));
   }
   return trajectory;
 }

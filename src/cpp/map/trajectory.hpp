@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "map/snapshot.hpp"
@@ -34,6 +35,14 @@ class TrajectoryRecorder {
   /// there is none). Throws StateError as above.
   Trajectory rebuild(const Map& map, MapIndex which = kNoMap) const;
 
+  /// Pose of a recorded frame in the map as it is now; nothing for one that is lost or unknown. The
+  /// caller holds a lock of the map.
+  std::optional<Pose> T_cw(const Map& map, FrameId frame) const;
+
+  /// Gives a frame that has a pose another one, in the map as it is now. The caller holds a lock of
+  /// the map.
+  void move(const Map& map, FrameId frame, const Pose& T_cw);
+
   /// Forgets the frames of one map, which is about to be dropped. Takes the map's read lock.
   void drop(const Map& map, MapIndex which);
 
@@ -59,8 +68,11 @@ class TrajectoryRecorder {
                          // would pad to 64 bytes
     double qw = 1, qx = 0, qy = 0, qz = 0, x = 0, y = 0, z = 0;
   };
+  static RelativePose relative_pose(const Pose& T_cr, double scale);
+  static Pose pose_of(const RelativePose& r, double scale);
   void check_epoch(const Map& map) const;
   std::size_t place_of(FrameId frame) const;
+  std::size_t place_with_pose(FrameId frame) const;
   void truncate(std::size_t n);
   std::vector<MapIndex> maps_of_frames(const Map& map) const;
 

@@ -167,19 +167,21 @@ class MapKeeper:
             "map_points": writer.keys("map_points") - looked_at,
             "observations": writer.keys("observations") - looked_at,
         }
-        rows = self._rows(changes, writer)
+        rows = self._rows(changes, writer, partly=before is not None)
         n = writer.commit(_leaving_time(rows) if gently else rows, kept)
         _log.debug("%d rows written to %s", n, writer.path)
         return changes
 
-    def _rows(self, changes: ChangedContents, writer: MapWriter) -> Iterator[tuple[str, Row]]:
+    def _rows(
+        self, changes: ChangedContents, writer: MapWriter, *, partly: bool
+    ) -> Iterator[tuple[str, Row]]:
         contents = changes.contents
         yield from self._head
         runs = (*self._runs_before(contents), self._present_run(contents))
         for number, run in enumerate(runs):
-            # Parts that are full do not change; the last one is looked at again.
+            # Parts that are full change at the end alone; the last one is looked at again.
             parts = sum(key[0] == number for key in writer.keys("frames"))
-            yield from run_rows(number, run, first_part=max(0, parts - 1))
+            yield from run_rows(number, run, first_part=max(0, parts - 1) if partly else 0)
         yield from map_rows(contents, changes.changed_keyframes)
         keys = zip(contents.keyframes.ids.tolist(), strict=True)
         written = writer.keys("keypoints")

@@ -13,6 +13,10 @@ from orbslam2py import _core as core
 from orbslam2py.maps.saved_map import RecordedFrames
 from orbslam2py.trajectory.trajectory import Trajectory
 
+#: So many frames wait for the end, when the map has settled, to be estimated again; those before
+#: them are where the map was settled long ago.
+_MOST_WAITING = 1000
+
 _NO_POSES = Trajectory(timestamps=np.zeros(0), T_wc=np.zeros((0, 4, 4)))
 
 
@@ -20,7 +24,9 @@ class FrameRecorder:
     """The path of the camera through the present maps, and through those that ended before.
 
     A frame is kept relative to its reference keyframe, so its pose moves with whatever refines the
-    map later. May be used from any thread, also while a frame is recorded.
+    map later. In the end, or when many frames have come after it, it is estimated once more from
+    the points it saw, each of which has moved in its own way (``docs/method/map.md``, settled
+    frames). May be used from any thread, also while a frame is recorded.
 
     Parameters
     ----------
@@ -31,6 +37,7 @@ class FrameRecorder:
     def __init__(self, slam_map: core.Map) -> None:
         self._map = slam_map
         self._recorder = core.TrajectoryRecorder()
+        self._sightings = core.FrameSightings()
         self._ended: dict[int, Trajectory] = {}
         self._lock = threading.Lock()
         self._doubted: core.TrackedFrame | None = None
@@ -52,7 +59,7 @@ class FrameRecorder:
         Those of them that had been recorded as lost have been found.
         """
         with self._lock:
-            self._settle()
+            self._record_waiting()
             self._young = []
             self._young_map = earlier[0].map_index
             for frame in earlier:
@@ -63,14 +70,19 @@ class FrameRecorder:
     ) -> None:
         """Record the frames since `begin` anew, with the poses that are estimated for them."""
         with self._lock:
-            self._settle()
+            self._record_waiting()
             young, self._young = self._young or [], None
             frames = estimate([frame for frame, _ in young])
             for frame, (_, lost) in zip(frames, young, strict=True):
                 self._append(frame, lost=lost)
 
-    def _append(self, frame: core.TrackedFrame, *, lost: bool) -> None:
+    def _append(self, frame: core.TrackedFrame, *, lost: bool, fixed_map: bool = False) -> None:
         self._recorder.record(self._map, frame, lost=lost)
+        if lost or fixed_map:
+            self._sightings.forget(frame.id)
+        else:
+            self._sightings.keep(frame)
+            self._sightings.settle(self._map, self._recorder, _MOST_WAITING)
         self._last_map = max(self._last_map, frame.map_index)
         if not lost and frame.map_index != self._young_map:
             self._young = None
@@ -81,20 +93,30 @@ class FrameRecorder:
         """Take back the pose of this frame, recorded next, if the one after it is lost."""
         self._doubted = frame
 
-    def record(self, frame: core.TrackedFrame, *, lost: bool) -> None:
-        """Keep a frame; a lost one is noted without a pose of its own."""
+    def record(self, frame: core.TrackedFrame, *, lost: bool, fixed_map: bool = False) -> None:
+        """Keep a frame; a lost one is noted without a pose of its own.
+
+        Parameters
+        ----------
+        frame : TrackedFrame
+            The frame.
+        lost : bool
+            Whether it has no pose.
+        fixed_map : bool
+            The map does not change: there is nothing for its pose to follow.
+        """
         with self._lock:
-            self._settle(believed=not lost)
+            self._record_waiting(believed=not lost)
             if frame is self._doubted:
                 # A copy: the frame itself goes on following the map while others may read.
                 self._waiting = core.TrackedFrame(frame.features)
                 self._waiting.T_cw = frame.T_cw
                 self._waiting.share_anchor(frame)
             else:
-                self._append(frame, lost=lost)
+                self._append(frame, lost=lost, fixed_map=fixed_map)
             self._doubted = None
 
-    def _settle(self, *, believed: bool = True) -> None:
+    def _record_waiting(self, *, believed: bool = True) -> None:
         """Record the frame that waits for the next one; who asks before that gets its pose."""
         frame, self._waiting = self._waiting, None
         if frame is None:
@@ -103,10 +125,17 @@ class FrameRecorder:
             frame.T_cw = None
         self._append(frame, lost=not believed)
 
+    def settle(self) -> None:
+        """Estimate the poses of the frames that wait for it: the map will hardly change any more."""
+        with self._lock:
+            self._record_waiting()
+            self._sightings.settle(self._map, self._recorder)
+
     def end_maps(self) -> None:
         """Keep the trajectories of the maps as they are now: they are about to be dropped."""
         with self._lock:
-            self._settle()
+            self._record_waiting()
+            self._sightings.settle(self._map, self._recorder)
             for map_index in self._living():
                 self._ended[map_index] = self._present(map_index)
             self._recorder.clear()
@@ -115,7 +144,8 @@ class FrameRecorder:
     def end_map(self, map_index: int) -> None:
         """Keep the trajectory of one of the maps, which is about to be dropped beside others."""
         with self._lock:
-            self._settle()
+            self._record_waiting()
+            self._sightings.settle(self._map, self._recorder)
             self._ended[map_index] = self._present(map_index)
             self._recorder.drop(self._map, map_index)
             self._young = None
@@ -123,7 +153,7 @@ class FrameRecorder:
     def trajectory(self) -> Trajectory:
         """The one in the active map."""
         with self._lock:
-            self._settle()
+            self._record_waiting()
             return self._present(self._map.active_map)
 
     def trajectories(self) -> list[Trajectory]:
@@ -132,7 +162,7 @@ class FrameRecorder:
         That of a map that has become part of another one is empty.
         """
         with self._lock:
-            self._settle()
+            self._record_waiting()
             found = self._ended | {index: self._present(index) for index in self._living()}
         last = max(*found, self._last_map)
         return [found.get(index, _NO_POSES) for index in range(last + 1)]
@@ -152,7 +182,7 @@ class FrameRecorder:
             another one are left for the next time.
         """
         with self._lock:
-            self._settle()
+            self._record_waiting()
             if self._map.epoch != map_index or not len(self._recorder):
                 return RecordedFrames.none()
             entries = self._recorder.entries()

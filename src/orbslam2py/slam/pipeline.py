@@ -223,7 +223,11 @@ class Pipeline:
         elif outcome.state in (TrackingState.OK, TrackingState.LOST):
             if outcome.earlier:
                 self.recorder.begin(outcome.earlier)
-            self.recorder.record(frame, lost=outcome.state is TrackingState.LOST)
+            self.recorder.record(
+                frame,
+                lost=outcome.state is TrackingState.LOST,
+                fixed_map=self.localization.on,
+            )
 
     def _record(
         self,

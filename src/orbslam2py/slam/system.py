@@ -458,12 +458,15 @@ class System:
         errors = back_end.finish(
             drain=drain, wait_for_adjustment=wait_for_adjustment, timeout=timeout
         )
+        ended = all(worker.ended for worker in back_end.workers)
+        if ended:
+            self.pipeline.recorder.settle()
         try:
             self.pipeline.keeper.stop_autosave()
         except MapFileError as unsaved:
             errors.append(unsaved)
         # Only now: should a Ctrl-C come before, the threads are still ended with the interpreter.
-        if all(worker.ended for worker in back_end.workers):
+        if ended:
             self._finalizer.detach()
         if errors:
             raise errors[0]
@@ -571,6 +574,9 @@ class System:
 
     def trajectory(self) -> Trajectory:
         """Poses of all images of the active map, after the latest optimisation.
+
+        After `shutdown` those of the last thousand images have been estimated once more, from the
+        points that they saw where these lie in the end.
 
         Returns
         -------

@@ -129,6 +129,8 @@ class Tracking:
         """
         self.state = TrackingState.LOST
         self._kept_maps = set(self._map.maps)
+        # The map's keyframes are of another run: the first frame found may be one already.
+        self._since_keyframe = SinceKeyframe(-self._keyframe_decision.limits.spacing)
         self._search.initial_pose = initial_pose
         self._search.searches_loaded_map = True
 
