@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "optimize/frame_sightings.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <optional>
 #include <unordered_set>
@@ -13,6 +14,15 @@ namespace {
 
 constexpr std::size_t kFewestSightings = 20;
 constexpr double kInlierShare = 0.5;
+constexpr double kOtherPose = 12.592;  // 95 % of chi-square, six degrees of freedom
+
+/// Whether the points say clearly that the frame is elsewhere. What is within the noise of its
+/// keypoints it shares with its neighbours as it was recorded, and alone if it is estimated anew.
+bool is_elsewhere(const Pose& recorded, const PoseEstimate& estimate) {
+  const Vector6d change = (estimate.T_cw * recorded.inverse()).log();
+  const Eigen::LDLT<Matrix6d> factor(estimate.covariance);
+  return factor.info() == Eigen::Success && change.dot(factor.solve(change)) > kOtherPose;
+}
 
 std::unordered_set<FrameId> frames_of_keyframes(const Map& map) {
   std::unordered_set<FrameId> frames;
@@ -72,7 +82,7 @@ bool FrameSightings::settle_one(const Map& map, TrajectoryRecorder& recorder, Fr
   if (static_cast<double>(observations.size()) < enough) return false;
   const Camera& camera = *sightings.camera;
   const PoseEstimate estimate = optimize_pose(*T_cw, camera.pinhole(), camera.bf(), observations);
-  if (estimate.n_inliers < enough) return false;
+  if (estimate.n_inliers < enough || !is_elsewhere(*T_cw, estimate)) return false;
   recorder.move(map, frame, estimate.T_cw);
   return true;
 }

@@ -27,9 +27,9 @@ class FrameSightings {
 
   /// Estimates the poses of all but the `n_youngest` youngest frames from the points as they are
   /// now, beginning where the recorder has them, and forgets those frames. Left as they were
-  /// recorded: lost frames, frames of living keyframes, which bundle adjustment has refined, and
-  /// those that no longer agree with half of what they saw. Takes the map's read lock frame by
-  /// frame. Returns how many frames have a new pose.
+  /// recorded: lost frames, frames of living keyframes, which bundle adjustment has refined, those
+  /// that no longer agree with half of what they saw, and those whose pose is the same within its
+  /// noise. Takes the map's read lock frame by frame. Returns how many frames have a new pose.
   int settle(const Map& map, TrajectoryRecorder& recorder, std::size_t n_youngest);
 
  private:

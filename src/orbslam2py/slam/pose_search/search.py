@@ -303,9 +303,14 @@ class PoseSearch:
         matches = core.match_local_map(
             frame, local_map.points, first.discarded, self._local_map_window(frame)
         )
-        n_matches = frame.n_associated()
         optimized = core.optimize_pose(frame)
         visible = matches.visible
+        if self.just_relocalized(frame) and optimized.n_inliers >= self.limits.map_matches:
+            # Wide windows find much that is wrong; where the camera is now, narrow ones find more.
+            frame.discard_outliers()
+            core.match_local_map(frame, local_map.points, first.discarded, self._usual_window())
+            optimized = core.optimize_pose(frame)
+        n_matches = frame.n_associated()
         estimate = PoseEstimate(
             n_matches=n_matches,
             n_inliers=optimized.n_inliers,
@@ -346,9 +351,10 @@ class PoseSearch:
         return self.limits.local_map_inliers
 
     def _local_map_window(self, frame: core.TrackedFrame) -> float:
-        limits = self.limits
         if self.just_relocalized(frame):
-            return limits.local_map_window_after_relocalization
-        if self._sensor is Sensor.RGBD:
-            return limits.local_map_window_rgbd
-        return limits.local_map_window
+            return self.limits.local_map_window_after_relocalization
+        return self._usual_window()
+
+    def _usual_window(self) -> float:
+        is_rgbd = self._sensor is Sensor.RGBD
+        return self.limits.local_map_window_rgbd if is_rgbd else self.limits.local_map_window
