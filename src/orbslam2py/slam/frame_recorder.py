@@ -126,7 +126,7 @@ class FrameRecorder:
         self._append(frame, lost=not believed)
 
     def settle(self) -> None:
-        """Estimate the poses of the frames that wait for it: the map will hardly change any more."""
+        """Estimate the poses of the frames that wait for it: the map is finished."""
         with self._lock:
             self._record_waiting()
             self._sightings.settle(self._map, self._recorder)
