@@ -89,6 +89,11 @@ std::optional<Pose> TrajectoryRecorder::T_cw(const Map& map, FrameId frame) cons
   return pose_of(T_cr_[at], reference.scale) * reference.T_cw;
 }
 
+KeyFrameId TrajectoryRecorder::reference(FrameId frame) const {
+  const std::size_t at = place_with_pose(frame);
+  return at == size() ? KeyFrameId() : references_[at];
+}
+
 void TrajectoryRecorder::move(const Map& map, FrameId frame, const Pose& T_cw) {
   check_epoch(map);
   const std::size_t at = place_with_pose(frame);

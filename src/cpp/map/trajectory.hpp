@@ -39,6 +39,9 @@ class TrajectoryRecorder {
   /// caller holds a lock of the map.
   std::optional<Pose> T_cw(const Map& map, FrameId frame) const;
 
+  /// The keyframe that such a frame is relative to; an invalid id for any other.
+  KeyFrameId reference(FrameId frame) const;
+
   /// Gives a frame that has a pose another one, in the map as it is now. The caller holds a lock of
   /// the map.
   void move(const Map& map, FrameId frame, const Pose& T_cw);

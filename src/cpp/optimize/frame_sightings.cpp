@@ -4,7 +4,6 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <optional>
-#include <unordered_set>
 #include <utility>
 
 #include "optimize/pose_optimization.hpp"
@@ -24,11 +23,10 @@ bool is_elsewhere(const Pose& recorded, const PoseEstimate& estimate) {
   return factor.info() == Eigen::Success && change.dot(factor.solve(change)) > kOtherPose;
 }
 
-std::unordered_set<FrameId> frames_of_keyframes(const Map& map) {
-  std::unordered_set<FrameId> frames;
-  const auto lock = map.read_lock();
-  map.for_each_keyframe([&](const KeyFrame& keyframe) { frames.insert(keyframe.frame->id); });
-  return frames;
+/// Whether the frame is a living keyframe: it is recorded relative to itself.
+bool is_keyframe(const Map& map, const TrajectoryRecorder& recorder, FrameId frame) {
+  const KeyFrame* reference = map.find(recorder.reference(frame));
+  return reference != nullptr && reference->frame->id == frame;
 }
 
 }  // namespace
@@ -52,12 +50,9 @@ void FrameSightings::keep(const TrackedFrame& frame) {
 
 int FrameSightings::settle(const Map& map, TrajectoryRecorder& recorder, std::size_t n_youngest) {
   int n_settled = 0;
-  if (frames_.size() <= n_youngest) return n_settled;
-  const std::unordered_set<FrameId> refined = frames_of_keyframes(map);
   while (frames_.size() > n_youngest) {
     const auto oldest = frames_.begin();
-    if (refined.count(oldest->first) == 0 &&
-        settle_one(map, recorder, oldest->first, oldest->second)) {
+    if (settle_one(map, recorder, oldest->first, oldest->second)) {
       ++n_settled;
     }
     frames_.erase(oldest);
@@ -69,7 +64,7 @@ bool FrameSightings::settle_one(const Map& map, TrajectoryRecorder& recorder, Fr
                                 const Sightings& sightings) {
   const auto lock = map.read_lock();
   const std::optional<Pose> T_cw = recorder.T_cw(map, frame);
-  if (!T_cw) return false;
+  if (!T_cw || is_keyframe(map, recorder, frame)) return false;
   std::vector<PoseObservation> observations;
   observations.reserve(sightings.seen.size());
   for (const Sighting& s : sightings.seen) {

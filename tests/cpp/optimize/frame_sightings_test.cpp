@@ -128,10 +128,12 @@ TEST(FrameSightings, ReplacedPointsGiveWayAndDeadOnesAreLeftOut) {
 
 TEST(FrameSightings, FramesOfLivingKeyframesLostOnesAndThoseThatNoLongerAgreeStay) {
   Tracked tracked;
-  const TrackedFrame frame = tracked.track(1);
+  TrackedFrame frame = tracked.track(1);
+  const KeyFrameId made = tracked.map.add_keyframe(frame.frame, *frame.T_cw);
+  tracked.map.publish(made);
+  anchor_frame(tracked.map, frame, made);
   tracked.record(frame);
   tracked.record(tracked.track(2), true);
-  tracked.map.publish(tracked.map.add_keyframe(frame.frame, *frame.T_cw));
   tracked.put_points_right();
   const double before = tracked.error(1);
   EXPECT_EQ(tracked.sightings.settle(tracked.map, tracked.recorder, 0), 0);
