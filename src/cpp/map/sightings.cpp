@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "map/sightings.hpp"
 
-#include <algorithm>
+#include "base/sort_unique.hpp"
 
 namespace orbslam {
 
@@ -12,8 +12,7 @@ void count_sightings(Map& map, const TrackedFrame& frame, const std::vector<MapP
   for (const MapPointId id : frame.map_points) {
     if (id.valid()) visible.push_back(id);
   }
-  std::sort(visible.begin(), visible.end());
-  visible.erase(std::unique(visible.begin(), visible.end()), visible.end());
+  sort_unique(visible);
 
   const auto lock = map.write_lock();
   for (const MapPointId id : visible) {

@@ -3,9 +3,11 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <optional>
+#include <cstddef>
+#include <iterator>
 #include <utility>
 
+#include "base/parallel.hpp"
 #include "optimize/pose_optimization.hpp"
 
 namespace orbslam {
@@ -49,37 +51,55 @@ void FrameSightings::keep(const TrackedFrame& frame) {
 }
 
 int FrameSightings::settle(const Map& map, TrajectoryRecorder& recorder, std::size_t n_youngest) {
+  if (frames_.size() <= n_youngest) return 0;
+  const auto end =
+      std::next(frames_.begin(), static_cast<std::ptrdiff_t>(frames_.size() - n_youngest));
+  struct Task {
+    FrameId frame;
+    const Sightings* sightings;
+    std::optional<Pose> T_cw;
+  };
+  std::vector<Task> tasks;
+  for (auto it = frames_.begin(); it != end; ++it) tasks.push_back({it->first, &it->second, {}});
+  for_each_in_parallel(tasks.size(), [&](std::size_t i) {
+    tasks[i].T_cw = settled_pose(map, recorder, tasks[i].frame, *tasks[i].sightings);
+  });
   int n_settled = 0;
-  while (frames_.size() > n_youngest) {
-    const auto oldest = frames_.begin();
-    if (settle_one(map, recorder, oldest->first, oldest->second)) {
+  {
+    const auto lock = map.read_lock();
+    for (const Task& task : tasks) {
+      if (!task.T_cw) continue;
+      recorder.move(map, task.frame, *task.T_cw);
       ++n_settled;
     }
-    frames_.erase(oldest);
   }
+  frames_.erase(frames_.begin(), end);
   return n_settled;
 }
 
-bool FrameSightings::settle_one(const Map& map, TrajectoryRecorder& recorder, FrameId frame,
-                                const Sightings& sightings) {
-  const auto lock = map.read_lock();
-  const std::optional<Pose> T_cw = recorder.T_cw(map, frame);
-  if (!T_cw || is_keyframe(map, recorder, frame)) return false;
+/// Nothing where the pose is to stay.
+std::optional<Pose> FrameSightings::settled_pose(const Map& map, const TrajectoryRecorder& recorder,
+                                                 FrameId frame, const Sightings& sightings) {
+  std::optional<Pose> T_cw;
   std::vector<PoseObservation> observations;
-  observations.reserve(sightings.seen.size());
-  for (const Sighting& s : sightings.seen) {
-    const MapPoint* point = map.find(map.resolve(s.point));
-    if (point == nullptr) continue;
-    observations.push_back({point->position, s.u, s.v, s.right_u, s.inverse_sigma2, s.has_depth});
+  {
+    const auto lock = map.read_lock();
+    T_cw = recorder.T_cw(map, frame);
+    if (!T_cw || is_keyframe(map, recorder, frame)) return std::nullopt;
+    observations.reserve(sightings.seen.size());
+    for (const Sighting& s : sightings.seen) {
+      const MapPoint* point = map.find(map.resolve(s.point));
+      if (point == nullptr) continue;
+      observations.push_back({point->position, s.u, s.v, s.right_u, s.inverse_sigma2, s.has_depth});
+    }
   }
   const auto enough = std::max(static_cast<double>(kFewestSightings),
                                kInlierShare * static_cast<double>(sightings.seen.size()));
-  if (static_cast<double>(observations.size()) < enough) return false;
+  if (static_cast<double>(observations.size()) < enough) return std::nullopt;
   const Camera& camera = *sightings.camera;
   const PoseEstimate estimate = optimize_pose(*T_cw, camera.pinhole(), camera.bf(), observations);
-  if (estimate.n_inliers < enough || !is_elsewhere(*T_cw, estimate)) return false;
-  recorder.move(map, frame, estimate.T_cw);
-  return true;
+  if (estimate.n_inliers < enough || !is_elsewhere(*T_cw, estimate)) return std::nullopt;
+  return estimate.T_cw;
 }
 
 }  // namespace orbslam

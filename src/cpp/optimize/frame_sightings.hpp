@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "frame/frame.hpp"
@@ -42,8 +43,8 @@ class FrameSightings {
     std::shared_ptr<const Camera> camera;
     std::vector<Sighting> seen;
   };
-  static bool settle_one(const Map& map, TrajectoryRecorder& recorder, FrameId frame,
-                         const Sightings& sightings);
+  static std::optional<Pose> settled_pose(const Map& map, const TrajectoryRecorder& recorder,
+                                          FrameId frame, const Sightings& sightings);
 
   std::map<FrameId, Sightings> frames_;  ///< by id, the oldest first
 };
