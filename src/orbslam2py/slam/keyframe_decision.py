@@ -44,6 +44,8 @@ class KeyframeDecision:
         Frames after which one is wanted even from a busy mapper: one second.
     thresholds : KeyframeThresholds, optional
         Limits.
+    waits : bool
+        Images are recorded ones: a frame that is worth it waits for the mapper.
     """
 
     def __init__(
@@ -53,12 +55,15 @@ class KeyframeDecision:
         sensor: Sensor,
         max_keyframe_interval: int,
         thresholds: KeyframeThresholds | None = None,
+        *,
+        waits: bool = False,
     ) -> None:
         self._map = slam_map
         self._mapping = mapping
         self._has_depth = sensor.has_depth
         self._max_keyframe_interval = max_keyframe_interval
         self.limits = thresholds or KeyframeThresholds()
+        self._waits = waits
 
     def due(self, frame_id: int, since: SinceKeyframe) -> bool:
         """Whether a frame may become a keyframe, however well it is tracked."""
@@ -98,17 +103,18 @@ class KeyframeDecision:
             or self._lacks_close_points(frame)
             or self._turns_away(frame, n_inliers, velocity)
         )
-        idle = self._mapping.idle
         one_second_passed = frame.id >= since.frame_id + self._max_keyframe_interval
         tracking_is_weak = self._has_depth and (
             n_inliers < limits.weak_share * n_reference or needs_new_points
         )
         sees_new_things = n_inliers < self._share(n_keyframes) * n_reference or needs_new_points
-        # For recorded images mapping has been waited for when one is due: frames alone count.
-        in_turn = idle and self.due(frame.id, since)
-        wanted = (one_second_passed or in_turn or tracking_is_weak) and (
-            sees_new_things and n_inliers > limits.inliers
-        )
+        worth_it = sees_new_things and n_inliers > limits.inliers
+        due = self.due(frame.id, since)
+        if worth_it and due and self._waits:
+            # Frames alone count, not how fast the mapper is.
+            self._mapping.wait_until_idle(unless_held=True)
+        idle = self._mapping.idle
+        wanted = worth_it and (one_second_passed or (idle and due) or tracking_is_weak)
         if not wanted or idle:
             return wanted
         self._mapping.interrupt()

@@ -193,9 +193,8 @@ class Pipeline:
 
     def _wait_for_mapping(self) -> None:
         worker = self.back_end.mapping.worker
-        if worker.held or (
-            self._sensor.has_depth and not self.tracking.keyframe_due(self._next_frame_id)
-        ):
+        if worker.held or (self._sensor.has_depth and not self.tracking.every_frame_in_turn):
+            # A frame that is worth a keyframe waits when that is known.
             worker.wait_until_waiting(at_most=1)
             return
         worker.wait_until_waiting(at_most=0)
@@ -360,6 +359,7 @@ def _make_tracking(setup: Setup, back_end: BackEnd, options: SystemOptions) -> T
             sensor,
             max_keyframe_interval,
             options.effort.keyframes(sensor),
+            waits=options.wait_for_mapping and not options.deterministic,
         ),
         has_depth=sensor.has_depth,
         new_map_after=options.new_map_after if options.several_maps else None,

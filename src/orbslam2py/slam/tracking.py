@@ -293,9 +293,10 @@ class Tracking:
             self._search.confirm()
         return estimate
 
-    def keyframe_due(self, frame_id: int) -> bool:
-        """Whether a frame may become a keyframe, however well it is tracked."""
-        return self._keyframe_decision.due(frame_id, self._since_keyframe)
+    @property
+    def every_frame_in_turn(self) -> bool:
+        """Whether any frame may become a keyframe, however well it is tracked."""
+        return self._keyframe_decision.limits.spacing <= 1
 
     def _begin_map(self, frame: core.TrackedFrame, timer: StageTimer) -> TrackingOutcome:
         self.state = TrackingState.NOT_INITIALIZED
