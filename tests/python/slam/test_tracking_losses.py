@@ -90,7 +90,8 @@ def test_a_frame_found_again_has_to_prove_itself(scene: Scene, inliers: int, fou
     scene.run(40)
     lose(scene)
     scene.core.n_reference = 0
-    scene.core.inliers.extend([100, inliers])
+    # First estimate, local map by wide windows, and once more by narrow ones.
+    scene.core.inliers.extend([100, 60, inliers])
     assert (scene.track().state is TrackingState.OK) == found
     assert scene.tracking.n_relocalizations == int(found)
 
@@ -112,10 +113,12 @@ def test_lost_keeps_trying_the_reference_keyframe_and_recovers(scene: Scene) -> 
     recovered = scene.last.id
     # The next frame: no motion model, wide search, 50 inliers needed for one second.
     scene.core.calls.clear()
-    scene.core.inliers.extend([100, 50])
+    scene.core.inliers.extend([100, 60, 50])
     assert scene.track().state is TrackingState.OK
     assert scene.core.calls[0] == "words"
-    assert scene.core.radius_factors[-1] == 5.0
+    wide, narrow = scene.core.radius_factors[-2:]
+    assert wide == 5.0
+    assert narrow < wide
     scene.run(recovered + MAX_FRAMES - 1 - len(scene.frames))
     assert scene.frames[-1].id == recovered + MAX_FRAMES - 2
     scene.core.inliers.extend([100, 49])

@@ -305,7 +305,8 @@ class PoseSearch:
         )
         optimized = core.optimize_pose(frame)
         visible = matches.visible
-        if self.just_relocalized(frame) and optimized.n_inliers >= self.limits.map_matches:
+        found_again = self._was_found_again and self.just_relocalized(frame)
+        if found_again and optimized.n_inliers >= self.limits.map_matches:
             # Wide windows find much that is wrong; where the camera is now, narrow ones find more.
             frame.discard_outliers()
             core.match_local_map(frame, local_map.points, first.discarded, self._usual_window())
