@@ -468,6 +468,10 @@ void bind_frame(py::module_& module) {
   module.def("count_staying", &count_staying, py::arg("frame"), py::arg("T_nw"),
              py::call_guard<py::gil_scoped_release>(),
              "How many inliers of a frame a camera at `T_nw` would still have in its image.");
+  module.def("median_displacement", &median_displacement, py::arg("frame"), py::arg("T_nw"),
+             py::call_guard<py::gil_scoped_release>(),
+             "Median distance [px] between the projections of a frame's inliers and those into a\n"
+             "camera at `T_nw`; 0 without any. Raises StateError without a pose.");
   module.def("to_depth_metres", &depth_metres_of, py::arg("raw"), py::arg("factor"),
              "Depth (h, w) float32 in metres: raw / factor. Values <= 0 and NaN mean none.");
 }

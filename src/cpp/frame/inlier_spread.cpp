@@ -5,6 +5,7 @@
 #include <array>
 #include <bitset>
 #include <cmath>
+#include <vector>
 
 #include "base/errors.hpp"
 
@@ -99,6 +100,29 @@ int count_staying(const TrackedFrame& tracked, const Pose& T_nw) {
     n += bounds.contains(pixel.x(), pixel.y()) ? 1 : 0;
   }
   return n;
+}
+
+double median_displacement(const TrackedFrame& tracked, const Pose& T_nw) {
+  if (!tracked.T_cw) {
+    throw StateError("median_displacement: the frame has no pose; set T_cw first");
+  }
+  const Frame& frame = *tracked.frame;
+  const Pinhole& pinhole = frame.camera->pinhole();
+  const Eigen::Matrix3d R_cw = tracked.T_cw->rotation_matrix(), R_nw = T_nw.rotation_matrix();
+  static thread_local std::vector<double> distances;  // calls after the first allocate nothing
+  distances.clear();
+  for (std::size_t i = 0; i < frame.size(); ++i) {
+    if (!tracked.map_points[i].valid() || tracked.outlier[i]) continue;
+    const Eigen::Vector3d here = R_cw * tracked.positions[i] + tracked.T_cw->translation();
+    const Eigen::Vector3d there = R_nw * tracked.positions[i] + T_nw.translation();
+    if (!(here.z() > 0) || !(there.z() > 0)) continue;
+    const double distance = (pinhole.project(there) - pinhole.project(here)).norm();
+    if (std::isfinite(distance)) distances.push_back(distance);
+  }
+  if (distances.empty()) return 0;
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  return *middle;
 }
 
 }  // namespace orbslam

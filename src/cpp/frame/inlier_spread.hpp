@@ -27,4 +27,9 @@ InlierSpread spread_of_inliers(const TrackedFrame& frame);
 /// what is not about to leave the view. See docs/method/tracking.md#new-keyframes.
 int count_staying(const TrackedFrame& frame, const Pose& T_nw);
 
+/// Median distance in the image between where the points of these keypoints are and where a camera
+/// at `T_nw` has them, pixels; what lies behind either is left out, 0 without any. Throws
+/// StateError when the frame has no pose.
+double median_displacement(const TrackedFrame& frame, const Pose& T_nw);
+
 }  // namespace orbslam

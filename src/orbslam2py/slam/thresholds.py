@@ -160,9 +160,11 @@ class EvidenceThresholds:
     weak_error_spreads: float = 3.0
     """... unless errors vary as much from image to image: above the usual by so many times their
     mean deviation from it, as between images that are far apart."""
-    honest_error: float = 0.65
+    honest_error: float = 0.8
     """Up to this median error, in standard deviations of keypoints, the stated covariance is that
     of the keypoints' noise; beyond it the standard deviations grow with the error ..."""
+    doubtful_error: float = 1.3
+    """... and beyond this with its square: then many matches are accidental ..."""
     largest_error: float = 10.0
     """... at most so many times, as they do for an error that is not the usual one."""
     surprise_pixels: float = 15.0
@@ -172,6 +174,17 @@ class EvidenceThresholds:
     """... or more with five times; images far apart turn by any angle."""
     usual_deviation: float = 1.3
     """A position beyond so many times the usual deviation is told with as much more variance."""
+    few_inliers: float = 70.0
+    """So many inliers are told with twice the variance, fewer with more by the fourth power of
+    their number: the fewer there are, the more of them fit by accident ..."""
+    fewest_inliers: int = 30
+    """... down to this number."""
+    unknown_change: float = 2.0
+    """So many times the variance is told where it is not known yet what is usual."""
+    visible_smear: float = 0.5
+    """Pixels of smear that sharp images seem to have as well; what is beyond ..."""
+    smear_of_sharpest: float = 2.0
+    """... is so many times as long: a camera that goes on and on smears its sharpest images too."""
     usual_changes: float = 1.5
     """A pose farther from where the motion led than so many times what is usual ..."""
     mistaken_share: float = 0.06

@@ -134,6 +134,27 @@ TEST(CountStaying, LeavesOutWhatATurnTakesOutOfView) {
   EXPECT_EQ(count_staying(frame, turned(3.1)), 0);
 }
 
+TEST(MedianDisplacement, IsHowFarThePointsMoveInTheImage) {
+  TrackedFrame frame = tracked_frame_at({{10, 30}, {40, 30}, {70, 30}, {40, 50}});
+  frame.T_cw = Pose();
+  const Pose aside(Eigen::Quaterniond::Identity(), {0.2, 0, 0});
+  EXPECT_EQ(median_displacement(frame, aside), 0);  // nothing is known
+  frame.associate(0, MapPointId(0), {-1.2, 0, 2});
+  frame.associate(1, MapPointId(1), {0, 0, 4});
+  frame.associate(2, MapPointId(2), {1.2, 0, 1});
+  EXPECT_EQ(median_displacement(frame, Pose()), 0);
+  // f = 50: by 5, 2.5 and 10 pixels.
+  EXPECT_NEAR(median_displacement(frame, aside), 5, 1e-9);
+  frame.outlier[2] = 1;
+  frame.associate(3, MapPointId(3), {0, 0, -1});  // behind both
+  EXPECT_NEAR(median_displacement(frame, aside), 5, 1e-9);
+}
+
+TEST(MedianDisplacement, NeedsAPose) {
+  const TrackedFrame frame = tracked_frame_at({{1, 1}});
+  EXPECT_THROW(median_displacement(frame, Pose()), StateError);
+}
+
 TEST(InlierSpread, NeedsAPose) {
   const TrackedFrame frame = tracked_frame_at({{1, 1}});
   EXPECT_THROW(spread_of_inliers(frame), StateError);

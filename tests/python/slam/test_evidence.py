@@ -10,6 +10,7 @@ import pytest
 
 from orbslam2py import Reason, Sensor, TrackingState
 from orbslam2py.slam.evidence import judgement
+from orbslam2py.slam.pose_search import MotionModel
 from orbslam2py.slam.records import PoseMethod, Verdict
 from orbslam2py.slam.thresholds import EvidenceThresholds, TrackingThresholds
 from support.tracking_scene import FakeCore, FakeFrame, Scene, every_way_ends_elsewhere, pose
@@ -203,7 +204,7 @@ def test_where_errors_vary_from_image_to_image_a_larger_one_is_not_sudden(carefu
     assert evidence.verdict is Verdict.WEAK
 
 
-@pytest.mark.parametrize(("error", "factor"), [(0.4, 1.0), (0.8, (0.8 / 0.65) ** 2)])
+@pytest.mark.parametrize(("error", "factor"), [(0.4, 1.0), (0.85, (0.85 / 0.8) ** 2)])
 def test_a_pose_is_as_uncertain_as_its_matches_are_off(
     careful: Scene, error: float, factor: float
 ) -> None:
@@ -215,6 +216,66 @@ def test_a_pose_is_as_uncertain_as_its_matches_are_off(
     assert estimate.evidence is not None
     assert estimate.evidence.verdict is Verdict.STRONG
     assert estimate.covariance[0, 0] == pytest.approx(factor * usual.covariance[0, 0])
+
+
+def test_where_many_matches_are_accidental_the_uncertainty_grows_faster(careful: Scene) -> None:
+    usual = careful.track().estimate
+    careful.core.match_error = 2.0
+    careful.run(200)  # until that is usual
+    estimate = careful.track().estimate
+    assert usual.covariance is not None
+    assert estimate.covariance is not None
+    assert estimate.evidence is not None
+    assert estimate.evidence.verdict is Verdict.STRONG
+    larger = estimate.covariance[0, 0] / usual.covariance[0, 0]
+    assert larger == pytest.approx((2.0 / 0.8 * 2.0 / 1.3) ** 2)
+
+
+@pytest.mark.parametrize(("n_inliers", "counted"), [(70, 70), (20, 30)])
+def test_few_inliers_are_less_certain_than_their_number_says(
+    careful: Scene, n_inliers: int, counted: int
+) -> None:
+    usual = careful.track().estimate
+    careful.core.inliers.extend([n_inliers] * 10)  # by whatever way it is searched
+    estimate = careful.track().estimate
+    assert usual.covariance is not None
+    assert estimate.covariance is not None
+    assert estimate.n_inliers == n_inliers
+    larger = estimate.covariance[0, 0] / usual.covariance[0, 0]
+    few = EvidenceThresholds().few_inliers
+    # What is stated of the keypoints' noise goes by the number, here in proportion.
+    by_number = (1 + (few / counted) ** 4) / (1 + (few / 100) ** 4)
+    assert larger == pytest.approx(n_inliers / 100 * by_number)
+
+
+def test_where_nothing_is_usual_yet_a_pose_is_less_certain(careful: Scene) -> None:
+    usual = careful.track().estimate
+    careful.tracking.reset()
+    careful.run(1)  # the first frame of a map
+    first = careful.track().estimate
+    careful.run(EvidenceThresholds().changes_seen + 1)
+    later = careful.track().estimate
+    assert usual.covariance is not None
+    assert first.covariance is not None
+    assert later.covariance is not None
+    np.testing.assert_allclose(first.covariance, 2 * usual.covariance)
+    np.testing.assert_allclose(later.covariance, usual.covariance)
+
+
+@pytest.mark.parametrize(("displacement", "share"), [(40.0, 18.2 / 40), (5.0, 1.0)])
+def test_a_blurred_image_is_of_any_moment_while_the_shutter_was_open(
+    careful: Scene, monkeypatch: pytest.MonkeyPatch, displacement: float, share: float
+) -> None:
+    careful.core.displacement = displacement
+    monkeypatch.setattr(MotionModel, "way", lambda self, frame: pose(0.4))
+    sharp = careful.track().estimate
+    careful.core.fine_detail_of_images = 0.7  # smeared by 9.6 pixels
+    blurred = careful.track().estimate
+    assert sharp.covariance is not None
+    assert blurred.covariance is not None
+    larger = blurred.covariance[4, 4] / sharp.covariance[4, 4]
+    along = blurred.covariance[3, 3] - larger * sharp.covariance[3, 3]
+    assert along == pytest.approx((share * 0.4) ** 2 / 12)
 
 
 @pytest.mark.parametrize(("correlation", "factor"), [(2.5, 2.5), (0.6, 1.0)])

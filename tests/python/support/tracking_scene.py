@@ -166,6 +166,8 @@ class FakeCore:
     correlation: float = 1.0
     match_error: float = 0.6
     fine_detail_of_images: float = 1.4
+    #: Pixels that the points moved in the image since the last frame.
+    displacement: float = 0.0
     #: Of what the motion model finds, in localization mode.
     n_map_points: int = 100
     #: Of the inliers, after three more frames of the present speed; how far that was.
@@ -197,6 +199,9 @@ class FakeCore:
 
     def fine_detail(self, features: object) -> float:
         return self.fine_detail_of_images
+
+    def median_displacement(self, frame: FakeFrame, T_nw: _core.Pose) -> float:
+        return self.displacement
 
     def count_staying(self, frame: FakeFrame, T_nw: _core.Pose) -> int:
         assert frame.T_cw is not None

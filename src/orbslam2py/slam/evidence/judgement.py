@@ -184,34 +184,36 @@ class EvidenceJudge:
     ) -> FloatArray | None:
         """The covariance that a pose is told with.
 
-        Keypoints that are off by more than they are taken for make a pose that is less certain.
-        Those near each other are wrong together: by a map point in the wrong place, a lens that is
-        not as stated, and on the way that a blurred image is smeared. As far as that shows they
-        count as fewer. Errors far beyond the usual ones are those of whole regions that move: then
-        each cell with inliers counts as one observation, and errors as large as they are. A camera
-        that suddenly turns otherwise smears and bends its images while they are taken, and matches
-        that hold a pose less firmly than usual let it be pulled further by what is wrong in all of
-        them. Where the map moved since the frame before, it was off by as much. And a pose far from
-        where the motion led may be a mistake, however well it fits.
+        Keypoints that are off by more than they are taken for make a pose that is less certain, and
+        so do few of them, and images of which it is not known what is usual. Keypoints near each
+        other are wrong together: by a map point in the wrong place, a lens that is not as stated,
+        and on the way that a blurred image is smeared. As far as that shows they count as fewer.
+        Errors far beyond the usual ones are those of whole regions that move: then each cell with
+        inliers counts as one observation, and errors as large as they are. A camera that suddenly
+        turns otherwise smears and bends its images while they are taken, and matches that hold a
+        pose less firmly than usual let it be pulled further by what is wrong in all of them. A
+        blurred image is of any moment while the shutter was open. Where the map moved since the
+        frame before, it was off by as much. And a pose far from where the motion led may be a
+        mistake, however well it fits.
         """
         covariance = refined.estimate.covariance
         if covariance is None:
             return None
         limits = self.limits
-        per_cell = refined.estimate.n_inliers / max(1, evidence.n_cells)
-        spread = core.spread_of_inliers(refined.frame)
-        # Places anywhere on a smear vary by as much, in terms of what the inliers are taken for.
-        smeared = evidence.smear**2 / 12 / spread.variance if spread.variance > 0 else 0.0
-        together = max(1.0, spread.correlation, 1.0 + per_cell * smeared)
-        larger = max(1.0, evidence.match_error / limits.honest_error)
-        factor = min(larger, limits.largest_error) ** 2 * together
-        if self._errs_suddenly(evidence.match_error):
-            larger = min(evidence.error_to_usual, limits.largest_error)
-            factor = max(factor, larger**2 * max(together, per_cell))
         surprise = self._pixels(evidence.turn_change) / limits.surprise_pixels
         surprise = min(surprise, limits.largest_surprise)
         looseness = max(1.0, evidence.deviation_to_usual / limits.usual_deviation)
-        covariance = covariance * (factor * (1.0 + surprise**2) * looseness)
+        n_inliers = max(refined.estimate.n_inliers, limits.fewest_inliers)
+        covariance = covariance * (
+            self._error_factor(refined, evidence)
+            * (1.0 + (limits.few_inliers / n_inliers) ** 4)
+            * (1.0 if self._change.is_known else limits.unknown_change)
+            * (1.0 + surprise**2)
+            * looseness
+        )
+        way = self._way_while_open(refined.frame, evidence, motion)
+        if way is not None:
+            covariance = covariance + way[:, None] * way / 12
         move = motion.move_of_map(refined.frame)
         if move is not None:
             covariance = covariance + move[:, None] * move
@@ -219,6 +221,41 @@ class EvidenceJudge:
         if beyond is not None:
             covariance = covariance + limits.mistaken_share * beyond[:, None] * beyond
         return covariance
+
+    def _error_factor(self, refined: RefinedPose, evidence: Evidence) -> float:
+        """How many times the variance is by how the matches fit, and how many are independent."""
+        limits = self.limits
+        per_cell = refined.estimate.n_inliers / max(1, evidence.n_cells)
+        spread = core.spread_of_inliers(refined.frame)
+        # Places anywhere on a smear vary by as much, in terms of what the inliers are taken for.
+        smeared = evidence.smear**2 / 12 / spread.variance if spread.variance > 0 else 0.0
+        together = max(1.0, spread.correlation, 1.0 + per_cell * smeared)
+        larger = max(1.0, evidence.match_error / limits.honest_error)
+        larger *= max(1.0, evidence.match_error / limits.doubtful_error)
+        factor = min(larger, limits.largest_error) ** 2 * together
+        if self._errs_suddenly(evidence.match_error):
+            larger = min(evidence.error_to_usual, limits.largest_error)
+            factor = max(factor, larger**2 * max(together, per_cell))
+        return factor
+
+    def _way_while_open(
+        self, frame: core.TrackedFrame, evidence: Evidence, motion: MotionModel
+    ) -> FloatArray | None:
+        """The part (6,) of the camera's way that a smeared image was taken on; None for a sharp one.
+
+        By how long the smear is beside how far the image moved since the last one.
+        """
+        limits = self.limits
+        smear = limits.smear_of_sharpest * (evidence.smear - limits.visible_smear)
+        T_cl = motion.way(frame)
+        if smear <= 0 or T_cl is None:
+            return None
+        T_lw = motion.last.T_cw
+        assert T_lw is not None
+        moved = core.median_displacement(frame, T_lw)
+        share = 1.0 if moved <= smear else smear / moved
+        way: FloatArray = share * T_cl.log()
+        return way
 
     def _errs_suddenly(self, error: float) -> bool:
         """Whether a median error is larger than that of images before, and than it varies."""

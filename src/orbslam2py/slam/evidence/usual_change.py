@@ -29,6 +29,11 @@ class UsualChange:
         self._way = 0.0
         self._n_seen = 0
 
+    @property
+    def is_known(self) -> bool:
+        """Whether enough was seen to tell what is usual."""
+        return self._n_seen >= self._limits.changes_seen
+
     def beyond(self, change: FloatArray) -> FloatArray | None:
         """The part (6,) of a change that is beyond the usual; None where there is none.
 
@@ -41,7 +46,7 @@ class UsualChange:
             The frame's.
         """
         limits = self._limits
-        if self._n_seen < limits.changes_seen:
+        if not self.is_known:
             return None
         turn, way = _squares(change)
         least = min(_by(self._turn, turn), _by(self._way, way))

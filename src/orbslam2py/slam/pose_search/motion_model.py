@@ -63,11 +63,18 @@ class MotionModel:
 
         In the camera's axes of `frame`, since the last one was tracked; None where it did not.
         """
-        if self._moved is None or frame.T_cw is None or self.last.T_cw is None:
+        T_cl = self.way(frame)
+        if self._moved is None or T_cl is None:
             return None
-        T_cl = frame.T_cw @ self.last.T_cw.inverse()
         move: FloatArray = (T_cl @ self._moved @ T_cl.inverse()).log()
         return move
+
+    def way(self, frame: core.TrackedFrame) -> core.Pose | None:
+        """The motion ``T_cl`` from the last frame to this one; None without a pose of either."""
+        T_lw = None if self._last is None else self._last.T_cw
+        if T_lw is None or frame.T_cw is None:
+            return None
+        return frame.T_cw @ T_lw.inverse()
 
     def change(self, frame: core.TrackedFrame) -> FloatArray | None:
         """From a frame's pose to the one that the speed leads to, (6,) rotation [rad] and way.
