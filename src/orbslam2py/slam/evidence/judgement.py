@@ -241,7 +241,7 @@ class EvidenceJudge:
     def _way_while_open(
         self, frame: core.TrackedFrame, evidence: Evidence, motion: MotionModel
     ) -> FloatArray | None:
-        """The part (6,) of the camera's way that a smeared image was taken on; None for a sharp one.
+        """The part (6,) of the camera's way that a smeared image was taken on; None if sharp.
 
         By how long the smear is beside how far the image moved since the last one.
         """
