@@ -9,25 +9,9 @@ import numpy as np
 import pytest
 
 from orbslam2py import Reason, Sensor, TrackingState
-from orbslam2py.slam.evidence import judgement
-from orbslam2py.slam.pose_search import MotionModel
 from orbslam2py.slam.records import PoseMethod, Verdict
-from orbslam2py.slam.thresholds import EvidenceThresholds, TrackingThresholds
+from orbslam2py.slam.thresholds import EvidenceThresholds
 from support.tracking_scene import FakeCore, FakeFrame, Scene, every_way_ends_elsewhere, pose
-
-#: Frames until the first second after the start, with its own limit of inliers, is over.
-_SETTLED = 40
-
-
-@pytest.fixture
-def careful(core: FakeCore, sensor: Sensor) -> Scene:
-    """A tracker that weighs its poses, used to 100 inliers; refuses fewer than 30."""
-    scene = Scene(
-        sensor, core, TrackingThresholds(local_map_inliers=10), evidence=EvidenceThresholds()
-    )
-    scene.run(_SETTLED)
-    core.calls.clear()
-    return scene
 
 
 def turned(correlation: float = 0.9) -> SimpleNamespace:
@@ -204,151 +188,6 @@ def test_where_errors_vary_from_image_to_image_a_larger_one_is_not_sudden(carefu
     assert evidence.verdict is Verdict.WEAK
 
 
-@pytest.mark.parametrize(("error", "factor"), [(0.4, 1.0), (0.85, (0.85 / 0.8) ** 2)])
-def test_a_pose_is_as_uncertain_as_its_matches_are_off(
-    careful: Scene, error: float, factor: float
-) -> None:
-    usual = careful.track().estimate
-    careful.core.match_error = error
-    estimate = careful.track().estimate
-    assert usual.covariance is not None
-    assert estimate.covariance is not None
-    assert estimate.evidence is not None
-    assert estimate.evidence.verdict is Verdict.STRONG
-    assert estimate.covariance[0, 0] == pytest.approx(factor * usual.covariance[0, 0])
-
-
-def test_where_many_matches_are_accidental_the_uncertainty_grows_faster(careful: Scene) -> None:
-    usual = careful.track().estimate
-    careful.core.match_error = 2.0
-    careful.run(200)  # until that is usual
-    estimate = careful.track().estimate
-    assert usual.covariance is not None
-    assert estimate.covariance is not None
-    assert estimate.evidence is not None
-    assert estimate.evidence.verdict is Verdict.STRONG
-    larger = estimate.covariance[0, 0] / usual.covariance[0, 0]
-    assert larger == pytest.approx((2.0 / 0.8 * 2.0 / 1.3) ** 2)
-
-
-@pytest.mark.parametrize(("n_inliers", "counted"), [(70, 70), (20, 30)])
-def test_few_inliers_are_less_certain_than_their_number_says(
-    careful: Scene, n_inliers: int, counted: int
-) -> None:
-    usual = careful.track().estimate
-    careful.core.inliers.extend([n_inliers] * 10)  # by whatever way it is searched
-    estimate = careful.track().estimate
-    assert usual.covariance is not None
-    assert estimate.covariance is not None
-    assert estimate.n_inliers == n_inliers
-    larger = estimate.covariance[0, 0] / usual.covariance[0, 0]
-    few = EvidenceThresholds().few_inliers
-    # What is stated of the keypoints' noise goes by the number, here in proportion.
-    by_number = (1 + (few / counted) ** 4) / (1 + (few / 100) ** 4)
-    assert larger == pytest.approx(n_inliers / 100 * by_number)
-
-
-def test_where_nothing_is_usual_yet_a_pose_is_less_certain(careful: Scene) -> None:
-    usual = careful.track().estimate
-    careful.tracking.reset()
-    careful.run(1)  # the first frame of a map
-    first = careful.track().estimate
-    careful.run(EvidenceThresholds().changes_seen + 1)
-    later = careful.track().estimate
-    assert usual.covariance is not None
-    assert first.covariance is not None
-    assert later.covariance is not None
-    np.testing.assert_allclose(first.covariance, 2 * usual.covariance)
-    np.testing.assert_allclose(later.covariance, usual.covariance)
-
-
-@pytest.mark.parametrize(("displacement", "share"), [(40.0, 18.2 / 40), (5.0, 1.0)])
-def test_a_blurred_image_is_of_any_moment_while_the_shutter_was_open(
-    careful: Scene, monkeypatch: pytest.MonkeyPatch, displacement: float, share: float
-) -> None:
-    careful.core.displacement = displacement
-    monkeypatch.setattr(MotionModel, "way", lambda self, frame: pose(0.4))
-    sharp = careful.track().estimate
-    careful.core.fine_detail_of_images = 0.7  # smeared by 9.6 pixels
-    blurred = careful.track().estimate
-    assert sharp.covariance is not None
-    assert blurred.covariance is not None
-    larger = blurred.covariance[4, 4] / sharp.covariance[4, 4]
-    along = blurred.covariance[3, 3] - larger * sharp.covariance[3, 3]
-    assert along == pytest.approx((share * 0.4) ** 2 / 12)
-
-
-@pytest.mark.parametrize(("correlation", "factor"), [(2.5, 2.5), (0.6, 1.0)])
-def test_neighbours_that_are_wrong_together_count_as_fewer(
-    careful: Scene, correlation: float, factor: float
-) -> None:
-    usual = careful.track().estimate
-    careful.core.correlation = correlation
-    estimate = careful.track().estimate
-    assert usual.covariance is not None
-    assert estimate.covariance is not None
-    assert usual.evidence is not None
-    assert estimate.evidence is not None
-    assert estimate.covariance[0, 0] == pytest.approx(factor * usual.covariance[0, 0])
-    assert estimate.evidence.verdict is usual.evidence.verdict
-
-
-def test_keypoints_on_a_smear_are_wrong_together(careful: Scene) -> None:
-    usual = careful.track().estimate
-    careful.core.fine_detail_of_images = 0.7
-    blurred = careful.track().estimate
-    careful.core.fine_detail_of_images = 1.4
-    sharp = careful.track().estimate
-    assert usual.covariance is not None
-    assert blurred.covariance is not None
-    assert sharp.covariance is not None
-    assert usual.evidence is not None
-    assert blurred.evidence is not None
-    limits = EvidenceThresholds()
-    assert blurred.evidence.smear == pytest.approx(limits.smear * (2**2 - 1))
-    assert usual.evidence.smear == 0
-    # 100 inliers in 30 cells, each with a variance of 2.
-    variance = blurred.evidence.smear**2 / 12 / 2
-    larger = blurred.covariance[0, 0] / usual.covariance[0, 0]
-    assert larger == pytest.approx(1 + 100 / 30 * variance)
-    assert blurred.evidence.verdict is Verdict.STRONG
-    assert sharp.covariance[0, 0] == pytest.approx(usual.covariance[0, 0])
-
-
-@pytest.mark.parametrize(("turn", "factor"), [(0.02, 1 + (10 / 15) ** 2), (0.5, 1 + 2**2)])
-def test_a_turn_that_nobody_expected_makes_a_pose_less_certain(
-    careful: Scene, monkeypatch: pytest.MonkeyPatch, turn: float, factor: float
-) -> None:
-    # Radians; the scene's focal length is 500 pixels.
-    usual = careful.track().estimate
-    monkeypatch.setattr(judgement, "_changes", lambda frame, motion: (np.degrees(turn), 0.0))
-    turned_otherwise = careful.track().estimate
-    assert usual.covariance is not None
-    assert turned_otherwise.covariance is not None
-    larger = turned_otherwise.covariance[0, 0] / usual.covariance[0, 0]
-    assert larger == pytest.approx(factor)
-
-
-@pytest.mark.parametrize(("looser", "factor"), [(1.2, 1.0), (2.0, 2.0 / 1.3)])
-def test_a_pose_that_is_held_loosely_is_less_certain_still(
-    careful: Scene, monkeypatch: pytest.MonkeyPatch, looser: float, factor: float
-) -> None:
-    usual = careful.track().estimate
-    optimize = careful.core.optimize_pose
-
-    def loosely(frame: FakeFrame) -> SimpleNamespace:
-        found = optimize(frame)
-        found.covariance = looser**2 * found.covariance
-        return found
-
-    monkeypatch.setattr(careful.core, "optimize_pose", loosely)
-    estimate = careful.track().estimate
-    assert usual.covariance is not None
-    assert estimate.covariance is not None
-    larger = estimate.covariance[0, 0] / usual.covariance[0, 0]
-    assert larger == pytest.approx(looser**2 * factor)
-
-
 def test_a_lasting_lack_of_detail_is_the_scene(careful: Scene) -> None:
     careful.core.fine_detail_of_images = 1.2
     lengths = []
@@ -359,28 +198,6 @@ def test_a_lasting_lack_of_detail_is_the_scene(careful: Scene) -> None:
     assert lengths[0] > 0
     assert lengths == sorted(lengths, reverse=True)
     assert lengths[-1] == 0
-
-
-def test_a_map_that_moved_was_off_by_as_much(careful: Scene) -> None:
-    usual = careful.track().estimate.covariance
-    careful.map.keyframe_x += 0.5
-    moved = careful.track().estimate.covariance
-    later = careful.track().estimate.covariance
-    assert usual is not None
-    assert moved is not None
-    assert later is not None
-    np.testing.assert_allclose(np.diag(moved - usual), [0, 0, 0, 0.25, 0, 0], atol=1e-9)
-    np.testing.assert_allclose(later, usual)
-
-
-def test_a_loop_that_moved_the_map_says_nothing_of_now(careful: Scene) -> None:
-    usual = careful.track().estimate.covariance
-    careful.map.keyframe_x += 0.5
-    careful.map.big_change_index += 1
-    moved = careful.track().estimate.covariance
-    assert usual is not None
-    assert moved is not None
-    np.testing.assert_allclose(moved, usual)
 
 
 def test_an_error_that_stays_becomes_the_usual_one(careful: Scene) -> None:

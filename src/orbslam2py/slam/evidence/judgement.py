@@ -213,6 +213,7 @@ class EvidenceJudge:
         )
         way = self._way_while_open(refined.frame, evidence, motion)
         if way is not None:
+            # The variance of a moment anywhere on it.
             covariance = covariance + way[:, None] * way / 12
         move = motion.move_of_map(refined.frame)
         if move is not None:

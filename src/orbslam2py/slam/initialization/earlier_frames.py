@@ -91,10 +91,8 @@ class EarlierFrames:
         if not estimate.found or not _is_strong(estimate):
             return False
         frame.discard_outliers()
-        last = search.motion.last
-        assert last.T_cw is not None and frame.T_cw is not None
         # Not update_velocity: the numbers of the frames may fall.
-        search.motion.velocity = frame.T_cw @ last.T_cw.inverse()
+        search.motion.velocity = search.motion.way(frame)
         search.motion.remember(frame)
         return True
 

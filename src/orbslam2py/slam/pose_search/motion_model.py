@@ -141,10 +141,10 @@ class MotionModel:
         """Measure the motion from the last frame to this one, if they follow each other."""
         last = self._last
         self.velocity = None
-        if last is None or last.T_cw is None or frame.T_cw is None or not self._last_tracked:
+        if last is None or not self._last_tracked:
             return
         if frame.id == last.id + 1 and frame.big_change == last.big_change:
-            self.velocity = frame.T_cw @ last.T_cw.inverse()
+            self.velocity = self.way(frame)
 
     def lose(self) -> None:
         """Tracking was lost: the speed is unknown."""
