@@ -22,14 +22,12 @@ from collections.abc import Callable, Iterator
 from typing import Generic, TypeVar
 
 from orbslam2py import _core as core
+from orbslam2py._waiting import WAIT_SLICE
 from orbslam2py.errors import StateError, WorkerError
 
 _log = logging.getLogger(__name__)
 
 Job = TypeVar("Job")
-
-#: Longest uninterrupted wait in seconds; between two of these, signals such as Ctrl-C are handled.
-_WAIT_SLICE = 0.2
 
 
 class WorkerState(enum.Enum):
@@ -145,7 +143,7 @@ class Worker(Generic[Job]):
         if thread is not None:
             deadline = None if timeout is None else time.monotonic() + timeout
             while thread.is_alive():
-                thread.join(_WAIT_SLICE)
+                thread.join(WAIT_SLICE)
                 if deadline is not None and time.monotonic() > deadline and thread.is_alive():
                     raise WorkerError(f"{self.name} did not end within {timeout} s")
             self._thread = None
@@ -257,7 +255,7 @@ class Worker(Generic[Job]):
         finally:
             with self._condition:
                 while self._threaded and self._pauses and not self.cancel_flag.is_set():
-                    self._condition.wait(_WAIT_SLICE)
+                    self._condition.wait(WAIT_SLICE)
                 self._off_duty = False
 
     # ---- pauses ----------------------------------------------------------------------------------
@@ -366,10 +364,10 @@ class Worker(Generic[Job]):
         deadline = None if timeout is None else time.monotonic() + timeout
         with self._condition:
             while not condition():
-                left = _WAIT_SLICE if deadline is None else deadline - time.monotonic()
+                left = WAIT_SLICE if deadline is None else deadline - time.monotonic()
                 if left <= 0:
                     return False
-                self._condition.wait(min(left, _WAIT_SLICE))
+                self._condition.wait(min(left, WAIT_SLICE))
         return True
 
     # ---- the thread ------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ import os
 import sys
 
 from orbslam2py.cli.exit_codes import ExitCode
+from orbslam2py.cli.interrupts import hold_while_loading
 from orbslam2py.cli.terminal_encoding import accept_all_letters
 
 
@@ -17,7 +18,8 @@ def main() -> None:
         # FFmpeg writes of broken videos by itself, beside the message.
         os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
         # Loading the libraries takes long enough for a Ctrl-C.
-        from orbslam2py.cli.app import run_app  # noqa: PLC0415
+        with hold_while_loading():
+            from orbslam2py.cli.app import run_app  # noqa: PLC0415
 
         run_app()
     except KeyboardInterrupt:

@@ -20,6 +20,7 @@ from rich.console import Console
 
 import orbslam2py
 from orbslam2py.cli.exit_codes import ExitCode
+from orbslam2py.cli.interrupts import hold_while_loading
 from orbslam2py.cli.messages import print_error, tell_repeated
 from orbslam2py.errors import OrbSlamError
 
@@ -57,7 +58,8 @@ class Subcommand:
 
 
 def _module(name: str) -> Any:
-    return importlib.import_module(f"orbslam2py.cli.{name}")
+    with hold_while_loading():
+        return importlib.import_module(f"orbslam2py.cli.{name}")
 
 
 #: In the order of the help.

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import threading
+from collections.abc import Iterator
 from types import FrameType
 
 
@@ -39,3 +41,21 @@ class StopOnInterrupt:
         if self.event.is_set():
             raise KeyboardInterrupt
         self.event.set()
+
+
+@contextlib.contextmanager
+def hold_while_loading() -> Iterator[None]:
+    """Let the first Ctrl-C wait until the libraries of the block are loaded.
+
+    Loading takes a second at most, and some libraries drop whatever exception comes up meanwhile or
+    make another one of it: the program would go on, or end with a traceback.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        At the end of the block, or at the second Ctrl-C.
+    """
+    with StopOnInterrupt() as interrupt:
+        yield
+    if interrupt.event.is_set():
+        raise KeyboardInterrupt

@@ -20,6 +20,7 @@ from types import TracebackType
 import numpy as np
 import numpy.typing as npt
 
+from orbslam2py._waiting import wait_for_event
 from orbslam2py.maps.changes import MapChanges
 from orbslam2py.slam.events import Event, LoopClosed, MapsMerged
 from orbslam2py.slam.records import TrackingRecord
@@ -205,7 +206,7 @@ class LiveView:
     def wait(self) -> None:
         """Keep the page until Ctrl-C, or until it is no more."""
         with contextlib.suppress(KeyboardInterrupt):
-            self._companion.ended.wait()
+            wait_for_event(self._companion.ended)
             if not self._missed:
                 _log.warning("the viewer stopped: %s", self._companion.why)
 
@@ -323,4 +324,4 @@ def announce(address: str, *, open_browser: bool) -> None:
 def wait_for_interrupt() -> None:
     """Return at Ctrl-C."""
     with contextlib.suppress(KeyboardInterrupt):
-        threading.Event().wait()
+        wait_for_event(threading.Event())

@@ -86,10 +86,10 @@ def run(
 
 
 def start(
-    folder: Path, module: str, name: str, n: int, times: int, *options: str
+    folder: Path, module: str, name: str, n: int, times: int, *options: str, before: str = ""
 ) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-c", _DRIVER, module, name, str(n), str(times), *RUN, *options],
+        [sys.executable, "-c", before + _DRIVER, module, name, str(n), str(times), *RUN, *options],
         cwd=folder,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -159,6 +159,21 @@ def test_while_the_vocabulary_is_loaded(lap: Path, forked: Forked) -> None:
 def test_while_libraries_are_loaded(lap: Path) -> None:
     code, err = finish(start(lap.parent, "importlib.metadata", "version", 1, 1))
     assert (code, err.strip()) == (130, "")
+
+
+@pytest.mark.parametrize("library", ["rich.table", "cv2.version"])
+def test_while_one_library_is_loaded(lap: Path, library: str) -> None:
+    """OpenCV drops every exception while it looks for its version."""
+    press = (
+        "import os, signal, sys\n"
+        "def press(event, arguments):\n"
+        f"    if event == 'import' and arguments[0] == {library!r}:\n"
+        "        os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.addaudithook(press)\n"
+    )
+    code, err = finish(start(lap.parent, "time", "ctime", 1, 1, before=press))
+    assert (code, err.strip()) == (130, "")
+    assert not (lap.parent / "r").exists(), "nothing was computed"
 
 
 def open_for_a_reader(pipe: Path) -> int:
