@@ -375,7 +375,7 @@ void bind_local_map(py::module_& module) {
              "Keyframes voted for by the frame's points, extended, and all their points.");
   module.def(
       "count_sightings",
-      [](Map& map, const TrackedFrame& frame, const IdArray& in_view) {
+      [](const Map& map, const TrackedFrame& frame, const IdArray& in_view) {
         const auto seen = to_point_ids(in_view);
         const py::gil_scoped_release release;
         count_sightings(map, frame, seen);

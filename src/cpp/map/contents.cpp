@@ -129,8 +129,8 @@ bool copy_point(const Map& map, const MapPoint& point, MapContents& contents) {
   rows.min_distance.push_back(point.min_distance);
   rows.max_distance.push_back(point.max_distance);
   rows.descriptors.push_back(point.descriptor);
-  rows.n_visible.push_back(point.n_visible);
-  rows.n_found.push_back(point.n_found);
+  rows.n_visible.push_back(point.n_visible.value());
+  rows.n_found.push_back(point.n_found.value());
   rows.reference_keyframe.push_back(reference);
   rows.first_keyframe.push_back(point.first_keyframe);
   rows.first_frame.push_back(point.first_frame);

@@ -183,8 +183,9 @@ class Map {
   /// when both are the same or `by` is dead.
   void replace_point(MapPointId id, MapPointId by);
   /// Counters of the tracker: seen in the frustum, matched as inlier. Replacements are followed.
-  void count_visible(MapPointId id, int n = 1);
-  void count_found(MapPointId id, int n = 1);
+  /// The read lock is enough.
+  void count_visible(MapPointId id, int n = 1) const;
+  void count_found(MapPointId id, int n = 1) const;
 
   /// Representative descriptor: the observed one with the least median distance to the others.
   void update_descriptor(MapPointId id);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <atomic>
 #include <vector>
 
 #include "base/descriptor.hpp"
@@ -22,6 +23,26 @@ struct PointGeometry {
   double min_distance = 0, max_distance = 0;
 };
 
+/// A number that grows while others read the map: tracking adds to it at every image, and must not
+/// wait until each of those who copy the map has finished. See docs/method/threads.md#locks.
+class SightingCount {
+ public:
+  explicit SightingCount(int n) : n_(n) {}
+  SightingCount(const SightingCount& other) : n_(other.value()) {}
+  SightingCount& operator=(const SightingCount& other) {
+    n_.store(other.value(), std::memory_order_relaxed);
+    return *this;
+  }
+  ~SightingCount() = default;
+
+  int value() const { return n_.load(std::memory_order_relaxed); }
+  /// The read lock of the map is enough.
+  void add(int n) const { n_.fetch_add(n, std::memory_order_relaxed); }
+
+ private:
+  mutable std::atomic<int> n_;
+};
+
 /// A 3-D point of the map. Only the Map changes it, so that both sides of an observation, the
 /// count and the derived fields always agree. See docs/method/map.md#map-points.
 struct MapPoint {
@@ -35,14 +56,14 @@ struct MapPoint {
 
   std::vector<Observation> observations;  ///< ascending keyframe id, one per keyframe
   int observation_count = 0;              ///< weighted: 2 per observation with depth, else 1
-  int n_visible = 1;                      ///< frames in whose view the point lay
-  int n_found = 1;                        ///< of these, frames that matched it as an inlier
+  SightingCount n_visible{1};             ///< frames in whose view the point lay
+  SightingCount n_found{1};               ///< of these, frames that matched it as an inlier
 
   KeyFrameId reference_keyframe;  ///< gives the scale range; always among the observations
   KeyFrameId first_keyframe;      ///< the creating keyframe
   FrameId first_frame = -1;
 
-  double found_ratio() const { return static_cast<double>(n_found) / n_visible; }
+  double found_ratio() const { return static_cast<double>(n_found.value()) / n_visible.value(); }
   const Observation* observation_of(KeyFrameId keyframe) const;
 };
 

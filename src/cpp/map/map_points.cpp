@@ -132,8 +132,8 @@ void Map::replace_point(MapPointId id, MapPointId by) {
       insert_observation(survivor, observer, observation.index);
     }
   }
-  survivor.n_found += dying->n_found;
-  survivor.n_visible += dying->n_visible;
+  survivor.n_found.add(dying->n_found.value());
+  survivor.n_visible.add(dying->n_visible.value());
   points_.erase(id);
   points_.touch(survivor_id);
   remember_replacement(id, survivor_id);
@@ -157,12 +157,12 @@ void Map::forget_old_replacements() {
   }
 }
 
-void Map::count_visible(MapPointId id, int n) {
-  if (MapPoint* counted = points_.find(resolve(id))) counted->n_visible += n;
+void Map::count_visible(MapPointId id, int n) const {
+  if (const MapPoint* counted = find(resolve(id))) counted->n_visible.add(n);
 }
 
-void Map::count_found(MapPointId id, int n) {
-  if (MapPoint* counted = points_.find(resolve(id))) counted->n_found += n;
+void Map::count_found(MapPointId id, int n) const {
+  if (const MapPoint* counted = find(resolve(id))) counted->n_found.add(n);
 }
 
 }  // namespace orbslam

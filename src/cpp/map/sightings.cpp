@@ -5,7 +5,8 @@
 
 namespace orbslam {
 
-void count_sightings(Map& map, const TrackedFrame& frame, const std::vector<MapPointId>& in_view) {
+void count_sightings(const Map& map, const TrackedFrame& frame,
+                     const std::vector<MapPointId>& in_view) {
   // Each point once, although the search may have matched what it saw in the frustum.
   thread_local std::vector<MapPointId> visible;
   visible.assign(in_view.begin(), in_view.end());
@@ -14,7 +15,7 @@ void count_sightings(Map& map, const TrackedFrame& frame, const std::vector<MapP
   }
   sort_unique(visible);
 
-  const auto lock = map.write_lock();
+  const auto lock = map.read_lock();
   for (const MapPointId id : visible) {
     if (map.find(id)) map.count_visible(id);
   }

@@ -51,8 +51,8 @@ void restore_points(Map& map, const StoredMap& stored) {
     point->min_distance = rows.min_distance[i];
     point->max_distance = rows.max_distance[i];
     std::memcpy(&point->descriptor, rows.descriptors + 32 * i, 32);
-    point->n_visible = rows.n_visible[i];
-    point->n_found = rows.n_found[i];
+    point->n_visible = SightingCount(rows.n_visible[i]);
+    point->n_found = SightingCount(rows.n_found[i]);
     point->reference_keyframe = KeyFrameId(rows.reference_keyframe[i]);
     point->first_keyframe = KeyFrameId(rows.first_keyframe[i]);
     point->first_frame = rows.first_frame[i];

@@ -4,12 +4,16 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
+#include <future>
 #include <thread>
 
 #include "map/content_hash.hpp"
 #include "map/culling.hpp"
 #include "map/keyframe_insertion.hpp"
 #include "map/local_map.hpp"
+#include "map/sightings.hpp"
+#include "map/snapshot.hpp"
 #include "map/trajectory.hpp"
 #include "map_builder.hpp"
 
@@ -78,6 +82,37 @@ TEST(Concurrency, ReadersSeeConsistentMapsWhileAWriterWorks) {
   tracker.join();
   viewer.join();
   EXPECT_TRUE(check_invariants(map, false).empty());
+}
+
+// Tracking counts at every image, and the map may be copied for tens of milliseconds.
+TEST(Concurrency, SightingsAreCountedWhileOthersRead) {
+  const PointCloud cloud = make_point_cloud(150, 2, 3, 6, 1);
+  Map map;
+  TrackedFrame frame(project_cloud(0, cloud, Pose()).frame);
+  frame.T_cw = Pose();
+  insert_keyframe(map, frame, true);
+  const std::vector<MapPointId> seen = snapshot_points(map).ids;
+  constexpr int kTimes = 100;
+  const auto count = [&] {
+    for (int i = 0; i < kTimes; ++i) count_sightings(map, frame, seen);
+  };
+
+  auto reading = map.read_lock();
+  auto first = std::async(std::launch::async, count);
+  auto second = std::async(std::launch::async, count);
+  // Well before the test's time is up, so that a counter which waits fails instead of hanging.
+  EXPECT_EQ(first.wait_for(std::chrono::seconds(20)), std::future_status::ready);
+  EXPECT_EQ(second.wait_for(std::chrono::seconds(20)), std::future_status::ready);
+  reading.unlock();
+  first.get();
+  second.get();
+
+  ASSERT_FALSE(seen.empty());
+  const auto lock = map.read_lock();
+  for (const MapPointId id : seen) {
+    EXPECT_EQ(map.find(id)->n_visible.value(), 1 + 2 * kTimes);
+    EXPECT_EQ(map.find(id)->n_found.value(), 1 + 2 * kTimes);
+  }
 }
 
 }  // namespace

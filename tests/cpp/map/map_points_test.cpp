@@ -25,8 +25,8 @@ TEST(MapPoints, AnObservationIsEnteredOnBothSidesAndWeightedByDepth) {
   EXPECT_EQ(point.observation_of(kf(1))->index, 4U);
   EXPECT_TRUE(point.observation_of(kf(1))->has_depth);
   EXPECT_EQ(point.observation_of(kf(2)), nullptr);
-  EXPECT_EQ(point.n_visible, 1);
-  EXPECT_EQ(point.n_found, 1);
+  EXPECT_EQ(point.n_visible.value(), 1);
+  EXPECT_EQ(point.n_found.value(), 1);
 }
 
 TEST(MapPoints, ASecondObservationInAKeyframeIsIgnored) {
@@ -121,8 +121,8 @@ TEST(MapPoints, ReplacingMovesObservationsAndCounters) {
   EXPECT_EQ(builder.map.resolve(dying), survivor);
   const MapPoint& point = *builder.map.find(survivor);
   EXPECT_EQ(point.observation_count, 4);
-  EXPECT_EQ(point.n_visible, 6);
-  EXPECT_EQ(point.n_found, 4);
+  EXPECT_EQ(point.n_visible.value(), 6);
+  EXPECT_EQ(point.n_found.value(), 4);
   // Keyframe 1 saw both: the slot of the dying one is free.
   EXPECT_EQ(builder.map.find(kf(1))->map_points[0], survivor);
   EXPECT_FALSE(builder.map.find(kf(1))->map_points[1].valid());
@@ -171,7 +171,7 @@ TEST(MapPoints, ReplacingByItselfOrByTheDeadDoesNothing) {
   builder.map.replace_point(a, a);
   builder.map.replace_point(a, dead);
   builder.map.replace_point(dead, a);
-  EXPECT_EQ(builder.map.find(a)->n_visible, 1);
+  EXPECT_EQ(builder.map.find(a)->n_visible.value(), 1);
   builder.map.replace_point(b, a);
   builder.map.replace_point(a, b);  // b leads to a
   ASSERT_TRUE(builder.map.find(a));
@@ -187,8 +187,8 @@ TEST(MapPoints, CountersFollowReplacementsAndIgnoreTheDead) {
   builder.map.replace_point(a, b);
   builder.map.count_visible(a, 5);
   builder.map.count_found(a);
-  EXPECT_EQ(builder.map.find(b)->n_visible, 7);
-  EXPECT_EQ(builder.map.find(b)->n_found, 3);
+  EXPECT_EQ(builder.map.find(b)->n_visible.value(), 7);
+  EXPECT_EQ(builder.map.find(b)->n_found.value(), 3);
   EXPECT_DOUBLE_EQ(builder.map.find(b)->found_ratio(), 3.0 / 7.0);
   builder.map.erase_point(b);
   EXPECT_NO_THROW(builder.map.count_visible(a));

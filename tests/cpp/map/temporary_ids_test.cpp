@@ -62,9 +62,9 @@ TEST(TemporaryIds, AloneTheyVoteForNothing) {
 TEST(TemporaryIds, SightingsOfThemAreNotCounted) {
   Setting s;
   count_sightings(s.builder.map, s.frame, {s.points[12], kTemporary});
-  EXPECT_EQ(s.builder.map.find(s.points[0])->n_found, 2);
-  EXPECT_EQ(s.builder.map.find(s.points[12])->n_visible, 2);
-  EXPECT_EQ(s.builder.map.find(s.points[13])->n_visible, 1);
+  EXPECT_EQ(s.builder.map.find(s.points[0])->n_found.value(), 2);
+  EXPECT_EQ(s.builder.map.find(s.points[12])->n_visible.value(), 2);
+  EXPECT_EQ(s.builder.map.find(s.points[13])->n_visible.value(), 1);
 }
 
 TEST(TemporaryIds, OutlierIsDiscarded) {
