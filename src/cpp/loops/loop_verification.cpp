@@ -55,10 +55,27 @@ std::optional<SimilarityMatch> correspondence(const Map& map, const KeyFrame& cu
   return match;
 }
 
-/// Nothing when a keyframe is dead. Matches that lack a point on either side are deleted: nothing
-/// could say whether they are right.
+/// A keypoint of `current` and the far side's point alone, whatever keyframe there observes it.
+std::optional<SimilarityMatch> sighting(const Map& map, const KeyFrame& current,
+                                        const KeyFrame& candidate, std::size_t keypoint,
+                                        MapPointId partner) {
+  const MapPoint* point_2 = map.find(partner);
+  if (!point_2) return std::nullopt;
+  const Keypoint& at_1 = current.frame->keypoints[keypoint];
+  SimilarityMatch match;
+  match.point_2 = candidate.T_cw * point_2->position;
+  match.pixel_1 = {at_1.x, at_1.y};
+  match.inverse_sigma2_1 = current.frame->scales->inverse_sigma2(at_1.level);
+  match.mutual = false;
+  return match;
+}
+
+enum class Gathered { kMutual, kAll };
+
+/// Nothing when a keyframe is dead. Matches that lack a point on either side are deleted, unless
+/// all are gathered: alone nothing could say whether they are right.
 std::optional<Correspondences> gather(const Map& map, KeyFrameId current, KeyFrameId candidate,
-                                      MatchedPoints& matched) {
+                                      MatchedPoints& matched, Gathered which = Gathered::kMutual) {
   const auto lock = map.read_lock();
   const KeyFrame* keyframe_1 = map.find(current);
   const KeyFrame* keyframe_2 = map.find(candidate);
@@ -69,7 +86,11 @@ std::optional<Correspondences> gather(const Map& map, KeyFrameId current, KeyFra
   gathered.T_mw = keyframe_2->T_cw;
   for (std::size_t i = 0; i < matched.size(); ++i) {
     if (!matched[i].valid()) continue;
-    if (const auto match = correspondence(map, *keyframe_1, *keyframe_2, i, matched[i])) {
+    auto match = correspondence(map, *keyframe_1, *keyframe_2, i, matched[i]);
+    if (!match && which == Gathered::kAll) {
+      match = sighting(map, *keyframe_1, *keyframe_2, i, matched[i]);
+    }
+    if (match) {
       gathered.keypoints.push_back(static_cast<std::uint32_t>(i));
       gathered.matches.push_back(*match);
     } else {
@@ -144,11 +165,10 @@ class Verification {
     std::optional<Loop> loop = find_similarity(*gathered, by_words);
     if (!loop) return {};
     loop->loop_points = points_around(map_, candidate_);
-    match_loop_points(map_, current_, loop->S_cw, loop->loop_points, loop->matches);
-    loop->n_matches =
-        static_cast<int>(std::count_if(loop->matches.begin(), loop->matches.end(),
-                                       [](MapPointId point) { return point.valid(); }));
-    return loop->n_matches >= options_.min_matches ? loop : std::nullopt;
+    match_around(*loop);
+    if (loop->n_matches < options_.min_matches) return {};
+    settle(*loop);
+    return loop;
   }
 
  private:
@@ -181,14 +201,9 @@ class Verification {
     match_by_similarity(map_, current_, candidate_, S_cm, matched);
     const auto gathered = gather(map_, current_, candidate_, matched);
     if (!gathered) return {};
-    SimilarityOptions similarity_options;
-    similarity_options.fix_scale = options_.fix_scale;
-    const SimilarityEstimate refined = optimize_similarity(
-        S_cm, gathered->pinhole_1, gathered->pinhole_2, gathered->matches, similarity_options);
+    const SimilarityEstimate refined = optimize(S_cm, *gathered);
     if (refined.n_inliers == 0 || refined.n_inliers < options_.min_inliers) return {};
-    for (std::size_t k = 0; k < gathered->keypoints.size(); ++k) {
-      if (refined.outlier[k]) matched[gathered->keypoints[k]] = MapPointId();
-    }
+    drop_outliers(refined, *gathered, matched);
     Loop loop;
     loop.current = current_;
     loop.matched = candidate_;
@@ -197,6 +212,40 @@ class Verification {
     loop.matches = std::move(matched);
     loop.n_inliers = refined.n_inliers;
     return loop;
+  }
+
+  /// Matches the points around the candidate as well.
+  void match_around(Loop& loop) const {
+    match_loop_points(map_, current_, loop.S_cw, loop.loop_points, loop.matches);
+    loop.n_matches = static_cast<int>(std::count_if(
+        loop.matches.begin(), loop.matches.end(), [](MapPointId point) { return point.valid(); }));
+  }
+
+  /// Once more with all matches: the points of the neighbours lie around the few that the two
+  /// keyframes share, and hold the similarity where these leave it loose.
+  void settle(Loop& loop) const {
+    const auto gathered = gather(map_, current_, candidate_, loop.matches, Gathered::kAll);
+    if (!gathered) return;
+    const SimilarityEstimate refined = optimize(loop.S_cm, *gathered);
+    if (refined.n_inliers < options_.min_matches) return;
+    drop_outliers(refined, *gathered, loop.matches);
+    loop.S_cm = refined.S_12;
+    loop.S_cw = refined.S_12 * Similarity(gathered->T_mw);
+    match_around(loop);
+  }
+
+  SimilarityEstimate optimize(const Similarity& S_cm, const Correspondences& gathered) const {
+    SimilarityOptions options;
+    options.fix_scale = options_.fix_scale;
+    return optimize_similarity(S_cm, gathered.pinhole_1, gathered.pinhole_2, gathered.matches,
+                               options);
+  }
+
+  static void drop_outliers(const SimilarityEstimate& estimate, const Correspondences& gathered,
+                            MatchedPoints& matched) {
+    for (std::size_t k = 0; k < gathered.keypoints.size(); ++k) {
+      if (estimate.outlier[k]) matched[gathered.keypoints[k]] = MapPointId();
+    }
   }
 
   const Map& map_;

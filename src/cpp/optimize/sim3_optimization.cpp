@@ -62,10 +62,10 @@ class Refinement {
     int n_inliers = 0;
     for (std::size_t i = 0; i < matches_.size(); ++i) {
       if (outlier_[i]) continue;
-      outlier_[i] = passes(sim3_residuals::forward(S_12, pinhole_1_, matches_[i])) &&
-                            passes(sim3_residuals::inverse(S_12, pinhole_2_, matches_[i]))
-                        ? 0
-                        : 1;
+      const bool fits =
+          passes(sim3_residuals::forward(S_12, pinhole_1_, matches_[i])) &&
+          (!matches_[i].mutual || passes(sim3_residuals::inverse(S_12, pinhole_2_, matches_[i])));
+      outlier_[i] = fits ? 0 : 1;
       n_inliers += outlier_[i] ? 0 : 1;
     }
     return n_inliers;
@@ -91,6 +91,7 @@ class Refinement {
     for (std::size_t i = 0; i < matches_.size(); ++i) {
       if (outlier_[i]) continue;
       add(sim3_residuals::forward(S_12, pinhole_1_, matches_[i]), system);
+      if (!matches_[i].mutual) continue;
       add(sim3_residuals::inverse(S_12, pinhole_2_, matches_[i]), system);
     }
     if (options_.fix_scale) {
@@ -143,9 +144,11 @@ class Refinement {
 };
 
 bool usable(const SimilarityMatch& match) {
-  return match.point_1.allFinite() && match.point_2.allFinite() && match.pixel_1.allFinite() &&
-         match.pixel_2.allFinite() && match.inverse_sigma2_1 > 0 && match.inverse_sigma2_2 > 0 &&
-         std::isfinite(match.inverse_sigma2_1 + match.inverse_sigma2_2);
+  const bool forward = match.point_2.allFinite() && match.pixel_1.allFinite() &&
+                       match.inverse_sigma2_1 > 0 && std::isfinite(match.inverse_sigma2_1);
+  const bool inverse = match.point_1.allFinite() && match.pixel_2.allFinite() &&
+                       match.inverse_sigma2_2 > 0 && std::isfinite(match.inverse_sigma2_2);
+  return forward && (inverse || !match.mutual);
 }
 
 }  // namespace

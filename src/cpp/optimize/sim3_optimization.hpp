@@ -13,10 +13,13 @@ namespace orbslam {
 /// A keypoint of keyframe 1 matched to one of keyframe 2. Each keyframe has its own point of the
 /// map there; the similarity should carry one onto the other.
 struct SimilarityMatch {
-  Eigen::Vector3d point_1, point_2;  ///< camera 1 and camera 2, each its own point
-  Eigen::Vector2d pixel_1, pixel_2;  ///< the keypoints, undistorted
-  double inverse_sigma2_1 = 1;       ///< of the keypoints' levels [1 / pixels^2]
+  Eigen::Vector3d point_1 = Eigen::Vector3d::Zero();  ///< camera 1, its own point
+  Eigen::Vector3d point_2 = Eigen::Vector3d::Zero();  ///< camera 2, the same
+  Eigen::Vector2d pixel_1 = Eigen::Vector2d::Zero();  ///< the keypoints, undistorted
+  Eigen::Vector2d pixel_2 = Eigen::Vector2d::Zero();
+  double inverse_sigma2_1 = 1;  ///< of the keypoints' levels [1 / pixels^2]
   double inverse_sigma2_2 = 1;
+  bool mutual = true;  ///< false: of keyframe 1 only the keypoint is known, of keyframe 2 the point
 };
 
 struct SimilarityOptions {

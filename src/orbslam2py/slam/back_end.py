@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 from collections.abc import Callable
 from typing import Any
@@ -147,6 +148,9 @@ class BackEnd:
         for worker in self.workers:
             wait = drain and (wait_for_adjustment or worker is not self.adjustment.worker)
             try:
+                if wait and worker is self.loop_closing.worker:
+                    with contextlib.suppress(WorkerError):  # told when it is finished
+                        self.loop_closing.end()
                 worker.finish(drain=wait, timeout=timeout)
             except Exception as error:
                 errors.append(error)

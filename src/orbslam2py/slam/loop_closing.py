@@ -25,8 +25,11 @@ from orbslam2py.slam.full_bundle_adjustment import FullBundleAdjustment
 from orbslam2py.slam.merging import MapMerging
 from orbslam2py.slam.options import SystemOptions
 from orbslam2py.slam.thresholds import LoopThresholds
+from orbslam2py.slam.waiting_loop import WaitingLoop
 
 _log = logging.getLogger(__name__)
+
+_NO_KEYFRAME = -1
 
 
 @dataclass(frozen=True)
@@ -94,6 +97,7 @@ class LoopClosing:
         self._merging = MapMerging(
             slam_map, self._confirm, self._find_alike, fix_scale=self._fix_scale
         )
+        self._waiting = WaitingLoop(slam_map, self._confirm, self._release, self._limits)
         self._consistency = core.LoopConsistency()
         self._next_search = 1
         # A map with a fresh seam, and the keyframe from which on it is adjusted once more.
@@ -114,9 +118,14 @@ class LoopClosing:
         """Queue a keyframe, unless a shutdown has begun: mapping may end after loop closing."""
         self.worker.offer(keyframe)
 
+    def end(self) -> None:
+        """Close the loop that waits for a better one, if one does: no keyframe follows."""
+        self.worker.offer(_NO_KEYFRAME)
+
     def reset(self) -> None:
         """Drop waiting keyframes and what the last ones proposed."""
         self.worker.reset()
+        self._waiting.drop()
         self._consistency.clear()
         self._merging.reset()
         self._next_search = 1
@@ -126,17 +135,30 @@ class LoopClosing:
     def process(self, keyframe: int) -> None:
         """Everything that is done with one keyframe."""
         timer = StageTimer()
-        with self._lease(keyframe) as alive:
-            if alive:
-                loop = self._find_loop(keyframe, timer)
-                if loop is not None and self._joins_maps(loop):
-                    self._join(loop, timer)
-                elif loop is not None:
-                    self._close(loop, timer)
-                else:
-                    self._adjust_seam(keyframe)
-        self.last_keyframe = keyframe
+        if keyframe == _NO_KEYFRAME:
+            self._close_last(timer)
+        else:
+            with self._lease(keyframe) as alive:
+                if alive:
+                    self._search(keyframe, timer)
+            self.last_keyframe = keyframe
         self.statistics.add({f"loop.{step}": ms for step, ms in timer.milliseconds.items()})
+
+    def _search(self, keyframe: int, timer: StageTimer) -> None:
+        found = self._find_loop(keyframe, timer)
+        if found is not None and self._joins_maps(found):
+            self._join(found, timer)
+            return
+        with self._waiting.ripe(found) as loop:
+            if loop is not None:
+                self._close(loop, timer)
+            else:
+                self._adjust_seam(keyframe)
+
+    def _close_last(self, timer: StageTimer) -> None:
+        with self._waiting.last() as loop:
+            if loop is not None:
+                self._close(loop, timer)
 
     @contextlib.contextmanager
     def _lease(self, keyframe: int) -> Iterator[bool]:
@@ -149,8 +171,11 @@ class LoopClosing:
         try:
             yield True
         finally:
-            if self._map.end_lease(keyframe):
-                self._keyframe_index.erase(keyframe)
+            self._release(keyframe)
+
+    def _release(self, keyframe: int) -> None:
+        if self._map.end_lease(keyframe):
+            self._keyframe_index.erase(keyframe)
 
     # ---- is this a place seen before? ------------------------------------------------------------
     def _find_loop(self, keyframe: int, timer: StageTimer) -> core.Loop | None:

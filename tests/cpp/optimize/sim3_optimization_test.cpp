@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -147,6 +148,36 @@ TEST(OptimizeSimilarity, FixedScaleDoesNotMove) {
   EXPECT_EQ(fixed.S_12.scale(), problem.S_12_initial.scale());
   EXPECT_GT(difference(fixed.S_12, problem.S_12_initial), 1e-4);
   EXPECT_NE(problem.solve().S_12.scale(), problem.S_12_initial.scale());
+}
+
+/// Of most matches one side is not known: they hold the motion, the others the scale.
+TEST(OptimizeSimilarity, MatchesOfOneSideTakePart) {
+  double with_all = 0;
+  double with_few = 0;
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    SimilarityProblem problem = random_sim3_problem(seed, 60, 0, 0);
+    SimilarityProblem noisy = random_sim3_problem(seed, 60, 1.0, 0);
+    for (std::size_t i = 10; i < 60; ++i) {
+      for (SimilarityMatch* match : {&problem.matches[i], &noisy.matches[i]}) {
+        match->mutual = false;
+        match->point_1.setConstant(std::numeric_limits<double>::quiet_NaN());
+        match->pixel_2.setConstant(std::numeric_limits<double>::quiet_NaN());
+      }
+    }
+    const SimilarityEstimate estimate = problem.solve();
+    EXPECT_LT(difference(estimate.S_12, problem.S_12_true), 1e-6) << seed;
+    EXPECT_EQ(estimate.n_inliers, 60) << seed;
+
+    SimilarityProblem few = noisy;
+    few.matches.resize(10);
+    const auto turned_by = [](const SimilarityProblem& solved) {
+      const Similarity off = solved.solve().S_12 * solved.S_12_true.inverse();
+      return Eigen::AngleAxisd(off.rotation_matrix()).angle();
+    };
+    with_all += turned_by(noisy);
+    with_few += turned_by(few);
+  }
+  EXPECT_LT(with_all, 0.7 * with_few);
 }
 
 TEST(OptimizeSimilarity, TooFewMatchesChangeNothing) {

@@ -28,7 +28,7 @@ class FakeLoop:
     matched: int
     place: str = "here"
     n_inliers: int = 55
-    n_matches: int = 66
+    n_matches: int = 166
     S_cm: np.ndarray = field(default_factory=lambda: np.eye(4))
 
 
@@ -39,6 +39,7 @@ class FakeMap:
         self.dead: set[int] = set()
         self.leases: list[int] = []
         self.dies_after_lease = False
+        self.big_change_index = 0
         self.calls: list[str] = []
 
     def begin_lease(self, keyframe: int) -> None:
@@ -49,6 +50,9 @@ class FakeMap:
     def end_lease(self, keyframe: int) -> bool:
         self.leases.remove(keyframe)
         return self.dies_after_lease
+
+    def has_keyframe(self, keyframe: int) -> bool:
+        return keyframe not in self.dead
 
     def update_connections(self, keyframe: int) -> None:
         self.calls.append("connections")
@@ -111,7 +115,11 @@ class Scene:
         self.candidates: list[int] = [3, 4, 7]
         self.places = {3: "here", 4: "here", 7: "here"}
         self.verified: list[int] = []
+        #: Of the next loops verified; 0: it is none. Then many.
+        self.n_matches: deque[int] = deque()
         self.aborted = False
+        #: The keyframe whose loop waits for a better one.
+        self.waits: list[int] = []
         self.applied = True
         self.events: list[LoopClosed] = []
         self.merged: list[MapsMerged] = []
@@ -145,10 +153,13 @@ class Scene:
         ) -> FakeLoop | None:
             assert options.fix_scale
             assert options.seed == 5
-            assert world.leases == [keyframe]
+            assert keyframe in world.leases
             self.verified.append(candidate)
             place = self.places.get(candidate)
-            return FakeLoop(keyframe, candidate, place) if place else None
+            if not place:
+                return None
+            n_matches = self.n_matches.popleft() if self.n_matches else 166
+            return FakeLoop(keyframe, candidate, place, n_matches=n_matches) if n_matches else None
 
         def choose(_map: FakeMap, loops: list[FakeLoop], fix_scale: bool) -> FakeLoop | None:
             return loops[0] if len({loop.place for loop in loops}) == 1 else None
@@ -186,7 +197,7 @@ class Scene:
     def process(self, *keyframes: int) -> None:
         for keyframe in keyframes:
             self.closing.insert_keyframe(keyframe)
-        assert self.map.leases == []
+        assert self.map.leases == self.waits
         assert not self.mapping.pausing
 
 
@@ -220,7 +231,7 @@ def test_a_confirmed_loop_is_closed_and_told(scene: Scene) -> None:
     assert not scene.merged
     assert (closed.current_keyframe, closed.matched_keyframe) == (20, 4)
     assert (closed.current_timestamp, closed.matched_timestamp) == (2.0, 0.4)
-    assert (closed.n_inliers, closed.n_matches, closed.n_fused) == (55, 66, 77)
+    assert (closed.n_inliers, closed.n_matches, closed.n_fused) == (55, 166, 77)
     assert closed.translation == 0.25
     assert closed.rotation_deg == pytest.approx(1.0)
     assert set(closed.milliseconds) == {"detect", "verify", "wait", "plan", "graph", "apply"}
@@ -235,6 +246,41 @@ def test_no_search_for_ten_keyframes_after_a_loop(scene: Scene) -> None:
     assert scene.consistency.n_cleared == 3, "after the loop and at every keyframe of the gap"
     scene.process(30)
     assert len(scene.events) == 2
+
+
+@pytest.fixture
+def weak(scene: Scene) -> Scene:
+    """Keyframe 20 has found a loop that few matches hold."""
+    scene.candidates = [4]
+    scene.consistency.consistent.extend([[4], [4]])
+    scene.n_matches.extend([60, 0])
+    scene.waits = [20]
+    scene.process(20)
+    assert scene.events == []
+    return scene
+
+
+def test_a_weak_loop_waits_for_a_better_one(weak: Scene) -> None:
+    weak.process(21)
+    weak.consistency.consistent.append([4])
+    weak.waits = []
+    weak.process(22)
+    assert [(e.current_keyframe, e.n_matches) for e in weak.events] == [(22, 166)]
+
+
+def test_at_the_end_it_is_closed(weak: Scene) -> None:
+    weak.closing.end()
+    assert [(e.current_keyframe, e.n_matches) for e in weak.events] == [(20, 60)]
+    assert weak.map.leases == []
+    assert weak.closing.last_keyframe == 20
+    assert weak.closing.statistics.summary()["loop.graph"]["count"] == 1
+
+
+def test_a_reset_forgets_it(weak: Scene) -> None:
+    weak.closing.reset()
+    assert weak.map.leases == []
+    weak.closing.end()
+    assert weak.events == []
 
 
 def test_proposals_that_are_not_consistent_close_nothing(scene: Scene) -> None:

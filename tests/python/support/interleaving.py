@@ -134,7 +134,7 @@ class Stage:
             if keyframe not in wanted:
                 return None
             return SimpleNamespace(
-                current=keyframe, matched=far, n_inliers=40, n_matches=60, S_cm=np.eye(4)
+                current=keyframe, matched=far, n_inliers=40, n_matches=160, S_cm=np.eye(4)
             )
 
         def apply(world: _core.Map, _correction: object) -> object:

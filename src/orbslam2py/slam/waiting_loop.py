@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A loop that few matches hold waits for a better one; ``docs/method/loops.md#waiting``."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator
+
+from orbslam2py import _core as core
+from orbslam2py.slam.thresholds import LoopThresholds
+
+
+class WaitingLoop:
+    """Chooses among the loops of a few keyframes the one with most matches.
+
+    A place is first recognised from afar, where its points lie close together in the image and a
+    few wrong matches turn the similarity by degrees. The keyframes that follow see more of it.
+
+    Parameters
+    ----------
+    slam_map : orbslam2py._core.Map
+        The map.
+    verify : callable
+        ``verify(current, matched)``: the loop between two keyframes, or None.
+    release : callable
+        ``release(keyframe)`` ends the lease of a keyframe.
+    thresholds : LoopThresholds
+        Limits.
+    """
+
+    def __init__(
+        self,
+        slam_map: core.Map,
+        verify: Callable[[int, int], core.Loop | None],
+        release: Callable[[int], None],
+        thresholds: LoopThresholds,
+    ) -> None:
+        self._map = slam_map
+        self._verify = verify
+        self._release = release
+        self._limits = thresholds
+        self._best: core.Loop | None = None
+        self._n_waited = 0
+        self._big_change = 0
+
+    def drop(self) -> None:
+        """Give up what waits."""
+        best, self._best = self._best, None
+        if best is not None:
+            self._release(best.current)
+
+    @contextlib.contextmanager
+    def ripe(self, found: core.Loop | None) -> Iterator[core.Loop | None]:
+        """Yield the loop that is to be closed now, if there is one; asked once for a keyframe.
+
+        Parameters
+        ----------
+        found : Loop or None
+            What this keyframe found.
+        """
+        self._consider(found)
+        if not self._is_ripe():
+            yield None
+            return
+        with self.last() as best:
+            yield best
+
+    @contextlib.contextmanager
+    def last(self) -> Iterator[core.Loop | None]:
+        """Yield what waits, if anything does: no keyframe follows."""
+        best = self._best
+        try:
+            yield None if best is None else self._as_it_is_now(best)
+        finally:
+            self.drop()
+
+    def _consider(self, found: core.Loop | None) -> None:
+        best = self._best
+        if best is not None:
+            self._n_waited += 1
+            if found is None or found.n_matches <= best.n_matches:
+                return
+            self.drop()
+        elif found is None:
+            return
+        else:
+            self._n_waited = 0
+        self._map.begin_lease(found.current)
+        self._best = found
+        self._big_change = self._map.big_change_index
+
+    def _is_ripe(self) -> bool:
+        limits, best = self._limits, self._best
+        if best is None:
+            return False
+        return best.n_matches >= limits.firm_matches or self._n_waited >= limits.patience
+
+    def _as_it_is_now(self, loop: core.Loop) -> core.Loop | None:
+        """The loop, found anew if the map has moved since; None if a keyframe died."""
+        if not all(self._map.has_keyframe(k) for k in (loop.current, loop.matched)):
+            return None
+        if self._map.big_change_index == self._big_change:
+            return loop
+        return self._verify(loop.current, loop.matched)
