@@ -4,18 +4,21 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
 from orbslam2py.maps.saved_map import RecordedFrames
+from orbslam2py.slam.second_look import SecondLook
 from orbslam2py.trajectory.trajectory import Trajectory
 
 #: So many frames wait for the end, when the map has settled, to be estimated again; those before
 #: them are where the map was settled long ago.
 _MOST_WAITING = 1000
+#: So many frames whose pose was in doubt wait for the end with all their keypoints, the youngest.
+_MOST_IN_DOUBT = 100
 
 _NO_POSES = Trajectory(timestamps=np.zeros(0), T_wc=np.zeros((0, 4, 4)))
 
@@ -25,17 +28,21 @@ class FrameRecorder:
 
     A frame is kept relative to its reference keyframe, so its pose moves with whatever refines the
     map later. In the end, or when many frames have come after it, it is estimated once more from
-    the points it saw, each of which has moved in its own way (``docs/method/map.md``, settled
-    frames). May be used from any thread, also while a frame is recorded.
+    the points it saw, each of which has moved in its own way; one that was in doubt is then
+    matched with the map once more (``docs/method/map.md``, settled frames). May be used from any
+    thread, also while a frame is recorded.
 
     Parameters
     ----------
     slam_map : orbslam2py._core.Map
         The map that the frames were tracked in.
+    second_look : SecondLook
+        Matches frames with the map again.
     """
 
-    def __init__(self, slam_map: core.Map) -> None:
+    def __init__(self, slam_map: core.Map, second_look: SecondLook) -> None:
         self._map = slam_map
+        self._second_look = second_look
         self._recorder = core.TrajectoryRecorder()
         self._sightings = core.FrameSightings()
         self._ended: dict[int, Trajectory] = {}
@@ -45,6 +52,7 @@ class FrameRecorder:
         # Frames of a young map, whose poses are estimated again; None: those of no map.
         self._young: list[tuple[core.TrackedFrame, bool]] | None = None
         self._young_map = -1
+        self._in_doubt: dict[int, core.TrackedFrame] = {}
         # The youngest map that a frame was recorded in.
         self._last_map = 0
 
@@ -65,16 +73,13 @@ class FrameRecorder:
             for frame in earlier:
                 self._append(frame, lost=False)
 
-    def look_again(
-        self, estimate: Callable[[Sequence[core.TrackedFrame]], list[core.TrackedFrame]]
-    ) -> None:
-        """Record the frames since `begin` anew, with the poses that are estimated for them."""
+    def look_again(self) -> None:
+        """Record the frames since `begin` anew, with their poses in the map as it is now."""
         with self._lock:
             self._record_waiting()
             young, self._young = self._young or [], None
-            frames = estimate([frame for frame, _ in young])
-            for frame, (_, lost) in zip(frames, young, strict=True):
-                self._append(frame, lost=lost)
+            for frame, lost in young:
+                self._append(self._second_look(frame), lost=lost)
 
     def _append(self, frame: core.TrackedFrame, *, lost: bool, fixed_map: bool = False) -> None:
         self._recorder.record(self._map, frame, lost=lost)
@@ -93,7 +98,14 @@ class FrameRecorder:
         """Take back the pose of this frame, recorded next, if the one after it is lost."""
         self._doubted = frame
 
-    def record(self, frame: core.TrackedFrame, *, lost: bool, fixed_map: bool = False) -> None:
+    def record(
+        self,
+        frame: core.TrackedFrame,
+        *,
+        lost: bool,
+        fixed_map: bool = False,
+        in_doubt: bool = False,
+    ) -> None:
         """Keep a frame; a lost one is noted without a pose of its own.
 
         Parameters
@@ -104,6 +116,9 @@ class FrameRecorder:
             Whether it has no pose.
         fixed_map : bool
             The map does not change: there is nothing for its pose to follow.
+        in_doubt : bool
+            Its pose was searched for harder than usual, or little speaks for it: the finished map
+            may say more.
         """
         with self._lock:
             self._record_waiting(believed=not lost)
@@ -115,6 +130,10 @@ class FrameRecorder:
             else:
                 self._append(frame, lost=lost, fixed_map=fixed_map)
             self._doubted = None
+            if in_doubt and not lost and not fixed_map:
+                self._in_doubt[frame.id] = frame
+                if len(self._in_doubt) > _MOST_IN_DOUBT:
+                    del self._in_doubt[min(self._in_doubt)]
 
     def _record_waiting(self, *, believed: bool = True) -> None:
         """Record the frame that waits for the next one; who asks before that gets its pose."""
@@ -123,19 +142,25 @@ class FrameRecorder:
             return
         if not believed:
             frame.T_cw = None
+            self._in_doubt.pop(frame.id, None)
         self._append(frame, lost=not believed)
 
     def settle(self) -> None:
         """Estimate the poses of the frames that wait for it: the map is finished."""
         with self._lock:
-            self._record_waiting()
-            self._sightings.settle(self._map, self._recorder)
+            self._settle()
+
+    def _settle(self) -> None:
+        self._record_waiting()
+        in_doubt, self._in_doubt = self._in_doubt, {}
+        for frame in in_doubt.values():
+            self._append(self._second_look(frame, in_doubt=True), lost=False)
+        self._sightings.settle(self._map, self._recorder)
 
     def end_maps(self) -> None:
         """Keep the trajectories of the maps as they are now: they are about to be dropped."""
         with self._lock:
-            self._record_waiting()
-            self._sightings.settle(self._map, self._recorder)
+            self._settle()
             for map_index in self._living():
                 self._ended[map_index] = self._present(map_index)
             self._recorder.clear()
@@ -144,8 +169,7 @@ class FrameRecorder:
     def end_map(self, map_index: int) -> None:
         """Keep the trajectory of one of the maps, which is about to be dropped beside others."""
         with self._lock:
-            self._record_waiting()
-            self._sightings.settle(self._map, self._recorder)
+            self._settle()
             self._ended[map_index] = self._present(map_index)
             self._recorder.drop(self._map, map_index)
             self._young = None

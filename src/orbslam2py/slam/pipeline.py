@@ -26,6 +26,7 @@ from orbslam2py.slam.events import Callbacks, MapStarted, Relocalized, TrackingL
 from orbslam2py.slam.evidence.belief import Belief
 from orbslam2py.slam.evidence.harder_search import HarderSearch
 from orbslam2py.slam.evidence.judgement import EvidenceJudge
+from orbslam2py.slam.evidence.smear import Smear
 from orbslam2py.slam.frame_recorder import FrameRecorder
 from orbslam2py.slam.front_end import FrontEnd
 from orbslam2py.slam.initialization import DepthInitializer, Initializer, MonocularInitializer
@@ -34,8 +35,15 @@ from orbslam2py.slam.keyframe_decision import KeyframeDecision
 from orbslam2py.slam.localization_mode import LocalizationSwitch
 from orbslam2py.slam.options import Setup, SystemOptions
 from orbslam2py.slam.pose_search import PoseSearch
-from orbslam2py.slam.records import Reason, TrackingOutcome, TrackingRecord, TrackingState
+from orbslam2py.slam.records import (
+    Reason,
+    TrackingOutcome,
+    TrackingRecord,
+    TrackingState,
+    Verdict,
+)
 from orbslam2py.slam.relocalization import Relocalizer
+from orbslam2py.slam.second_look import SecondLook
 from orbslam2py.slam.thresholds import (
     InitializationThresholds,
     RelocalizationThresholds,
@@ -93,7 +101,9 @@ class Pipeline:
         self.localization = LocalizationSwitch(
             back_end.map, 1 if sensor.has_depth else 2, back_end.map_workers
         )
-        self.recorder = FrameRecorder(back_end.map)
+        self.recorder = FrameRecorder(
+            back_end.map, SecondLook(back_end.map, _make_search(setup, back_end))
+        )
         self.statistics = StageStatistics()
         self.reset_requested = threading.Event()
         self.frame_watchers: tuple[FrameWatcher, ...] = ()
@@ -208,7 +218,7 @@ class Pipeline:
         slam_map = self.back_end.map
         settled = slam_map.n_keyframes_of(slam_map.active_map) > self._limits.settled_map
         if n_young > 0 and (settled or n_young >= self._limits.young_frames):
-            self.recorder.look_again(self.tracking.look_again)
+            self.recorder.look_again()
 
     def _keep(self, frame: core.TrackedFrame, outcome: TrackingOutcome) -> None:
         if outcome.reset_needed:
@@ -220,12 +230,15 @@ class Pipeline:
                 _log.info("lost soon after initialization; starting a new map")
             self.reset_requested.set()
         elif outcome.state in (TrackingState.OK, TrackingState.LOST):
+            evidence = outcome.estimate.evidence
             if outcome.earlier:
                 self.recorder.begin(outcome.earlier)
             self.recorder.record(
                 frame,
                 lost=outcome.state is TrackingState.LOST,
                 fixed_map=self.localization.on,
+                in_doubt=evidence is not None
+                and (evidence.doubted or evidence.verdict is Verdict.WEAK),
             )
 
     def _record(
@@ -308,6 +321,19 @@ class Pipeline:
         self._start_failed = False
 
 
+def _make_search(
+    setup: Setup, back_end: BackEnd, relocalizer: Relocalizer | None = None
+) -> PoseSearch:
+    return PoseSearch(
+        back_end.map,
+        setup.vocabulary,
+        setup.sensor,
+        setup.settings.max_keyframe_interval,
+        relocalizer,
+        TrackingThresholds().for_features(setup.settings.orb.n_features),
+    )
+
+
 def _make_tracking(setup: Setup, back_end: BackEnd, options: SystemOptions) -> Tracking:
     seed = options.seed
     sensor, vocabulary = setup.sensor, setup.vocabulary
@@ -315,36 +341,33 @@ def _make_tracking(setup: Setup, back_end: BackEnd, options: SystemOptions) -> T
     slam_map, mapping = back_end.map, back_end.mapping
     n_features = setup.settings.orb.n_features
 
-    def search(relocalizer: Relocalizer | None) -> PoseSearch:
-        return PoseSearch(
-            slam_map,
-            vocabulary,
-            sensor,
-            max_keyframe_interval,
-            relocalizer,
-            TrackingThresholds().for_features(n_features),
-        )
-
     def belief(searching: PoseSearch) -> Belief:
         judge = EvidenceJudge(searching.motion_model_window, setup.settings.camera.fx)
         return Belief(searching, judge, HarderSearch(searching, judge))
 
     initializer: Initializer
     if sensor is Sensor.MONOCULAR:
-        earlier = search(None)
+        earlier = _make_search(setup, back_end)
         initializer = MonocularInitializer(
-            slam_map, vocabulary, mapping, seed, EarlierFrames(earlier, belief(earlier))
+            slam_map,
+            vocabulary,
+            mapping,
+            seed,
+            Smear(setup.settings.camera.fx),
+            EarlierFrames(earlier, belief(earlier)),
         )
     else:
         initializer = DepthInitializer(slam_map, vocabulary, mapping, n_features)
-    searching = search(
+    searching = _make_search(
+        setup,
+        back_end,
         Relocalizer(
             slam_map,
             back_end.keyframe_index,
             seed,
             fix_scale=sensor.has_depth,
             thresholds=RelocalizationThresholds().for_features(n_features),
-        )
+        ),
     )
     return Tracking(
         slam_map,

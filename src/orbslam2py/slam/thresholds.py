@@ -63,6 +63,8 @@ class InitializationThresholds:
     clearly_worse: float = 2.0
     """Of motions that two views cannot tell apart, the others must fit a third view worse than
     the right one by this factor."""
+    same_direction: float = 20.0
+    """Two that lead to within so many degrees of each other count as one."""
     further_draws: int = 5
     """So many more draws give motions that all views are asked to compare. One whose direction
     differs ..."""
@@ -200,6 +202,11 @@ class EvidenceThresholds:
     """Pixels that an image is smeared with 0.7 of the fine detail of the sharpest ones ..."""
     fading: float = 0.995
     """... whose detail counts so many times with every further frame."""
+    long_smear: float = 0.03
+    """Images smeared by more than this share of the focal length begin no map of a single camera
+    and do not lead back to one, and are not believed ..."""
+    young_map: int = 30
+    """... among so many images after it began."""
     refused_share: float = 0.3
     """A pose with less than this share of the usual inliers ..."""
     refused_inliers: int = 100
@@ -374,6 +381,10 @@ class LoopThresholds:
 
     gap: int = 10
     """Keyframes after a loop that are not searched for another one."""
+    firm_matches: int = 100
+    """A loop with fewer matches ..."""
+    patience: int = 8
+    """... waits so many keyframes for one with more."""
 
 
 @dataclass(frozen=True)

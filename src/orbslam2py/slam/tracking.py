@@ -9,7 +9,6 @@ section V; Mur-Artal and Tardos, "ORB-SLAM2", 2017, section III. Step by step:
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -163,10 +162,6 @@ class Tracking:
         begins = self.initializing or self._seeks_map
         return self._initializer.feature_factor if begins else 1
 
-    def look_again(self, frames: Sequence[core.TrackedFrame]) -> list[core.TrackedFrame]:
-        """Versions of the frames of the start, with their poses in the map as it is now."""
-        return self._initializer.look_again(frames)
-
     @property
     def motion(self) -> MotionModel:
         """The last frame that had a pose, and the speed."""
@@ -316,7 +311,7 @@ class Tracking:
         if not self._loss.overdue(frame.timestamp):
             return None
         if not self._seeks_map:
-            self._initializer.reset()
+            self._initializer.restart([])
             self._seeks_map = True
         frame.clear_associations()
         with timer("keyframe"):
@@ -337,6 +332,8 @@ class Tracking:
         self._search.reference_keyframe = frame.reference_keyframe
         self._search.motion.remember(frame)
         self._since_keyframe = SinceKeyframe(frame.id)
+        if not self._has_depth:
+            self._belief.begin_map(frame, self._map.active_map)
         n = frame.n_associated()
         # It is the origin, and yet lies in its map no better than the keypoints that became points.
         covariance = core.pose_covariance(frame)

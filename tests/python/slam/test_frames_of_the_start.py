@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +17,7 @@ from orbslam2py.slam.frame_recorder import FrameRecorder
 from orbslam2py.slam.thresholds import InitializationThresholds
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.trajectory.rotations import rotation_angles
+from support.moved_frames import MovedByAMetre
 
 pytestmark = pytest.mark.watchdog(120)
 
@@ -81,15 +81,7 @@ def test_poses_that_are_estimated_again_replace_the_first_ones() -> None:
     sequence = SyntheticSequence(
         SyntheticOptions(world="corridor", sensor="rgbd", size=(320, 240), frames=3)
     )
-    seen: list[list[int]] = []
-
-    def moved(frames: Sequence[core.TrackedFrame]) -> list[core.TrackedFrame]:
-        seen.append([frame.id for frame in frames])
-        for frame in frames:
-            assert frame.T_cw is not None
-            frame.T_cw = core.Pose(np.array([0.0, 0, 0, 1]), np.array([0, 0, -1.0])) @ frame.T_cw
-        return list(frames)
-
+    moved = MovedByAMetre()
     with System(sequence.settings, "rgbd", deterministic=True) as system:
         for i in range(3):
             images = sequence.load(i)
@@ -106,14 +98,14 @@ def test_poses_that_are_estimated_again_replace_the_first_ones() -> None:
             frame.T_cw = core.Pose(np.array([0.0, 0, 0, 1]), np.array([0, 0, float(i)]))
             core.anchor_frame(slam_map, frame, 0)
             frames.append(frame)
-        recorder = FrameRecorder(slam_map)
+        recorder = FrameRecorder(slam_map, moved)
         recorder.begin(frames[:2])
         recorder.record(frames[2], lost=True)
         assert recorder.n_young == 3
         before = recorder.trajectories()[0]
-        recorder.look_again(moved)
+        recorder.look_again()
         after = recorder.trajectories()[0]
         assert recorder.n_young == 0
-    assert seen == [[0, 1, 2]]
+    assert moved.seen == [(0, False), (1, False), (2, False)]
     assert list(after.lost) == [False, False, True]
     assert after.positions[:, 2] == pytest.approx(before.positions[:, 2] + 1.0)

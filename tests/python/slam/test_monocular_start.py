@@ -81,6 +81,13 @@ def test_few_features_begin_a_map() -> None:
     assert played.error() < 0.02
 
 
+def test_straight_on_to_a_wall_a_map_begins() -> None:
+    """The two motions of a plane are nearly one there, and nothing tells them apart."""
+    played = Played(world="two-rooms", frames=40, noise=2.0, seed=1)
+    assert played.first <= 20
+    assert played.error() < 0.03
+
+
 def test_a_turn_before_the_first_step_begins_no_wrong_map() -> None:
     """Rotation first and translation later: views from behind the turn serve."""
     played = Played(world="corridor", motion="turn-on-the-spot", seed=3, frames=60)

@@ -16,7 +16,7 @@ from orbslam2py._timing import StageTimer
 from orbslam2py.slam.front_end import FrontEnd, intrinsics
 from orbslam2py.slam.initialization.kept_views import KeptViews, View
 from orbslam2py.slam.initialization.several_views import SeveralViews
-from orbslam2py.slam.initialization.third_view import Candidate
+from orbslam2py.slam.initialization.third_view import Candidate, confirmed_motion
 from orbslam2py.slam.thresholds import InitializationThresholds
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
@@ -122,6 +122,16 @@ def test_a_plane_passed_on_a_straight_way_waits() -> None:
     assert wall.best_motion(wall.place(wall.T_21)) is None
     # If they counted as one, the map would begin with either.
     assert wall.best_motion(wall.place(wall.T_21), other_direction=180.0) is not None
+
+
+@pytest.mark.parametrize(("degrees", "is_one"), [(0, True), (15, True), (45, False)])
+def test_two_motions_to_nearly_the_same_place_are_one(
+    seen: Seen, degrees: float, is_one: bool
+) -> None:
+    motions = tuple(seen.place(turned(seen.T_21, turn)) for turn in (0, degrees))
+    limits = InitializationThresholds(clearly_worse=1e9)  # none fits that much worse
+    chosen = confirmed_motion(Candidate(seen.view, motions), seen.kept.views, seen.last, limits)
+    assert (chosen is not None) == is_one
 
 
 def test_too_little_parallax_or_too_few_points_wait(seen: Seen) -> None:

@@ -40,6 +40,13 @@ class Belief:
         """Forget the frames before."""
         self._judge.reset()
         self._n_weak = 0
+        self._young_map = -1
+        self._young_until = -1
+
+    def begin_map(self, frame: core.TrackedFrame, map_index: int) -> None:
+        """Let a single camera's map begin with this frame: for a while blur would bend it."""
+        self._young_map = map_index
+        self._young_until = frame.id + self._judge.limits.young_map
 
     def go_elsewhere(self) -> None:
         """What follows is in another place, or in another map."""
@@ -78,14 +85,16 @@ class Belief:
             return estimate
         if doubted:
             hypothesis = replace(hypothesis, evidence=replace(hypothesis.evidence, doubted=True))
-        return self._take(frame, hypothesis)
+        return self._take(frame, hypothesis, lost=lost)
 
     def _refined(self, frame: core.TrackedFrame, first: PoseEstimate) -> RefinedPose:
         if first.visual_odometry:
             return self._search.beyond_the_map(frame, first)
         return self._search.in_local_map(frame, first)
 
-    def _take(self, frame: core.TrackedFrame, hypothesis: Hypothesis) -> PoseEstimate:
+    def _take(
+        self, frame: core.TrackedFrame, hypothesis: Hypothesis, *, lost: bool
+    ) -> PoseEstimate:
         refined, evidence = hypothesis.refined, hypothesis.evidence
         if refined.frame is not frame:
             frame.take_over(refined.frame)
@@ -103,10 +112,23 @@ class Belief:
         )
         if evidence.verdict is Verdict.REFUSED:
             return estimate.failed(Reason.WEAK_EVIDENCE)
+        if self._bends_with(frame, lost=lost) and self._judge.is_blurred(evidence):
+            self._judge.see(frame)
+            return estimate.failed(Reason.TOO_BLURRED)
         self._judge.get_used_to_frame(refined, evidence, change)
         if evidence.verdict is Verdict.STRONG or self._may_count(evidence):
             self._judge.get_used_to(refined)
         return estimate
+
+    def _bends_with(self, frame: core.TrackedFrame, *, lost: bool) -> bool:
+        """Whether a blurred frame would bend the map: one camera's, until it is firm.
+
+        What a camera that only turns adds to it has no depth, and blur looks like parallax. And a
+        frame that nothing leads to is held by nothing else.
+        """
+        if self._young_map < 0:
+            return False
+        return lost or (frame.id <= self._young_until and frame.map_index == self._young_map)
 
     def allows_keyframe(self, evidence: Evidence | None) -> bool:
         """Whether a frame that is believed may become a keyframe; asked once for each frame."""

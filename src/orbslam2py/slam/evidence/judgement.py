@@ -61,7 +61,7 @@ class EvidenceJudge:
         self._usual: UsualFigures | None = None
         self._usual_error: float | None = None
         self._error_spread = 0.0
-        self._smear = Smear(self.limits)
+        self._smear = Smear(self._focal_length, self.limits)
         self._change = UsualChange(self.limits)
 
     def go_elsewhere(self) -> None:
@@ -135,6 +135,14 @@ class EvidenceJudge:
             or evidence.deviation_to_usual > limits.sudden_deviation
             or self._windows(evidence.turn_change) > limits.surprise_windows
         )
+
+    def is_blurred(self, evidence: Evidence) -> bool:
+        """Whether the image is smeared too far for a map that is not firm."""
+        return self._smear.is_long(evidence.smear)
+
+    def see(self, frame: core.TrackedFrame) -> None:
+        """Let an image that is not believed count among those that others are compared with."""
+        self._smear.see(frame.features)
 
     def is_same(self, first: RefinedPose, second: RefinedPose) -> bool:
         """Whether two poses of a frame are one, as far as can be told."""

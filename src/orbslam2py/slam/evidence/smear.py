@@ -12,12 +12,19 @@ class Smear:
 
     Parameters
     ----------
-    thresholds : EvidenceThresholds
+    focal_length : float
+        Pixels.
+    thresholds : EvidenceThresholds, optional
         Limits.
     """
 
-    def __init__(self, thresholds: EvidenceThresholds) -> None:
-        self._limits = thresholds
+    def __init__(self, focal_length: float, thresholds: EvidenceThresholds | None = None) -> None:
+        self._limits = thresholds or EvidenceThresholds()
+        self._longest = self._limits.long_smear * focal_length
+        self.reset()
+
+    def reset(self) -> None:
+        """No image is known."""
         self._finest = 0.0
 
     def length(self, frame: core.Frame) -> float:
@@ -32,6 +39,10 @@ class Smear:
         if detail <= 0 or self._finest <= detail:
             return 0.0
         return self._limits.smear * ((self._finest / detail) ** 2 - 1)
+
+    def is_long(self, length: float) -> bool:
+        """Whether an image smeared so far [px] would bend a map that is not firm."""
+        return length > self._longest
 
     def see(self, frame: core.Frame) -> None:
         """Let the next frame be one of those that others are compared with."""

@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The frames before a single camera's map began, tracked in it, and looked at again later.
+"""The frames before a single camera's map began, tracked in it.
 
 ``docs/method/start.md#earlier-frames``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-
-import numpy as np
+from collections.abc import Iterable
 
 from orbslam2py import _core as core
 from orbslam2py.slam.evidence.belief import Belief
@@ -95,40 +93,6 @@ class EarlierFrames:
         search.motion.velocity = search.motion.way(frame)
         search.motion.remember(frame)
         return True
-
-    def look_again(
-        self, frames: Sequence[core.TrackedFrame], slam_map: core.Map
-    ) -> list[core.TrackedFrame]:
-        """Versions of frames with their poses in the map as it is now.
-
-        What the first poses were estimated from were two views; meanwhile others have moved the
-        points, each in its own way, and added some. A frame that is no longer found keeps the pose
-        that follows its keyframe.
-        """
-        return [self._version(frame, slam_map) for frame in frames]
-
-    def _version(self, frame: core.TrackedFrame, slam_map: core.Map) -> core.TrackedFrame:
-        followed = _copy_of(frame)
-        if followed.T_cw is None:
-            return followed
-        core.follow_map(slam_map, followed)
-        keyframe = slam_map.living(followed.reference_keyframe)
-        is_keyframe = keyframe >= 0 and slam_map.keyframe_frame(keyframe).id == frame.id
-        if self._search is None or is_keyframe:
-            return followed
-        refined = self._search.in_local_map(_copy_of(followed), PoseEstimate())
-        if not refined.estimate.found:
-            return followed
-        refined.frame.discard_outliers()
-        return refined.frame
-
-
-def _copy_of(frame: core.TrackedFrame) -> core.TrackedFrame:
-    copy = core.TrackedFrame(frame.features)
-    copy.copy_associations(frame, np.ones(len(frame.features), bool))
-    copy.T_cw = frame.T_cw
-    copy.share_anchor(frame)
-    return copy
 
 
 def _is_strong(estimate: PoseEstimate) -> bool:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import logging
 import sys
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -67,10 +66,6 @@ class DepthInitializer:
     def take_earlier(self) -> tuple[core.TrackedFrame, ...]:
         """None: the first frame that can begin the map does."""
         return ()
-
-    def look_again(self, frames: Sequence[core.TrackedFrame]) -> list[core.TrackedFrame]:
-        """The frames: depths were as good from the first one on."""
-        return list(frames)
 
     def remember(self, frame: core.TrackedFrame) -> None:
         """Nothing: the next frame can begin a map as well."""

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import logging
 from collections import deque
-from collections.abc import Sequence
 
 import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
+from orbslam2py.slam.evidence.smear import Smear
 from orbslam2py.slam.front_end import intrinsics
 from orbslam2py.slam.initialization.earlier_frames import EarlierFrames
 from orbslam2py.slam.initialization.kept_views import KeptViews, View
@@ -59,6 +59,8 @@ class MonocularInitializer:
         Takes the two first keyframes.
     seed : int
         Seed of the draws.
+    smear : Smear
+        Tells blurred images, with which no map is begun.
     earlier : EarlierFrames, optional
         Tracks the earlier frames in the map; without it they are left out.
     thresholds : InitializationThresholds, optional
@@ -71,6 +73,7 @@ class MonocularInitializer:
         vocabulary: core.Vocabulary,
         mapping: LocalMapping,
         seed: int,
+        smear: Smear,
         earlier: EarlierFrames | None = None,
         thresholds: InitializationThresholds | None = None,
     ) -> None:
@@ -78,13 +81,18 @@ class MonocularInitializer:
         self._vocabulary = vocabulary
         self._mapping = mapping
         self._seed = seed
+        self._smear = smear
         self._limits = thresholds or InitializationThresholds()
         self._kept = KeptViews(self._limits)
         self._earlier = earlier or EarlierFrames(None, None)
         self.reset()
 
     def reset(self) -> None:
-        """Drop all views."""
+        """Drop all views, and how sharp the camera's images were."""
+        self._smear.reset()
+        self._drop_views()
+
+    def _drop_views(self) -> None:
         self._kept.clear()
         self._history: deque[core.TrackedFrame] = deque(maxlen=self._limits.remembered_frames)
         self._n_waiting = 0
@@ -101,7 +109,7 @@ class MonocularInitializer:
 
     def restart(self, frames: list[core.Frame]) -> None:
         """Begin anew, with the views of the last moments of an earlier attempt."""
-        self.reset()
+        self._drop_views()
         # Their poses were those in the map that is gone.
         self._history.extend(core.TrackedFrame(frame) for frame in frames)
         for frame in frames[-self._limits.followed_again :]:
@@ -130,10 +138,6 @@ class MonocularInitializer:
         """Frames before the one that began the map, with their poses in it, in order; once."""
         return self._earlier.take()
 
-    def look_again(self, frames: Sequence[core.TrackedFrame]) -> list[core.TrackedFrame]:
-        """Versions of the frames of the start, with their poses in the map as it is now."""
-        return self._earlier.look_again(frames, self._map)
-
     def shows_enough(self, frame: core.TrackedFrame) -> bool:
         """Whether a frame has the keypoints that a map needs to begin."""
         return frame.features.size > self._limits.keypoints
@@ -149,10 +153,14 @@ class MonocularInitializer:
         self._kept.follow(frame.features)
         self._history.append(frame)
         self._last = frame
-        reason = self._from_best_pair(frame)
+        blurred = self._smear.is_long(self._smear.length(frame.features))
+        self._smear.see(frame.features)
+        reason = Reason.TOO_BLURRED_TO_BEGIN if blurred else self._from_best_pair(frame)
         if reason is Reason.NONE:
             return reason
         self._shown = self._kept.views[0] if self._kept.views else None
+        if blurred:
+            return reason
         self._kept.keep_last()
         if self._shown is None:
             return Reason.FEW_MATCHES_FIRST_VIEW if had_views else Reason.FIRST_VIEW

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Protocol
 
 from orbslam2py import _core as core
@@ -48,10 +47,6 @@ class Initializer(Protocol):
 
     def take_earlier(self) -> tuple[core.TrackedFrame, ...]:
         """Frames before the one that began the map, with their poses in it, in order; once."""
-        ...
-
-    def look_again(self, frames: Sequence[core.TrackedFrame]) -> list[core.TrackedFrame]:
-        """Versions of the frames of the start, with their poses in the map as it is now."""
         ...
 
     def remember(self, frame: core.TrackedFrame) -> None:

@@ -8,7 +8,6 @@ give any of them, and one third view agrees with many. All views together tell t
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -23,6 +22,7 @@ from orbslam2py.slam.initialization.third_view import (
     INLIER_CHI2,
     Candidate,
     Motion,
+    is_another_direction,
     other_views,
     pose_of_view,
     squared_errors,
@@ -123,7 +123,8 @@ class SeveralViews:
         chosen = found[best].motion
         enough = self._limits.clearly_worse_direction * costs[best]
         for placed, cost in zip(found, costs, strict=True):
-            if cost < enough and self._differs(placed.motion, chosen):
+            other = self._limits.other_direction
+            if cost < enough and is_another_direction(placed.motion, chosen, other):
                 return None
         n_points = np.count_nonzero(chosen.triangulated)
         if chosen.parallax < self._limits.parallax or n_points < self._limits.points:
@@ -143,10 +144,6 @@ class SeveralViews:
                 two_threads=False,
             )
             yield from [result] if result.success else result.alternatives
-
-    def _differs(self, motion: core.TwoViewMotion, other: core.TwoViewMotion) -> bool:
-        cosine = float(motion.T_21.translation @ other.T_21.translation)  # both of length 1
-        return cosine < math.cos(math.radians(self._limits.other_direction))
 
     # ---- adjustment ------------------------------------------------------------------------------
     def _refined(self, motion: Motion) -> _Placed:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -67,7 +68,7 @@ def confirmed_motion(
     """The motion that most of the other views agree with; None if they do not, or cannot say.
 
     A view that lies so near to one of the two that any motion would suit it is not asked. Where
-    two motions are left, the right one must fit much better than the next best.
+    two motions are left, the right one must fit much better than one that leads elsewhere.
     """
     thirds = other_views(candidate.view, views, limits)
     verdicts = [_verdicts(candidate, third, last) for third in thirds]
@@ -81,10 +82,21 @@ def confirmed_motion(
         return None
     if candidate.motions[best].parallax < limits.parallax:
         return None
-    others = np.delete(mean_costs, best)
-    if len(others) and others.min() < limits.clearly_worse * mean_costs[best]:
-        return None
-    return candidate.motions[best]
+    chosen = candidate.motions[best]
+    enough = limits.clearly_worse * mean_costs[best]
+    for motion, cost in zip(candidate.motions, mean_costs, strict=True):
+        if cost < enough and is_another_direction(motion, chosen, limits.same_direction):
+            return None
+    return chosen
+
+
+def is_another_direction(motion: Motion, other: Motion, degrees: float) -> bool:
+    """Whether two motions lead more than so many degrees apart.
+
+    Straight on to a wall its two motions are nearly one, and noise alone tells them apart.
+    """
+    cosine = float(motion.T_21.translation @ other.T_21.translation)  # both of length 1
+    return cosine < math.cos(math.radians(degrees))
 
 
 def other_views(view: View, views: Sequence[View], limits: InitializationThresholds) -> list[View]:

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Frames of the past, matched again with the map as it is now.
+
+``docs/method/map.md#settled-frames``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from orbslam2py import _core as core
+from orbslam2py.slam.pose_search import PoseSearch
+from orbslam2py.slam.records import PoseEstimate
+
+#: Times that a frame whose pose is in doubt is matched, at most: each is nearer to where it was.
+_MOST_LOOKS = 6
+
+
+class SecondLook:
+    """Gives frames that were tracked long ago new poses; the map is only read.
+
+    Parameters
+    ----------
+    slam_map : orbslam2py._core.Map
+        The map.
+    search : PoseSearch
+        The ways to a pose; its own, not the tracker's.
+    """
+
+    def __init__(self, slam_map: core.Map, search: PoseSearch) -> None:
+        self._map = slam_map
+        self._search = search
+
+    def __call__(self, frame: core.TrackedFrame, *, in_doubt: bool = False) -> core.TrackedFrame:
+        """A version of a frame with its pose in the map as it is now.
+
+        One that is no longer found, or is a keyframe, keeps the pose that follows its keyframe.
+
+        Parameters
+        ----------
+        frame : TrackedFrame
+            As it was tracked; it stays as it is.
+        in_doubt : bool
+            Its pose may be far off: look further around, and again from where it is then found.
+        """
+        followed = _copy_of(frame)
+        if followed.T_cw is None:
+            return followed
+        core.follow_map(self._map, followed)
+        keyframe = self._map.living(followed.reference_keyframe)
+        if keyframe >= 0 and self._map.keyframe_frame(keyframe).id == frame.id:
+            return followed
+        found = followed
+        for _ in range(_MOST_LOOKS if in_doubt else 1):
+            looked = self._look(found, wide=in_doubt)
+            if looked is None:
+                break
+            same = np.array_equal(looked.map_points, found.map_points)
+            found = looked
+            if same:
+                break
+        return found
+
+    def _look(self, frame: core.TrackedFrame, *, wide: bool) -> core.TrackedFrame | None:
+        self._search.reset()
+        if wide:
+            self._search.found_again(frame)
+        refined = self._search.in_local_map(_copy_of(frame), PoseEstimate())
+        if not refined.estimate.found:
+            return None
+        refined.frame.discard_outliers()
+        return refined.frame
+
+
+def _copy_of(frame: core.TrackedFrame) -> core.TrackedFrame:
+    copy = core.TrackedFrame(frame.features)
+    copy.copy_associations(frame, np.ones(len(frame.features), bool))
+    core.discard_temporary(copy)  # seen by the frame before alone
+    copy.T_cw = frame.T_cw
+    copy.share_anchor(frame)
+    return copy

@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Frames whose pose was in doubt are matched with the finished map once more."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from orbslam2py import Sensor, System
+from orbslam2py import _core as core
+from orbslam2py.slam import frame_recorder
+from orbslam2py.slam.frame_recorder import FrameRecorder
+from orbslam2py.slam.pose_search import PoseSearch
+from orbslam2py.slam.second_look import SecondLook
+from orbslam2py.slam.thresholds import TrackingThresholds
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+from orbslam2py.vocabulary import load_vocabulary
+from support.moved_frames import MovedByAMetre
+
+pytestmark = pytest.mark.watchdog(120)
+
+N = 12
+ASIDE = core.Pose(np.array([0.0, np.sin(0.02), 0, np.cos(0.02)]), np.array([0.12, 0.03, 0]))
+
+
+class Walk:
+    """A few frames of a corridor, tracked with depth, and the map that they made."""
+
+    def __init__(self) -> None:
+        sequence = SyntheticSequence(
+            SyntheticOptions(world="corridor", sensor="rgbd", size=(320, 240), frames=N)
+        )
+        self.frames: list[core.TrackedFrame] = []
+        self.system = System(sequence.settings, "rgbd", deterministic=True)
+        for i in range(N):
+            images = sequence.load(i)
+            self.system.track_rgbd(images.image, images.depth, i / 20)
+            self.frames.append(self.system.pipeline.tracking.motion.last)
+        self.map = self.system.pipeline.back_end.map
+        self.second_look = SecondLook(
+            self.map,
+            PoseSearch(
+                self.map,
+                load_vocabulary(),
+                Sensor.RGBD,
+                20,
+                None,
+                TrackingThresholds(),
+            ),
+        )
+
+    def no_keyframe(self) -> core.TrackedFrame:
+        """The last frame that is none."""
+        keyframes = {self.map.keyframe_frame(k).id for k in self.map.keyframe_ids()}
+        return next(frame for frame in reversed(self.frames) if frame.id not in keyframes)
+
+    def put_aside(self, frame: core.TrackedFrame) -> core.TrackedFrame:
+        """A version of the frame with a pose that is wrong."""
+        version = core.TrackedFrame(frame.features)
+        version.copy_associations(frame, np.ones(len(frame.features), bool))
+        assert frame.T_cw is not None
+        version.T_cw = ASIDE @ frame.T_cw
+        core.anchor_frame(self.map, version, frame.reference_keyframe)
+        return version
+
+
+@pytest.fixture(scope="module")
+def walk() -> Iterator[Walk]:
+    walk = Walk()
+    yield walk
+    walk.system.shutdown()
+
+
+def way(first: core.TrackedFrame, second: core.TrackedFrame) -> float:
+    """Metres from one to the other."""
+    assert first.T_cw is not None and second.T_cw is not None
+    return float(np.linalg.norm((first.T_cw @ second.T_cw.inverse()).matrix[:3, 3]))
+
+
+def test_a_frame_in_doubt_is_found_where_it_was(walk: Walk) -> None:
+    frame = walk.no_keyframe()
+    aside = walk.put_aside(frame)
+    assert way(aside, frame) > 0.1
+    found = walk.second_look(aside, in_doubt=True)
+    assert way(found, frame) < 0.01
+    assert way(aside, frame) > 0.1, "what was tracked stays as it is"
+    again = walk.second_look(aside, in_doubt=True)
+    assert again.T_cw is not None and found.T_cw is not None
+    np.testing.assert_array_equal(again.T_cw.matrix, found.T_cw.matrix)
+
+
+def test_a_frame_that_sees_nothing_of_the_map_keeps_its_pose(walk: Walk) -> None:
+    frame = walk.no_keyframe()
+    blind = core.TrackedFrame(frame.features)
+    assert frame.T_cw is not None
+    behind = core.Pose(np.array([0.0, 1, 0, 0]), np.zeros(3))
+    blind.T_cw = behind @ frame.T_cw
+    core.anchor_frame(walk.map, blind, frame.reference_keyframe)
+    found = walk.second_look(blind, in_doubt=True)
+    assert way(found, blind) < 1e-9
+
+
+def test_a_keyframe_keeps_its_pose(walk: Walk) -> None:
+    first = walk.frames[0]
+    assert way(walk.second_look(first, in_doubt=True), first) < 1e-9
+
+
+def test_only_those_in_doubt_are_looked_at_and_only_at_the_end(walk: Walk) -> None:
+    moved = MovedByAMetre()
+    recorder = FrameRecorder(walk.map, moved)
+    for frame in walk.frames:
+        recorder.record(
+            frame,
+            lost=frame.id == 7,
+            fixed_map=frame.id == 8,
+            in_doubt=frame.id in (2, 7, 8, 9),
+        )
+    before = recorder.trajectory()
+    assert moved.seen == []
+    recorder.settle()
+    assert moved.seen == [(2, True), (9, True)]
+    after = recorder.trajectory()
+    ways = np.linalg.norm(after.positions - before.positions, axis=1)
+    assert ways[[2, 9]] == pytest.approx([1, 1])
+    assert np.delete(ways, [2, 9]).max() < 0.1
+    recorder.settle()
+    assert len(moved.seen) == 2, "once"
+
+
+def test_a_pose_that_was_taken_back_is_not_looked_for(walk: Walk) -> None:
+    moved = MovedByAMetre()
+    recorder = FrameRecorder(walk.map, moved)
+    recorder.record(walk.frames[0], lost=False)
+    recorder.doubt(walk.frames[1])
+    recorder.record(walk.frames[1], lost=False, in_doubt=True)
+    recorder.record(walk.frames[2], lost=True)
+    recorder.settle()
+    assert moved.seen == []
+    assert list(recorder.trajectory().lost) == [False, True, True]
+
+
+def test_of_many_in_doubt_the_youngest_are_kept(
+    walk: Walk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(frame_recorder, "_MOST_IN_DOUBT", 3)
+    moved = MovedByAMetre()
+    recorder = FrameRecorder(walk.map, moved)
+    for frame in walk.frames:
+        recorder.record(frame, lost=False, in_doubt=True)
+    recorder.settle()
+    assert [number for number, _ in moved.seen] == [N - 3, N - 2, N - 1]
