@@ -3,6 +3,8 @@
 
 Every sequence that has a ground truth is run with both, deterministic, with every sensor that its
 folder serves: the ATE, and the error over one frame, in which the place of a keypoint shows most.
+With depth also what is left of the ATE when the path has a scale of its own, and by how much that
+scale is off: a baseline or a focal length that is not exact makes every path too long or too short.
 Runs that begin a few frames later say how much a figure varies by itself. Recordings have a
 calibration and a truth that are off themselves; `--made-up` takes streets whose truth is exact,
 with as many seeds as `--starts` says.
@@ -42,6 +44,10 @@ class Errors:
     """What one run was off by; RMSE, metres and degrees."""
 
     ate: float
+    shape: float
+    """ATE of the path with a scale of its own."""
+    length: float
+    """By how much of it the path is too long [percent]."""
     step: float
     step_degrees: float
     tracked: float
@@ -77,21 +83,26 @@ def with_coordinates(settings: Settings, *, original: bool) -> Settings:
 
 def judge(
     path: Trajectory, truth: Trajectory, *, with_scale: bool
-) -> tuple[float, float, float] | None:
-    """ATE [m] and error over one frame [m], [degrees] of a path without lost poses."""
+) -> tuple[float, float, float, float, float] | None:
+    """The first five of `Errors`, of a path without lost poses."""
     if len(path) < _FEWEST:
         return None
     i, j = match_poses(path, truth)
     if len(i) < _FEWEST:
         return None
     true = truth.T_wc[j]
-    aligned = align(path.T_wc[i][:, :3, 3], true[:, :3, 3], with_scale=with_scale)
+    positions, places = path.T_wc[i][:, :3, 3], true[:, :3, 3]
+    scaled = align(positions, places, with_scale=True)
+    aligned = scaled if with_scale else align(positions, places)
     poses = aligned.apply_to_poses(path.T_wc[i])
     gaps = np.diff(path.timestamps[i])
     steps = np.flatnonzero(gaps < _FOLLOWS * np.median(gaps))
     metres, radians = relative_errors(poses, true, (steps, steps + 1))
-    off = np.linalg.norm(poses[:, :3, 3] - true[:, :3, 3], axis=1)
-    return _rms(off), _rms(metres), float(np.degrees(_rms(radians)))
+    ate, shape = (
+        _rms(np.linalg.norm(found.apply(positions) - places, axis=1)) for found in (aligned, scaled)
+    )
+    too_long = 0.0 if with_scale else 100 * (1 / scaled.scale - 1)
+    return ate, shape, too_long, _rms(metres), float(np.degrees(_rms(radians)))
 
 
 def _rms(values: FloatArray) -> float:
@@ -127,10 +138,14 @@ def rows_of(name: str, begun: list[tuple[Sequence, int]]) -> Iterator[tuple[str,
             str(statistics.median_low([run.keyframes for run in judged])),
         )
     before, after = medians
-    yield ("", "", "ratio", *(f"{new / old:.3f}" for old, new in zip(before, after, strict=True)))
+    ratios = [
+        "" if name == "length" else f"{new / old:.3f}"
+        for name, old, new in zip(ERRORS, before, after, strict=True)
+    ]
+    yield ("", "", "ratio", *ratios)
 
 
-ERRORS = ("ate", "step", "step_degrees")
+ERRORS = ("ate", "shape", "length", "step", "step_degrees")
 
 
 def _named(original: bool) -> str:
@@ -181,7 +196,15 @@ def main() -> None:
     table = new_table(
         "Places of keypoints: RMSE against the truth, median (least..most)",
         ["sequence", "sensor", "keypoints"],
-        ["ATE [m]", "over one\nframe [m]", "over one\nframe [deg]", "tracked", "keyframes"],
+        [
+            "ATE [m]",
+            "ATE, own\nscale [m]",
+            "too long\nby [%]",
+            "over one\nframe [m]",
+            "over one\nframe [deg]",
+            "tracked",
+            "keyframes",
+        ],
     )
     for name, begun in chosen(arguments):
         for row in rows_of(name, begun):
