@@ -97,6 +97,8 @@ class Tracking:
         if frames:
             # The count of the frames goes on, and the next map is young as well.
             self._search.last_relocalization = frames[-1].id
+            # It is the same camera: its sharpest images stay what others are compared with.
+            self._belief.see(frames)
         self._initializer.restart(frames)
 
     def reset(self) -> None:

@@ -92,9 +92,9 @@ print(*(smallest_of_ten_turns() for _ in range(4)))
 """
 
 
-# What malloc cannot give back swings by 0.5 MB from turn to turn, and beside other work now and then
-# steps by as much for a while. What turns keep for good adds up: in the smallest readings of ten
-# turns, and thrice as much in thirty.
+# What malloc cannot give back swings by 0.5 MB from turn to turn, and beside other work steps by as
+# much now and then. What turns keep for good adds up: in the smallest readings of ten turns, and
+# thrice as much in thirty.
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is read from /proc")
 def test_saving_resetting_and_loading_again_and_again_keeps_memory(tmp_path: Path) -> None:
     path = written(tmp_path)

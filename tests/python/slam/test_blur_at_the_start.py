@@ -90,6 +90,19 @@ def test_images_that_stay_without_detail_are_believed_in_the_end(single: Scene) 
     assert set(states[:first]) == {TrackingState.LOST}
 
 
+# ---- after a map that came to nothing ------------------------------------------------------------
+def test_the_next_map_is_held_to_the_sharpness_of_the_one_before(
+    single: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    initializer: Any = single.tracking._initializer
+    before: Any = SimpleNamespace(id=single.last.id)
+    monkeypatch.setattr(initializer, "remembered", lambda: [before])
+    monkeypatch.setattr(initializer, "restart", lambda frames: None)
+    single.tracking.restart()
+    assert track_blurred(single).state is TrackingState.OK  # begins the map: not asked here
+    assert track_blurred(single).estimate.reason is Reason.TOO_BLURRED
+
+
 # ---- the first views -----------------------------------------------------------------------------
 class Starter(MonocularInitializer):
     """Begins a map with the next image that may, once it is willing."""
@@ -128,6 +141,7 @@ def starter(monkeypatch: pytest.MonkeyPatch) -> Starter:
 
     monkeypatch.setattr(smear_module, "core", SimpleNamespace(fine_detail=detail))
     monkeypatch.setattr(from_views, "KeptViews", lambda limits: FakeViews())
+    monkeypatch.setattr(from_views, "core", FakeCore())
     return Starter()
 
 
@@ -155,6 +169,14 @@ def test_what_was_sharp_is_known_where_another_map_begins(starter: Starter) -> N
     shown(starter, SHARP)
     starter.restart([])
     assert shown(starter, BLURRED) is Reason.TOO_BLURRED_TO_BEGIN
+
+
+def test_what_was_sharp_is_known_after_a_map_that_came_to_nothing(starter: Starter) -> None:
+    shown(starter, SHARP)
+    frames = starter.remembered()
+    starter.reset()
+    starter.restart(frames)
+    assert shown(starter, BLURRED, 1) is Reason.TOO_BLURRED_TO_BEGIN
 
 
 def test_a_reset_forgets_it(starter: Starter) -> None:

@@ -43,6 +43,11 @@ class Belief:
         self._young_map = -1
         self._young_until = -1
 
+    def see(self, frames: list[core.Frame]) -> None:
+        """Let images from before a reset count among those that later ones are compared with."""
+        for frame in frames:
+            self._judge.see(frame)
+
     def begin_map(self, frame: core.TrackedFrame, map_index: int) -> None:
         """Let a single camera's map begin with this frame: for a while blur would bend it."""
         self._young_map = map_index
@@ -113,7 +118,7 @@ class Belief:
         if evidence.verdict is Verdict.REFUSED:
             return estimate.failed(Reason.WEAK_EVIDENCE)
         if self._bends_with(frame, lost=lost) and self._judge.is_blurred(evidence):
-            self._judge.see(frame)
+            self._judge.see(frame.features)
             return estimate.failed(Reason.TOO_BLURRED)
         self._judge.get_used_to_frame(refined, evidence, change)
         if evidence.verdict is Verdict.STRONG or self._may_count(evidence):

@@ -140,9 +140,9 @@ class EvidenceJudge:
         """Whether the image is smeared too far for a map that is not firm."""
         return self._smear.is_long(evidence.smear)
 
-    def see(self, frame: core.TrackedFrame) -> None:
-        """Let an image that is not believed count among those that others are compared with."""
-        self._smear.see(frame.features)
+    def see(self, frame: core.Frame) -> None:
+        """Let an image count among those that others are compared with."""
+        self._smear.see(frame)
 
     def is_same(self, first: RefinedPose, second: RefinedPose) -> bool:
         """Whether two poses of a frame are one, as far as can be told."""

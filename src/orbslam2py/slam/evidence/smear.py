@@ -27,6 +27,11 @@ class Smear:
         """No image is known."""
         self._finest = 0.0
 
+    @property
+    def knows_images(self) -> bool:
+        """Whether there is anything to compare an image with."""
+        return self._finest > 0
+
     def length(self, frame: core.Frame) -> float:
         """How far the image of a frame is smeared [px]; 0 while no image is known.
 

@@ -110,6 +110,9 @@ class MonocularInitializer:
     def restart(self, frames: list[core.Frame]) -> None:
         """Begin anew, with the views of the last moments of an earlier attempt."""
         self._drop_views()
+        if not self._smear.knows_images:  # after a reset
+            for frame in frames:
+                self._smear.see(frame)
         # Their poses were those in the map that is gone.
         self._history.extend(core.TrackedFrame(frame) for frame in frames)
         for frame in frames[-self._limits.followed_again :]:
