@@ -17,7 +17,7 @@ struct Loop {
   Similarity S_cw;                      ///< world to `current` once corrected: S_cm * S_mw
   std::vector<MapPointId> matches;      ///< per keypoint of `current`: far-side point or invalid
   std::vector<MapPointId> loop_points;  ///< all points around `matched`, each once
-  int n_inliers = 0;                    ///< matches that the refined similarity was judged on
+  int n_inliers = 0;                    ///< points of both keyframes that agree with S_cm
   int n_matches = 0;                    ///< valid entries of `matches`
 };
 

@@ -227,8 +227,10 @@ class Verification {
     const auto gathered = gather(map_, current_, candidate_, loop.matches, Gathered::kAll);
     if (!gathered) return;
     const SimilarityEstimate refined = optimize(loop.S_cm, *gathered);
-    if (refined.n_inliers < options_.min_matches) return;
+    const int n_mutual = count_mutual(refined, *gathered);
+    if (refined.n_inliers < options_.min_matches || n_mutual < options_.min_inliers) return;
     drop_outliers(refined, *gathered, loop.matches);
+    loop.n_inliers = n_mutual;
     loop.S_cm = refined.S_12;
     loop.S_cw = refined.S_12 * Similarity(gathered->T_mw);
     match_around(loop);
@@ -239,6 +241,15 @@ class Verification {
     options.fix_scale = options_.fix_scale;
     return optimize_similarity(S_cm, gathered.pinhole_1, gathered.pinhole_2, gathered.matches,
                                options);
+  }
+
+  /// Inliers that both keyframes have a point for: these alone tell the scale.
+  static int count_mutual(const SimilarityEstimate& estimate, const Correspondences& gathered) {
+    int n = 0;
+    for (std::size_t k = 0; k < gathered.matches.size(); ++k) {
+      n += gathered.matches[k].mutual && !estimate.outlier[k] ? 1 : 0;
+    }
+    return n;
   }
 
   static void drop_outliers(const SimilarityEstimate& estimate, const Correspondences& gathered,

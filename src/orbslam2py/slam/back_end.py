@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -132,13 +133,34 @@ class BackEnd:
             self.keyframe_index.erase(keyframe)
         self.events.post(MapChanged(ended, MapChangeCause.RESET))
 
-    def wait_until_idle(self, timeout: float | None) -> bool:
+    def wait_until_idle(self, timeout: float | None, *, close_loop: bool = False) -> bool:
         """Wait until every worker is idle.
 
-        False when one took longer than `timeout` seconds, or holds work back for a pause that may
-        last.
+        Parameters
+        ----------
+        timeout : float or None
+            Seconds; None: for ever.
+        close_loop : bool
+            Then close the loop that waits for a better one, if one does, and wait for what follows.
+
+        Returns
+        -------
+        bool
+            False when the time passed first, or a worker holds work back for a pause that may last.
         """
-        return all(worker.wait_until_idle(timeout, unless_held=True) for worker in self.map_workers)
+        deadline = None if timeout is None else time.monotonic() + timeout
+
+        def are_idle() -> bool:
+            left = None if deadline is None else max(0.0, deadline - time.monotonic())
+            workers = self.map_workers
+            return all(worker.wait_until_idle(left, unless_held=True) for worker in workers)
+
+        if not are_idle():
+            return False
+        if not (close_loop and self.loop_closing.has_loop_waiting):
+            return True
+        self.loop_closing.end()
+        return are_idle()
 
     def finish(
         self, *, drain: bool, wait_for_adjustment: bool, timeout: float | None

@@ -36,7 +36,7 @@ class LoopClosed:
     """Seconds."""
     matched_timestamp: float
     n_inliers: int
-    """Matches that agree with the refined similarity."""
+    """Matches between points of both keyframes that agree with the similarity."""
     n_matches: int
     """Keypoints of the current keyframe that show points around the matched one."""
     n_fused: int
@@ -93,7 +93,7 @@ class MapsMerged:
     """Seconds."""
     matched_timestamp: float
     n_inliers: int
-    """Matches that agree with the refined similarity."""
+    """Matches between points of both keyframes that agree with the similarity."""
     n_matches: int
     """Keypoints of the current keyframe that show points around the matched one."""
     n_fused: int

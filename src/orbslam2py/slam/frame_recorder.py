@@ -150,12 +150,20 @@ class FrameRecorder:
         with self._lock:
             self._settle()
 
-    def _settle(self) -> None:
+    def _settle(self, only_map: int | None = None) -> None:
+        """Look once more at the frames in doubt, of all maps or of one, and settle those around."""
         self._record_waiting()
         in_doubt, self._in_doubt = self._in_doubt, {}
         for frame in in_doubt.values():
-            self._append(self._second_look(frame, in_doubt=True), lost=False)
+            if only_map is None or self._map_of(frame) == only_map:
+                self._append(self._second_look(frame, in_doubt=True), lost=False)
+            else:
+                self._in_doubt[frame.id] = frame
         self._sightings.settle(self._map, self._recorder)
+
+    def _map_of(self, frame: core.TrackedFrame) -> int:
+        """The map that a frame lies in by now, which may have become part of another."""
+        return int(self._map.map_of(frame.reference_keyframe))
 
     def end_maps(self) -> None:
         """Keep the trajectories of the maps as they are now: they are about to be dropped."""
@@ -169,7 +177,7 @@ class FrameRecorder:
     def end_map(self, map_index: int) -> None:
         """Keep the trajectory of one of the maps, which is about to be dropped beside others."""
         with self._lock:
-            self._settle()
+            self._settle(map_index)
             self._ended[map_index] = self._present(map_index)
             self._recorder.drop(self._map, map_index)
             self._young = None

@@ -118,6 +118,11 @@ class LoopClosing:
         """Queue a keyframe, unless a shutdown has begun: mapping may end after loop closing."""
         self.worker.offer(keyframe)
 
+    @property
+    def has_loop_waiting(self) -> bool:
+        """Whether a loop waits for a better one."""
+        return self._waiting.has_loop
+
     def end(self) -> None:
         """Close the loop that waits for a better one, if one does: no keyframe follows."""
         self.worker.offer(_NO_KEYFRAME)

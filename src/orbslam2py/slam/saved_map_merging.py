@@ -103,4 +103,5 @@ def _compare(slam_map: core.Map, index: core.KeyFrameIndex, closing: LoopClosing
                 core.index_keyframe(index, slam_map, keyframe)
             else:
                 closing.process(keyframe)
+        closing.end()
         closing.reset()

@@ -412,13 +412,18 @@ class System:
     def wait_until_idle(self, timeout: float | None = None) -> bool:
         """Wait until every keyframe has been processed, and full adjustments have ended.
 
+        A loop that waits for a better view is closed first, but not in localization mode.
+
         Returns
         -------
         bool
             False when `timeout` seconds passed first, or keyframes wait for the end of localization
             mode.
         """
-        return self.pipeline.back_end.wait_until_idle(patience_of(timeout))
+        localization = self.pipeline.localization
+        return self.pipeline.back_end.wait_until_idle(
+            patience_of(timeout), close_loop=not (localization.wanted or localization.on)
+        )
 
     def shutdown(
         self,

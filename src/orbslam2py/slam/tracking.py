@@ -335,6 +335,8 @@ class Tracking:
         self._search.motion.remember(frame)
         self._since_keyframe = SinceKeyframe(frame.id)
         if not self._has_depth:
+            # The images before the first map were not tracked: how sharp they were is known here.
+            self._belief.see(self._initializer.remembered())
             self._belief.begin_map(frame, self._map.active_map)
         n = frame.n_associated()
         # It is the origin, and yet lies in its map no better than the keypoints that became points.
@@ -370,7 +372,7 @@ class Tracking:
         self._loss.followed(frame.timestamp)
         if self._seeks_map:
             self._seeks_map = False
-            self._initializer.reset()
+            self._initializer.restart([])
         if frame.map_index != self._map.active_map:
             found_in = self._map.activate_map_of(frame.reference_keyframe)
             _log.info("found again at frame %d in map %d", frame.id, found_in)

@@ -43,6 +43,11 @@ class WaitingLoop:
         self._n_waited = 0
         self._big_change = 0
 
+    @property
+    def has_loop(self) -> bool:
+        """Whether one waits."""
+        return self._best is not None
+
     def drop(self) -> None:
         """Give up what waits."""
         best, self._best = self._best, None
@@ -58,6 +63,7 @@ class WaitingLoop:
         found : Loop or None
             What this keyframe found.
         """
+        self._follow_map()
         self._consider(found)
         if not self._is_ripe():
             yield None
@@ -68,9 +74,9 @@ class WaitingLoop:
     @contextlib.contextmanager
     def last(self) -> Iterator[core.Loop | None]:
         """Yield what waits, if anything does: no keyframe follows."""
-        best = self._best
+        self._follow_map()
         try:
-            yield None if best is None else self._as_it_is_now(best)
+            yield self._best
         finally:
             self.drop()
 
@@ -95,10 +101,17 @@ class WaitingLoop:
             return False
         return best.n_matches >= limits.firm_matches or self._n_waited >= limits.patience
 
-    def _as_it_is_now(self, loop: core.Loop) -> core.Loop | None:
-        """The loop, found anew if the map has moved since; None if a keyframe died."""
-        if not all(self._map.has_keyframe(k) for k in (loop.current, loop.matched)):
-            return None
-        if self._map.big_change_index == self._big_change:
-            return loop
-        return self._verify(loop.current, loop.matched)
+    def _follow_map(self) -> None:
+        """Find what waits anew if the map has moved since; drop it if it is no loop any more."""
+        best = self._best
+        if best is None:
+            return
+        alive = all(self._map.has_keyframe(k) for k in (best.current, best.matched))
+        if alive and self._map.big_change_index == self._big_change:
+            return
+        self._big_change = self._map.big_change_index
+        found = self._verify(best.current, best.matched) if alive else None
+        if found is None:
+            self.drop()
+        else:
+            self._best = found

@@ -32,6 +32,17 @@ int n_right(const TwiceMappedScene& scene, const Loop& loop) {
   return n;
 }
 
+/// How many of the matches are between points of both keyframes.
+int n_mutual(const TwiceMappedScene& scene, const Loop& loop) {
+  const KeyFrame* current = scene.map.find(scene.kCurrent);
+  int n = 0;
+  for (std::size_t i = 0; i < loop.matches.size(); ++i) {
+    if (!loop.matches[i].valid() || !scene.map.find(current->map_points[i])) continue;
+    n += scene.map.find(loop.matches[i])->observation_of(scene.kMatched) ? 1 : 0;
+  }
+  return n;
+}
+
 ProjectionOptions noisy() {
   ProjectionOptions options;
   options.pixel_noise = 1;
@@ -124,6 +135,7 @@ TEST(VerifyLoopCandidate, NeighboursOfTheCandidateAddPoints) {
   const auto loop = verify(scene, true);
   ASSERT_TRUE(loop);
   EXPECT_GT(loop->n_matches, loop->n_inliers + n_lost / 2);
+  EXPECT_EQ(loop->n_inliers, n_mutual(scene, *loop)) << "one-sided matches are none of them";
   EXPECT_EQ(n_right(scene, *loop), loop->n_matches);
 }
 

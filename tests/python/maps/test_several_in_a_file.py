@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from orbslam2py import _core as core
 from orbslam2py.maps import SavedMap, load_map, save_map, verify_map_file
 from orbslam2py.maps.edits.parts import map_numbers, put_together, take_map
 from orbslam2py.maps.map_copies import restore_contents
+from orbslam2py.slam import saved_map_merging
 from orbslam2py.slam.saved_map_merging import merge_maps
 from support.command_line import CommandLine
 from support.cut_sequences import corridor, cut, settings_of, track
@@ -99,6 +102,21 @@ def test_merging_gives_the_same_bytes_in_every_run(
     once, _ = merge_maps([beginning, overlapping])
     twice, _ = merge_maps([beginning, overlapping])
     assert once.contents.first_difference(twice.contents) is None
+
+
+def test_a_loop_that_waits_at_the_end_of_a_map_is_closed() -> None:
+    asked: list[object] = []
+    closing: Any = SimpleNamespace(
+        process=asked.append,
+        end=lambda: asked.append("end"),
+        reset=lambda: asked.append("reset"),
+    )
+    slam_map: Any = SimpleNamespace(
+        maps=[1, 2], keyframe_ids=lambda number: np.array([10 * number, 10 * number + 1])
+    )
+    index: Any = None
+    saved_map_merging._compare(slam_map, index, closing)
+    assert asked == [10, 11, "end", "reset", 20, 21, "end", "reset"]
 
 
 def test_one_map_is_not_enough(beginning: SavedMap) -> None:

@@ -44,6 +44,18 @@ def test_a_young_map_believes_no_blurred_image(single: Scene) -> None:
     assert outcome.estimate.evidence.smear > 20
 
 
+def test_the_images_before_the_map_say_what_is_sharp(
+    core: FakeCore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first image that is tracked may be blurred already."""
+    scene = Scene(Sensor.MONOCULAR, core)
+    initializer: Any = scene.tracking._initializer
+    monkeypatch.setattr(initializer, "remembered", lambda: [FakeFrame(0).features])
+    scene.track()
+    assert track_blurred(scene).estimate.reason is Reason.TOO_BLURRED
+    assert track_blurred(scene).estimate.reason is Reason.TOO_BLURRED
+
+
 def test_it_goes_on_with_the_next_sharp_one(single: Scene) -> None:
     track_blurred(single)
     assert single.track().state is TrackingState.OK
@@ -177,6 +189,25 @@ def test_what_was_sharp_is_known_after_a_map_that_came_to_nothing(starter: Start
     starter.reset()
     starter.restart(frames)
     assert shown(starter, BLURRED, 1) is Reason.TOO_BLURRED_TO_BEGIN
+
+
+def test_a_blurred_image_of_before_is_no_view(starter: Starter) -> None:
+    sharp, blurred = FakeFrame(0).features, FakeFrame(1).features
+    sharp.detail, blurred.detail = SHARP, BLURRED
+    starter.restart([sharp, blurred])
+    assert [view.frame.frame_id for view in starter._kept.views] == [0]
+
+
+def test_a_camera_that_is_found_again_still_knows_what_is_sharp(
+    single: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    initializer: Any = single.tracking._initializer
+    restarts: list[object] = []
+    monkeypatch.setattr(initializer, "restart", restarts.append)
+    monkeypatch.setattr(initializer, "reset", lambda: pytest.fail("forgets it"))
+    single.tracking._seeks_map = True
+    single.tracking._stay(single.last)
+    assert restarts == [[]]
 
 
 def test_a_reset_forgets_it(starter: Starter) -> None:

@@ -276,6 +276,12 @@ def test_at_the_end_it_is_closed(weak: Scene) -> None:
     assert weak.closing.statistics.summary()["loop.graph"]["count"] == 1
 
 
+def test_whether_one_waits_is_known(weak: Scene) -> None:
+    assert weak.closing.has_loop_waiting
+    weak.closing.end()
+    assert not weak.closing.has_loop_waiting
+
+
 def test_a_reset_forgets_it(weak: Scene) -> None:
     weak.closing.reset()
     assert weak.map.leases == []

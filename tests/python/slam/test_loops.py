@@ -20,6 +20,8 @@ from orbslam2py import (
 )
 from orbslam2py.datasets import Images
 from orbslam2py.evaluation import lap_error, scale_drift
+from orbslam2py.slam import loop_closing
+from orbslam2py.slam.thresholds import LoopThresholds
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.feeding import feed
 
@@ -168,6 +170,28 @@ def test_walls_that_repeat_their_pictures_close_true_loops_only() -> None:
     assert loop.translation < 1.0, "a false one would be off by four metres or more"
     assert end_error(made, result.trajectory) < 0.3
     assert result.problems == []
+
+
+def test_a_loop_that_still_waits_is_closed_when_all_is_waited_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    never = LoopThresholds(firm_matches=10**6, patience=10**6)
+    monkeypatch.setattr(loop_closing, "LoopThresholds", lambda: never)
+    made = sequence("corridor", Sensor.RGBD)
+    settings = replace(made.settings, orb=replace(made.settings.orb, n_features=600))
+    with System(settings, Sensor.RGBD, deterministic=True) as system:
+        for index, timestamp in enumerate(made.timestamps):
+            feed(system, images("corridor", Sensor.RGBD, 1.4, index), float(timestamp))
+        assert system.loops == []
+        system.localization_mode = True
+        assert system.wait_until_idle()
+        assert system.loops == [], "the map stays as it is in localization mode"
+        system.localization_mode = False
+        assert system.wait_until_idle()
+        assert len(system.loops) == 1
+        assert [record.used for record in system.full_adjustments] == [True]
+        assert system.check_map() == []
+    assert len(system.loops) == 1
 
 
 def test_two_rooms_that_look_alike_are_not_one() -> None:

@@ -151,3 +151,16 @@ def test_of_many_in_doubt_the_youngest_are_kept(
         recorder.record(frame, lost=False, in_doubt=True)
     recorder.settle()
     assert [number for number, _ in moved.seen] == [N - 3, N - 2, N - 1]
+
+
+def test_a_map_that_ends_is_finished_others_are_not(
+    walk: Walk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    moved = MovedByAMetre()
+    recorder = FrameRecorder(walk.map, moved)
+    for frame in walk.frames:
+        recorder.record(frame, lost=False, in_doubt=frame.id == 9)
+    recorder.end_map(walk.map.active_map + 1)
+    assert moved.seen == []
+    recorder.settle()
+    assert moved.seen == [(9, True)]

@@ -133,3 +133,20 @@ def test_the_lease_ends_with_an_error_too(world: World) -> None:
     with pytest.raises(ZeroDivisionError), world.waiting.ripe(found):
         raise ZeroDivisionError
     assert world.leases == []
+
+
+def test_one_that_is_none_any_more_gives_way_to_a_weaker_one(world: World) -> None:
+    world.ask(20, 90)
+    world.matches_now = 0
+    world.big_change_index += 1
+    told = [world.ask(21, 85), *(world.ask(22 + k) for k in range(PATIENCE))]
+    assert told == [None] * PATIENCE + [(21, 85)]
+    assert world.leases == []
+
+
+def test_so_does_one_whose_place_died(world: World) -> None:
+    found: Any = SimpleNamespace(current=20, matched=3, n_matches=90)
+    with world.waiting.ripe(found):
+        world.dead.add(3)
+    told = [world.ask(21, 85), *(world.ask(22 + k) for k in range(PATIENCE))]
+    assert told == [None] * PATIENCE + [(21, 85)]

@@ -44,7 +44,9 @@ class Belief:
         self._young_until = -1
 
     def see(self, frames: list[core.Frame]) -> None:
-        """Let images from before a reset count among those that later ones are compared with."""
+        """Let earlier images be those that later ones are compared with, if none is known yet."""
+        if self._judge.knows_images:
+            return
         for frame in frames:
             self._judge.see(frame)
 

@@ -140,6 +140,11 @@ class EvidenceJudge:
         """Whether the image is smeared too far for a map that is not firm."""
         return self._smear.is_long(evidence.smear)
 
+    @property
+    def knows_images(self) -> bool:
+        """Whether there is an image whose sharpness others are compared with."""
+        return self._smear.knows_images
+
     def see(self, frame: core.Frame) -> None:
         """Let an image count among those that others are compared with."""
         self._smear.see(frame)

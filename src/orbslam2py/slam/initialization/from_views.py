@@ -119,7 +119,8 @@ class MonocularInitializer:
             if frame.size <= self._limits.keypoints:
                 continue
             self._kept.follow(frame)
-            self._kept.keep_last()
+            if not self._smear.is_long(self._smear.length(frame)):
+                self._kept.keep_last()
 
     @property
     def feature_factor(self) -> int:
