@@ -19,9 +19,26 @@ Record = dict[str, float]
 
 
 def run_report(
-    folder: Path, sensor: str, *options: str, environment: dict[str, str] | None = None
+    folder: Path,
+    sensor: str,
+    *options: str,
+    environment: dict[str, str] | None = None,
+    python: str = sys.executable,
 ) -> dict[str, Any]:
     """``orbslam2py run`` with these options; returns report.json.
+
+    Parameters
+    ----------
+    folder
+        Of the sequence.
+    sensor
+        What it is run with.
+    options
+        Further ones of the command.
+    environment
+        Variables that differ.
+    python
+        The interpreter, of another version perhaps.
 
     Raises
     ------
@@ -29,7 +46,7 @@ def run_report(
         With the program's words, if it fails.
     """
     with tempfile.TemporaryDirectory() as output:
-        command = [sys.executable, "-m", "orbslam2py", "run", str(folder), "--sensor", sensor]
+        command = [python, "-m", "orbslam2py", "run", str(folder), "--sensor", sensor]
         _output_of([*command, *options, "--output", output, "--force", "--quiet"], environment)
         report: dict[str, Any] = json.loads((Path(output) / "report.json").read_text())
         return report

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Recorded sequences with this version and another one, in turns: speed and error.
+
+The other version is a checkout in which it is installed (``git worktree add ../before COMMIT``, and
+there ``make install``). Each turn plays every sequence with both, one after the other, so that both
+see the same machine. With threads a turn has a seed of its own; deterministic runs differ by
+nothing but their first image, so there each begins one image later. Speed wants a machine on which
+nothing else runs.
+
+    python -m benchmarks.versions.turns ../before
+    python -m benchmarks.versions.turns ../before --turns 10 --deterministic --only stereo
+    python -m benchmarks.versions.turns ../before --options "--effort thorough"
+"""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import statistics
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from benchmarks.harness.arguments import add_counts, add_width, console_of, new_parser
+from benchmarks.harness.folders import needed_shared_folder
+from benchmarks.harness.runs import run_report
+from benchmarks.harness.tables import new_table
+
+Report = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A recorded sequence and how it is played."""
+
+    name: str
+    folder: str
+    sensor: str
+
+
+CASES = (
+    Case("redkitchen, RGB-D", "7scenes_redkitchen_head250", "rgbd"),
+    Case("KITTI 06, stereo", "kitti_06_head51_stereo", "stereo"),
+    Case("KITTI 03, mono", "kitti_03_left_head120", "mono"),
+    Case("KITTI 06, mono", "kitti_06_head51_stereo", "mono"),
+    Case("redkitchen, mono", "7scenes_redkitchen_head250", "mono"),
+)
+_COLUMNS = (
+    "frames/s before",
+    "now",
+    "ratio",
+    "system alone, ratio",
+    "track ms before",
+    "now",
+    "mapping ms before",
+    "now",
+    "ATE m before",
+    "now",
+    "ratio",
+)
+
+
+def options_of_turn(turn: int, *, deterministic: bool) -> list[str]:
+    """What tells the runs of one version apart."""
+    if deterministic:
+        return ["--deterministic", "--start", str(turn)]
+    return ["--seed", str(turn)]
+
+
+def python_of(checkout: Path) -> str:
+    """The interpreter of a checkout; ends the program where nothing is installed."""
+    python = checkout / ".venv" / "bin" / "python"
+    if not python.is_file():
+        sys.exit(f"{checkout} has no {python.relative_to(checkout)}: run make install there")
+    return str(python)
+
+
+def row(before: list[Report], now: list[Report]) -> list[str]:
+    """Medians of both, and ratios of the medians."""
+
+    def median(reports: list[Report], *keys: str) -> float:
+        values: list[float] = []
+        for report in reports:
+            value: Any = report
+            for key in keys:
+                value = value.get(key) if isinstance(value, dict) else None
+            if value is not None:
+                values.append(float(value))
+        return statistics.median(values) if values else float("nan")
+
+    def both(form: str, *keys: str) -> list[str]:
+        return [format(median(reports, *keys), form) for reports in (before, now)]
+
+    def ratio(*keys: str) -> str:
+        return f"{median(now, *keys) / median(before, *keys):.2f}"
+
+    return [
+        *both(".1f", "frames_per_second"),
+        ratio("frames_per_second"),
+        ratio("slam_frames_per_second"),
+        *both(".2f", "milliseconds", "track", "median"),
+        *both(".1f", "milliseconds", "mapping", "mean"),
+        *both(".4f", "ate_rmse_m"),
+        ratio("ate_rmse_m"),
+    ]
+
+
+def main() -> None:
+    """Play, and print a table."""
+    parser = new_parser(__doc__)
+    parser.add_argument("before", type=Path, help="checkout of the other version, installed")
+    parser.add_argument("--only", metavar="TEXT", default="", help="cases with this in their name")
+    parser.add_argument("--deterministic", action="store_true", help="[with threads]")
+    parser.add_argument("--options", default="", help="of this version's runs alone, one string")
+    add_counts(parser, turns=(5, "turns"))
+    add_width(parser, 170)
+    arguments = parser.parse_args()
+    folder = needed_shared_folder() / "sequences"
+    python = python_of(arguments.before)
+    cases = [case for case in CASES if arguments.only in case.name]
+    if not cases or arguments.turns < 1:
+        names = "; ".join(case.name for case in CASES)
+        parser.error(f"nothing to play: --turns {arguments.turns}, and --only one of: {names}")
+    print_turns(console_of(arguments).print, cases, folder, python, arguments)
+
+
+def print_turns(
+    tell: Callable[[object], None],
+    cases: list[Case],
+    folder: Path,
+    python: str,
+    arguments: argparse.Namespace,
+) -> None:
+    """Play all turns of each case, and print the table of them."""
+    how = "deterministic, first images" if arguments.deterministic else "threads, seeds"
+    title = f"In turns with {arguments.before}: {how} 0 to {arguments.turns - 1}, medians"
+    table = new_table(title, ["sequence"], _COLUMNS)
+    for case in cases:
+        before: list[Report] = []
+        now: list[Report] = []
+        for turn in range(arguments.turns):
+            options = options_of_turn(turn, deterministic=arguments.deterministic)
+            place = folder / case.folder
+            before.append(run_report(place, case.sensor, *options, python=python))
+            more = shlex.split(arguments.options)
+            now.append(run_report(place, case.sensor, *options, *more))
+        table.add_row(case.name, *row(before, now))
+    tell(table)
+
+
+if __name__ == "__main__":
+    main()
