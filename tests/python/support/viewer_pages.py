@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import tempfile
 import time
@@ -21,7 +22,11 @@ WIDTH, HEIGHT = 1200, 800
 #: Where the map is seen: between the two panels.
 _MAP = slice(470, 890)
 
-#: Elements that show exactly this text, of all kinds that can be clicked; the innermost.
+#: Clicks on one thing: the page may move it away between the look for it and the click.
+_MOST_CLICKS = 5
+
+#: Elements that show exactly this text, of all kinds that can be clicked; the innermost. The page
+#: notes whether the next click hits it.
 _FIND = """
 (() => {
   const text = %s;
@@ -32,6 +37,10 @@ _FIND = """
   found.scrollIntoView({block: "center", behavior: "instant"});
   const target = document.getElementById(found.htmlFor) || found;
   const box = target.getBoundingClientRect();
+  window.clickHit = false;
+  document.addEventListener("click", event => {
+    window.clickHit ||= target.contains(event.target) || found.contains(event.target);
+  }, {capture: true});
   return [box.x + box.width / 2, box.y + box.height / 2];
 })()
 """
@@ -46,10 +55,15 @@ def open_viewer(browser: Browser, address: str) -> Page:
 
 def click_on(page: Page, text: str) -> None:
     """Click on the button, switch or tab with a text."""
-    place = page.wait_for(_FIND % json.dumps(text), PATIENCE)
-    page.mouse("mouseMoved", *place)
-    page.mouse("mousePressed", *place)
-    page.mouse("mouseReleased", *place)
+    for _ in range(_MOST_CLICKS):
+        place = page.wait_for(_FIND % json.dumps(text), PATIENCE)
+        page.mouse("mouseMoved", *place)
+        page.mouse("mousePressed", *place)
+        page.mouse("mouseReleased", *place)
+        with contextlib.suppress(BrowserError):
+            page.wait_for("window.clickHit", 2.0)
+            return
+    raise BrowserError(f"{_MOST_CLICKS} clicks missed what shows '{text}'")
 
 
 def wait_until_checked(page: Page, text: str, *, checked: bool = True) -> None:
