@@ -123,12 +123,13 @@ def save_map(saved: SavedMap, path: str | os.PathLike[str]) -> None:
     saved
         The map, and what must be known to use it.
     path
-        The file, by custom with the suffix ``.orbmap``; replaced if it exists.
+        The file, by custom with the suffix ``.orbmap``; a map that is there is replaced.
 
     Raises
     ------
     MapFileError
-        If the map has no keyframes, or the file cannot be written; a file that was there is kept.
+        If the map has no keyframes, the file cannot be written, or it is there and is no map; a
+        file that was there is kept.
     """
     if not len(saved.contents.keyframes):
         raise MapFileError(

@@ -54,8 +54,11 @@ class Timeline:
 
     @property
     def duration(self) -> float:
-        """Seconds from the first frame to the last; 0 without any."""
-        return float(self.seconds[-1]) if len(self.seconds) else 0.0
+        """Seconds from the first frame to the last; 0 without any.
+
+        Frames that were skipped may go backwards.
+        """
+        return float(max(self.seconds, default=0.0))
 
     @classmethod
     def of(

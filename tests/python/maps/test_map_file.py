@@ -272,3 +272,26 @@ def test_a_read_only_file_is_kept(tmp_path: Path) -> None:
     with pytest.raises(MapFileError, match="read-only"):
         save_map(small_map(), path)
     load_map(path)
+
+
+@pytest.mark.parametrize("foreign", ["a film", "a database"])
+def test_a_file_that_is_no_map_is_not_replaced(tmp_path: Path, foreign: str) -> None:
+    path = tmp_path / "mine"
+    if foreign == "a database":
+        with closing(sqlite3.connect(path)) as connection:
+            connection.execute("CREATE TABLE messages (id INTEGER)")
+    else:
+        path.write_bytes(b"not a map")
+    before = path.read_bytes()
+    with pytest.raises(MapFileError, match="no map file; choose another name, or remove it"):
+        save_map(small_map(), path)
+    assert path.read_bytes() == before
+    assert [file.name for file in tmp_path.iterdir()] == ["mine"]
+
+
+def test_an_empty_file_and_a_map_are_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "mine"
+    path.touch()
+    for _ in range(2):
+        save_map(small_map(), path)
+    load_map(path)

@@ -57,3 +57,10 @@ def test_gaps_in_time() -> None:
     assert gaps_in_time(np.zeros(0)).tolist() == []
     empty = Timeline.of([], 0)
     assert (empty.duration, empty.untracked) == (0.0, [])
+
+
+def test_frames_that_were_skipped_may_go_backwards() -> None:
+    nothing = np.zeros(3, np.int64)
+    assert Timeline(np.array([0.0, 0.4, -0.1]), nothing, [], {}).duration == 0.4
+    assert Timeline(np.array([0.0, -0.1, -0.2]), nothing, [], {}).duration == 0.0
+    assert Timeline(np.zeros(0), nothing[:0], [], {}).duration == 0.0

@@ -74,9 +74,8 @@ class Story:
 
     @property
     def duration(self) -> float:
-        """Seconds from the first frame to the last."""
-        seconds = self.run.frames.seconds
-        return float(seconds[-1]) if len(seconds) else 0.0
+        """Seconds from the first frame to the last; frames that were skipped may go backwards."""
+        return float(max(self.run.frames.seconds, default=0.0))
 
     @property
     def has_truth(self) -> bool:
