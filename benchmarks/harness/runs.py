@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -50,6 +51,18 @@ def run_report(
         _output_of([*command, *options, "--output", output, "--force", "--quiet"], environment)
         report: dict[str, Any] = json.loads((Path(output) / "report.json").read_text())
         return report
+
+
+def median_of(reports: Sequence[dict[str, Any]], *keys: str) -> float:
+    """Median of what the reports hold under these keys, one in the other; NaN where none does."""
+    values = []
+    for report in reports:
+        value: Any = report
+        for key in keys:
+            value = value[key]
+        if value is not None:
+            values.append(float(value))
+    return statistics.median(values) if values else float("nan")
 
 
 def run_module(name: str, *options: str) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import statistics
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -14,19 +13,9 @@ from rich.table import Table
 from benchmarks.harness import reference
 from benchmarks.harness.folders import MISSING, sequence_folder, shared_folder
 from benchmarks.harness.reference import SequenceFigure
-from benchmarks.harness.runs import run_report
+from benchmarks.harness.runs import median_of, run_report
 from benchmarks.harness.tables import new_table, verdict
 from benchmarks.harness.yardstick import Measurement, Times, Yardstick
-
-
-def _median(reports: list[dict[str, Any]], *keys: str) -> float:
-    values = []
-    for report in reports:
-        value: Any = report
-        for key in keys:
-            value = value[key]
-        values.append(float(value))
-    return statistics.median(values)
 
 
 def sequence_tables(yardstick: Yardstick, n_runs: int) -> Iterator[object]:
@@ -105,10 +94,10 @@ def _add_offline(
         f"{ratio:.2f}",
         f"{reference.SEQUENCE_SPEED_RATIO}",
         verdict(ratio >= reference.SEQUENCE_SPEED_RATIO),
-        f"{_median(reports, 'milliseconds', 'track', 'median'):.1f} / "
-        f"{_median(reports, 'milliseconds', 'track', 'p99'):.1f}",
+        f"{median_of(reports, 'milliseconds', 'track', 'median'):.1f} / "
+        f"{median_of(reports, 'milliseconds', 'track', 'p99'):.1f}",
         f"{figure.track_ms[0]} / {figure.track_ms[1]}",
-        f"{_median(reports, 'ate_rmse_m'):.4f}",
+        f"{median_of(reports, 'ate_rmse_m'):.4f}",
         f"{figure.ate}",
     )
     return reports, measured
@@ -153,21 +142,21 @@ def _add_summed(
             f"{there:.0f}",
             f"{figure.frames_per_second}",
             f"{there / figure.frames_per_second:.2f}",
-            f"{_median(reports, 'ate_rmse_m'):.4f}",
+            f"{median_of(reports, 'ate_rmse_m'):.4f}",
             f"{figure.ate}",
         )
 
 
 def _add_realtime(table: Table, figure: SequenceFigure, folder: Path, n_runs: int) -> None:
     reports = [run_report(folder, figure.sensor, "--realtime") for _ in range(min(n_runs, 3))]
-    p99 = _median(reports, "milliseconds", "track", "p99")
+    p99 = median_of(reports, "milliseconds", "track", "p99")
     table.add_row(
         figure.name,
-        f"{_median(reports, 'milliseconds', 'track', 'median'):.1f}",
+        f"{median_of(reports, 'milliseconds', 'track', 'median'):.1f}",
         f"{p99:.1f}",
         f"{figure.period_ms}",
         verdict(p99 < figure.period_ms),
-        f"{_median(reports, 'dropped_frames'):.0f}",
+        f"{median_of(reports, 'dropped_frames'):.0f}",
         f"{figure.track_ms[0]} / {figure.track_ms[1]}",
     )
 

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import argparse
 import shlex
-import statistics
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,7 +24,7 @@ from typing import Any
 
 from benchmarks.harness.arguments import add_counts, add_width, console_of, new_parser
 from benchmarks.harness.folders import needed_shared_folder
-from benchmarks.harness.runs import run_report
+from benchmarks.harness.runs import median_of, run_report
 from benchmarks.harness.tables import new_table
 
 Report = dict[str, Any]
@@ -80,21 +79,11 @@ def python_of(checkout: Path) -> str:
 def row(before: list[Report], now: list[Report]) -> list[str]:
     """Medians of both, and ratios of the medians."""
 
-    def median(reports: list[Report], *keys: str) -> float:
-        values: list[float] = []
-        for report in reports:
-            value: Any = report
-            for key in keys:
-                value = value.get(key) if isinstance(value, dict) else None
-            if value is not None:
-                values.append(float(value))
-        return statistics.median(values) if values else float("nan")
-
     def both(form: str, *keys: str) -> list[str]:
-        return [format(median(reports, *keys), form) for reports in (before, now)]
+        return [format(median_of(reports, *keys), form) for reports in (before, now)]
 
     def ratio(*keys: str) -> str:
-        return f"{median(now, *keys) / median(before, *keys):.2f}"
+        return f"{median_of(now, *keys) / median_of(before, *keys):.2f}"
 
     return [
         *both(".1f", "frames_per_second"),

@@ -21,7 +21,15 @@ from orbslam2py.errors import MapFileError, SettingsError
 from orbslam2py.maps.map_tables import BlobTable, MapTables, read_one, read_rows
 from orbslam2py.maps.map_writer import connect
 from orbslam2py.maps.saved_map import RecordedFrames, Run, SavedMap, VocabularyIdentity
-from orbslam2py.maps.schema import APPLICATION_ID, FORMAT_VERSION, Table, create_script, tables_of
+from orbslam2py.maps.schema import (
+    APPLICATION_ID,
+    FORMAT_VERSION,
+    HEADER_SIZE,
+    Table,
+    application_of,
+    create_script,
+    tables_of,
+)
 from orbslam2py.settings.keys import ORIGINAL_COORDINATES
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
@@ -97,16 +105,17 @@ def _check_header(path: Path, named: str) -> int:
             raise MapFileError(f"{named} is a folder; give the map file itself")
         size = path.stat().st_size
         with path.open("rb") as stream:
-            header = stream.read(100)
+            header = stream.read(HEADER_SIZE)
     except FileNotFoundError:
         raise MapFileError(f"there is no map file {named}; check the name") from None
     except OSError as error:
         raise MapFileError(f"cannot read {named}: {reason_of(error)}; check the file") from error
     if size == 0:
         raise MapFileError(f"{named} is empty; {_COPY}, or save the map again")
-    if len(header) < 100 or not header.startswith(b"SQLite format 3\x00"):
+    application = application_of(header)
+    if application is None:
         raise MapFileError(f"{named} is not a map file; {_WRITTEN_BY}")
-    if int.from_bytes(header[68:72], "big") != APPLICATION_ID:
+    if application != APPLICATION_ID:
         raise MapFileError(f"{named} is a database of another program; {_WRITTEN_BY}")
     version = int.from_bytes(header[60:64], "big")
     if version > FORMAT_VERSION:

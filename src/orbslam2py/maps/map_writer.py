@@ -14,7 +14,14 @@ from types import MappingProxyType
 from orbslam2py._files import reason_of
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.map_rows import Row, checksum
-from orbslam2py.maps.schema import APPLICATION_ID, TABLES, Table, create_script
+from orbslam2py.maps.schema import (
+    APPLICATION_ID,
+    HEADER_SIZE,
+    TABLES,
+    Table,
+    application_of,
+    create_script,
+)
 
 #: Tables whose rows never change and are written once.
 WRITTEN_ONCE = frozenset({"keypoints", "images", "frames", "runs", "settings", "vocabulary"})
@@ -23,8 +30,6 @@ WRITTEN_ONCE = frozenset({"keypoints", "images", "frames", "runs", "settings", "
 LOCK_PATIENCE = 2.0
 
 _OLDEST_SQLITE = (3, 37, 0)
-_HEADER = 72  # bytes of a file that say what it is
-_APPLICATION_ID = slice(68, 72)
 _SIDE_FILES = ("-wal", "-shm", "-journal")
 
 
@@ -279,11 +284,10 @@ def _check_target(path: Path, named: str) -> None:
     if not os.access(path, os.W_OK):
         raise MapFileError(f"cannot write {named}: it is read-only; choose another name")
     with path.open("rb") as stream:
-        header = stream.read(_HEADER)
+        header = stream.read(HEADER_SIZE)
     if not header:
         return
-    ours = header[_APPLICATION_ID] == APPLICATION_ID.to_bytes(4, "big")
-    if not (header.startswith(b"SQLite format 3\x00") and ours):
+    if application_of(header) != APPLICATION_ID:
         raise MapFileError(
             f"cannot write {named}: it is there and is no map file; choose another name, or "
             "remove it first"

@@ -156,6 +156,17 @@ def create_script(version: int = FORMAT_VERSION) -> str:
     return _CREATE.format(version=version, keypoints=keypoints)
 
 
+#: Bytes at the beginning of a file that say whose SQLite file it is.
+HEADER_SIZE = 100
+
+
+def application_of(header: bytes) -> int | None:
+    """Id of the application whose SQLite file begins so; None if it is no SQLite file."""
+    if len(header) < HEADER_SIZE or not header.startswith(b"SQLite format 3\x00"):
+        return None
+    return int.from_bytes(header[68:72], "big")
+
+
 _CREATE = f"""
 PRAGMA application_id = {APPLICATION_ID};
 PRAGMA user_version = {{version}};
