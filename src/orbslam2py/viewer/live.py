@@ -216,7 +216,9 @@ class LiveView:
 
     def _ended(self) -> None:
         """The page is no more: nobody can let a run go on that stands still."""
-        if self._watches and self._control is not None and self._control.paused:
+        # Whoever was told so by an image that could not be shown has closed this view already.
+        waits_for_it = self._watches or self._missed
+        if waits_for_it and self._control is not None and self._control.paused:
             self._control.resume()
 
     def _path(self) -> PathNow:

@@ -123,6 +123,29 @@ def test_when_it_is_killed_a_run_that_stands_still_goes_on(system: System, view:
         wait_until(lambda: not control.paused, "a run that goes on")
 
 
+def test_it_goes_on_although_the_publisher_noticed_first(
+    system: System, view: LiveView, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    control = RunControl()
+    left_out = threading.Event()
+    end_in_its_thread = view._companion._on_end
+
+    def end_late() -> None:
+        left_out.wait(60)
+        end_in_its_thread()
+
+    monkeypatch.setattr(view._companion, "_on_end", end_late)
+    view.attach(system, control=control)
+    with Publisher(system, [view], frame_rate=1e6) as publisher:
+        play(system, 2)
+        control.pause()
+        os.kill(view.process_id, signal.SIGKILL)
+        play(system, 2, first=2)
+        wait_until(lambda: not publisher._works(), "a publisher without watchers")
+        left_out.set()
+        wait_until(lambda: not control.paused, "a run that goes on")
+
+
 def test_one_that_hangs_delays_nobody_and_is_given_up(
     system: System,
     view: LiveView,
