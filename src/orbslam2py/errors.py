@@ -28,7 +28,7 @@ class MapFileError(OrbSlamError):
 
 
 class OutputFileError(OrbSlamError):
-    """A video or a recording that was asked for cannot be written."""
+    """A file that was asked for cannot be written there: a video, a page, settings."""
 
 
 class ImageError(OrbSlamError):

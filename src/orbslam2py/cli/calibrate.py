@@ -22,6 +22,7 @@ from orbslam2py.calibration import (
 )
 from orbslam2py.calibration import calibrate as calibrate_views
 from orbslam2py.calibration.plot import draw_residuals
+from orbslam2py.cli.targets import check_apart, check_target
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import CameraSettings, OrbSettings, Sensor, settings_for_camera
 
@@ -92,6 +93,7 @@ def calibrate(
     orb = None if features is None else OrbSettings(n_features=features)
     settings_for_camera(a_camera, sensor, baseline=baseline, depth_factor=depth_factor, orb=orb)
     model = Board.parse(board, square)
+    check_apart({"--output": output, "--plot": plot}, [source])
     for path in (output, plot):
         check_target(path, force=force)
     console = Console(quiet=quiet)
@@ -178,16 +180,6 @@ def _search(source: Path, board: Board, every: int | None, console: Console) -> 
             bar.update(task, description=f"board seen in {seen} of {searched} images")
 
         return find_views(source, board, every=every, progress=show)
-
-
-def check_target(path: Path | None, *, force: bool) -> None:
-    """Raise `SettingsError` if a file must not or cannot be written."""
-    if path is None:
-        return
-    if path.exists() and not force:
-        raise SettingsError(f"{path} exists; use --force to replace it")
-    if not path.absolute().parent.is_dir():
-        raise SettingsError(f"{path.parent}: no such folder; make it first, or give another name")
 
 
 def _table(result: Calibration, source: Path) -> Table:

@@ -11,7 +11,8 @@ from typing import Annotated
 import typer
 
 from orbslam2py.cli.run_and_show import run_and_show
-from orbslam2py.cli.run_options import NoReportFlag, QuietFlag
+from orbslam2py.cli.run_options import ForceFlag, NoReportFlag, QuietFlag
+from orbslam2py.cli.targets import check_kept
 from orbslam2py.cli.viewing import (
     ViewerExit,
     ViewerFlag,
@@ -40,6 +41,7 @@ def demo(
     viewer_exit: ViewerExit = False,
     video: VideoOption = None,
     record: RecordOption = None,
+    force: ForceFlag = False,
     quiet: QuietFlag = False,
 ) -> None:
     """Track a camera once around a synthetic corridor: needs no data.
@@ -50,16 +52,15 @@ def demo(
 
         orbslam2py demo --viewer
     """
+    check_kept(video, record, force=force)
     look = ViewerOptions(viewer, viewer_port, viewer_host, viewer_exit)
     options = SyntheticOptions(world="corridor", sensor=sensor, frames=frames, speed=2.8, noise=2)
     sequence = SyntheticSequence(options)
-    # Results of an earlier demo are replaced, other files are not.
-    force = output == DEFAULT_OUTPUT or (output / "report.json").is_file()
     code = run_and_show(
         sequence,
         RunOptions(sensor),
         output=output,
-        force=force,
+        force=force or output == DEFAULT_OUTPUT,  # there, results are an earlier demo's
         report_page=not no_report,
         viewer=look,
         video=video,

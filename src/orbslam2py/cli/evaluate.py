@@ -18,6 +18,7 @@ from rich.table import Table
 from orbslam2py._arrays import FloatArray
 from orbslam2py._files import atomic_write
 from orbslam2py.cli.messages import log_to
+from orbslam2py.cli.targets import check_figures
 from orbslam2py.datasets import Layout, is_recording, open_sequence, recognise
 from orbslam2py.datasets.euroc import find_root
 from orbslam2py.datasets.euroc_calibration import read_sensor_yaml
@@ -120,6 +121,7 @@ def evaluate(
         timed=both.is_timed,
     )
     figures = result.as_dict()
+    check_figures(json, figures)
     Console().print(_table(figures, trajectory, ground_truth))
     _say_what_was_compared(both, result, asked=alignment)
     if json is not None:

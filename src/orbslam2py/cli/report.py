@@ -13,7 +13,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from orbslam2py.cli.messages import log_to
-from orbslam2py.errors import DatasetError
+from orbslam2py.cli.targets import check_page
 from orbslam2py.runs.report_page import (
     Comparison,
     compare_runs,
@@ -39,7 +39,7 @@ def report(
     """
     log_to(Console(stderr=True), quiet=False)
     page = output or run / "report.html"
-    write_report_page(_page_file(page), run)
+    write_report_page(check_page(page), run)
     _tell(page)
 
 
@@ -60,14 +60,8 @@ def compare(
     for warning in comparison.warnings:
         _log.warning("%s", warning.rstrip("."))
     Console().print(_table(comparison))
-    write_comparison(_page_file(output), comparison)
+    write_comparison(check_page(output), comparison)
     _tell(output)
-
-
-def _page_file(path: Path) -> Path:
-    if path.is_dir():
-        raise DatasetError(f"{path} is a folder; give the page a name with --output")
-    return path
 
 
 def _tell(page: Path) -> None:

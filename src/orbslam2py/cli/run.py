@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import typer
 from rich.console import Console
 
@@ -43,9 +45,11 @@ from orbslam2py.cli.run_options import (
     TopicsOption,
     VocabularyOption,
 )
+from orbslam2py.cli.targets import check_kept
 from orbslam2py.cli.viewing import ViewerExit, ViewerFlag, ViewerHost, ViewerOptions, ViewerPort
 from orbslam2py.cli.watching import RecordOption, VideoOption
 from orbslam2py.datasets import open_input
+from orbslam2py.errors import DatasetError
 from orbslam2py.maps import MapFile
 from orbslam2py.maps.setup_check import check_sensor
 from orbslam2py.runs.options import RunOptions
@@ -115,6 +119,9 @@ def run(
     quiet: QuietFlag = False,
 ) -> None:
     """Track a recorded sequence, a video or a camera; write trajectory, map and report."""
+    check_kept(video, record, force=force)
+    if save_images and save is None:
+        raise DatasetError("--save-images keeps images in the map that is saved: --save FILE")
     look = ViewerOptions(viewer, viewer_port, viewer_host, viewer_exit)
     log_to(Console(stderr=True), quiet=quiet)  # opening warns already
     loaded = None if load is None else MapFile(load)
@@ -161,6 +168,7 @@ def run(
         viewer=look,
         video=video,
         record=record,
+        inputs=[Path(sequence)],
         quiet=quiet,
     )
     raise typer.Exit(code)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import contextlib
 import shlex
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 from rich.console import Console
@@ -16,12 +17,13 @@ from orbslam2py.cli.display import Display, progress_bar, report_table
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.interrupts import StopOnInterrupt
 from orbslam2py.cli.messages import log_to, print_error, tell_repeated
+from orbslam2py.cli.targets import check_apart
 from orbslam2py.cli.viewing import ViewerOptions, Viewing
 from orbslam2py.cli.watching import file_watchers, watch_all
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.runs.feeds import is_sequence
 from orbslam2py.runs.options import RunOptions
-from orbslam2py.runs.outputs import new_output_folder
+from orbslam2py.runs.outputs import new_output_folder, prepare_output_folder
 from orbslam2py.runs.remedies import why_nothing_was_tracked
 from orbslam2py.runs.result import FrameRow
 from orbslam2py.runs.run import FinishedRun, run_sequence
@@ -41,14 +43,28 @@ def run_and_show(
     quiet: bool = False,
     video: Path | None = None,
     record: Path | None = None,
+    inputs: Iterable[Path] = (),
 ) -> ExitCode:
-    """Run, with a progress bar and a table at the end; returns the exit code."""
+    """Run, with a progress bar and a table at the end; returns the exit code.
+
+    Of what is written none may be among the `inputs`.
+    """
     console = Console(quiet=quiet)
     errors = Console(stderr=True)
     log_to(errors, quiet=quiet)
     n_frames = options.n_frames(sequence)
     words = load_vocabulary(vocabulary)  # until here a Ctrl-C leaves nothing behind
+    check_apart({"--video": video, "--record": record, "--save": options.save_map}, inputs)
+    output = output or new_output_folder(sequence.name)
     with contextlib.ExitStack() as page:
+        if any(
+            path is not None and path.resolve().parent == output.resolve()
+            for path in (video, record)
+        ):
+            settings = sequence.settings.to_yaml()
+            prepare_output_folder(output, force=force, settings=settings)
+            page.callback(_remove_if_empty, output)  # if there is no run after all
+            force = True
         with StopOnInterrupt() as interrupt:
             files = page.enter_context(file_watchers(sequence, options, video, record))
             in_real_time = options.realtime or not is_sequence(sequence)
@@ -68,7 +84,7 @@ def run_and_show(
                     sequence,
                     options,
                     vocabulary=words,
-                    output=output or new_output_folder(sequence.name),
+                    output=output,
                     force=force,
                     report_page=report_page,
                     command=shlex.join(["orbslam2py", *sys.argv[1:]]),
@@ -94,6 +110,11 @@ def run_and_show(
     if code is not ExitCode.FAILED and interrupted:
         return ExitCode.INTERRUPTED
     return code
+
+
+def _remove_if_empty(folder: Path) -> None:
+    with contextlib.suppress(OSError):
+        folder.rmdir()
 
 
 def _conclude(done: FinishedRun, errors: Console) -> ExitCode:

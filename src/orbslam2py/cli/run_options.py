@@ -172,7 +172,8 @@ ForceFlag = Annotated[
     bool,
     typer.Option(
         "--force",
-        help="Write into an output folder that is not empty; results of an earlier run there go.",
+        help="Write into an output folder that is not empty; results of an earlier run there go. "
+        "Replace a video or recording.",
     ),
 ]
 NoReportFlag = Annotated[

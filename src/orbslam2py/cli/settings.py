@@ -13,9 +13,10 @@ from rich.markup import escape
 from rich.table import Table
 
 from orbslam2py._files import atomic_write
-from orbslam2py.cli.calibrate import Baseline, DepthFactor, Force, Quiet, check_target
+from orbslam2py.cli.calibrate import Baseline, DepthFactor, Force, Quiet
 from orbslam2py.cli.messages import log_to
 from orbslam2py.cli.synthesize import parse_size
+from orbslam2py.cli.targets import check_target
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import (
     BUILTIN_NAMES,

@@ -160,6 +160,8 @@ def synthesize(
     quiet: Annotated[bool, typer.Option("--quiet", help="Only errors.")] = False,
 ) -> None:
     """Write a synthetic sequence with calibration and exact ground truth."""
+    if depth_noise and sensor is not Sensor.RGBD:
+        raise SettingsError("--depth-noise is of depth images: --sensor rgbd")
     options = SyntheticOptions(
         world=world,
         sensor=sensor,

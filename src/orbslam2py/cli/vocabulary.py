@@ -17,6 +17,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from orbslam2py import _core as core
 from orbslam2py._arguments import seed_of
 from orbslam2py._version import __version__
+from orbslam2py.cli.targets import check_target
 from orbslam2py.errors import VocabularyError
 from orbslam2py.vocabulary import (
     convert_vocabulary,
@@ -144,10 +145,7 @@ def info(
 def _check_target(path: Path, *, force: bool) -> None:
     if not path.name.endswith((".bvoc", ".txt", ".txt.gz")):
         raise VocabularyError(f"{path}: the name must end with .bvoc, .txt or .txt.gz")
-    if path.exists() and not force:
-        raise VocabularyError(f"{path} exists; use --force to replace it")
-    if not path.absolute().parent.is_dir():
-        raise VocabularyError(f"{path.parent}: no such folder; make it first, or give another name")
+    check_target(path, force=force)
 
 
 EXAMPLE = "{}\n\n**Example**\n\n    orbslam2py vocabulary {}\n"

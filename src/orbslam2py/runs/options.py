@@ -67,6 +67,8 @@ class RunOptions:
             )
         if self.initial_pose is not None and self.load_map is None:
             raise DatasetError("--initial-pose says where in a map the camera is; load one: --load")
+        if self.allow_other_setup and self.load_map is None:
+            raise DatasetError("--allow-other-setup is about a map that is loaded: --load FILE")
         if self.autosave is not None and self.save_map is None:
             raise DatasetError("--autosave needs the file to save to: --save FILE")
         if self.autosave is not None and not (math.isfinite(self.autosave) and self.autosave > 0):

@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import contextlib
+import fnmatch
 import json
 import logging
 import os
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,9 @@ from orbslam2py.trajectory import Trajectory, write_kitti, write_tum
 
 _log = logging.getLogger(__name__)
 
+#: What the run worked with.
+_SETTINGS = "settings.yaml"
+
 #: Files that a run may have no content for.
 _NOT_ALWAYS = (
     *("trajectory.txt", "trajectory_online.txt", "trajectory_kitti.txt", "keyframes.txt"),
@@ -39,8 +43,11 @@ _NOT_ALWAYS = (
     *("report.html", "frame_images.zip"),
 )
 
-#: What else a run writes; the settings are not among them, which are nobody's result.
-_ALWAYS = ("frames.csv", "points.ply", "map.npz", "report.json")
+#: By these it is known that a run has written into a folder: the first to come, the last to go.
+_MARKS = ("report.json", "frames.csv")
+
+#: All results; the settings are not among them, which may be those that the run was given.
+_RESULTS = (*_NOT_ALWAYS, "points.ply", "map.npz", *_MARKS)
 
 
 def new_output_folder(name: str) -> Path:
@@ -54,7 +61,12 @@ def new_output_folder(name: str) -> Path:
     return folder
 
 
-def prepare_output_folder(folder: Path, *, force: bool) -> Path:
+def is_name_of_result(name: str) -> bool:
+    """Whether a run writes a file of that name into its folder."""
+    return name == _SETTINGS or any(fnmatch.fnmatchcase(name, pattern) for pattern in _RESULTS)
+
+
+def prepare_output_folder(folder: Path, *, force: bool, settings: str = "") -> Path:
     """Make the folder that takes the results, and see that it can be written.
 
     Parameters
@@ -62,17 +74,25 @@ def prepare_output_folder(folder: Path, *, force: bool) -> Path:
     folder : Path
         The folder.
     force : bool
-        Accept a folder that holds files.
+        Accept a folder that holds files. Those that are called as results are must be a run's.
+    settings : str
+        Text of the settings file that will be written: one that holds it already may be there.
 
     Raises
     ------
     DatasetError
-        If it is not empty (without `force`), not a folder, or not writable.
+        If it is not empty (without `force`), not a folder, or not writable, or if files that no run
+        has written would be replaced.
     """
     if folder.exists() and not folder.is_dir():
         raise DatasetError(f"{folder} is not a folder; give another one with --output")
     if folder.exists() and any(folder.iterdir()) and not force:
         raise DatasetError(f"{folder} is not empty; give another --output, or --force to overwrite")
+    if folder.is_dir() and (name := _other_work(folder, settings)):
+        raise DatasetError(
+            f"{folder} holds {name}, which would be replaced, but no run that has written it (no "
+            f"{_MARKS[0]}); give another --output"
+        )
     try:
         folder.mkdir(parents=True, exist_ok=True)
         probe = folder / ".write-test"
@@ -90,12 +110,31 @@ def remove_earlier_results(folder: Path) -> None:
 
     Only from a folder in which a run has written, and only what runs write; the settings stay.
     """
-    if not any((folder / name).is_file() for name in ("report.json", "frames.csv")):
+    if not _holds_run(folder):
         return
-    for path in (path for name in (*_ALWAYS, *_NOT_ALWAYS) for path in folder.glob(name)):
+    for path in _results_in(folder):
         if path.is_file():
             with contextlib.suppress(OSError):
                 path.unlink()
+
+
+def _holds_run(folder: Path) -> bool:
+    return any((folder / name).is_file() for name in _MARKS)
+
+
+def _results_in(folder: Path) -> Iterator[Path]:
+    return (path for name in _RESULTS for path in sorted(folder.glob(name)))
+
+
+def _other_work(folder: Path, settings: str) -> str | None:
+    """Name of a file that is called as a result is, and is none."""
+    if _holds_run(folder):
+        return None
+    # A run that was killed has left the settings of the one before, which are no loss.
+    own = folder / _SETTINGS
+    if own.is_file() and own.read_bytes() != settings.encode():
+        return own.name
+    return next((path.name for path in _results_in(folder)), None)
 
 
 def link_latest(folder: Path) -> None:
@@ -138,9 +177,9 @@ class OutputWriter:
         page: bool = True,
     ) -> None:
         """Write all files of the run; the page and its images only if they are wanted."""
-        self._write("settings.yaml", result.settings.save)
+        self._write("frames.csv", lambda path: write_frames(path, result.rows))  # marks the folder
+        self._write(_SETTINGS, result.settings.save)
         self._write_trajectories(result, evaluation)
-        self._write("frames.csv", lambda path: write_frames(path, result.rows))
         points = anchored_points(result)
         unit = "units" if result.options.sensor is Sensor.MONOCULAR else "m"
         self._write("points.ply", lambda path: write_ply(path, points, unit=unit))

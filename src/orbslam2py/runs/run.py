@@ -21,6 +21,7 @@ from orbslam2py.runs.losses import find_losses, last_loss_warning
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.outputs import (
     OutputWriter,
+    is_name_of_result,
     link_latest,
     prepare_output_folder,
     remove_earlier_results,
@@ -84,7 +85,7 @@ def run_sequence(
         Folder for the results; nothing is written if None.
     force : bool
         Accept an output folder that holds files; the results of an earlier run are removed when
-        this one begins.
+        this one begins. Files called as results are that no run has written are not replaced.
     progress : callable, optional
         ``progress(row, system)``, called after every frame.
     stop : threading.Event, optional
@@ -143,14 +144,9 @@ def run_sequence(
         )
         if isinstance(options.load_map, MapFile):
             options.load_map.check()
-    if options.save_map is not None:
-        check_map_target(options.save_map)
     runner = SequenceRunner(sequence, sequence.settings, vocabulary, options)
     runner.result.command = command
-    if folder is not None:
-        folder = prepare_output_folder(folder, force=force)
-        remove_earlier_results(folder)
-        link_latest(folder)
+    _prepare(folder, options.save_map, sequence.settings.to_yaml(), force=force)
     result = runner.run(progress, stop, control=control, watch=watch)
     warning = last_loss_warning(find_losses(result.rows))
     if warning is not None:
@@ -164,3 +160,26 @@ def run_sequence(
         writer.write_all(result, report, evaluation, page=report_page)
         problems = tuple(writer.problems)
     return FinishedRun(result, evaluation, report, folder, problems)
+
+
+def _prepare(
+    folder: Path | None, saved_map: str | Path | None, settings: str, *, force: bool
+) -> None:
+    """Make the folder of the results, and see that these and the map can be written."""
+    target = None if saved_map is None else path_of(saved_map, "save_map")
+    is_among_results = (
+        target is not None and folder is not None and target.resolve().parent == folder.resolve()
+    )
+    if target is not None and not is_among_results:
+        check_map_target(target)
+    if folder is None:
+        return
+    if target is not None and is_among_results and is_name_of_result(target.name):
+        raise DatasetError(
+            f"{target} is what one of the run's results is called; give the map another name"
+        )
+    prepare_output_folder(folder, force=force, settings=settings)
+    if target is not None and is_among_results:
+        check_map_target(target)  # its folder may not have been there before
+    remove_earlier_results(folder)
+    link_latest(folder)

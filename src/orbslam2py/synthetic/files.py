@@ -28,6 +28,8 @@ Progress = Callable[[int, int], None]
 
 #: Holds the options; marks folders that may be replaced.
 MARKER = "synthetic.json"
+#: In it: names in the folder, by which another's files are told from its own.
+_ENTRIES = "entries"
 
 _SENSORS = {
     Layout.TUM: (Sensor.MONOCULAR, Sensor.RGBD),
@@ -107,6 +109,7 @@ def write_sequence(
     with atomic_folder(folder) as temporary:
         writers[chosen](sequence, temporary, progress or (lambda done, total: None))
         about: dict[str, Any] = dataclasses.asdict(sequence.options) | {"layout": str(chosen)}
+        about[_ENTRIES] = sorted(path.name for path in temporary.iterdir())
         _write_text(temporary / MARKER, [json.dumps(about, indent=2, default=str)])
         _check_replaceable(folder, force=force)  # writing takes long: it may have been filled
     return folder
@@ -258,6 +261,23 @@ def _check_replaceable(folder: Path, *, force: bool) -> None:
             f"{folder} holds no {MARKER}, so it was not written by this command and is not "
             "replaced; give another name or remove it yourself"
         )
+    if (name := _other_work(folder)) is not None:
+        raise DatasetError(
+            f"{folder / name} was not written by this command and would be lost with {folder}; "
+            "take it away, or give another name"
+        )
+
+
+def _other_work(folder: Path) -> str | None:
+    """Name of what lies in the folder of a synthetic sequence and does not belong to it."""
+    try:
+        written = {MARKER, *json.loads((folder / MARKER).read_text(encoding="utf-8"))[_ENTRIES]}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise DatasetError(
+            f"{folder / MARKER} does not say what else was written there, so {folder} is not "
+            "replaced; give another name or remove it yourself"
+        ) from error
+    return next((path.name for path in sorted(folder.iterdir()) if path.name not in written), None)
 
 
 def _write_image(path: Path, image: NDArray[Any]) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 from typer.testing import CliRunner
 
-from orbslam2py import Sensor, Settings, SettingsError
+from orbslam2py import OutputFileError, Sensor, Settings
 from orbslam2py.cli.app import app
 from support import chessboards
 from support.camera_files import FX, KALIBR, written
@@ -30,7 +30,7 @@ def test_command_writes_settings_that_load(tmp_path: Path) -> None:
     assert picture is not None
     assert picture.std() > 10
     again = CliRunner().invoke(app, arguments)
-    assert isinstance(again.exception, SettingsError)
+    assert isinstance(again.exception, OutputFileError)
     assert "--force" in str(again.exception)
 
 
@@ -39,5 +39,5 @@ def test_import_command(tmp_path: Path) -> None:
     arguments = ["import-camera", str(written(tmp_path, KALIBR)), "--output", str(output)]
     assert CliRunner().invoke(app, arguments).exit_code == 0
     assert Settings.load(output, Sensor.MONOCULAR).camera.fx == FX
-    assert isinstance(CliRunner().invoke(app, arguments).exception, SettingsError)
+    assert isinstance(CliRunner().invoke(app, arguments).exception, OutputFileError)
     assert CliRunner().invoke(app, [*arguments, "--force"]).exit_code == 0

@@ -257,11 +257,12 @@ def test_a_folder_with_files_is_not_touched_without_force(command: CommandLine, 
     folder.mkdir()
     (folder / "thesis.txt").write_text("precious")
     (folder / "trajectory_map0.txt").write_text("of an earlier run")
+    (folder / "frames.csv").write_text("of the same")
     done = command("run", rgbd, "--sensor", "rgbd", "--output", folder)
     assert done.code == 2
     assert "not empty" in done.err
     assert "--force" in done.err
-    assert len(list(folder.iterdir())) == 2
+    assert len(list(folder.iterdir())) == 3
     assert command("run", rgbd, "--sensor", "rgbd", "--output", folder, "--force").code == 0
     assert (folder / "thesis.txt").read_text() == "precious"
     assert {path.name for path in folder.iterdir()} == RUN_FILES | {"thesis.txt"}

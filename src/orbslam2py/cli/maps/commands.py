@@ -11,12 +11,14 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from orbslam2py.cli.calibrate import Force, Quiet, check_target
+from orbslam2py.cli.calibrate import Force, Quiet
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.maps.description import describe_map
 from orbslam2py.cli.maps.edits import MapFile, MapNumber, align, crop, optimize, save_edited
 from orbslam2py.cli.maps.export import ExportCommand, export
 from orbslam2py.cli.maps.merge import merge
+from orbslam2py.cli.targets import check_target
+from orbslam2py.errors import MapFileError
 from orbslam2py.maps import MapContents, load_map, map_differences, verify_map_file
 from orbslam2py.maps.edits.parts import map_numbers, take_map
 from orbslam2py.runs.map_picture import draw_map
@@ -42,6 +44,8 @@ def info(
 ) -> None:
     """Show what is in a map file: camera, keyframes, points, runs, extent."""
     check_target(picture, force=force)
+    if number is not None and picture is None:
+        raise MapFileError("--map says of which map the picture is to be: --picture FILE.png")
     saved = load_map(file, images=True)
     console = Console(highlight=False, soft_wrap=True)
     for name, value in describe_map(saved, file):

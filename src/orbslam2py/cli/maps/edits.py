@@ -14,9 +14,10 @@ from rich.console import Console
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py._text_lines import content_lines, numbers_of
-from orbslam2py.cli.calibrate import Force, Quiet, check_target
+from orbslam2py.cli.calibrate import Force, Quiet
 from orbslam2py.cli.maps.true_path import read_true_path
 from orbslam2py.cli.messages import log_to
+from orbslam2py.cli.targets import check_target
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps import (
     MapContents,

@@ -16,9 +16,10 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from orbslam2py._arrays import ByteArray
-from orbslam2py.cli.calibrate import Force, Quiet, check_target
+from orbslam2py.cli.calibrate import Force, Quiet
 from orbslam2py.cli.maps.edits import MapNumber
 from orbslam2py.cli.messages import log_to
+from orbslam2py.cli.targets import check_target
 from orbslam2py.datasets import open_input
 from orbslam2py.errors import DatasetError
 from orbslam2py.maps import (

@@ -20,6 +20,10 @@ from orbslam2py.runs.report_page.scene import script_data
 from orbslam2py.runs.report_page.story import Story
 
 _FOLDER = Path(__file__).parents[2] / "data" / "report_page"
+#: What the head of a page begins to say about its maker; the version follows.
+_MADE_BY = '<meta name="generator" content="orbslam2py '
+#: Bytes in which that comes.
+_HEAD = 4096
 
 
 def run_page(run: RunFolder) -> str:
@@ -47,6 +51,15 @@ def run_page(run: RunFolder) -> str:
     return whole_page(run.name, subtitle, links, body, script_data(story))
 
 
+def is_page(path: Path) -> bool:
+    """Whether a file is a page that was made here, of whatever version."""
+    try:
+        with path.open("rb") as stream:
+            return _MADE_BY.encode() in stream.read(_HEAD)
+    except OSError:
+        return False
+
+
 def whole_page(
     title: str,
     subtitle: str,
@@ -70,7 +83,7 @@ def whole_page(
         Markup(f'<meta http-equiv="Content-Security-Policy" content="{policy}">'),
         Markup('<meta name="viewport" content="width=device-width, initial-scale=1">'),
         Markup('<meta name="color-scheme" content="light dark">'),
-        Markup(f'<meta name="generator" content="orbslam2py {__version__}">'),
+        Markup(f'{_MADE_BY}{__version__}">'),
         Markup('<link rel="icon" href="data:,">'),
         element("title", f"{title} - orbslam2py"),
         Markup(f"<style>{style}</style>"),

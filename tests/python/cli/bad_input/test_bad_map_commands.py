@@ -43,6 +43,7 @@ EXPORT = "map export colmap a.orbmap out"
         ("map info text.orbmap", "text.orbmap is not a map file", "save_map"),
         ("map info folder", "folder is a folder", "give the map file"),
         ("map info a.orbmap --picture nowhere/a.png", "nowhere", "no such folder"),
+        ("map info a.orbmap --map 0", "--map says of which map the picture", "--picture FILE"),
         ("map verify text.orbmap", "text.orbmap is not a map file", "save_map"),
         ("map compare a.orbmap text.orbmap", "text.orbmap is not a map file", "save_map"),
         ("map compact none.orbmap", "none.orbmap is empty", "save the map again"),

@@ -5,8 +5,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from orbslam2py.cli.run_arguments import read_initial_pose
 from support.command_line import CommandLine
 from support.saved_maps import edit, written
 
@@ -74,6 +76,8 @@ def test_a_map_of_another_camera(command: CommandLine, rgbd: Path, tmp_path: Pat
     [
         (["--localize"], "--localize needs a map from the beginning: load one with --load"),
         (["--initial-pose", "0,0,0"], "--initial-pose says where in a map"),
+        (["--allow-other-setup"], "--allow-other-setup is about a map that is loaded: --load"),
+        (["--save-images"], "--save-images keeps images in the map that is saved: --save FILE"),
         (["--autosave", "5"], "--autosave needs the file to save to: --save FILE"),
         (["--save", "a.orbmap", "--autosave", "0"], "--autosave must be more than 0 seconds"),
         (["--save", "nowhere/a.orbmap"], "cannot write nowhere/a.orbmap"),
@@ -81,6 +85,10 @@ def test_a_map_of_another_camera(command: CommandLine, rgbd: Path, tmp_path: Pat
         (["--load", "M", "--initial-pose", "1,2"], "--initial-pose 1,2 is not a pose"),
         (["--load", "M", "--initial-pose", "1,2,here"], "is not a pose"),
         (["--load", "M", "--initial-pose", "1,2,3,0,0,0,0"], "is not a pose"),
+        (
+            ["--load", "M", "--initial-pose", "1e300,0,0"],
+            "--initial-pose 1e300,0,0 is too far away to be meant; give a position",
+        ),
     ],
 )
 def test_options_that_make_no_sense(
@@ -88,6 +96,14 @@ def test_options_that_make_no_sense(
 ) -> None:
     arguments = [str(written(tmp_path)) if option == "M" else option for option in options]
     _refused(command, rgbd, *arguments, message=message)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("size", ["1e300", "1", "1e-300"])
+def test_quaternions_of_any_size_are_taken(size: str) -> None:
+    T_wc = read_initial_pose(f"1,2,3,0,0,{size},{size}")
+    quarter = [[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]
+    np.testing.assert_allclose(T_wc, quarter, atol=1e-12)
 
 
 def test_the_sequence_is_refused_before_the_map_is_touched(

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Files that a command is asked to write: what is nobody's earlier result is not replaced."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Iterable, Mapping
+from pathlib import Path
+
+from orbslam2py.errors import OutputFileError
+
+#: So much of a file is read to see whether figures could be in it [bytes]: they take a hundredth.
+_MOST_FIGURES = 1 << 20
+
+
+def check_target(path: Path | None, *, force: bool) -> None:
+    """Raise `OutputFileError` if a file must not or cannot be written."""
+    check_kept(path, force=force)
+    if path is not None and not path.absolute().parent.is_dir():
+        raise OutputFileError(f"{path.parent}: no such folder; make it first, or give another name")
+
+
+def check_kept(*paths: Path | None, force: bool) -> None:
+    """Raise `OutputFileError` if a file would be replaced that is not to be."""
+    for path in paths:
+        if path is not None and path.exists() and not force:
+            raise OutputFileError(f"{path} exists; use --force to replace it")
+
+
+def check_apart(outputs: Mapping[str, Path | None], inputs: Iterable[Path] = ()) -> None:
+    """See that no two files that are written are one, and none of them is read.
+
+    Parameters
+    ----------
+    outputs
+        What is written, by the option that asks for it.
+    inputs
+        What is read.
+
+    Raises
+    ------
+    OutputFileError
+        Naming the options, or the file.
+    """
+    read = {path.resolve() for path in inputs}
+    options: dict[Path, str] = {}
+    for option, path in outputs.items():
+        if path is None:
+            continue
+        place = path.resolve()
+        if place in read:
+            raise OutputFileError(f"{option} {path} is what is read; give another name")
+        if place in options:
+            raise OutputFileError(
+                f"{options[place]} and {option} both write {path}; give one of them another name"
+            )
+        options[place] = option
+
+
+def check_page(path: Path) -> Path:
+    """See that a page may be written there: only one of this program is replaced.
+
+    Raises
+    ------
+    OutputFileError
+        If something else has that name.
+    """
+    if path.is_dir():
+        raise OutputFileError(f"{path} is a folder; give the page a name with --output")
+    from orbslam2py.runs.report_page import is_page  # noqa: PLC0415  (large)
+
+    if path.is_file() and not is_page(path):
+        raise OutputFileError(
+            f"{path} exists and is no page of this program, so it is kept; give the page another "
+            "name with --output"
+        )
+    return path
+
+
+def check_figures(path: Path | None, names: Collection[str]) -> None:
+    """See that figures may be written there as JSON: only some of the same names are replaced.
+
+    Raises
+    ------
+    OutputFileError
+        If something else has that name.
+    """
+    if path is None or not path.is_file():
+        return
+    try:
+        with path.open("rb") as stream:
+            there = json.loads(stream.read(_MOST_FIGURES))
+    except (OSError, ValueError):
+        there = None
+    if not isinstance(there, dict) or set(there) != set(names):
+        raise OutputFileError(
+            f"{path} exists and holds something else than figures of this command, so it is kept; "
+            "give another name"
+        )

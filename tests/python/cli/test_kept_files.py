@@ -1,0 +1,195 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Files that no command replaces: inputs, other people's work, results of another run."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from orbslam2py import Sensor
+from support.command_line import RUN_FILES, CommandLine, Outcome
+from support.files import names_in
+from support.small_sequences import sequence
+
+pytestmark = pytest.mark.watchdog(60)
+
+N = 12
+MINE = "my own work\n"
+
+
+@pytest.fixture(scope="module")
+def original(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return sequence(Sensor.RGBD, N).write(tmp_path_factory.mktemp("sequences") / "rgbd")
+
+
+@pytest.fixture
+def rgbd(original: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(original, tmp_path / "lap"))
+
+
+@pytest.fixture
+def finished(command: CommandLine, rgbd: Path) -> Path:
+    done = command("run", rgbd, "--deterministic", "--output", "r", "--quiet")
+    assert done.code == 0, done.err
+    return Path("r")
+
+
+def refused(done: Outcome, *said: str) -> None:
+    """One line, of the exit code of wrong usage."""
+    assert done.code == 2, done.out
+    assert len(done.err.strip().splitlines()) == 1, done.err
+    for text in said:
+        assert text in done.err
+
+
+# ---- videos and recordings -----------------------------------------------------------------------
+@pytest.mark.parametrize("what", ["run", "demo"])
+def test_a_video_is_replaced_with_force_only(command: CommandLine, rgbd: Path, what: str) -> None:
+    video = Path("a.mp4")
+    video.write_text(MINE)
+    arguments = (what, rgbd) if what == "run" else (what, "--frames", "10")
+    arguments = (*arguments, "--output", "r", "--video", video)
+    refused(command(*arguments), "a.mp4 exists; use --force")
+    assert video.read_text() == MINE
+    assert not Path("r").exists()
+    done = command(*arguments, "--force", "--quiet")
+    assert done.code == 0, done.err
+    assert video.stat().st_size > 1000
+
+
+def test_the_video_that_is_read_is_not_replaced_even_so(command: CommandLine, rgbd: Path) -> None:
+    assert command("run", rgbd, "--output", "r", "--video", "a.mp4", "--quiet").code == 0
+    before = Path("a.mp4").read_bytes()
+    arguments = ("--sensor", "mono", "--settings", "tum1", "--force", "--output", "again")
+    refused(
+        command("run", "a.mp4", *arguments, "--video", "./a.mp4"),
+        "--video a.mp4 is what is read; give another name",
+    )
+    assert Path("a.mp4").read_bytes() == before
+
+
+def test_a_video_in_the_folder_of_the_results(command: CommandLine, rgbd: Path) -> None:
+    arguments = ("run", rgbd, "--output", "new/r", "--video", "new/r/a.mp4", "--quiet")
+    done = command(*arguments)
+    assert done.code == 0, done.err
+    assert names_in(Path("new/r")) == sorted({*RUN_FILES, "a.mp4"})
+    refused(command(*arguments), "new/r/a.mp4 exists; use --force")
+    done = command(*arguments, "--force")
+    assert done.code == 0, done.err
+    assert names_in(Path("new/r")) == sorted({*RUN_FILES, "a.mp4"})
+
+
+def test_that_folder_is_not_left_behind_by_a_run_that_does_not_begin(
+    command: CommandLine, rgbd: Path
+) -> None:
+    Path("map.orbmap").write_text(MINE)
+    files = ("--output", "r", "--video", "r/a.mp4", "--save", "map.orbmap")
+    refused(command("run", rgbd, *files), "map.orbmap")
+    assert names_in(Path()) == ["lap", "map.orbmap"]
+
+
+def test_two_outputs_of_one_name(command: CommandLine, rgbd: Path) -> None:
+    files = ("--output", "r", "--video", "a.mp4", "--save", "./a.mp4")
+    refused(command("run", rgbd, *files), "--video and --save both write a.mp4")
+    refused(
+        command("run", rgbd, "--output", "r", "--save", "r/trajectory_map0.txt"),
+        "r/trajectory_map0.txt is what one of the run's results is called",
+    )
+    assert names_in(Path()) == ["lap"]
+    assert command("run", rgbd, "--output", "r", "--save", "r/a.orbmap", "--quiet").code == 0
+    assert names_in(Path("r")) == sorted({*RUN_FILES, "a.orbmap"})
+
+
+# ---- folders -------------------------------------------------------------------------------------
+@pytest.mark.parametrize("name", ["settings.yaml", "keyframes.txt", "points.ply"])
+def test_what_is_only_called_as_a_result_is_kept(
+    command: CommandLine, rgbd: Path, name: str
+) -> None:
+    folder = Path("r")
+    folder.mkdir()
+    (folder / name).write_text(MINE)
+    arguments = ("run", rgbd, "--output", folder, "--force")
+    refused(command(*arguments), f"r holds {name}", "give another --output")
+    assert names_in(folder) == [name]
+    assert (folder / name).read_text() == MINE
+
+
+def test_a_run_that_was_killed_is_replaced(command: CommandLine, rgbd: Path) -> None:
+    """Its folder holds the settings of the run before, and no results."""
+    arguments = ("run", rgbd, "--output", "r", "--quiet")
+    assert command(*arguments).code == 0
+    for path in Path("r").iterdir():
+        if path.name != "settings.yaml":
+            path.unlink()
+    done = command(*arguments, "--force")
+    assert done.code == 0, done.err
+
+
+def test_the_demo_replaces_no_other_run(command: CommandLine, finished: Path) -> None:
+    before = (finished / "report.json").read_bytes()
+    arguments = ("demo", "--frames", "10", "--output", finished, "--quiet")
+    refused(command(*arguments), "r is not empty", "--force to overwrite")
+    assert (finished / "report.json").read_bytes() == before
+    assert command(*arguments, "--force").code == 0
+    assert (finished / "report.json").read_bytes() != before
+
+
+def test_a_sequence_with_other_work_in_it_is_kept(command: CommandLine, tmp_path: Path) -> None:
+    arguments = ("synthesize", "s", "--frames", "3", "--sensor", "rgbd", "--quiet")
+    assert command(*arguments).code == 0
+    assert command(*arguments, "--force").code == 0
+    assert command(*arguments, "--force", "--layout", "mcap").code == 0, "another layout"
+    assert command(*arguments, "--force").code == 0
+    (tmp_path / "s" / "notes.txt").write_text(MINE)
+    refused(command(*arguments, "--force"), "s/notes.txt was not written by this command")
+    assert (tmp_path / "s" / "notes.txt").read_text() == MINE
+    (tmp_path / "s" / "notes.txt").unlink()
+    (tmp_path / "s" / "synthetic.json").write_text("{}")
+    refused(command(*arguments, "--force"), "synthetic.json does not say what else was written")
+    assert names_in(tmp_path) == ["s"]
+
+
+# ---- pages and figures ---------------------------------------------------------------------------
+def test_pages_replace_pages_only(command: CommandLine, finished: Path) -> None:
+    table = (finished / "frames.csv").read_bytes()
+    refused(
+        command("report", finished, "-o", finished / "frames.csv"),
+        "r/frames.csv exists and is no page of this program",
+    )
+    refused(
+        command("compare", finished, finished, "-o", finished / "frames.csv"),
+        "r/frames.csv exists and is no page of this program",
+    )
+    assert (finished / "frames.csv").read_bytes() == table
+    for _ in range(2):
+        assert command("report", finished, "-o", "a.html").code == 0
+        assert command("compare", finished, finished, "-o", "a.html").code == 0
+
+
+def test_figures_replace_figures_only(command: CommandLine, finished: Path, rgbd: Path) -> None:
+    report = (finished / "report.json").read_bytes()
+    arguments = ("evaluate", finished / "trajectory.txt", rgbd, "--json")
+    refused(
+        command(*arguments, finished / "report.json"),
+        "r/report.json exists and holds something else than figures",
+    )
+    assert (finished / "report.json").read_bytes() == report
+    Path("list.json").write_text("[1, 2]")
+    refused(command(*arguments, "list.json"), "list.json exists and holds something else")
+    for _ in range(2):
+        done = command(*arguments, "figures.json")
+        assert done.code == 0, done.err
+    assert json.loads(Path("figures.json").read_text())["ate_rmse_m"] < 0.1
+
+
+def test_a_calibration_writes_two_files(command: CommandLine) -> None:
+    Path("board.mp4").write_text(MINE)
+    board = ("calibrate", "board.mp4", "--board", "9x6", "--square", "0.02", "--force")
+    refused(
+        command(*board, "-o", "x.png", "--plot", "x.png"), "--output and --plot both write x.png"
+    )
+    refused(command(*board, "-o", "board.mp4"), "--output board.mp4 is what is read")
+    assert Path("board.mp4").read_text() == MINE
