@@ -11,6 +11,7 @@ import typer.core
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import DatasetError
+from orbslam2py.maps.edits.placement import FARTHEST
 from orbslam2py.trajectory.rotations import poses_from, rotations_from_quaternions
 
 #: Numbers of a position, and of a position with a quaternion.
@@ -41,7 +42,7 @@ def read_initial_pose(text: str) -> FloatArray:
     Raises
     ------
     DatasetError
-        If it is neither three nor seven numbers.
+        If it is neither three nor seven numbers, or farther away than anything is.
     """
     try:
         numbers = np.array([float(number) for number in text.split(",")])
@@ -54,5 +55,12 @@ def read_initial_pose(text: str) -> FloatArray:
             f"--initial-pose {text} is not a pose; give three numbers x,y,z or seven "
             "x,y,z,qx,qy,qz,qw"
         )
-    T_wc = poses_from(rotations_from_quaternions(numbers[None, 3:]), numbers[None, :3])
+    if (np.abs(numbers[:_POSITION]) > FARTHEST).any():
+        raise DatasetError(
+            f"--initial-pose {text} is too far away to be meant; give a position in the map's "
+            f"world, with numbers up to {FARTHEST:g}"
+        )
+    # Only its direction counts; of very large and very small numbers the squares are none.
+    quaternion = numbers[_POSITION:] / np.abs(numbers[_POSITION:]).max()
+    T_wc = poses_from(rotations_from_quaternions(quaternion[None]), numbers[None, :_POSITION])
     return np.asarray(T_wc[0])

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from orbslam2py._arguments import index_of
+from orbslam2py._arguments import number_of as counted
 from orbslam2py._arrays import FloatArray
 from orbslam2py._text_lines import content_lines, number_of
 from orbslam2py.datasets.base import Images, Layout, Stamps, require_frames
@@ -59,7 +60,8 @@ class KittiSequence(RecordedSequence):
     Raises
     ------
     DatasetError
-        Naming the file, and the line if a list is malformed.
+        Naming the file, and the line if a list is malformed; also if there are images without a
+        time. Times without images, as where only a part of the images was copied, are warned of.
     SettingsError
         If the settings are wrong.
     """
@@ -87,6 +89,8 @@ class KittiSequence(RecordedSequence):
         self._stamps = _read_times(times)
         require_frames(times, len(self))
         self._stamps.warn_unless_increasing(times)
+        folders = [self.folder / f"image_{camera}" for camera in self._cameras()]
+        _check_number_of_times(times, len(self), folders)
 
     def image_path(self, index: int, /) -> Path:
         """Return the file of the left image of a frame."""
@@ -115,8 +119,10 @@ class KittiSequence(RecordedSequence):
         return Trajectory(self.timestamps[:n], poses.T_wc[:n] @ self._T_grey_camera())
 
     def _files(self, index: int) -> tuple[Path, ...]:
-        cameras = (self._left, self._right)[: 1 + (self.sensor is Sensor.STEREO)]
-        return tuple(self._path(camera, index) for camera in cameras)
+        return tuple(self._path(camera, index) for camera in self._cameras())
+
+    def _cameras(self) -> tuple[int, ...]:
+        return (self._left, self._right)[: 1 + (self.sensor is Sensor.STEREO)]
 
     def _path(self, camera: int, index: int) -> Path:
         index = index_of(index, len(self))
@@ -237,6 +243,40 @@ def _read_times(path: Path) -> Stamps:
         tuple(line.fields[0] for line in lines),
         tuple(line.number for line in lines),
     )
+
+
+def _check_number_of_times(times: Path, n: int, folders: list[Path]) -> None:
+    """Refuse images without a time, and warn of times without images.
+
+    Images belong to times by their number. Those beyond the last time would be left out, and a list
+    that is too short may well be that of another sequence. The other way round, the images that are
+    there have their times, as where only the first ones were copied; the others are skipped like
+    any image that is missing, which is said here once for all of them.
+    """
+    found = [(numbers, folder) for folder in folders if (numbers := _numbers_of_images(folder))]
+    for numbers, folder in found:
+        if numbers[-1] >= n:
+            raise DatasetError(
+                f"{times} holds {counted(n, 'time stamp')}, but there are {len(numbers)} images in "
+                f"{folder}, up to {numbers[-1]:06d}; copy the sequence's own times.txt there, or "
+                f"take the images from {n:06d} on away"
+            )
+    # Of a pair, the camera whose images end first. No images at all: see `require_images`.
+    numbers, folder = min(found, key=lambda one: one[0][-1], default=([], times))
+    if numbers and numbers[-1] + 1 < n:
+        _log.warning(
+            "%s holds %d time stamps, but there are %d images in %s, up to %06d; the frames after "
+            "it are skipped: put their images there, or take --max-frames %d",
+            *(times, n, len(numbers), folder, numbers[-1], numbers[-1] + 1),
+        )
+
+
+def _numbers_of_images(folder: Path) -> list[int]:
+    """Numbers of the frames that a folder has an image of, ascending."""
+    if not folder.is_dir():
+        return []
+    stems = {path.stem for path in folder.iterdir() if path.suffix in (".png", ".jpg")}
+    return sorted(int(stem) for stem in stems if re.fullmatch(r"[1-9]?\d{6}", stem, re.ASCII))
 
 
 def _read_calibration(path: Path) -> dict[str, FloatArray]:

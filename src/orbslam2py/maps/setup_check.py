@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from orbslam2py import _core as core
 from orbslam2py.errors import MapFileError, SettingsError
@@ -13,6 +13,8 @@ from orbslam2py.settings.keys import KEYS
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
 
+#: What else a map that is loaded may be given.
+_ALLOW = ", or allow another setup (--allow-other-setup, allow_other_setup=True)"
 #: Values of the settings that may change from run to run: the rate of the images, the order of
 #: their colours, how many features are taken and from which contrast on.
 _FREE = {"Camera.fps", "Camera.RGB", "ORBextractor.nFeatures"} | {
@@ -32,31 +34,55 @@ def check_sensor(saved: SavedMap | MapFile, sensor: Sensor) -> None:
         )
 
 
+def check_made_alike(files: Sequence[SavedMap | MapFile]) -> None:
+    """Raise `SettingsError`, naming both, unless maps were made with one sensor and one camera."""
+    for saved in files[1:]:
+        first = files[0]
+        name, other = first.source or "in memory", saved.source or "in memory"
+        if saved.sensor is not first.sensor:
+            raise SettingsError(
+                f"the map {name} was made for sensor '{first.sensor}', but {other} "
+                f"for '{saved.sensor}', and only maps of the same kind of sensor can become one; "
+                f"give maps of one sensor, or make {other} anew of images for "
+                f"'{first.sensor}' (run --sensor {first.sensor} --save)"
+            )
+        differences = list(_differences(first.settings, saved.settings, "in the first"))
+        if differences:
+            raise SettingsError(
+                f"the maps {name} and {other} were made with different cameras: "
+                f"{'; '.join(differences)}; give maps of one camera, or make {other} anew "
+                "with the settings of the first"
+            )
+
+
 def check_camera(saved: SavedMap | MapFile, settings: Settings) -> None:
     """Raise `SettingsError`, saying what differs, unless the map was made with this camera."""
     differences = list(_differences(saved.settings, settings))
     if differences:
         raise SettingsError(
             f"the map {saved.source} was made with another camera: {'; '.join(differences)}; "
-            "leave the settings out to take those of the map, or allow another setup "
-            "(--allow-other-setup, allow_other_setup=True)"
+            f"leave the settings out to take those of the map{_ALLOW}"
         )
 
 
-def check_vocabulary(saved: SavedMap | MapFile, vocabulary: core.Vocabulary, name: str) -> None:
-    """Raise `MapFileError` unless the map was made with these visual words."""
+def check_vocabulary(
+    saved: SavedMap | MapFile, vocabulary: core.Vocabulary, name: str, *, may_differ: bool = True
+) -> None:
+    """Raise `MapFileError` unless the map was made with these visual words.
+
+    With `may_differ` the message tells how they can be others all the same.
+    """
     made_with = saved.vocabulary
     if not made_with.is_of(vocabulary):
         present = VocabularyIdentity.of(vocabulary, name)
         raise MapFileError(
             f"the map {saved.source} was made with the vocabulary {made_with.name or 'in memory'} "
             f"({made_with.hash}), not with {present.name or 'the one given'} ({present.hash}); "
-            "give that vocabulary, or allow another setup "
-            "(--allow-other-setup, allow_other_setup=True)"
+            f"give that vocabulary{_ALLOW if may_differ else ''}"
         )
 
 
-def _differences(saved: Settings, present: Settings) -> Iterator[str]:
+def _differences(saved: Settings, present: Settings, where: str = "in the map") -> Iterator[str]:
     for key in KEYS:
         if key.group not in ("camera", "orb") or key.name in _FREE:
             continue
@@ -65,4 +91,4 @@ def _differences(saved: Settings, present: Settings) -> Iterator[str]:
         if before != now and present.sensor in key.sensors:
             # As it is written in the file: 0 or 1, not False or True.
             now, before = (int(v) if key.kind is bool else v for v in (now, before))
-            yield f"{key.name} is {now}, in the map {before}"
+            yield f"{key.name} is {now}, {where} {before}"

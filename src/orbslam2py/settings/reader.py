@@ -128,7 +128,17 @@ def groups_of_text(
     values = _read_values(document, sensor)
     missing = sum(" is missing; " in problem.text for problem in problems)
     rectification = _read_rectification(document) if sensor is Sensor.STEREO else None
-    _raise_if_any(path, problems, new_line(sensor) if missing > 1 else None)
+    advice = []
+    # With one key missing it was forgotten; with several the file is for something else.
+    if 1 < missing == len(problems) and (served := _served_by(document)):
+        names = " and ".join(map(str, served))
+        advice.append(
+            f"The file is complete for {names}, not for {sensor}: take it for {served[0]} "
+            f"(--sensor {served[0]}), or add what is missing"
+        )
+    if missing > 1:
+        advice.append(f"A complete file is written by\n    {new_line(sensor)}")
+    _raise_if_any(path, problems, advice)
 
     groups = SettingsGroups(
         camera=CameraSettings(**values["camera"]),
@@ -142,7 +152,17 @@ def groups_of_text(
     return groups
 
 
-def _raise_if_any(path: Path, problems: list[Problem], remedy: str | None) -> None:
+def _served_by(document: Document) -> list[Sensor]:
+    """Sensors all of whose required keys are there."""
+    required = [key for key in schema.KEYS if key.required]
+    return [
+        sensor
+        for sensor in Sensor
+        if all(key.name in document.entries for key in required if sensor in key.sensors)
+    ]
+
+
+def _raise_if_any(path: Path, problems: list[Problem], advice: list[str]) -> None:
     if not problems:
         return
     ordered = sorted(problems, key=lambda problem: (problem.line is None, problem.line or 0))
@@ -151,9 +171,7 @@ def _raise_if_any(path: Path, problems: list[Problem], remedy: str | None) -> No
         lines.append(f"... and {len(ordered) - _MOST_PROBLEMS} more")
     if len(ordered) > 1:
         lines.insert(0, f"{len(ordered)} problems in settings file {path}:")
-    if remedy is not None:
-        lines.append(f"A complete file is written by\n    {remedy}")
-    raise SettingsError("\n".join(lines))
+    raise SettingsError("\n".join(lines + advice))
 
 
 def _refuse_camera_file(path: Path, text: str, sensor: Sensor) -> None:

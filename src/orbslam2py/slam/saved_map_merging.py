@@ -13,7 +13,7 @@ from orbslam2py.errors import MapFileError
 from orbslam2py.maps.edits.parts import put_together
 from orbslam2py.maps.map_copies import restore_contents, take_contents
 from orbslam2py.maps.saved_map import SavedMap
-from orbslam2py.maps.setup_check import check_camera, check_sensor, check_vocabulary
+from orbslam2py.maps.setup_check import check_made_alike, check_vocabulary
 from orbslam2py.slam.events import MapsMerged
 from orbslam2py.slam.full_bundle_adjustment import FullBundleAdjustment
 from orbslam2py.slam.loop_closing import LoopClosing
@@ -61,10 +61,9 @@ def merge_maps(
         raise MapFileError("merging takes two maps or more; give another map file")
     first = files[0]
     words = vocabulary if isinstance(vocabulary, core.Vocabulary) else load_vocabulary(vocabulary)
+    check_made_alike(files)
     for saved in files:
-        check_sensor(saved, first.sensor)
-        check_camera(saved, first.settings)
-        check_vocabulary(saved, words, vocabulary_name(vocabulary))
+        check_vocabulary(saved, words, vocabulary_name(vocabulary), may_differ=False)
     together = put_together(files)
     slam_map, index = core.Map(), core.KeyFrameIndex()
     restore_contents(together.contents, slam_map, words, words_fit=True)

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
-from orbslam2py._arguments import patience_of
+from orbslam2py._arguments import is_whole, patience_of, shown
 from orbslam2py._call_guard import CallGuard
 from orbslam2py.errors import MapFileError, StateError, WorkerError
 from orbslam2py.maps.contents import MapContents
@@ -600,12 +600,40 @@ class System:
         return self.pipeline.recorder.trajectories()
 
     def keyframe_trajectory(self, map_index: int | None = None) -> Trajectory:
-        """Poses of the keyframes of a map (None: the active one), relative to the first one."""
+        """Poses of the keyframes of a map (None: the active one), relative to the first one.
+
+        Raises
+        ------
+        IndexError
+            If no map of that number has begun. One that is no more, merged or given up, is empty.
+        """
+        self._check_map_index(map_index)
         return keyframe_trajectory(self.pipeline.back_end.map, map_index)
 
     def map_snapshot(self, map_index: int | None = None) -> MapSnapshot:
-        """A copy of keyframe poses and points of a map (None: the active one), at any time."""
+        """A copy of keyframe poses and points of a map (None: the active one), at any time.
+
+        Raises
+        ------
+        IndexError
+            If no map of that number has begun. One that is no more, merged or given up, is empty.
+        """
+        self._check_map_index(map_index)
         return take_snapshot(self.pipeline.back_end.map, map_index)
+
+    def _check_map_index(self, map_index: int | None) -> None:
+        """Refuse the number of a map that never began, which would look like an empty one."""
+        if map_index is None:
+            return
+        remedy = "give a number of those in System.maps, or None for the active map"
+        if not is_whole(map_index):
+            raise StateError(f"the number of the map is {shown(map_index)}; {remedy}")
+        if map_index in self.pipeline.back_end.map.maps:
+            return
+        n_begun = len(self.trajectories())
+        if not 0 <= map_index < n_begun:
+            begun = f"{n_begun} {'has' if n_begun == 1 else 'have'} begun so far"
+            raise IndexError(f"there is no map {map_index}; {begun}; {remedy}")
 
     def map_snapshots(self) -> list[MapSnapshot]:
         """Copies of all maps at any time, the oldest first; `MapSnapshot.map_index` tells which."""

@@ -114,8 +114,41 @@ def test_points_on_a_line(command: CommandLine, tmp_path: Path) -> None:
     (tmp_path / "points.txt").write_text("0 0 0 0 0 0\n1 0 0 2 0 0\n2 0 0 4 0 0\n")
     file = map_file(tmp_path)
     done = command("map", "align", file, "-o", "b.orbmap", "--points", "points.txt")
+    assert done.code == 2
+    assert "the known points lie on a line in the map, so how far" in done.err
+    assert not Path("b.orbmap").exists()
+
+
+def test_a_straight_true_path(command: CommandLine, tmp_path: Path) -> None:
+    """It tells all but the turn around it, which is said."""
+    saved = made_up_saved()
+    T_wc = saved.contents.keyframes.T_wc.copy()
+    T_wc[:, :3, 3] = np.outer(np.arange(len(T_wc)), [1.0, 2.0, 0.5])
+    write_tum(tmp_path / "truth.txt", Trajectory(saved.contents.keyframes.timestamps, T_wc))
+    file = map_file(tmp_path, saved)
+    done = command("map", "align", file, "-o", "b.orbmap", "--truth", "truth.txt")
     assert done.code == 0
     assert "They lie on a line, so the turn around it is not known" in done.out
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--length", "1e300", "--between", "0,0,0", "1,0,0"), "a length of 1e+300 m cannot be"),
+        (("--length", "1", "--between", "0,0,0", "1e300,0,0"), "1e+300, 0, 0 cannot be meant"),
+        (("--points", "far.txt"), "the position 1e+300, 0, 0 cannot be meant"),
+    ],
+)
+def test_numbers_that_cannot_be_meant(
+    command: CommandLine, tmp_path: Path, words: tuple[str, ...], message: str
+) -> None:
+    (tmp_path / "far.txt").write_text("0 0 0 0 0 0\n1 0 0 2 0 0\n2 1 0 1e300 0 0\n")
+    file = map_file(tmp_path)
+    done = command("map", "align", file, "-o", "b.orbmap", *words)
+    assert done.code == 2
+    assert message in done.err
+    assert not Path("b.orbmap").exists()
 
 
 @pytest.mark.parametrize("by_time", [False, True])
@@ -144,6 +177,33 @@ def test_a_map_with_metres_is_only_moved(command: CommandLine, tmp_path: Path) -
     moved = loaded("b.orbmap")
     np.testing.assert_allclose(moved.keyframes.T_wc, T_wc, atol=1e-6)
     np.testing.assert_array_equal(moved.keyframes.depth, saved.contents.keyframes.depth)
+
+
+# ---- merge ---------------------------------------------------------------------------------------
+def test_merging_maps_of_different_sensors(command: CommandLine, tmp_path: Path) -> None:
+    map_file(tmp_path)
+    map_file(tmp_path, made_up_saved(made_up_map(depth=True)), "b.orbmap")
+    done = command("map", "merge", "a.orbmap", "b.orbmap", "-o", "c.orbmap")
+    assert done.code == 2
+    told = " ".join(done.err.split())
+    assert "the map a.orbmap was made for sensor 'mono', but b.orbmap for 'rgbd'" in told
+    assert "give maps of one sensor, or make b.orbmap anew of images for 'mono'" in told
+    assert not Path("c.orbmap").exists()
+
+
+def test_merging_maps_of_different_cameras(command: CommandLine, tmp_path: Path) -> None:
+    """The remedies of a run, another setup or none, are none of this command."""
+    saved = made_up_saved()
+    map_file(tmp_path, saved)
+    camera = replace(saved.settings.camera, fx=123.0)
+    other = replace(saved, settings=replace(saved.settings, camera=camera))
+    map_file(tmp_path, other, "b.orbmap")
+    done = command("map", "merge", "a.orbmap", "b.orbmap", "-o", "c.orbmap")
+    assert done.code == 2
+    told = " ".join(done.err.split())
+    assert "a.orbmap and b.orbmap were made with different cameras: Camera.fx is 123.0, in" in told
+    assert "give maps of one camera, or make b.orbmap anew" in told
+    assert "--allow-other-setup" not in told
 
 
 # ---- optimize ------------------------------------------------------------------------------------

@@ -103,6 +103,53 @@ def test_kitti_bad_times(kitti: Path, text: str, expected: str) -> None:
     assert expected in str(caught.value)
 
 
+@pytest.mark.parametrize("camera", [0, 1])
+def test_kitti_images_without_a_time(kitti: Path, camera: int) -> None:
+    """They were left out silently; the list may be that of another sequence."""
+    folder = kitti / f"image_{camera}"
+    save(folder / "000003.png", image(3))
+    save(folder / "000004.jpg", image(4))
+    with pytest.raises(DatasetError) as caught:
+        open_sequence(kitti)
+    assert str(caught.value) == (
+        f"{kitti / 'times.txt'} holds 3 time stamps, but there are 5 images in {folder}, up to "
+        "000004; copy the sequence's own times.txt there, or take the images from 000003 on away"
+    )
+
+
+def test_kitti_images_of_a_camera_that_is_not_used_need_no_times(kitti: Path) -> None:
+    save(kitti / "image_1" / "000003.png", image(3))
+    assert len(open_sequence(kitti, Sensor.MONOCULAR)) == 3
+
+
+def test_kitti_other_files_among_the_images_need_no_times(kitti: Path) -> None:
+    for name in ("0000000009.png", "cover.png", "000009.txt"):
+        (kitti / "image_0" / name).write_bytes(b"")
+    assert len(open_sequence(kitti)) == 3
+
+
+def test_kitti_times_without_images_are_told_at_once(
+    kitti: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A part of the images was copied: those that are there have their times."""
+    times = kitti / "times.txt"
+    times.write_text(times.read_text() + "3.1e-01\n4.1e-01\n")
+    assert len(open_sequence(kitti)) == 5
+    (said,) = [record.getMessage() for record in caplog.records]
+    assert said == (
+        f"{times} holds 5 time stamps, but there are 3 images in {kitti / 'image_0'}, up to "
+        "000002; the frames after it are skipped: put their images there, or take --max-frames 3"
+    )
+
+
+def test_kitti_with_a_time_for_every_image_is_not_warned_of(
+    kitti: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (kitti / "image_0" / "000001.png").unlink()
+    assert len(open_sequence(kitti)) == 3
+    assert not caplog.records
+
+
 @pytest.mark.parametrize("place", ["poses.txt", "07.txt", "../../poses/07.txt", "03.txt"])
 def test_kitti_ground_truth_is_found(kitti: Path, place: str) -> None:
     assert open_sequence(kitti).ground_truth() is None

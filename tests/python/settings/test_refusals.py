@@ -56,6 +56,25 @@ def test_a_pair_needs_no_factor_of_depth_images(tmp_path: Path) -> None:
     assert Settings.load(write(tmp_path / "a.yaml", values), Sensor.STEREO).depth_factor == 1.0
 
 
+@pytest.mark.parametrize(
+    ("present", "sensor", "told"),
+    [
+        ((), "stereo", "complete for mono, not for stereo: take it for mono (--sensor mono), or"),
+        ((), "rgbd", "complete for mono, not for rgbd: take it for mono"),
+        (("ThDepth",), "rgbd", "complete for mono, not for rgbd: take it for mono"),
+    ],
+)
+def test_what_a_file_serves_is_told_where_it_lacks_something(
+    tmp_path: Path, present: tuple[str, ...], sensor: str, told: str
+) -> None:
+    values = {**MONO, **dict.fromkeys(present, "40.0")}
+    message = refusal(write(tmp_path / "a.yaml", values), Sensor(sensor))
+    assert told in message
+    # Where more is wrong it serves nobody.
+    message = refusal(write(tmp_path / "a.yaml", {**values, "Camera.fy": "0"}), Sensor(sensor))
+    assert "complete for" not in message
+
+
 def test_a_missing_factor_is_told_with_usual_values(tmp_path: Path) -> None:
     values = {**MONO, "Camera.bf": "40.0", "ThDepth": "40.0"}
     message = refusal(write(tmp_path / "a.yaml", values), Sensor.RGBD)

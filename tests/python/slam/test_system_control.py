@@ -39,6 +39,27 @@ def test_shutdown_without_images(sensor: Sensor) -> None:
     assert system.stage_statistics() == {}
 
 
+def test_a_map_that_never_began() -> None:
+    """It looked like one that is empty."""
+    with new_system(Sensor.STEREO, deterministic=True) as system:
+        for number, told in ((5, "there is no map 5; 1 has begun so far"), (-1, "no map -1")):
+            for ask in (system.keyframe_trajectory, system.map_snapshot):
+                with pytest.raises(IndexError, match=told) as caught:
+                    ask(number)
+                assert "give a number of those in System.maps, or None" in str(caught.value)
+        for ask in (system.keyframe_trajectory, system.map_snapshot):
+            with pytest.raises(StateError, match="the number of the map is 'first'; give"):
+                ask("first")  # type: ignore[arg-type]
+        play(system, 3)
+        assert len(system.keyframe_trajectory(0)) == 1
+        assert system.map_snapshot(0) == system.map_snapshot()
+        system.reset()
+        track(system, 3)
+        assert len(system.map_snapshot(0).keyframe_ids) == 0, "nothing is left of one that ended"
+        with pytest.raises(IndexError, match="there is no map 2; 2 have begun"):
+            system.map_snapshot(2)
+
+
 def test_shutdown_without_draining_interrupts_mapping() -> None:
     system = new_system(Sensor.STEREO)
     play(system, 30)

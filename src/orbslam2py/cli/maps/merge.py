@@ -11,9 +11,10 @@ import typer
 from rich.console import Console
 
 from orbslam2py._arguments import number_of
-from orbslam2py.cli.calibrate import Force, Quiet, check_target
+from orbslam2py.cli.calibrate import Force, Quiet
 from orbslam2py.cli.messages import log_to
 from orbslam2py.cli.run_options import VocabularyOption
+from orbslam2py.cli.targets import check_target
 from orbslam2py.maps import SavedMap, load_map, save_map
 from orbslam2py.maps.edits.parts import map_numbers
 from orbslam2py.maps.units import unit_of

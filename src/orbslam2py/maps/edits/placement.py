@@ -22,6 +22,10 @@ _THIN = 1e-3
 #: Positions that are nearer than this are one.
 _SAME_PLACE = 1e-9
 
+#: Nothing is farther away than this [m], more than twice as far as the moon: such a number is a
+#: slip, and those of much larger ones overflow further on.
+FARTHEST = 1e9
+
 
 @dataclass(frozen=True, eq=False)
 class Placement:
@@ -36,7 +40,8 @@ class Placement:
     rmse
         Of the distances that are left between them [m]; 0 where a length alone told it.
     on_a_line
-        The positions lie on a line: the turn around it is not known, and was chosen small.
+        The positions of a path lie on a line: the turn around it is not known, and was chosen
+        small.
     """
 
     similarity: Similarity
@@ -62,7 +67,8 @@ def place_by_trajectory(
     Raises
     ------
     MapFileError
-        If fewer than three keyframes have a true pose at their time, or all stood at one place.
+        If fewer than three keyframes have a true pose at their time, all stood at one place, or a
+        position is farther away than anything is.
     """
     keyframes = contents.keyframes
     there = truth.select(~truth.lost)
@@ -73,7 +79,8 @@ def place_by_trajectory(
             f"{max_difference:g} s, and it takes {_FEWEST}; give the truth of the sequence that "
             "the map was made of"
         )
-    return place_by_points(contents, keyframes.T_wc[rows, :3, 3], there.positions[poses])
+    # A camera that went straight on has no other path to give: it is placed, and that is told.
+    return _place(contents, keyframes.T_wc[rows, :3, 3], there.positions[poses])
 
 
 def place_by_points(contents: MapContents, positions: FloatArray, known: FloatArray) -> Placement:
@@ -91,13 +98,28 @@ def place_by_points(contents: MapContents, positions: FloatArray, known: FloatAr
     Raises
     ------
     MapFileError
-        If there are fewer than three, or all are at one place.
+        If there are fewer than three, all are at one place or on one line, or one is farther away
+        than anything is.
     """
     if len(positions) < _FEWEST:
         raise MapFileError(
             f"{len(positions)} known points do not tell how the map lies; give at least {_FEWEST}, "
             "not on one line"
         )
+    placement = _place(contents, positions, known)
+    if placement.on_a_line:
+        thin = "the map" if _is_thin(_spread(positions)) else "the world"
+        raise MapFileError(
+            f"the known points lie on a line in {thin}, so how far the map is turned around it is "
+            "not known; give another one, well beside the line"
+        )
+    return placement
+
+
+def _place(contents: MapContents, positions: FloatArray, known: FloatArray) -> Placement:
+    """Lay positions on where they are known to be; a turn that they do not tell is kept small."""
+    _check_near(positions)
+    _check_near(known)
     spreads = [_spread(places) for places in (positions, known)]
     if min(spread[0] for spread in spreads) < _SAME_PLACE:
         raise MapFileError("the known points are all at one place; give some that are apart")
@@ -107,7 +129,7 @@ def place_by_points(contents: MapContents, positions: FloatArray, known: FloatAr
         similarity=similarity,
         n_pairs=len(positions),
         rmse=float(np.sqrt(np.mean(left**2))),
-        on_a_line=any(spread[1] < _THIN * spread[0] for spread in spreads),
+        on_a_line=any(map(_is_thin, spreads)),
     )
 
 
@@ -128,7 +150,8 @@ def place_by_length(
     Raises
     ------
     MapFileError
-        If the map has metres already, the places are one, or the length is not above 0.
+        If the map has metres already, the places are one, or the length or a place is none that
+        can be meant.
     """
     if unit_of(contents) == "m":
         raise MapFileError(
@@ -137,6 +160,12 @@ def place_by_length(
         )
     if not (np.isfinite(metres) and metres > 0):
         raise MapFileError(f"a length of {metres:g} m says nothing; give one above 0")
+    if not _SAME_PLACE <= metres <= FARTHEST:
+        raise MapFileError(
+            f"a length of {metres:g} m cannot be meant; give metres, from {_SAME_PLACE:g} to "
+            f"{FARTHEST:g}"
+        )
+    _check_near(np.stack([first, second]))
     distance = float(np.linalg.norm(np.subtract(second, first)))
     if distance < _SAME_PLACE:
         raise MapFileError("both ends of the length are at one place; give two that are apart")
@@ -144,6 +173,21 @@ def place_by_length(
     scale = metres / distance
     centre = contents.keyframes.T_wc[0, :3, 3]
     return Placement(Similarity(scale, np.eye(3), (1 - scale) * centre), 2, 0.0, on_a_line=False)
+
+
+def _check_near(positions: FloatArray) -> None:
+    """Refuse positions (m, 3) that are farther away than anything is."""
+    far = np.flatnonzero(~(np.abs(positions) <= FARTHEST).all(axis=1))
+    if len(far):
+        named = ", ".join(f"{number:g}" for number in positions[far[0]])
+        raise MapFileError(
+            f"the position {named} cannot be meant; give numbers up to {FARTHEST:g}, such as "
+            "1.5, 0, -2"
+        )
+
+
+def _is_thin(spread: FloatArray) -> bool:
+    return bool(spread[1] < _THIN * spread[0])
 
 
 def _spread(positions: FloatArray) -> FloatArray:

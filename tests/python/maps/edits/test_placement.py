@@ -71,15 +71,57 @@ def test_too_few_poses() -> None:
         place_by_trajectory(contents, truth)
 
 
-def test_points_on_a_line_are_told() -> None:
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+def test_points_on_a_line_are_refused(size: float) -> None:
+    """However large the map is: the turn around the line would be made up."""
     contents = made_up_map()
-    line = np.outer(np.arange(5.0), [1.0, 2.0, 0.5])
-    assert place_by_points(contents, line, 3 * line + 1).on_a_line
-    assert not place_by_points(contents, np.eye(3), 3 * np.eye(3)).on_a_line
+    line = size * np.outer(np.arange(5.0), [1.0, 2.0, 0.5])
+    beside = size * np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0], [1, 0.1, 0]])
+    with pytest.raises(MapFileError, match=r"on a line in the map, .* well beside the line"):
+        place_by_points(contents, line, beside)
+    with pytest.raises(MapFileError, match="on a line in the world, "):
+        place_by_points(contents, beside, line + 1e-5 * size)
+    assert not place_by_points(contents, beside, 3 * beside).on_a_line
+
+
+def test_points_that_tell_nothing() -> None:
+    contents = made_up_map()
     with pytest.raises(MapFileError, match="all at one place"):
         place_by_points(contents, np.ones((4, 3)), np.eye(4)[:, :3])
     with pytest.raises(MapFileError, match=r"2 known points do not tell.*at least 3"):
-        place_by_points(contents, line[:2], line[:2])
+        place_by_points(contents, np.eye(3)[:2], np.eye(3)[:2])
+
+
+def test_a_straight_path_is_taken_and_told() -> None:
+    contents = made_up_map()
+    T_wc = contents.keyframes.T_wc.copy()
+    T_wc[:, :3, 3] = np.outer(np.arange(8.0), [1.0, 2.0, 0.5])
+    assert place_by_trajectory(contents, Trajectory(contents.keyframes.timestamps, T_wc)).on_a_line
+
+
+@pytest.mark.filterwarnings("error")
+def test_positions_that_cannot_be_meant() -> None:
+    contents = made_up_map()
+    far = np.eye(3)
+    far[1] = [0, 1e300, 0]
+    for places in ((np.eye(3), far), (far, np.eye(3)), (np.eye(3), np.full((3, 3), np.nan))):
+        with pytest.raises(MapFileError, match=r"the position .*, .* cannot be meant; give"):
+            place_by_points(contents, *places)
+    truth = truth_of(contents, known(1.0))
+    T_wc = truth.T_wc.copy()
+    T_wc[3, 0, 3] = -1e300
+    with pytest.raises(MapFileError, match=r"the position -1e\+300, "):
+        place_by_trajectory(contents, Trajectory(truth.timestamps, T_wc))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("metres", [1e-9, 1e9])
+def test_the_longest_and_the_shortest_length(metres: float) -> None:
+    contents = made_up_map()
+    ends = np.array([[0.0, 0, 0], [0, 3, 4]])
+    moved = transform_map(contents, place_by_length(contents, *ends, metres).similarity)
+    assert np.isfinite(moved.points.positions).all()
+    assert (moved.points.max_distance > 0).all()
 
 
 def test_a_known_length() -> None:
@@ -92,12 +134,21 @@ def test_a_known_length() -> None:
     np.testing.assert_array_equal(found.similarity.R, np.eye(3))
 
 
+@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
     ("depth", "second", "metres", "words"),
     [
         (True, [1, 0, 0], 1.0, "has metres already"),
         (False, [1, 0, 0], 0.0, "a length of 0 m says nothing"),
         (False, [1, 0, 0], np.nan, "a length of nan m says nothing"),
+        (
+            False,
+            [1, 0, 0],
+            1e300,
+            r"a length of 1e\+300 m cannot be meant; give metres",
+        ),
+        (False, [1, 0, 0], 1e-300, "a length of 1e-300 m cannot be meant"),
+        (False, [1e300, 0, 0], 1.0, r"the position 1e\+300, 0, 0 cannot be meant"),
         (False, [0, 0, 0], 1.0, "at one place"),
     ],
 )
