@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -10,14 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from orbslam2py._arguments import path_of
-from orbslam2py.batches.cache import DEFAULT_SIZE, Cache, bytes_of, default_folder
-from orbslam2py.batches.engine import Watch, open_workers, run_on
+from orbslam2py.batches.cache import DEFAULT_SIZE, Cache, cache_size_of, default_folder
+from orbslam2py.batches.engine import Watch, open_workers, require_dask, run_on
 from orbslam2py.batches.jobs import Job, make_jobs, read_jobs
 from orbslam2py.batches.results import Results
 from orbslam2py.batches.summary import Group, summarise
 from orbslam2py.batches.sweep_picture import write_sweep_picture
 from orbslam2py.batches.table import write_table
 from orbslam2py.batches.work import run_job
+from orbslam2py.batches.workers import Workers
 from orbslam2py.errors import DatasetError
 
 Progress = Callable[[dict[str, Any], int, int], None]
@@ -90,7 +92,8 @@ def batch(
     workers
         How many to start; by default one a core. 0: run in this process, one after the other.
     memory_limit
-        Of each worker that is started, such as ``4GB``.
+        Of each worker that is started, such as ``4GB``, at least 500 MB; by default an equal part
+        of the computer's. It has no meaning with a `scheduler`, nor without workers.
     report_pages
         Write ``report.html`` for every run.
     cache
@@ -113,7 +116,7 @@ def batch(
     Raises
     ------
     SettingsError
-        If the jobs are wrong, or Dask is not installed.
+        If the jobs or options are wrong, or Dask is not installed. Nothing is written then.
     DatasetError
         If a sequence is not there, the folder cannot take results, or the scheduler cannot be
         reached.
@@ -126,6 +129,11 @@ def batch(
     >>> done.groups[0].ate_rmse_m.median  # doctest: +SKIP
     0.0112
     """
+    where = Workers.of(scheduler, workers, memory_limit)
+    kept = Cache(
+        default_folder() if cache is None else path_of(cache, "the cache").absolute(),
+        cache_size_of(DEFAULT_SIZE if cache_size is None else cache_size),
+    )
     if isinstance(jobs, Mapping):
         wanted = make_jobs(jobs)
         named = jobs.get("output")
@@ -137,15 +145,10 @@ def batch(
     return run_jobs(
         wanted,
         place,
+        where,
         resume=resume,
-        scheduler=scheduler,
-        workers=workers,
-        memory_limit=memory_limit,
         report_pages=report_pages,
-        cache=Cache(
-            default_folder() if cache is None else path_of(cache, "the cache").absolute(),
-            bytes_of(cache_size or DEFAULT_SIZE),
-        ),
+        cache=kept,
         progress=progress,
         watch=watch,
         stop=stop,
@@ -155,11 +158,9 @@ def batch(
 def run_jobs(
     wanted: list[Job],
     place: str | Path,
+    workers: Workers,
     *,
     resume: bool = False,
-    scheduler: str | None = None,
-    workers: int | None = None,
-    memory_limit: str | None = None,
     report_pages: bool = False,
     cache: Cache | None = None,
     progress: Progress | None = None,
@@ -168,19 +169,17 @@ def run_jobs(
 ) -> BatchResult:
     """Run jobs that are made already; see `batch`."""
     results = Results.at(place)
-    results.begin(resume=resume)
-    rows = results.rows_of(wanted)
+    results.require_free(resume=resume)
+    rows = results.rows_of(wanted) if resume else {}
     left = [job for job in wanted if job.key not in rows]
     stop = stop or threading.Event()
-    for job, row in _ended(
-        *(left, results, stop, scheduler, workers, memory_limit),
-        page=report_pages,
-        cache=cache,
-        watch=watch,
-    ):
-        rows[job.key] = row
-        if progress is not None:
-            progress(row, len(rows), len(wanted))
+    with _begun(results, workers, len(left)) as client:
+        for job, row in _ended(
+            *(left, results, stop, client), page=report_pages, cache=cache, watch=watch
+        ):
+            rows[job.key] = row
+            if progress is not None:
+                progress(row, len(rows), len(wanted))
     if stop.is_set():
         # A run may have ended just when it was taken back.
         rows |= results.rows_of([job for job in left if job.key not in rows])
@@ -196,30 +195,39 @@ def run_jobs(
     return BatchResult(results.address, table, n_left, addresses)
 
 
+@contextlib.contextmanager
+def _begun(results: Results, workers: Workers, n_jobs: int) -> Iterator[Any]:
+    """Make the place of the batch, and have the workers that it needs; None if it needs none."""
+    if workers.is_this_process or not n_jobs:
+        results.begin()
+        yield None
+        return
+    require_dask()
+    if workers.scheduler is None:
+        results.begin()  # workers would be started in vain if it cannot be written
+    with open_workers(workers, most=n_jobs) as client:
+        if workers.scheduler is not None:
+            results.begin()  # a scheduler that cannot be reached leaves nothing behind
+        yield client
+
+
 def _ended(
     jobs: list[Job],
     results: Results,
     stop: threading.Event,
-    scheduler: str | None,
-    workers: int | None,
-    memory_limit: str | None,
+    client: Any,
     *,
     page: bool,
     cache: Cache | None,
     watch: Watch | None,
 ) -> Iterator[tuple[Job, dict[str, Any]]]:
-    if not jobs:
-        return
-    if workers == 0 and scheduler is None:
-        for job in jobs:
-            if stop.is_set():
-                return
-            if watch is not None:
-                watch({"here": job.key})
-            if (row := run_job(job, results, page=page, cache=cache)) is not None:
-                yield job, row
-        return
-    if workers is not None:
-        workers = min(workers, len(jobs))
-    with open_workers(scheduler, workers, memory_limit) as client:
+    if client is not None:
         yield from run_on(client, jobs, results, stop, page=page, cache=cache, watch=watch)
+        return
+    for job in jobs:
+        if stop.is_set():
+            return
+        if watch is not None:
+            watch({"here": job.key})
+        if (row := run_job(job, results, page=page, cache=cache)) is not None:
+            yield job, row

@@ -8,7 +8,6 @@ import fcntl
 import hashlib
 import json
 import os
-import re
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -16,30 +15,24 @@ from pathlib import Path
 from typing import Any
 
 from orbslam2py._files import atomic_write, reason_of
-from orbslam2py.errors import DatasetError, SettingsError
+from orbslam2py.batches.sizes import bytes_of, text_of
+from orbslam2py.errors import DatasetError
 
 DEFAULT_SIZE = "20GB"
-_UNITS = {"B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
 
 #: Puts content into a new folder; gets the folder, and what to call before it needs so many bytes.
 Fetch = Callable[[Path, Callable[[int], None]], None]
 
 
-def bytes_of(size: str | int) -> int:
-    """Read a size such as ``20GB``.
+def cache_size_of(size: str | int) -> int:
+    """Read the most that a cache may take, such as ``20GB``.
 
     Raises
     ------
     SettingsError
-        If it is none.
+        If it is no size.
     """
-    found = re.fullmatch(r"\s*([0-9]+(?:\.[0-9]+)?)\s*([kKMGT]?B?)\s*", str(size))
-    unit = found[2].upper() if found else ""
-    unit = unit if unit.endswith("B") else f"{unit}B"
-    value = round(float(found[1]) * _UNITS[unit]) if found else 0
-    if value < 1:
-        raise SettingsError(f"the size of the cache is '{size}'; give one such as {DEFAULT_SIZE}")
-    return value
+    return bytes_of(size, "the size of the cache", DEFAULT_SIZE)
 
 
 def default_folder() -> Path:
@@ -125,7 +118,7 @@ class Cache:
         """Make room for content, and note that it is taken."""
         if size > self.limit:
             raise DatasetError(
-                f"{address} takes {_shown(size)}, more than the cache of {_shown(self.limit)}; "
+                f"{address} takes {text_of(size)}, more than the cache of {text_of(self.limit)}; "
                 "give more with --cache-size"
             )
         with self._locked("cache", fcntl.LOCK_EX):
@@ -138,9 +131,9 @@ class Cache:
                     del sizes[other]
             if sum(sizes.values()) > self.limit:
                 raise DatasetError(
-                    f"there is no room for {address} ({_shown(size)}): the cache of "
-                    f"{_shown(self.limit)} is full of sequences that are being run; give more with "
-                    "--cache-size"
+                    f"there is no room for {address} ({text_of(size)}): the cache of "
+                    f"{text_of(self.limit)} is full of sequences that are being run; give more "
+                    "with --cache-size"
                 )
             with atomic_write(self._note(key)) as stream:
                 json.dump({"address": address, "size": size}, stream)
@@ -185,8 +178,3 @@ class Cache:
 
 def _size(folder: Path) -> int:
     return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
-
-
-def _shown(size: int) -> str:
-    unit = next((unit for unit in ("TB", "GB", "MB", "KB") if size >= _UNITS[unit]), "B")
-    return f"{size / _UNITS[unit]:.3g} {unit}"

@@ -21,6 +21,7 @@ from orbslam2py.batches.cache import Cache
 from orbslam2py.batches.jobs import Job
 from orbslam2py.batches.results import Results
 from orbslam2py.batches.work import failed_row, run_job
+from orbslam2py.batches.workers import Workers
 from orbslam2py.errors import DatasetError, SettingsError
 
 #: So many runs a worker are handed out at once: no worker waits, and none has a long queue.
@@ -59,19 +60,15 @@ def require_dask() -> Any:
 
 
 @contextlib.contextmanager
-def open_workers(
-    scheduler: str | None, n_workers: int | None, memory_limit: str | None
-) -> Iterator[Any]:
+def open_workers(workers: Workers, most: int | None = None) -> Iterator[Any]:
     """Connect to a scheduler, or start one with workers on this computer alone.
 
     Parameters
     ----------
-    scheduler
-        Address of a scheduler that runs; None for workers of this batch's own.
-    n_workers
-        Workers to start; by default one a core.
-    memory_limit
-        Of each worker, such as ``4GB``; by default an equal part of the computer's.
+    workers
+        Which.
+    most
+        No more than so many are started, if their number is given.
 
     Yields
     ------
@@ -83,18 +80,14 @@ def open_workers(
         If the scheduler cannot be reached, or its workers have another version of the package.
     """
     distributed = require_dask()
-    if scheduler is not None:
-        try:
-            client = distributed.Client(scheduler, timeout=_PATIENCE, set_as_default=False)
-        except (OSError, TimeoutError, ValueError) as error:
-            raise DatasetError(
-                f"the scheduler {scheduler} cannot be reached; start one with 'dask scheduler', or "
-                "leave out --scheduler to work on this computer"
-            ) from error
-        with client:
-            _require_version(client, scheduler)
+    if workers.scheduler is not None:
+        with _client_of(distributed, workers.scheduler) as client:
+            _require_version(client, workers.scheduler)
             yield client
         return
+    count = workers.count or _cores()
+    if workers.count is not None and most is not None:
+        count = min(count, most)
     dask = importlib.import_module("dask")
     limits = dict.fromkeys(_THREAD_LIMITS, "1")
     with dask.config.set(
@@ -109,10 +102,10 @@ def open_workers(
         }
     ):
         cluster = distributed.LocalCluster(
-            n_workers=n_workers or _cores(),
+            n_workers=count,
             threads_per_worker=1,
             processes=True,
-            memory_limit=memory_limit or "auto",
+            memory_limit=workers.memory_limit or "auto",
             host="127.0.0.1",
             dashboard_address=None,
             # Any port: for its usual one two batches at a time would contend.
@@ -280,7 +273,36 @@ def _reason(error: Exception) -> str:
             "its workers ended again and again before it began: they were killed, or have too "
             "little memory; give more with --memory-limit"
         )
-    return f"the worker failed: {' '.join(str(error).split()) or name}"
+    return f"the worker failed: {_words_of(error)}"
+
+
+def _words_of(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def _client_of(distributed: Any, scheduler: str) -> Any:
+    """Connect to a scheduler."""
+    # Made in two steps: one that fails halfway must be closed, and its constructor hands nothing
+    # out to close. Left to itself it ends with a traceback, after 20 s in which nothing happens.
+    client = distributed.Client.__new__(distributed.Client)
+    try:
+        client.__init__(scheduler, timeout=_PATIENCE, set_as_default=False)
+    except Exception as error:  # whatever a program says that is no scheduler
+        with contextlib.suppress(Exception):
+            client.close(timeout=_PATIENCE)
+        remedy = "or leave out --scheduler to work on this computer"
+        if isinstance(error, OSError | TimeoutError):
+            raise DatasetError(
+                f"the scheduler {scheduler} cannot be reached; start one with 'dask scheduler', "
+                f"{remedy}"
+            ) from error
+        says = isinstance(error, ValueError | ImportError)  # of the address, or of versions
+        reason = _words_of(error) if says else "another program answers there"
+        raise DatasetError(
+            f"{scheduler} is no scheduler that can be used: {reason}; give the address that 'dask "
+            f"scheduler' prints, {remedy}"
+        ) from error
+    return client
 
 
 def _require_version(client: Any, scheduler: str) -> None:

@@ -241,11 +241,13 @@ def options_of(values: Mapping[str, Any]) -> tuple[tuple[str, Any], ...]:
 
     Raises
     ------
-    SettingsError
-        For an unknown one.
+    SettingsError, DatasetError
+        For an unknown one, and for values that would fail in every run.
     """
     _refuse_unknown(values, (*RUN_OPTIONS, *SYSTEM_OPTIONS), "option")
-    return tuple(sorted(values.items()))
+    given = tuple(sorted(values.items()))
+    Job("", "", options=given).run_options(Sensor.MONOCULAR)
+    return given
 
 
 def _seeds(value: Any) -> list[int]:

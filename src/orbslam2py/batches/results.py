@@ -60,13 +60,13 @@ class Results:
         return None if is_remote(self.address) else Path(self.address)
 
     # ---- the batch -------------------------------------------------------------------------------
-    def begin(self, *, resume: bool) -> None:
-        """Make the place, or see that it is one that may be gone on with.
+    def require_free(self, *, resume: bool) -> None:
+        """See that a batch may begin here, or be gone on with; nothing is written.
 
         Raises
         ------
         DatasetError
-            If it holds something else, or cannot be written.
+            If the place holds something else, or a batch that is not to be gone on with.
         """
         folder = self.folder
         if folder is not None and folder.exists() and not folder.is_dir():
@@ -80,6 +80,15 @@ class Results:
             raise DatasetError(
                 f"{self.address} holds a batch already; go on with --resume, or give another folder"
             )
+
+    def begin(self) -> None:
+        """Make the place, after `require_free`.
+
+        Raises
+        ------
+        DatasetError
+            If it cannot be written.
+        """
         try:
             self._write(BATCH_FILE, {"what": "runs of orbslam2py batch"})
             self._remove(_STOP_FILE)

@@ -3,22 +3,24 @@
 
 from __future__ import annotations
 
-import difflib
 import itertools
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from orbslam2py._arguments import is_number, is_whole, seed_of, shown
+from orbslam2py._arguments import choice_of, is_number, is_whole, seed_of, shown
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import Settings
-from orbslam2py.settings.keys import KEYS
+from orbslam2py.settings.keys import KEYS, convert, nearest_key
 
 _KEYS = {key.name: key for key in KEYS}
 _RANGE_KEYS = ("from", "to", "log")
+#: What a sweep holds beside keys of the settings.
+_OTHER_KEYS = ("random", "seed")
 
 
 @dataclass(frozen=True)
@@ -73,34 +75,36 @@ def read_sweep(values: Any) -> Sweep:
     Raises
     ------
     SettingsError
-        If a key is none, or values make no sense.
+        If a key is none, or values make no sense or are not allowed.
     """
-    if not isinstance(values, Mapping) or not values:
-        raise SettingsError("sweep is empty; give 'KEY: [VALUE, ...]' with keys of the settings")
+    if not isinstance(values, Mapping) or not set(values) - set(_OTHER_KEYS):
+        is_other = values is not None and not isinstance(values, Mapping)
+        found = shown(values) if is_other else "empty" if not values else "without a key"
+        raise SettingsError(f"sweep is {found}; give 'KEY: [VALUE, ...]' with keys of the settings")
     n_draws = values.get("random", 0)
     if not is_whole(n_draws) or n_draws < 0:
         raise SettingsError(f"sweep: random is {shown(n_draws)}; give how many draws")
     grid, ranges = [], []
     for name, value in values.items():
-        if name in ("random", "seed"):
+        if name in _OTHER_KEYS:
             continue
         if name not in _KEYS:
-            near = difflib.get_close_matches(str(name), _KEYS, 1, 0.5)
-            hint = f"did you mean {near[0]}?" if near else "see 'orbslam2py settings show tum1'"
+            near = nearest_key(str(name))
+            known = "see 'orbslam2py settings show tum1'"
+            hint = f"did you mean {near}?" if near in _KEYS else known
             raise SettingsError(f"sweep: '{name}' is no key of the settings; {hint}")
         if isinstance(value, Mapping):
             ranges.append((name, *_range(name, value)))
         else:
-            listed = value if isinstance(value, list) else [value]
-            if not listed or not all(is_number(one) for one in listed):
-                raise SettingsError(f"sweep: {name} is {shown(value)}; give a list of numbers")
-            grid.append((name, tuple(listed)))
+            grid.append((name, _values(name, value if isinstance(value, list) else [value])))
     if ranges and not n_draws:
         raise SettingsError(
             f"sweep: {ranges[0][0]} has a range; add 'random: N' for N draws, or list its values"
         )
     seed = seed_of(values.get("seed", 0), "sweep: seed")
-    return Sweep(tuple(sorted(grid)), tuple(sorted(ranges)), int(n_draws), seed)
+    sweep = Sweep(tuple(sorted(grid)), tuple(sorted(ranges)), int(n_draws), seed)
+    _require_different_draws(sweep)
+    return sweep
 
 
 def with_parameters(settings: Settings, parameters: tuple[tuple[str, float], ...]) -> Settings:
@@ -121,20 +125,58 @@ def with_parameters(settings: Settings, parameters: tuple[tuple[str, float], ...
     return settings
 
 
+def _values(name: str, listed: list[Any]) -> tuple[float, ...]:
+    """Take the values of a list."""
+    if not listed:
+        raise SettingsError(f"sweep: {name} has no values; give a list of numbers")
+    for number, value in enumerate(listed):
+        if not is_number(value):
+            raise SettingsError(f"sweep: a value of {name} is {shown(value)}; give numbers")
+        try:
+            convert(_KEYS[name], value)
+        except ValueError as error:
+            raise SettingsError(f"sweep: {error}") from error
+        if value in listed[:number]:
+            raise SettingsError(f"sweep: {name} has the value {value} twice; leave one out")
+    return tuple(listed)
+
+
+def _require_different_draws(sweep: Sweep) -> None:
+    """Refuse equal draws, whose runs would be the same."""
+    points = list(sweep.points()) if sweep.n_draws else []
+    counts = Counter(points)
+    if len(counts) < len(points):
+        same = ", ".join(f"{name}: {value}" for name, value in counts.most_common(1)[0][0])
+        raise SettingsError(
+            f"sweep: of {sweep.n_draws} random draws some are equal ({same}); draw fewer, give "
+            "ranges, or leave out 'random' for all combinations"
+        )
+
+
 def _range(name: str, value: Mapping[str, Any]) -> tuple[float, float, bool]:
-    low, high = value.get("from"), value.get("to")
-    wrong = set(value) - set(_RANGE_KEYS)
-    if wrong or not (is_number(low) and is_number(high)):
-        raise SettingsError(f"sweep: {name} needs numbers 'from' and 'to' (and 'log: true')")
-    assert low is not None
-    assert high is not None
-    logarithm = bool(value.get("log", False))
+    for wrong in set(value) - set(_RANGE_KEYS):
+        raise SettingsError(
+            f"sweep: {name} has an unknown key '{wrong}'; there are {', '.join(_RANGE_KEYS)}"
+        )
+    low, high = (_end(name, which, value.get(which)) for which in ("from", "to"))
+    logarithm = choice_of(value.get("log", False), f"sweep: log of {name}")
     if not low < high or (logarithm and low <= 0):
         raise SettingsError(
             f"sweep: {name} goes from {low} to {high}; 'from' must be less than 'to'"
             + (", and above 0 for log" if logarithm else "")
         )
-    return float(low), float(high), logarithm
+    return low, high, logarithm
+
+
+def _end(name: str, which: str, value: Any) -> float:
+    """Take an end of a range."""
+    key = _KEYS[name]
+    if value is None or not is_number(value):
+        wrong = f"has no '{which}'" if value is None else f"goes {which} {shown(value)}"
+        raise SettingsError(f"sweep: {name} {wrong}; give numbers 'from' and 'to'")
+    if not math.isfinite(value) or not key.rule.allows(value):
+        raise SettingsError(f"sweep: {name} goes {which} {value}; allowed: {key.allowed}")
+    return float(value)
 
 
 def _rounded(name: str, value: float) -> float:

@@ -14,7 +14,7 @@ import cv2
 
 from orbslam2py._files import describe_error
 from orbslam2py._version import __version__
-from orbslam2py.batches.cache import DEFAULT_SIZE, Cache, bytes_of, default_folder
+from orbslam2py.batches.cache import DEFAULT_SIZE, Cache, cache_size_of, default_folder
 from orbslam2py.batches.jobs import Job
 from orbslam2py.batches.remote import here
 from orbslam2py.batches.results import Results
@@ -86,7 +86,7 @@ def run_job(
                 "too little memory; give more with --memory-limit, or run it alone"
             )
         else:
-            cache = cache or Cache(default_folder(), bytes_of(DEFAULT_SIZE))
+            cache = cache or Cache(default_folder(), cache_size_of(DEFAULT_SIZE))
             with here(job.path, cache) as path, results.of_run(job.key) as folder:
                 _run(job, path, folder, row, page=page)
     except (OrbSlamError, OSError, MemoryError) as error:

@@ -12,6 +12,7 @@ import pytest
 
 import orbslam2py as orb
 from orbslam2py.batches import engine
+from orbslam2py.batches.workers import Workers
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.cluster import Cluster
 
@@ -172,7 +173,7 @@ def test_the_scheduler_is_lost(
 @pytest.mark.watchdog(120)
 def test_own_workers_listen_on_loopback_addresses_only() -> None:
     psutil = pytest.importorskip("psutil", reason="it comes with dask")
-    with engine.open_workers(None, 1, None) as client:
+    with engine.open_workers(Workers(count=1)) as client:
         client.wait_for_workers(1)
         own = psutil.Process()
         listening = [
@@ -188,7 +189,7 @@ def test_own_workers_listen_on_loopback_addresses_only() -> None:
 def test_two_batches_at_a_time_do_not_contend_for_a_port(
     recwarn: pytest.WarningsRecorder,
 ) -> None:
-    with engine.open_workers(None, 1, None), engine.open_workers(None, 1, None) as second:
+    with engine.open_workers(Workers(count=1)), engine.open_workers(Workers(count=1)) as second:
         assert second.run_on_scheduler(_web_address).startswith("127.0.0.1:")
     assert [str(warning.message) for warning in recwarn if "Port" in str(warning.message)] == []
 

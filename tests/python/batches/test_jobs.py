@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -72,19 +73,68 @@ def test_file(places: Path) -> None:
         ({"sequences": ["a/01"], "options": [1]}, "options are a list"),
         ({"sequences": ["a/01"], "options": {"deterministic": "no"}}, "deterministic is 'no'"),
         ({"sequences": ["a/01"], "options": {"effort": "slow"}}, "effort is 'slow'.* fast, normal"),
-        ({"sequences": ["a/01"], "sweep": {}}, "sweep is empty"),
-        ({"sequences": ["a/01"], "sweep": {"nFeatures": [1]}}, "is no key of the settings; did"),
-        ({"sequences": ["a/01"], "sweep": {"ThDepth": ["x"]}}, "ThDepth is .* give a list of num"),
-        ({"sequences": ["a/01"], "sweep": {"ThDepth": {"from": 1, "to": 9}}}, "add 'random: N'"),
-        (
-            {"sequences": ["a/01"], "sweep": {"random": 3, "ThDepth": {"from": 9, "to": 1}}},
-            "'from' must be less than 'to'",
-        ),
+        ({"sequences": ["a/01"], "sweep": {"ThDepth": ["x"]}}, "^sweep: a value of ThDepth is 'x'"),
     ],
 )
 def test_wrong_jobs(places: Path, document: dict[str, Any], message: str) -> None:
     with pytest.raises((orb.SettingsError, orb.DatasetError), match=message):
         make_jobs(document, places)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({}, "sweep is empty; give 'KEY: [VALUE, ...]'"),
+        (None, "sweep is empty; give"),
+        ([1], "sweep is a list; give 'KEY: [VALUE, ...]'"),
+        ({"random": 2, "seed": 1}, "sweep is without a key; give 'KEY: [VALUE, ...]'"),
+        ({"random": "x", "ThDepth": [30]}, "random is 'x'; give how many draws"),
+        ({"nFeatures": [1]}, "'nFeatures' is no key of the settings; did you mean ORBextractor.nF"),
+        ({"fx": [1]}, "'fx' is no key of the settings; did you mean Camera.fx?"),
+        ({"Blah": [1]}, "'Blah' is no key of the settings; see 'orbslam2py settings show tum1'"),
+        ({"ThDepth": []}, "ThDepth has no values; give a list of numbers"),
+        ({"ThDepth": "x"}, "a value of ThDepth is 'x'; give numbers"),
+        ({"ThDepth": [30, "x"]}, "a value of ThDepth is 'x'; give numbers"),
+        ({"ThDepth": [30, -5]}, "ThDepth is -5; allowed: greater than 0"),
+        ({"ThDepth": [float("nan")]}, "ThDepth is not finite; allowed: greater than 0"),
+        ({"ThDepth": [30, 40, 30.0]}, "ThDepth has the value 30.0 twice; leave one out"),
+        (
+            {"ORBextractor.nFeatures": [500.5]},
+            "ORBextractor.nFeatures is 500.5, but must be a whole number: 1 to 1e+06",
+        ),
+        ({"ThDepth": {"from": 1, "to": 9}}, "ThDepth has a range; add 'random: N' for N draws"),
+        (
+            {"random": 3, "ThDepth": {"from": 9, "to": 1}},
+            "ThDepth goes from 9.0 to 1.0; 'from' must be less than 'to'",
+        ),
+        (
+            {"random": 3, "ThDepth": {"from": 1}},
+            "ThDepth has no 'to'; give numbers 'from' and 'to'",
+        ),
+        ({"random": 3, "ThDepth": {"from": 1, "to": "x"}}, "ThDepth goes to 'x'; give numbers"),
+        (
+            {"random": 3, "ThDepth": {"from": -1, "to": 9}},
+            "ThDepth goes from -1; allowed: greater than 0",
+        ),
+        ({"random": 3, "ThDepth": {"from": 1, "to": float("inf")}}, "ThDepth goes to inf; allowed"),
+        (
+            {"random": 3, "ThDepth": {"from": 1, "too": 9}},
+            "ThDepth has an unknown key 'too'; there are from, to, log",
+        ),
+        (
+            {"random": 3, "ThDepth": {"from": 1, "to": 9, "log": "maybe"}},
+            "log of ThDepth is 'maybe'; give True or False",
+        ),
+        (
+            {"random": 5, "ThDepth": [30, 40]},
+            "of 5 random draws some are equal (ThDepth: 40); draw fewer, give ranges, or leave out",
+        ),
+    ],
+)
+def test_wrong_sweeps(values: Any, message: str) -> None:
+    """The key, the value and the remedy are named, before a run is made with it."""
+    with pytest.raises(orb.SettingsError, match=re.escape(message)):
+        read_sweep(values)
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ import pytest
 
 import orbslam2py as orb
 from orbslam2py.batches import make_jobs
-from orbslam2py.batches.cache import Cache, bytes_of
+from orbslam2py.batches.cache import Cache, cache_size_of
 from orbslam2py.batches.remote import here, is_remote, name_of
 from support.batches import make_sequences, reproducible
 from support.small_disk import small_disk
@@ -199,21 +199,11 @@ def test_protocols(path: str, message: str) -> None:
 
 def test_full_disk(data: Path, tmp_path: Path) -> None:
     with small_disk(tmp_path / "disk", "300k") as disk:
-        cache = Cache(disk / "cache", bytes_of("1GB"))
+        cache = Cache(disk / "cache", cache_size_of("1GB"))
         message = r"cannot write to the cache .*/cache: No space left on device; make room, or give"
         with pytest.raises(orb.DatasetError, match=message), here(str(data / "one.tar.gz"), cache):
             pass
         assert not list((disk / "cache").glob("*.part"))
-
-
-@pytest.mark.parametrize(
-    ("text", "size"), [("20GB", 20 * 10**9), ("1.5 MB", 1_500_000), (300, 300), ("4k", 4000)]
-)
-def test_sizes(text: str | int, size: int) -> None:
-    assert bytes_of(text) == size
-    for wrong in ("", "much", "-1GB", "0", "3 apples"):
-        with pytest.raises(orb.SettingsError, match="give one such as 20GB"):
-            bytes_of(wrong)
 
 
 def test_names(tmp_path: Path) -> None:

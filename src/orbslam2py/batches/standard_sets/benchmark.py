@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +14,12 @@ from orbslam2py._files import atomic_write
 from orbslam2py.batches.batch import BatchResult, Progress, run_jobs
 from orbslam2py.batches.engine import Watch
 from orbslam2py.batches.jobs import Job, options_of
+from orbslam2py.batches.results import Results
 from orbslam2py.batches.standard_sets.entries import Entry, entries_of
 from orbslam2py.batches.standard_sets.find import StandardSet, find_sequences
 from orbslam2py.batches.standard_sets.markdown import markdown_table
 from orbslam2py.batches.standard_sets.page import benchmark_page
+from orbslam2py.batches.workers import Workers
 from orbslam2py.datasets import open_sequence
 from orbslam2py.errors import DatasetError, OrbSlamError, SettingsError
 from orbslam2py.settings import Sensor
@@ -113,9 +115,14 @@ def benchmark(
     kind = StandardSet.of(kind)
     if not is_whole(seeds) or seeds < 1:
         raise SettingsError(f"seeds is {shown(seeds)}; give how many runs of each")
+    # All that can be is checked before sequences are looked for and opened, which may take long.
+    where = Workers.of(scheduler, workers, memory_limit)
     root, folder = path_of(root, "the root"), path_of(output, "output").absolute()
+    chosen = None if sensors is None else {Sensor(sensor) for sensor in sensors}
+    given = options_of(options or {})
+    Results.at(folder).require_free(resume=resume)
     found = find_sequences(kind, root)
-    jobs = _jobs(found, sensors, int(seeds), options or {})
+    jobs = _jobs(found, chosen, int(seeds), given)
     if not jobs:
         wanted = ", ".join(str(Sensor(sensor)) for sensor in sensors or ())
         raise DatasetError(
@@ -125,10 +132,8 @@ def benchmark(
     done = run_jobs(
         jobs,
         folder,
+        where,
         resume=resume,
-        scheduler=scheduler,
-        workers=workers,
-        memory_limit=memory_limit,
         report_pages=report_pages,
         progress=progress,
         watch=watch,
@@ -147,18 +152,15 @@ def benchmark(
 
 def _jobs(
     found: Mapping[str, Path],
-    sensors: Sequence[Sensor | str] | None,
+    sensors: set[Sensor] | None,
     seeds: int,
-    options: Mapping[str, Any],
+    options: tuple[tuple[str, Any], ...],
 ) -> list[Job]:
-    chosen = None if sensors is None else {Sensor(sensor) for sensor in sensors}
-    given = options_of(options)
     jobs = []
     for name, path in found.items():
-        for sensor in _sensors_of(path, chosen):
-            job = Job(str(path.absolute()), name, sensor, options=given)
-            job.run_options(Sensor.MONOCULAR)  # says now what would fail in every run
-            jobs += [Job(job.path, name, sensor, options=given, seed=seed) for seed in range(seeds)]
+        for sensor in _sensors_of(path, sensors):
+            job = Job(str(path.absolute()), name, sensor, options=options)
+            jobs += [replace(job, seed=seed) for seed in range(seeds)]
     return jobs
 
 

@@ -21,7 +21,12 @@ WorkersOption = Annotated[
     typer.Option(help="Workers to start [one a core]; 0: none, one run after the other.", min=0),
 ]
 MemoryLimitOption = Annotated[
-    str | None, typer.Option(help="Of each worker, such as 4GB.", metavar="SIZE")
+    str | None,
+    typer.Option(
+        help="Of each worker that is started, such as 4GB; at least 500MB [an equal part of the "
+        "computer's].",
+        metavar="SIZE",
+    ),
 ]
 ReportPagesFlag = Annotated[
     bool, typer.Option("--report-pages", help="Write report.html for every run.")

@@ -77,6 +77,30 @@ def test_what_the_screen_shows() -> None:
             ("jobs.yaml", "--output", "out", "--scheduler", "tcp://127.0.0.1:9"),
             "the scheduler tcp://127.0.0.1:9 cannot be reached; start one with 'dask scheduler'",
         ),
+        *(
+            (
+                ("jobs.yaml", "--output", "out", "--memory-limit", size),
+                f"the memory of a worker (--memory-limit) is '{size}'; give one such as 4GB, at "
+                "least 500 MB",
+            )
+            for size in ("abc", "-1GB", "1kB")
+        ),
+        (
+            ("jobs.yaml", "--output", "out", "--memory-limit", "4GB", "--workers", "0"),
+            "--memory-limit 4GB has no meaning with --workers 0",
+        ),
+        (
+            ("none.yaml", "--output", "out", "--memory-limit", "4GB", "--scheduler", "tcp://a:1"),
+            "--memory-limit 4GB has no meaning with --scheduler tcp://a:1",
+        ),
+        (
+            ("jobs.yaml", "--output", "out", "--scheduler", "foo"),
+            "the scheduler (--scheduler) is 'foo'; give an address such as tcp://10.0.0.1:8786",
+        ),
+        (
+            ("sweep.yaml", "--output", "out"),
+            "sweep.yaml: sweep: ThDepth is -5; allowed: greater than 0",
+        ),
     ],
 )
 def test_bad_input(
@@ -94,6 +118,7 @@ def test_bad_input(
         ("nothing", {"sequences": ["none_*"]}),
         ("twice", {"sequences": [one, one]}),
         ("far", {"sequences": ["nfs9://host/one"]}),
+        ("sweep", {"sequences": [one], "sweep": {"ThDepth": [40, -5]}}),
     ):
         Path(f"{name}.yaml").write_text(json.dumps(document))
     Path("full").mkdir()
@@ -101,6 +126,6 @@ def test_bad_input(
     done = command("batch", *arguments)
     assert done.code == 2
     assert message in " ".join(done.err.split())
-    assert not Path("out/runs").exists()
+    assert not Path("out").exists()
     for noise in ("Traceback", "Errno", "Error(", "SettingsError"):
         assert noise not in done.err

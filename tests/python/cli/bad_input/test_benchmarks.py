@@ -42,6 +42,15 @@ def test_command(command: CommandLine, root: Path) -> None:
         (("tum", "ROOT", "--sensor", "stereo"), "has images for stereo; choose another --sensor"),
         (("coco", "ROOT"), "'coco' is not one of"),
         (("tum", "ROOT", "--seeds", "0"), "greater than or equal to 1"),
+        (
+            ("tum", "ROOT", "--memory-limit", "1kB"),
+            "(--memory-limit) is '1kB'; give one such as 4GB",
+        ),
+        (
+            ("tum", "nowhere", "--memory-limit", "4GB", "--workers", "0"),
+            "--memory-limit 4GB has no meaning with --workers 0",
+        ),
+        (("tum", "ROOT", "--scheduler", "foo"), "the scheduler (--scheduler) is 'foo'; give an"),
     ],
 )
 def test_bad_input(
