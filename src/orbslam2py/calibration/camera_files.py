@@ -210,7 +210,12 @@ def _opencv(path: Path, text: str) -> CameraModel:
                 node = _node(storage, "image_size")
                 size = [int(node.at(i).real()) for i in range(2)]
     except (cv2.error, SystemError) as error:
-        raise SettingsError(f"{path} is no file that OpenCV reads: {error}") from error
+        # What it says of the reason is a line of its own source.
+        raise SettingsError(
+            f"{path} is damaged: OpenCV cannot read it, or a matrix in it has another size than it "
+            "says; write it again with cv2.FileStorage, with camera_matrix 3 x 3 and "
+            "distortion_coefficients"
+        ) from error
     if K is None:
         names = ", ".join(_OPENCV_NAMES["camera_matrix"])
         raise SettingsError(

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from orbslam2py._arguments import number_of
 from orbslam2py._arrays import FloatArray
 from orbslam2py.maps.saved_map import SavedMap
 from orbslam2py.maps.units import unit_of
@@ -42,12 +43,11 @@ def draw_map(path: Path, saved: SavedMap, *, title: str) -> None:
     seconds, gaps = _one_after_the_other(paths)
     rows = np.searchsorted(keyframes.ids, contents.loop_edges)
     centres = _moved(T_0w, keyframes.T_wc[:, :3, 3])
-    runs = "run" if len(saved.runs) == 1 else "runs"
     draw_trajectory(
         path,
         title=title,
-        subtitle=f"{len(saved.runs)} {runs}, {len(keyframes)} keyframes, "
-        f"{len(contents.points)} points",
+        subtitle=f"{number_of(len(saved.runs), 'run')}, {number_of(len(keyframes), 'keyframe')}, "
+        f"{number_of(len(contents.points), 'point')}",
         positions=np.concatenate([one.positions for one in paths]),
         seconds=seconds,
         keyframes=centres,

@@ -265,8 +265,9 @@ def _draw_errors(axes: Axes, view: View, estimate: _Path, errors: FloatArray, un
     axes.add_collection(lines, autolim=False)
     # Few ticks: labels of many digits would push the bar's own label out of the picture.
     ticks = MaxNLocator(nbins=4, steps=[1, 2, 5, 10])
-    bar = axes.figure.colorbar(lines, ax=axes, shrink=0.85, fraction=0.1, pad=0.01, ticks=ticks)
-    bar.ax.ticklabel_format(axis="y", scilimits=(-3, 5))
+    bar = axes.figure.colorbar(
+        lines, ax=axes, shrink=0.85, fraction=0.1, pad=0.01, ticks=ticks, format="{x:g}"
+    )
     bar.set_label(f"estimate: distance to the ground truth [{unit}]")
 
 

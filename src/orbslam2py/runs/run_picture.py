@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from orbslam2py._arguments import number_of
 from orbslam2py.evaluation import Alignment
 from orbslam2py.runs.frame_errors import position_errors
 from orbslam2py.runs.plots import draw_trajectory
@@ -57,7 +58,8 @@ def draw_run(
     truth = None
     subtitle = (
         f"{report['tracked']} of {report['frames']} frames tracked, "
-        f"{report['keyframes']} keyframes, {report['map_points']} points"
+        f"{number_of(report['keyframes'], 'keyframe')}, "
+        f"{number_of(report['map_points'], 'point')}"
     )
     n_maps = sum(not one.lost.all() for one in result.trajectories)
     if n_maps > 1:

@@ -120,6 +120,7 @@ def test_ros_pair(tmp_path: Path) -> None:
         (ROS.replace("data: [520.5", "data: [520.5, 1"), "must hold 9 finite numbers"),
         (OPENCV.replace("camera_matrix", "matrix_of_camera"), "has no camera matrix"),
         (OPENCV.replace(f"[ {FX}, 0.,", f"[ {FX}, 5.,"), "skew"),
+        (OPENCV.replace(f"[ {FX}, 0.,", f"[ {FX},"), r"^\S+ is damaged: OpenCV cannot read it, or"),
         ("cam0: [\n", "is no YAML"),
         ("hello\n", "no camera file we know"),
     ],
