@@ -146,6 +146,15 @@ def test_it_goes_on_although_the_publisher_noticed_first(
         wait_until(lambda: not control.paused, "a run that goes on")
 
 
+def test_a_pause_that_was_its_last_wish_is_ended(system: System, view: LiveView) -> None:
+    control = RunControl()
+    view.attach(system, control=control)
+    os.kill(view.process_id, signal.SIGKILL)
+    assert view._companion.ended.wait(30)
+    view._companion._answer(1, "pause", ())
+    assert not control.paused
+
+
 def test_one_that_hangs_delays_nobody_and_is_given_up(
     system: System,
     view: LiveView,

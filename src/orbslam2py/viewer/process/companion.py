@@ -50,7 +50,7 @@ class Companion:
     answers : mapping of str to callable
         What it may ask of this process; each call is made in a thread of its own.
     on_end : callable
-        Called once when it has ended, in a thread of its own.
+        Called when it has ended, in a thread of its own; again after whatever it had asked for.
 
     Attributes
     ----------
@@ -230,6 +230,7 @@ class Companion:
             self.tell("answer", number, answer)
         except CompanionError as error:
             _log.debug("nobody to answer: %s", error)
+            self._on_end()  # again: what was asked last may be a pause
 
 
 def _start(end: socket.socket) -> subprocess.Popen[bytes]:
