@@ -88,8 +88,9 @@ def atomic_write(path: str | os.PathLike[str], *, binary: bool = False) -> Itera
     """
     path = path_of(path, "the file to write")
     target = Path(os.path.realpath(path))
-    if target.exists() and not target.is_file():
-        with _open(path, target, os.O_WRONLY, binary) as stream:
+    # Of the path itself: /dev/stdout may lead to a pipe, which has no place.
+    if path.exists() and not path.is_file():
+        with _open(path, path, os.O_WRONLY, binary) as stream:
             yield stream
         return
     temporary = target.with_name(f".{target.name}.{os.getpid()}-{secrets.token_hex(4)}.tmp")

@@ -10,6 +10,7 @@ import os
 import queue
 import secrets
 import signal
+import socket
 import sys
 import threading
 import time
@@ -32,6 +33,8 @@ _RETRIES = 2
 #: itself knows how often it was begun (`work.run_job`), so that this is but an end to all.
 _MOST_DEATHS = 20
 _PATIENCE = 10.0
+#: Bytes with which a scheduler may greet: some hundreds say what it is and can.
+_LONGEST_GREETING = 1 << 24
 #: Seconds after which it is looked at whether the batch is to be stopped.
 _LOOK_AROUND = 0.5
 #: Libraries that would start as many threads as there are cores, in every worker.
@@ -280,8 +283,36 @@ def _words_of(error: Exception) -> str:
     return " ".join(str(error).split()) or type(error).__name__
 
 
+def _greets(scheduler: str) -> bool:
+    """Whether what answers at an address begins as a scheduler does.
+
+    It speaks first, with the length of its message in eight bytes. Dask would take the text of
+    another program for such a length, and wait for that much without end.
+    """
+    protocol, _, place = scheduler.rpartition("://")
+    host, _, port = place.rstrip("/").rpartition(":")
+    if protocol not in ("", "tcp"):
+        return True  # Dask knows
+    try:
+        with socket.create_connection((host.strip("[]"), int(port)), _PATIENCE) as connection:
+            connection.settimeout(_PATIENCE)
+            greeting = connection.recv(8, socket.MSG_WAITALL)
+    except TimeoutError:
+        return False
+    except OSError:
+        return True  # nobody is there, which Dask says
+    return len(greeting) == 8 and int.from_bytes(greeting, "little") <= _LONGEST_GREETING
+
+
 def _client_of(distributed: Any, scheduler: str) -> Any:
     """Connect to a scheduler."""
+    remedy = "or leave out --scheduler to work on this computer"
+    no_scheduler = (
+        f"{scheduler} is no scheduler that can be used: {{}}; give the address that 'dask "
+        f"scheduler' prints, {remedy}"
+    )
+    if not _greets(scheduler):
+        raise DatasetError(no_scheduler.format("another program answers there"))
     # Made in two steps: one that fails halfway must be closed, and its constructor hands nothing
     # out to close. Left to itself it ends with a traceback, after 20 s in which nothing happens.
     client = distributed.Client.__new__(distributed.Client)
@@ -290,7 +321,6 @@ def _client_of(distributed: Any, scheduler: str) -> Any:
     except Exception as error:  # whatever a program says that is no scheduler
         with contextlib.suppress(Exception):
             client.close(timeout=_PATIENCE)
-        remedy = "or leave out --scheduler to work on this computer"
         if isinstance(error, OSError | TimeoutError):
             raise DatasetError(
                 f"the scheduler {scheduler} cannot be reached; start one with 'dask scheduler', "
@@ -298,10 +328,7 @@ def _client_of(distributed: Any, scheduler: str) -> Any:
             ) from error
         says = isinstance(error, ValueError | ImportError)  # of the address, or of versions
         reason = _words_of(error) if says else "another program answers there"
-        raise DatasetError(
-            f"{scheduler} is no scheduler that can be used: {reason}; give the address that 'dask "
-            f"scheduler' prints, {remedy}"
-        ) from error
+        raise DatasetError(no_scheduler.format(reason)) from error
     return client
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -21,6 +20,10 @@ _KEYS = {key.name: key for key in KEYS}
 _RANGE_KEYS = ("from", "to", "log")
 #: What a sweep holds beside keys of the settings.
 _OTHER_KEYS = ("random", "seed")
+
+
+#: Draws for each one that is wanted, until there are said to be no more different ones.
+_DRAWS_IN_VAIN = 20
 
 
 @dataclass(frozen=True)
@@ -45,14 +48,20 @@ class Sweep:
     seed: int = 0
 
     def points(self) -> Iterator[tuple[tuple[str, float], ...]]:
-        """Yield the values of each point; one without any if nothing is swept."""
+        """Yield the values of each point; one without any if nothing is swept.
+
+        Draws differ; there are fewer than asked for where there are not so many different ones.
+        """
         if not self.n_draws:
             names = [name for name, _ in self.grid]
             for values in itertools.product(*(values for _, values in self.grid)):
                 yield tuple(zip(names, values, strict=True))
             return
         random = np.random.default_rng(self.seed)
-        for _ in range(self.n_draws):
+        drawn: set[tuple[tuple[str, float], ...]] = set()
+        left = self.n_draws + _DRAWS_IN_VAIN * (self.n_draws + 50)
+        while len(drawn) < self.n_draws and left > 0:
+            left -= 1
             point = [(name, values[random.integers(len(values))]) for name, values in self.grid]
             for name, low, high, even_in_logarithm in self.ranges:
                 if even_in_logarithm:
@@ -60,7 +69,10 @@ class Sweep:
                 else:
                     value = float(random.uniform(low, high))
                 point.append((name, _rounded(name, value)))
-            yield tuple(sorted(point))
+            new = tuple(sorted(point))
+            if new not in drawn:  # equal ones would be the same run
+                drawn.add(new)
+                yield new
 
 
 def read_sweep(values: Any) -> Sweep:
@@ -134,6 +146,10 @@ def _values(name: str, listed: list[Any]) -> tuple[float, ...]:
             raise SettingsError(f"sweep: a value of {name} is {shown(value)}; give numbers")
         try:
             convert(_KEYS[name], value)
+        except OverflowError as error:
+            raise SettingsError(
+                f"sweep: {name} is {shown(value)}; allowed: {_KEYS[name].allowed}"
+            ) from error
         except ValueError as error:
             raise SettingsError(f"sweep: {error}") from error
         if value in listed[:number]:
@@ -142,14 +158,12 @@ def _values(name: str, listed: list[Any]) -> tuple[float, ...]:
 
 
 def _require_different_draws(sweep: Sweep) -> None:
-    """Refuse equal draws, whose runs would be the same."""
-    points = list(sweep.points()) if sweep.n_draws else []
-    counts = Counter(points)
-    if len(counts) < len(points):
-        same = ", ".join(f"{name}: {value}" for name, value in counts.most_common(1)[0][0])
+    """Refuse more draws than there are different ones."""
+    n_different = sum(1 for _ in sweep.points()) if sweep.n_draws else 0
+    if n_different < sweep.n_draws:
         raise SettingsError(
-            f"sweep: of {sweep.n_draws} random draws some are equal ({same}); draw fewer, give "
-            "ranges, or leave out 'random' for all combinations"
+            f"sweep: of {sweep.n_draws} random draws only {n_different} could be different; draw "
+            "fewer, or give more values or wider ranges"
         )
 
 
@@ -174,9 +188,13 @@ def _end(name: str, which: str, value: Any) -> float:
     if value is None or not is_number(value):
         wrong = f"has no '{which}'" if value is None else f"goes {which} {shown(value)}"
         raise SettingsError(f"sweep: {name} {wrong}; give numbers 'from' and 'to'")
-    if not math.isfinite(value) or not key.rule.allows(value):
-        raise SettingsError(f"sweep: {name} goes {which} {value}; allowed: {key.allowed}")
-    return float(value)
+    try:
+        end = float(value)
+    except OverflowError:
+        end = math.inf
+    if not math.isfinite(end) or not key.rule.allows(end):
+        raise SettingsError(f"sweep: {name} goes {which} {shown(value)}; allowed: {key.allowed}")
+    return end
 
 
 def _rounded(name: str, value: float) -> float:

@@ -86,8 +86,12 @@ def evaluate(
         ),
     ] = None,
     json: Annotated[
-        Path | None, typer.Option(help="Write the figures to this file as well.")
+        Path | None,
+        typer.Option(help="Write the figures to this file as well; earlier ones are replaced."),
     ] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Replace whatever that file holds.")
+    ] = False,
 ) -> None:
     """Compare a trajectory with ground truth: ATE, RPE and KITTI's segment errors.
 
@@ -121,7 +125,7 @@ def evaluate(
         timed=both.is_timed,
     )
     figures = result.as_dict()
-    check_figures(json, figures)
+    check_figures(json, figures, force=force)
     Console().print(_table(figures, trajectory, ground_truth))
     _say_what_was_compared(both, result, asked=alignment)
     if json is not None:

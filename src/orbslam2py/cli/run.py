@@ -168,7 +168,7 @@ def run(
         viewer=look,
         video=video,
         record=record,
-        inputs=[Path(sequence)],
+        inputs=[Path(given) for given in (sequence, settings, times, mask, vocabulary) if given],
         quiet=quiet,
     )
     raise typer.Exit(code)

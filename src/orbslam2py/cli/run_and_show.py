@@ -62,8 +62,10 @@ def run_and_show(
             for path in (video, record)
         ):
             settings = sequence.settings.to_yaml()
+            is_new = not output.exists()
             prepare_output_folder(output, force=force, settings=settings)
-            page.callback(_remove_if_empty, output)  # if there is no run after all
+            if is_new:
+                page.callback(_remove_if_empty, output)  # if there is no run after all
             force = True
         with StopOnInterrupt() as interrupt:
             files = page.enter_context(file_watchers(sequence, options, video, record))

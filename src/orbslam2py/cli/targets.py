@@ -69,7 +69,7 @@ def check_page(path: Path) -> Path:
         raise OutputFileError(f"{path} is a folder; give the page a name with --output")
     from orbslam2py.runs.report_page import is_page  # noqa: PLC0415  (large)
 
-    if path.is_file() and not is_page(path):
+    if _holds_something(path) and not is_page(path):
         raise OutputFileError(
             f"{path} exists and is no page of this program, so it is kept; give the page another "
             "name with --output"
@@ -77,7 +77,7 @@ def check_page(path: Path) -> Path:
     return path
 
 
-def check_figures(path: Path | None, names: Collection[str]) -> None:
+def check_figures(path: Path | None, names: Collection[str], *, force: bool) -> None:
     """See that figures may be written there as JSON: only some of the same names are replaced.
 
     Raises
@@ -85,7 +85,7 @@ def check_figures(path: Path | None, names: Collection[str]) -> None:
     OutputFileError
         If something else has that name.
     """
-    if path is None or not path.is_file():
+    if path is None or force or not _holds_something(path):
         return
     try:
         with path.open("rb") as stream:
@@ -94,6 +94,10 @@ def check_figures(path: Path | None, names: Collection[str]) -> None:
         there = None
     if not isinstance(there, dict) or set(there) != set(names):
         raise OutputFileError(
-            f"{path} exists and holds something else than figures of this command, so it is kept; "
-            "give another name"
+            f"{path} exists and holds something else than figures of this command; use --force to "
+            "replace it"
         )
+
+
+def _holds_something(path: Path) -> bool:
+    return path.is_file() and path.stat().st_size > 0

@@ -19,12 +19,38 @@ from orbslam2py.trajectory.rotations import quaternions_from_rotations
 STAGES = ("wait", "extract", "stereo", "predict", "local_map", "keyframe", "track")
 
 _ALWAYS = ["index", "timestamp", "map", "state", "reason"]
+_BEGINNING = ",".join(_ALWAYS).encode()
 _TRACKED = [
     *("inliers", "matches", "keyframe", "reference_keyframe"),
     *("tx", "ty", "tz", "qx", "qy", "qz", "qw", "std_position", "std_angle"),
     *("visual_odometry", "evidence", "method", "found", "unconfirmed"),
     *(f"ms_{stage}" for stage in STAGES),
 ]
+
+
+def begin_frames(path: Path) -> None:
+    """Write the table of a run that has no frames yet.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    write_frames(path, ())
+
+
+def is_frame_table(path: Path) -> bool:
+    """Whether a file is such a table, of this version or of another."""
+    try:
+        with path.open("rb") as file:
+            return file.read(len(_BEGINNING)) == _BEGINNING
+    except OSError:
+        return False
+
+
+def has_no_frames(path: Path) -> bool:
+    """Whether a file is the table of a run that has not ended."""
+    return is_frame_table(path) and path.read_bytes().count(b"\n") == 1
 
 
 def write_frames(path: Path, rows: Iterable[FrameRow]) -> None:

@@ -18,7 +18,7 @@ from orbslam2py._files import atomic_write, reason_of
 from orbslam2py.errors import DatasetError
 from orbslam2py.maps.ply import write_ply
 from orbslam2py.runs.frame_errors import truth_of_frames, worst_frames
-from orbslam2py.runs.frame_table import write_frames
+from orbslam2py.runs.frame_table import begin_frames, has_no_frames, is_frame_table, write_frames
 from orbslam2py.runs.report import RunEvaluation
 from orbslam2py.runs.report_page import write_report_page
 from orbslam2py.runs.report_page.frame_images import (
@@ -43,11 +43,11 @@ _NOT_ALWAYS = (
     *("report.html", "frame_images.zip"),
 )
 
-#: By these it is known that a run has written into a folder: the first to come, the last to go.
-_MARKS = ("report.json", "frames.csv")
+#: By it a folder is known as that of a run: the first to come, without frames, the last to go.
+_MARK = "frames.csv"
 
 #: All results; the settings are not among them, which may be those that the run was given.
-_RESULTS = (*_NOT_ALWAYS, "points.ply", "map.npz", *_MARKS)
+_RESULTS = (*_NOT_ALWAYS, "points.ply", "map.npz", "report.json", _MARK)
 
 
 def new_output_folder(name: str) -> Path:
@@ -86,12 +86,12 @@ def prepare_output_folder(folder: Path, *, force: bool, settings: str = "") -> P
     """
     if folder.exists() and not folder.is_dir():
         raise DatasetError(f"{folder} is not a folder; give another one with --output")
-    if folder.exists() and any(folder.iterdir()) and not force:
+    if folder.exists() and any(folder.iterdir()) and not force and not _is_only_begun(folder):
         raise DatasetError(f"{folder} is not empty; give another --output, or --force to overwrite")
     if folder.is_dir() and (name := _other_work(folder, settings)):
         raise DatasetError(
             f"{folder} holds {name}, which would be replaced, but no run that has written it (no "
-            f"{_MARKS[0]}); give another --output"
+            f"{_MARK} of one); give another --output"
         )
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -108,18 +108,40 @@ def prepare_output_folder(folder: Path, *, force: bool, settings: str = "") -> P
 def remove_earlier_results(folder: Path) -> None:
     """Remove the results of an earlier run, so that none looks like one of the run that begins.
 
-    Only from a folder in which a run has written, and only what runs write; the settings stay.
+    Only from a folder in which a run has written, and only what runs write; the settings stay, and
+    so does the table of frames.
     """
     if not _holds_run(folder):
         return
     for path in _results_in(folder):
-        if path.is_file():
+        if path.is_file() and path.name != _MARK:
             with contextlib.suppress(OSError):
                 path.unlink()
 
 
+def mark_as_begun(folder: Path) -> None:
+    """Write a table without frames, so that what a run leaves that is killed is known as its own.
+
+    Raises
+    ------
+    DatasetError
+        If it cannot be written.
+    """
+    try:
+        begin_frames(folder / _MARK)
+    except OSError as error:
+        raise DatasetError(
+            f"cannot write to {folder}: {reason_of(error)}; give another folder with --output"
+        ) from error
+
+
 def _holds_run(folder: Path) -> bool:
-    return any((folder / name).is_file() for name in _MARKS)
+    return is_frame_table(folder / _MARK)
+
+
+def _is_only_begun(folder: Path) -> bool:
+    """Whether a run that was killed has left nothing but its mark."""
+    return [path.name for path in folder.iterdir()] == [_MARK] and has_no_frames(folder / _MARK)
 
 
 def _results_in(folder: Path) -> Iterator[Path]:
@@ -130,7 +152,6 @@ def _other_work(folder: Path, settings: str) -> str | None:
     """Name of a file that is called as a result is, and is none."""
     if _holds_run(folder):
         return None
-    # A run that was killed has left the settings of the one before, which are no loss.
     own = folder / _SETTINGS
     if own.is_file() and own.read_bytes() != settings.encode():
         return own.name
@@ -177,7 +198,7 @@ class OutputWriter:
         page: bool = True,
     ) -> None:
         """Write all files of the run; the page and its images only if they are wanted."""
-        self._write("frames.csv", lambda path: write_frames(path, result.rows))  # marks the folder
+        self._write(_MARK, lambda path: write_frames(path, result.rows))
         self._write(_SETTINGS, result.settings.save)
         self._write_trajectories(result, evaluation)
         points = anchored_points(result)

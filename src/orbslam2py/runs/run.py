@@ -23,6 +23,7 @@ from orbslam2py.runs.outputs import (
     OutputWriter,
     is_name_of_result,
     link_latest,
+    mark_as_begun,
     prepare_output_folder,
     remove_earlier_results,
 )
@@ -182,4 +183,5 @@ def _prepare(
     if target is not None and is_among_results:
         check_map_target(target)  # its folder may not have been there before
     remove_earlier_results(folder)
+    mark_as_begun(folder)
     link_latest(folder)

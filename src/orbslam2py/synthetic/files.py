@@ -28,8 +28,11 @@ Progress = Callable[[int, int], None]
 
 #: Holds the options; marks folders that may be replaced.
 MARKER = "synthetic.json"
-#: In it: names in the folder, by which another's files are told from its own.
+#: In it: names in the folder, and how many files each of them holds, by which another's files are
+#: told from its own.
 _ENTRIES = "entries"
+#: What programs that show folders leave in them.
+_NOBODYS = (".DS_Store", "Thumbs.db", "desktop.ini")
 
 _SENSORS = {
     Layout.TUM: (Sensor.MONOCULAR, Sensor.RGBD),
@@ -109,7 +112,7 @@ def write_sequence(
     with atomic_folder(folder) as temporary:
         writers[chosen](sequence, temporary, progress or (lambda done, total: None))
         about: dict[str, Any] = dataclasses.asdict(sequence.options) | {"layout": str(chosen)}
-        about[_ENTRIES] = sorted(path.name for path in temporary.iterdir())
+        about[_ENTRIES] = {entry.name: _n_files(entry) for entry in sorted(temporary.iterdir())}
         _write_text(temporary / MARKER, [json.dumps(about, indent=2, default=str)])
         _check_replaceable(folder, force=force)  # writing takes long: it may have been filled
     return folder
@@ -261,23 +264,35 @@ def _check_replaceable(folder: Path, *, force: bool) -> None:
             f"{folder} holds no {MARKER}, so it was not written by this command and is not "
             "replaced; give another name or remove it yourself"
         )
-    if (name := _other_work(folder)) is not None:
+    if (other := _other_work(folder)) is not None:
+        held = "is or holds what" if other.is_dir() else "is what"
         raise DatasetError(
-            f"{folder / name} was not written by this command and would be lost with {folder}; "
-            "take it away, or give another name"
+            f"{other} {held} was not written by this command and would be lost with {folder}; take "
+            "it away, or give another name"
         )
 
 
-def _other_work(folder: Path) -> str | None:
-    """Name of what lies in the folder of a synthetic sequence and does not belong to it."""
+def _other_work(folder: Path) -> Path | None:
+    """What lies in the folder of a synthetic sequence and does not belong to it."""
     try:
-        written = {MARKER, *json.loads((folder / MARKER).read_text(encoding="utf-8"))[_ENTRIES]}
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        told = json.loads((folder / MARKER).read_text(encoding="utf-8"))[_ENTRIES]
+        written = {MARKER: 1, **{str(name): int(n_files) for name, n_files in told.items()}}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise DatasetError(
             f"{folder / MARKER} does not say what else was written there, so {folder} is not "
             "replaced; give another name or remove it yourself"
         ) from error
-    return next((path.name for path in sorted(folder.iterdir()) if path.name not in written), None)
+    for entry in sorted(folder.iterdir()):
+        if entry.name not in _NOBODYS and _n_files(entry) > written.get(entry.name, 0):
+            return entry
+    return None
+
+
+def _n_files(entry: Path) -> int:
+    """Number of files: one, or those in a folder."""
+    if not entry.is_dir() or entry.is_symlink():
+        return 1
+    return sum(not path.is_dir() and path.name not in _NOBODYS for path in entry.rglob("*"))
 
 
 def _write_image(path: Path, image: NDArray[Any]) -> None:

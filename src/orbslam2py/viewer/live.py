@@ -81,7 +81,7 @@ class LiveView:
         self._control: RunActions | None = None
         self._answers: dict[str, Callable[..., object]] = {}
         self._n_dropped = 0
-        self._watches = self._missed = False
+        self._missed = False
         self._companion = Companion(
             host=host,
             port=port,
@@ -125,7 +125,7 @@ class LiveView:
         folder : path
             Where maps are saved.
         """
-        self._system, self._control, self._watches = system, control, True
+        self._system, self._control = system, control
         actions = ActionsOnSystem(system, Path(folder))
         self._answers.update(
             path=self._path,
@@ -185,7 +185,6 @@ class LiveView:
 
     def close(self) -> None:
         """Show the last of it; the page stays."""
-        self._watches = False
         with contextlib.suppress(CompanionError):  # it was said, or is when the page is missed
             self._companion.tell("close", self._n_dropped)
 
@@ -216,9 +215,9 @@ class LiveView:
 
     def _ended(self) -> None:
         """The page is no more: nobody can let a run go on that stands still."""
-        # Whoever was told so by an image that could not be shown has closed this view already.
-        waits_for_it = self._watches or self._missed
-        if waits_for_it and self._control is not None and self._control.paused:
+        # Also if the view is closed: an image that could not be shown may have been the first to
+        # tell, and a run that has ended does not mind.
+        if self._control is not None and self._control.paused:
             self._control.resume()
 
     def _path(self) -> PathNow:

@@ -127,8 +127,10 @@ def test_wrong_jobs(places: Path, document: dict[str, Any], message: str) -> Non
         ),
         (
             {"random": 5, "ThDepth": [30, 40]},
-            "of 5 random draws some are equal (ThDepth: 40); draw fewer, give ranges, or leave out",
+            "of 5 random draws only 2 could be different; draw fewer, or give more values",
         ),
+        ({"ThDepth": [10**400]}, "ThDepth is 1000000"),
+        ({"random": 2, "ThDepth": {"from": 1, "to": 10**400}}, "ThDepth goes to 1000000"),
     ],
 )
 def test_wrong_sweeps(values: Any, message: str) -> None:
@@ -155,6 +157,14 @@ def test_grid() -> None:
     points = list(sweep.points())
     assert len(points) == 4
     assert points[0] == (("ORBextractor.nFeatures", 500), ("ThDepth", 30))
+
+
+def test_draws_of_few_values_differ() -> None:
+    whole = {"from": 500, "to": 599}
+    points = list(read_sweep({"random": 95, "ORBextractor.nFeatures": whole}).points())
+    assert len(set(points)) == len(points) == 95
+    every = read_sweep({"random": 4, "ThDepth": [30, 40], "ORBextractor.nLevels": [6, 8]})
+    assert len(set(every.points())) == 4
 
 
 def test_random_draws() -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import socket
 import subprocess
@@ -51,6 +52,13 @@ WRONG: list[tuple[dict[str, Any], str]] = [
 ]
 
 
+@pytest.fixture
+def silent_program() -> Iterator[str]:
+    """Address of a server that waits to be spoken to, as one of web pages does."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        yield f"127.0.0.1:{server.getsockname()[1]}"
+
+
 @pytest.fixture(scope="module")
 def sequences(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return make_sequences(tmp_path_factory.mktemp("sequences"))
@@ -67,7 +75,7 @@ def other_program() -> Iterator[str]:
                     connection, _ = server.accept()
                 except OSError:
                     return
-                with connection:
+                with connection, contextlib.suppress(ConnectionResetError):
                     connection.sendall(b"HTTP/1.1 400 Bad Request\r\n\r\n" * 4)
                     connection.recv(1)
 
@@ -133,13 +141,18 @@ def test_the_limit_is_that_of_the_workers() -> None:
 
 
 def test_no_place_is_made_for_a_scheduler_that_is_not_there(
-    sequences: Path, tmp_path: Path, other_program: str, monkeypatch: pytest.MonkeyPatch
+    sequences: Path,
+    tmp_path: Path,
+    other_program: str,
+    silent_program: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """So that the right address does not need another folder, or --resume."""
     pytest.importorskip("distributed", reason="dask is an extra")
     monkeypatch.setattr(engine, "_PATIENCE", 0.5)
     for address, message in (
         ("tcp://127.0.0.1:9", "tcp://127.0.0.1:9 cannot be reached; start one with"),
+        (silent_program, f"{silent_program} is no scheduler that can be used: another program"),
         (other_program, f"{other_program} is no scheduler that can be used: another program"),
         ("xyz://a:1", "xyz://a:1 is no scheduler that can be used: unknown address scheme"),
     ):

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -35,6 +36,13 @@ def finished(command: CommandLine, rgbd: Path) -> Path:
     done = command("run", rgbd, "--deterministic", "--output", "r", "--quiet")
     assert done.code == 0, done.err
     return Path("r")
+
+
+def _raise(kind: type[BaseException]) -> Callable[..., None]:
+    def raise_it(*_: object, **__: object) -> None:
+        raise kind
+
+    return raise_it
 
 
 def refused(done: Outcome, *said: str) -> None:
@@ -89,6 +97,9 @@ def test_that_folder_is_not_left_behind_by_a_run_that_does_not_begin(
     files = ("--output", "r", "--video", "r/a.mp4", "--save", "map.orbmap")
     refused(command("run", rgbd, *files), "map.orbmap")
     assert names_in(Path()) == ["lap", "map.orbmap"]
+    Path("mine").mkdir()
+    refused(command("run", rgbd, "--output", "mine", "--video", "mine/a.xyz"), "mine/a.xyz")
+    assert names_in(Path()) == ["lap", "map.orbmap", "mine"]
 
 
 def test_two_outputs_of_one_name(command: CommandLine, rgbd: Path) -> None:
@@ -117,15 +128,56 @@ def test_what_is_only_called_as_a_result_is_kept(
     assert (folder / name).read_text() == MINE
 
 
-def test_a_run_that_was_killed_is_replaced(command: CommandLine, rgbd: Path) -> None:
+def test_a_run_that_was_killed_is_replaced(
+    command: CommandLine, rgbd: Path, finished: Path
+) -> None:
     """Its folder holds the settings of the run before, and no results."""
-    arguments = ("run", rgbd, "--output", "r", "--quiet")
-    assert command(*arguments).code == 0
-    for path in Path("r").iterdir():
-        if path.name != "settings.yaml":
-            path.unlink()
-    done = command(*arguments, "--force")
+
+    class Killed(BaseException):
+        """No handler takes it."""
+
+    arguments = ("run", rgbd, "--output", finished, "--quiet", "--force", "--sensor", "mono")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("orbslam2py.runs.runner.SequenceRunner.run", _raise(Killed))
+        with pytest.raises(Killed):
+            command(*arguments)
+    assert names_in(finished) == ["frames.csv", "settings.yaml"]
+    # A camera that stands in one place begins no map, which is no error of the folder.
+    assert command(*arguments).code in (0, 4)
+    assert "report.json" in names_in(finished)
+
+
+def test_a_first_run_that_was_killed_needs_no_force(command: CommandLine, rgbd: Path) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("orbslam2py.runs.runner.SequenceRunner.run", _raise(SystemExit))
+        command("run", rgbd, "--output", "r", "--quiet")
+    assert names_in(Path("r")) == ["frames.csv"]
+    done = command("run", rgbd, "--output", "r", "--quiet")
     assert done.code == 0, done.err
+    refused(command("run", rgbd, "--output", "r", "--quiet"), "r is not empty")
+
+
+def test_results_that_a_full_disk_cut_short_are_replaced(
+    command: CommandLine, rgbd: Path, finished: Path
+) -> None:
+    """What marks the folder was there before the disk was full."""
+    mark = (finished / "frames.csv").read_text().splitlines(keepends=True)[0]
+    (finished / "frames.csv").write_text(mark)
+    (finished / "report.json").unlink()
+    done = command("run", rgbd, "--output", finished, "--quiet", "--force")
+    assert done.code == 0, done.err
+    assert len((finished / "frames.csv").read_text().splitlines()) == N + 1
+
+
+@pytest.mark.parametrize("name", ["frames.csv", "report.json"])
+def test_files_of_others_do_not_make_a_folder_that_of_a_run(
+    command: CommandLine, rgbd: Path, name: str
+) -> None:
+    Path("data").mkdir()
+    for mine in (name, "points.ply"):
+        Path("data", mine).write_text(MINE)
+    refused(command("run", rgbd, "--output", "data", "--force"), "data holds points.ply")
+    assert names_in(Path("data")) == sorted([name, "points.ply"])
 
 
 def test_the_demo_replaces_no_other_run(command: CommandLine, finished: Path) -> None:
@@ -144,9 +196,15 @@ def test_a_sequence_with_other_work_in_it_is_kept(command: CommandLine, tmp_path
     assert command(*arguments, "--force", "--layout", "mcap").code == 0, "another layout"
     assert command(*arguments, "--force").code == 0
     (tmp_path / "s" / "notes.txt").write_text(MINE)
-    refused(command(*arguments, "--force"), "s/notes.txt was not written by this command")
+    refused(command(*arguments, "--force"), "s/notes.txt is what was not written by this command")
     assert (tmp_path / "s" / "notes.txt").read_text() == MINE
     (tmp_path / "s" / "notes.txt").unlink()
+    (tmp_path / "s" / "depth" / "notes.txt").write_text(MINE)
+    refused(command(*arguments, "--force"), "s/depth is or holds what was not written")
+    (tmp_path / "s" / "depth" / "notes.txt").unlink()
+    for folder in ("s", "s/rgb"):
+        (tmp_path / folder / ".DS_Store").touch()
+    assert command(*arguments, "--force").code == 0
     (tmp_path / "s" / "synthetic.json").write_text("{}")
     refused(command(*arguments, "--force"), "synthetic.json does not say what else was written")
     assert names_in(tmp_path) == ["s"]
@@ -164,6 +222,7 @@ def test_pages_replace_pages_only(command: CommandLine, finished: Path) -> None:
         "r/frames.csv exists and is no page of this program",
     )
     assert (finished / "frames.csv").read_bytes() == table
+    Path("a.html").touch()
     for _ in range(2):
         assert command("report", finished, "-o", "a.html").code == 0
         assert command("compare", finished, finished, "-o", "a.html").code == 0
@@ -179,6 +238,8 @@ def test_figures_replace_figures_only(command: CommandLine, finished: Path, rgbd
     assert (finished / "report.json").read_bytes() == report
     Path("list.json").write_text("[1, 2]")
     refused(command(*arguments, "list.json"), "list.json exists and holds something else")
+    assert command(*arguments, "list.json", "--force").code == 0
+    Path("figures.json").touch()
     for _ in range(2):
         done = command(*arguments, "figures.json")
         assert done.code == 0, done.err

@@ -257,7 +257,7 @@ def test_a_folder_with_files_is_not_touched_without_force(command: CommandLine, 
     folder.mkdir()
     (folder / "thesis.txt").write_text("precious")
     (folder / "trajectory_map0.txt").write_text("of an earlier run")
-    (folder / "frames.csv").write_text("of the same")
+    (folder / "frames.csv").write_text("index,timestamp,map,state,reason\n0,0,0,OK,\n")
     done = command("run", rgbd, "--sensor", "rgbd", "--output", folder)
     assert done.code == 2
     assert "not empty" in done.err

@@ -104,6 +104,15 @@ def test_devices_are_written_directly() -> None:
         stream.write("x" * 100_000)
 
 
+def test_a_pipe_that_has_no_place_is_written_directly() -> None:
+    read, write = os.pipe()
+    with os.fdopen(read) as reader:
+        with atomic_write(f"/proc/self/fd/{write}") as stream:
+            stream.write("through\n")
+        os.close(write)
+        assert reader.read() == "through\n"
+
+
 def test_links_are_followed(tmp_path: Path) -> None:
     (tmp_path / "real").write_text("old")
     (tmp_path / "link").symlink_to("real")

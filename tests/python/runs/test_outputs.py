@@ -13,6 +13,7 @@ from orbslam2py import DatasetError, run_sequence
 from orbslam2py.runs import RunOptions, SystemOptions, run_picture
 from orbslam2py.runs.outputs import (
     link_latest,
+    mark_as_begun,
     prepare_output_folder,
     remove_earlier_results,
     write_ply,
@@ -121,8 +122,10 @@ def test_results_of_an_earlier_run_are_gone_when_a_new_one_begins(tmp_path: Path
     for own in ("notes.txt", "office.orbmap", "trajectory_mine.txt"):
         (run / own).write_text("mine")
     remove_earlier_results(run)
-    left = {path.name for path in run.iterdir()}
+    mark_as_begun(run)
+    left = {path.name for path in run.iterdir()} - {"frames.csv"}
     assert left == {"settings.yaml", "notes.txt", "office.orbmap", "trajectory_mine.txt"}
+    assert len((run / "frames.csv").read_text().splitlines()) == 1, "no frame"
 
 
 def test_a_folder_without_a_run_is_left_alone(tmp_path: Path) -> None:
