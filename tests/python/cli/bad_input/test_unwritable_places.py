@@ -14,6 +14,7 @@ import pytest
 from orbslam2py import _files
 from orbslam2py.trajectory import read_tum
 from support.command_line import RUN_FILES, CommandLine, Results
+from support.files import names_in
 from support.small_disk import small_disk
 from support.spoilt_runs import N, run
 
@@ -76,13 +77,21 @@ def fill_disk(monkeypatch: pytest.MonkeyPatch, full: Callable[[Path], bool]) -> 
 def test_disk_full(
     command: CommandLine, rgbd: Path, rescue: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    fill_disk(monkeypatch, lambda path: path.parent.name == "r")
+    written: list[Path] = []
+
+    def is_full(path: Path) -> bool:
+        if path.parent.name == "r":
+            written.append(path)
+        return path.parent.name == "r" and len(written) > 1
+
+    fill_disk(monkeypatch, is_full)
     done = run(command, rgbd)
     assert done.code == 1
     assert "Traceback" not in done.err
     (kept,) = rescue.iterdir()
     assert {path.name for path in kept.iterdir()} == RUN_FILES
-    assert list(Path("r").iterdir()) == [], "no halves"
+    assert names_in(Path("r")) == ["frames.csv"], "no halves"
+    assert len(Path("r/frames.csv").read_text().splitlines()) == 1
     for name in sorted(RUN_FILES):
         assert f"cannot write r/{name}: No space left on device; kept in" in done.err
         assert f"kept in {kept / name}" in done.err
@@ -90,6 +99,17 @@ def test_disk_full(
     assert done.err.count("cannot write") == len(RUN_FILES), "each is said once"
     assert len(read_tum(kept / "trajectory.txt")) == N
     assert Results(kept).report["tracked"] == N
+
+
+def test_disk_full_from_the_beginning(
+    command: CommandLine, rgbd: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Told before any image is looked at."""
+    fill_disk(monkeypatch, lambda path: path.parent.name == "r")
+    done = run(command, rgbd)
+    assert done.code == 2
+    assert "cannot write to r: No space left on device; give another folder" in done.err
+    assert names_in(Path("r")) == []
 
 
 def test_disk_full_for_one_file(
