@@ -15,10 +15,10 @@ from orbslam2py.errors import SettingsError
 #: gives none work that fills 80 % of its limit: with less it would wait for ever, or be killed.
 LEAST_MEMORY = 500 * 10**6
 _LARGEST_PORT = 65535
-#: Dask knows more protocols (``tls``, ``ws``); what is not one of them is said by it.
-_ADDRESS = re.compile(r"(?:[a-z]+://)?(?:[^\s/:\[\]]+|\[[0-9A-Fa-f:.%\w]+\]):([0-9]{1,5})/?")
-#: Of a scheduler in this very process, with an address of another form.
-_IN_PROCESS = "inproc://"
+_ADDRESS = re.compile(r"(?:tcp://)?(?:[^\s/:\[\]]+|\[[0-9A-Fa-f:.%\w]+\]):([0-9]{1,5})/?")
+#: Dask knows more protocols (``tls``, ``ws``, ``inproc``), some with addresses of another form;
+#: what is none of them is said by it.
+_OTHER_PROTOCOL = re.compile(r"(?!tcp://)[a-z]+://\S+")
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,9 @@ def _memory_of(limit: Any) -> int:
 def _require_address(scheduler: Any) -> None:
     if isinstance(scheduler, str):
         found = _ADDRESS.fullmatch(scheduler)
-        if scheduler.startswith(_IN_PROCESS) or (found and 0 < int(found[1]) <= _LARGEST_PORT):
+        if found and 0 < int(found[1]) <= _LARGEST_PORT:
+            return
+        if _OTHER_PROTOCOL.fullmatch(scheduler):
             return
     raise SettingsError(
         f"the scheduler (--scheduler) is {shown(scheduler)}; give an address such as "

@@ -222,8 +222,8 @@ class OutputWriter:
         frames = choose_frames(result, worst)
         if frames and has_any_images(result):
             self._write("frame_images.zip", lambda path: write_frame_images(path, result, frames))
-        # It is made from the other files, wherever they could be written: one that is kept elsewhere
-        # has only its beginning in the folder.
+        # It is made from the other files, wherever they could be written: of one that is kept
+        # elsewhere the folder has only the beginning.
         folders = [*([] if self._rescue is None else [self._rescue]), self.folder]
         self._write("report.html", lambda path: write_report_page(path, folders))
 

@@ -104,6 +104,7 @@ def test_workers() -> None:
         "a-b.org:1",
         "tls://[fe80::1%eth0]:65535",
         "inproc://1/2",
+        "ws://h:80/ws",
     ):
         assert Workers.of(address, None, None) == Workers(address)
 
