@@ -87,16 +87,25 @@ FeaturePairs find_pairs(const FreeFeatures& a, FreeFeatures& b) {
   const Frame& frame_b = *b.frame;
   EpipolarGeometry geometry(a, b);
   FeaturePairs pairs;
+  thread_local std::vector<std::uint32_t> free_b;
   for_each_common_node(frame_a, frame_b, [&](NodeFeatures node_a, NodeFeatures node_b) {
+    // Once for all features of a: which of b are left is a coin toss that no processor foresees.
+    free_b.clear();
+    for (const std::uint32_t j : node_b) {
+      if (b.occupied[j]) continue;
+      __builtin_prefetch(&frame_b.descriptors[j]);
+      free_b.push_back(j);
+    }
+    if (free_b.empty()) return;
     for (const std::uint32_t i : node_a) {
       if (a.occupied[i]) continue;
       geometry.select(frame_a.keypoints[i]);
       int best = kDescriptorLow;
       std::int64_t match = -1;
-      for (const std::uint32_t j : node_b) {
-        if (b.occupied[j]) continue;
+      for (const std::uint32_t j : free_b) {
         const int distance = hamming_distance(frame_a.descriptors[i], frame_b.descriptors[j]);
         if (distance > best) continue;  // the last of equals wins
+        if (b.occupied[j]) continue;    // since a moment ago
         const Keypoint& feature = frame_b.keypoints[j];
         const bool has_depth = frame_a.has_depth(i) || frame_b.has_depth(j);
         if (!has_depth && geometry.near_epipole(feature)) continue;

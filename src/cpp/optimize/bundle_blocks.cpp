@@ -4,9 +4,10 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <optional>
 #include <utility>
 
-#include "base/worker_thread.hpp"
+#include "base/task_pair.hpp"
 #include "optimize/block_bundle.hpp"
 #include "optimize/bundle_minimiser.hpp"
 #include "optimize/gates.hpp"
@@ -41,7 +42,6 @@ struct Workspace {
   std::vector<double> steps, solution, factor_scratch;
   std::vector<Pose> poses, moved_poses;
   std::array<Sums, BlockBundle::kTasks> sums;
-  std::unique_ptr<WorkerThread> helper;
 };
 
 Workspace& workspace() {
@@ -61,14 +61,11 @@ class BlockMinimiser final : public BundleMinimiser {
  public:
   BlockMinimiser(BundleProblem& problem, const BundleOptions& options,
                  const std::vector<std::uint8_t>& usable, const Kernels& kernels)
-      : problem_(problem),
-        robust_(options.robust),
-        threads_(options.n_threads),
-        kernels_(kernels),
-        w_(workspace()) {
+      : problem_(problem), robust_(options.robust), kernels_(kernels), w_(workspace()) {
     w_.bundle.build(problem, usable);
     copy_estimate();
     make_room();
+    if (options.n_threads > 1) pair_.emplace();
   }
 
   void keep_inliers(const std::vector<std::uint8_t>& outlier) override {
@@ -179,11 +176,8 @@ class BlockMinimiser final : public BundleMinimiser {
   template <class Work>
   void for_each_task(const Work& work) {
     static_assert(BlockBundle::kTasks == 2);
-    if (threads_ > 1) {
-      if (w_.helper == nullptr) w_.helper = std::make_unique<WorkerThread>();
-      w_.helper->start([&work] { work(1); });
-      work(0);
-      w_.helper->finish();
+    if (pair_) {
+      pair_->run([&work](int number) noexcept { work(static_cast<std::size_t>(number)); });
     } else {
       work(0);
       work(1);
@@ -304,12 +298,12 @@ class BlockMinimiser final : public BundleMinimiser {
 
   BundleProblem& problem_;
   bool robust_;
-  int threads_;
   const Kernels& kernels_;
   Workspace& w_;
   bool scaled_ = false;
   double damping_ = 0, cost_ = 0, moved_cost_ = 0;
   double predicted_ = -1;  // of the last step; negative: none was found
+  std::optional<TaskPair> pair_;
 };
 
 }  // namespace

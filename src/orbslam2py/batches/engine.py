@@ -6,7 +6,6 @@ from __future__ import annotations
 import contextlib
 import importlib
 import itertools
-import os
 import queue
 import secrets
 import signal
@@ -17,6 +16,7 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
+from orbslam2py._cores import n_cores
 from orbslam2py._version import __version__
 from orbslam2py.batches.cache import Cache
 from orbslam2py.batches.jobs import Job
@@ -88,7 +88,7 @@ def open_workers(workers: Workers, most: int | None = None) -> Iterator[Any]:
             _require_version(client, workers.scheduler)
             yield client
         return
-    count = workers.count or _cores()
+    count = workers.count or n_cores()
     if workers.count is not None and most is not None:
         count = min(count, most)
     dask = importlib.import_module("dask")
@@ -359,9 +359,3 @@ def _version_here() -> str:
 def _leave_interrupts_to_the_batch() -> None:
     """Ctrl-C goes to all processes of a terminal; what it means is for the batch to say."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def _cores() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
-import os
 import platform
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
+
+from orbslam2py._cores import n_cores
 
 
 def describe_machine() -> dict[str, Any]:
@@ -24,7 +25,7 @@ def describe_machine() -> dict[str, Any]:
     return {
         "system": f"{platform.system()} {platform.release()} ({platform.machine()})",
         "processor": _processor(),
-        "cores": _cores(),
+        "cores": n_cores(),
         "memory_gb": _memory_gb(),
         "python": platform.python_version(),
         "numpy": np.__version__,
@@ -38,12 +39,6 @@ def _processor() -> str:
         if name.strip() == "model name":
             return value.strip()
     return platform.processor() or platform.machine()
-
-
-def _cores() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _memory_gb() -> float | None:

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 from orbslam2py import _core as core
+from orbslam2py._cores import n_threads
 from orbslam2py._worker import Worker
 from orbslam2py.errors import MapFileError, WorkerError
 from orbslam2py.maps.map_keeper import MapKeeper
@@ -52,7 +53,15 @@ class BackEnd:
         self.map = core.Map()
         self.keyframe_index = core.KeyFrameIndex()
         self.events = EventDispatcher(callbacks, threaded=threaded)
-        self.mapping = LocalMapping(self.map, sensor, self.keyframe_index, threaded=threaded)
+        # The other core works on images while mapping goes on, unless these wait for it.
+        images_wait = not threaded or (options.wait_for_mapping and not sensor.has_depth)
+        self.mapping = LocalMapping(
+            self.map,
+            sensor,
+            self.keyframe_index,
+            threaded=threaded,
+            adjustment_threads=n_threads(2) if images_wait else 1,
+        )
         self.adjustment = FullBundleAdjustment(
             self.map,
             self.mapping.worker,

@@ -30,6 +30,8 @@ class LocalMapping:
         Forgets the keyframes that are culled.
     threaded : bool
         In a thread of its own, or inline at `start`.
+    adjustment_threads : int
+        Of local bundle adjustment, 1 or 2; the result is the same.
     thresholds : MappingThresholds, optional
         Limits.
     """
@@ -41,6 +43,7 @@ class LocalMapping:
         keyframe_index: core.KeyFrameIndex,
         *,
         threaded: bool,
+        adjustment_threads: int = 1,
         thresholds: MappingThresholds | None = None,
     ) -> None:
         limits = thresholds or MappingThresholds()
@@ -58,6 +61,7 @@ class LocalMapping:
         self._min_observations = (
             limits.observations_monocular if self._monocular else limits.observations
         )
+        self._adjustment_threads = adjustment_threads
         self._adjusted_keyframes = limits.adjusted_keyframes
         #: Milliseconds per part of the work, over all keyframes.
         self.statistics = StageStatistics()
@@ -110,7 +114,11 @@ class LocalMapping:
         if n_keyframes > self._adjusted_keyframes:
             with timer("mapping.local_bundle_adjustment"):
                 core.local_bundle_adjustment(
-                    self._map, keyframe, self.worker.interrupt_flag, self._monocular
+                    self._map,
+                    keyframe,
+                    self.worker.interrupt_flag,
+                    self._monocular,
+                    self._adjustment_threads,
                 )
         with timer("mapping.cull_keyframes"):
             culled = core.cull_keyframes(self._map, keyframe, only_close=not self._monocular)

@@ -91,6 +91,7 @@ class Pipeline:
     def __init__(self, setup: Setup, options: SystemOptions, callbacks: Callbacks) -> None:
         sensor = setup.sensor
         self._sensor = sensor
+        self._vocabulary = setup.vocabulary
         self._waits_for_mapping = options.wait_for_mapping and not options.deterministic
         self._keeps_images = options.keyframe_images
         self.front_end = FrontEnd(
@@ -158,7 +159,7 @@ class Pipeline:
             frame = core.TrackedFrame(build(self._next_frame_id, timer))
         if self._waits_for_mapping:
             with timer("wait"):
-                self._wait_for_mapping()
+                self._wait_for_mapping(frame)
         self._look_again_at_start()
         state_before = tracking.state
         watchers = self.frame_watchers
@@ -201,13 +202,16 @@ class Pipeline:
                 f"time stamps must grow: {timestamp!r} came after {self._last_timestamp!r}"
             )
 
-    def _wait_for_mapping(self) -> None:
+    def _wait_for_mapping(self, frame: core.TrackedFrame) -> None:
         worker = self.back_end.mapping.worker
         if worker.held or (self._sensor.has_depth and not self.tracking.every_frame_in_turn):
             # A frame that is worth a keyframe waits when that is known.
             worker.wait_until_waiting(at_most=1)
             return
         worker.wait_until_waiting(at_most=0)
+        if not worker.idle:
+            # There is time, and a keyframe needs its words.
+            core.describe(frame.features, self._vocabulary)
         # Which frames become keyframes must not depend on the clock; and a single camera gets new
         # points from mapping alone: on fast motion the map would end before the mapper is done.
         worker.wait_until_idle(unless_held=True)

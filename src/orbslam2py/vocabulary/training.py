@@ -15,6 +15,7 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py._arguments import path_of, shown
 from orbslam2py._arrays import ByteArray
+from orbslam2py._cores import n_cores
 from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.errors import ImageError, VocabularyError
 
@@ -118,7 +119,7 @@ def _describe_images(
         return descriptors
 
     results: list[ByteArray] = []
-    pool = ThreadPoolExecutor(options.n_threads or os.cpu_count() or 1)
+    pool = ThreadPoolExecutor(options.n_threads or n_cores())
     try:
         for descriptors in pool.map(describe, paths):
             results.append(descriptors)

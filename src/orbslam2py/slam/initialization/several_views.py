@@ -8,13 +8,17 @@ give any of them, and one third view agrees with many. All views together tell t
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import functools
+import itertools
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
+from orbslam2py._cores import n_threads
 from orbslam2py.slam.front_end import intrinsics
 from orbslam2py.slam.initialization.kept_views import View
 from orbslam2py.slam.initialization.third_view import (
@@ -117,8 +121,12 @@ class SeveralViews:
         seed
             Of the further draws that give others to compare with.
         """
-        found = [self._refined(other) for other in self._hypotheses(motion, seed)]
-        costs = [self._cost(placed) for placed in found]
+        draws = range(self._limits.further_draws + 1)
+        # Nothing else is mapped yet, so the other cores are free. The order is that of the draws.
+        with ThreadPoolExecutor(n_threads(len(draws))) as pool:
+            judge = functools.partial(self._judged, motion, seed)
+            judged = list(itertools.chain.from_iterable(pool.map(judge, draws)))
+        found, costs = [placed for placed, _ in judged], [cost for _, cost in judged]
         best = int(np.argmin(costs))
         chosen = found[best].motion
         enough = self._limits.clearly_worse_direction * costs[best]
@@ -131,19 +139,24 @@ class SeveralViews:
             return None
         return chosen
 
-    def _hypotheses(self, motion: Motion, seed: int) -> Iterator[Motion]:
-        yield motion
+    def _judged(self, motion: Motion, seed: int, draw: int) -> list[tuple[_Placed, float]]:
+        """What comes of each motion of a draw, with its cost; draw 0 is the motion given."""
+        found = [self._refined(other) for other in self._drawn(motion, seed, draw)]
+        return [(placed, self._cost(placed)) for placed in found]
+
+    def _drawn(self, motion: Motion, seed: int, draw: int) -> Sequence[Motion]:
+        if draw == 0:
+            return [motion]
         view = self._view
-        for draw in range(1, self._limits.further_draws + 1):
-            result = core.reconstruct_two_views(
-                view.keypoints,
-                self._last.keypoints,
-                view.matches,
-                self._camera,
-                seed=seed + draw,
-                two_threads=False,
-            )
-            yield from [result] if result.success else result.alternatives
+        result = core.reconstruct_two_views(
+            view.keypoints,
+            self._last.keypoints,
+            view.matches,
+            self._camera,
+            seed=seed + draw,
+            two_threads=False,  # the draws are what is done side by side
+        )
+        return [result] if result.success else result.alternatives
 
     # ---- adjustment ------------------------------------------------------------------------------
     def _refined(self, motion: Motion) -> _Placed:
