@@ -41,7 +41,7 @@ Eigen::Matrix3d fit_homography(const PointPairs& pairs, const EightPairs& sample
   // The normal matrix costs a third of the SVD of A; in float64 it keeps more digits than the
   // pixels have.
   const Eigen::Matrix<double, 9, 9> normal = A.transpose() * A;
-  const Eigen::Matrix<double, 9, 1> h = symmetric_eigen(normal).vectors.col(0);
+  const Eigen::Matrix<double, 9, 1> h = least_eigenvector<9>(normal);
   const Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> H_normalized(h.data());
   return normalization_2.inverse() * H_normalized * normalization_1.matrix();
 }

@@ -31,7 +31,7 @@ struct CameraPair {
     A.row(2) = (u_2 - pinhole.cx) * P.row(2) - fx * P.row(0);
     A.row(3) = (v_2 - pinhole.cy) * P.row(2) - fy * P.row(1);
     const Eigen::Matrix4d normal = A.transpose() * A;
-    const Eigen::Vector4d point = symmetric_eigenvectors_4(normal).col(0);
+    const Eigen::Vector4d point = least_eigenvector<4>(normal);
     return point.head<3>() / point.w();
   }
 

@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <cmath>
 #include <random>
+#include <utility>
 
 namespace orbslam {
 namespace {
@@ -38,6 +40,49 @@ TEST(SmallSolvers, FourByFourAgreesWithTheGeneralOne) {
   for (int k = 0; k < 4; ++k) {
     EXPECT_NEAR(std::abs(vectors.col(k).dot(general.col(k))), 1, 1e-12) << k;
   }
+}
+
+/// A symmetric matrix with these eigenvalues, and the eigenvector of the first.
+template <int N>
+std::pair<Eigen::Matrix<double, N, N>, Eigen::Matrix<double, N, 1>> with_eigenvalues(
+    const Eigen::Matrix<double, N, 1>& values, unsigned seed) {
+  const SmallMatrix half = drawn(N, N, seed);
+  const SmallMatrix vectors = symmetric_eigen(half + half.transpose()).vectors;
+  return {vectors * values.asDiagonal() * vectors.transpose(), vectors.col(0)};
+}
+
+TEST(SmallSolvers, LeastEigenvectorWhateverTheOthersAre) {
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    for (const double least : {0.0, 1e-9, 1e-3, 0.1, 0.9}) {
+      const auto [four, of_four] = with_eigenvalues<4>({least, 1, 3e2, 5e5}, seed);
+      EXPECT_NEAR(std::abs(least_eigenvector<4>(four).dot(of_four)), 1, 1e-11) << least;
+      Eigen::Matrix<double, 9, 1> values;
+      values << least, 1, 1.5, 2, 4, 30, 60, 1e3, 1e4;
+      const auto [nine, of_nine] = with_eigenvalues<9>(values, seed);
+      EXPECT_NEAR(std::abs(least_eigenvector<9>(nine).dot(of_nine)), 1, 1e-11) << least;
+    }
+  }
+}
+
+TEST(SmallSolvers, LeastEigenvectorSolvesItsEquation) {
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    const Eigen::Matrix4d half = drawn(4, 4, seed);
+    const Eigen::Matrix4d matrix = half.transpose() * half;
+    const Eigen::Vector4d vector = least_eigenvector<4>(matrix);
+    const double value = symmetric_eigen(matrix).values[0];
+    EXPECT_NEAR(vector.norm(), 1, 1e-12);
+    EXPECT_LT((matrix * vector - value * vector).norm(), 1e-11);
+  }
+}
+
+TEST(SmallSolvers, LeastEigenvectorOfMatricesOutOfOrder) {
+  // Two directions are lost, or all: one of them.
+  const Eigen::Vector4d values(0, 0, 1, 2);
+  EXPECT_LT((values.asDiagonal() * least_eigenvector<4>(values.asDiagonal())).norm(), 1e-12);
+  EXPECT_NEAR(least_eigenvector<4>(Eigen::Matrix4d::Zero()).norm(), 1, 1e-12);
+  // Negative eigenvalues: the least of all, as the eigenvalue solver gives it.
+  const Eigen::Vector4d negative(3, -2, 1, -1);
+  EXPECT_NEAR(std::abs(least_eigenvector<4>(negative.asDiagonal())[1]), 1, 1e-12);
 }
 
 TEST(SmallSolvers, SingularValuesInDescendingOrder) {
