@@ -24,6 +24,7 @@ namespace {
 
 constexpr int kGap = 10;  // keyframes after a loop that are not searched
 constexpr int kSureMatches = 80;
+constexpr int kAdjustmentThreads = 2;
 
 /// Protects a keyframe while it is looked at; false when it is dead already.
 class Lease {
@@ -91,7 +92,8 @@ void LocalMapping::process(KeyFrameId keyframe) {
   recent_.insert(recent_.end(), created.begin(), created.end());
   if (worker.n_waiting() == 0) fuse_with_neighbours(map_, keyframe, 10);
   if (worker.lower_interrupt()) {
-    local_bundle_adjustment(map_, keyframe, &worker.interrupt_flag.value());
+    local_bundle_adjustment(map_, keyframe, &worker.interrupt_flag.value(), false,
+                            kAdjustmentThreads);
     for (const KeyFrameId dead : cull_keyframes(map_, keyframe, true)) index_.erase(dead);
   }
   on_done(keyframe);
