@@ -69,9 +69,9 @@ TEST(TaskPair, EndsAwakeOrAsleep) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
   TaskPair pair;
-  int n_done = 0;
-  pair.run([&](int number) noexcept { n_done += number == 0 ? 1 : 0; });
-  EXPECT_EQ(n_done, 1);
+  std::atomic<int> n_done{0};
+  pair.run([&](int) noexcept { ++n_done; });
+  EXPECT_EQ(n_done, 2);
 }
 
 }  // namespace
