@@ -95,6 +95,7 @@ class Worker(Generic[Job]):
         self._finish_requested = False
         self._error: BaseException | None = None
         self._thread: threading.Thread | None = None
+        self._inline_in: int | None = None  # the thread that a step runs in for its caller
         #: Raised when the running step should end early; lowered when a step begins.
         self.interrupt_flag = core.StopFlag()
         #: Raised when nobody wants the running step's result any more (reset, finish).
@@ -197,6 +198,7 @@ class Worker(Generic[Job]):
         return True
 
     def _run_inline(self) -> None:
+        outer, self._inline_in = self._inline_in, threading.get_ident()
         try:
             while self._queue:
                 with self._condition:
@@ -206,6 +208,7 @@ class Worker(Generic[Job]):
             self._error = error
             self.raise_if_failed()
         finally:
+            self._inline_in = outer
             self._queue.clear()  # after an error or Ctrl-C
             self.waiting_flag.clear()
             self._busy = False
@@ -360,10 +363,21 @@ class Worker(Generic[Job]):
             ) from error
 
     def wait_until(self, condition: Callable[[], bool], timeout: float | None = None) -> bool:
-        """Wait for a condition on the worker's state; False on time-out."""
+        """Wait for a condition on the worker's state; False on time-out.
+
+        Raises
+        ------
+        StateError
+            If a step that runs in this very thread would have to end first.
+        """
         deadline = None if timeout is None else time.monotonic() + timeout
         with self._condition:
             while not condition():
+                if self._inline_in == threading.get_ident():
+                    raise StateError(
+                        f"{self.name} is at work in this very call, whose end cannot be waited "
+                        "for within a callback; wait when the image has been tracked"
+                    )
                 left = WAIT_SLICE if deadline is None else deadline - time.monotonic()
                 if left <= 0:
                     return False

@@ -34,6 +34,7 @@ MEASURED = (
 _LEFT_OUT = (
     *("sequence", "settings", "options", "command", "command_folder", "machine", "sensor", "seed"),
     *("version", "deterministic", "realtime", "loaded_map", "saved_map", "final_adjustment"),
+    "error",  # it is the reason of the row
 )
 
 
@@ -48,7 +49,8 @@ def run_job(
 ) -> dict[str, Any] | None:
     """Make a run, leave its files in a folder of its own, and return its row of the table.
 
-    Never raises for what is wrong with the run: the row says it.
+    Never raises for what is wrong with the run: the row says it. A Ctrl-C, for which the run itself
+    ends early, goes on to the caller, and the run counts as not made.
 
     Parameters
     ----------
@@ -116,6 +118,8 @@ def _run(job: Job, path: Path, folder: Path, row: dict[str, Any], *, page: bool)
     done = run_sequence(
         sequence, options, output=folder, force=True, report_page=page, stop=threading.Event()
     )
+    if done.result.interrupted:
+        raise KeyboardInterrupt  # it is half a run, which is made anew when the batch goes on
     row |= _figures(done.report)
     row["state"] = "done"
     if done.result.error is not None:

@@ -159,7 +159,9 @@ class Callbacks:
 
     They run one after the other in a thread of their own (in deterministic mode: in the thread of
     the track call), so that a slow one delays neither tracking nor mapping, and hold no lock of the
-    system; they may call the system's methods. An exception is logged and goes no further.
+    system; they may call the system's methods. In deterministic mode the image is not done before
+    they are, so that what would wait for its end (`System.wait_until_idle`, `System.run`) raises
+    `StateError`. An exception is logged and goes no further.
 
     Raises
     ------

@@ -54,6 +54,9 @@ from orbslam2py.slam.watched_frame import FrameWatcher, WatchedFrame, frame_feat
 
 _log = logging.getLogger(__name__)
 
+#: The year 5138 in seconds since 1970; today in milliseconds, or in what is finer, lies far beyond.
+_NO_SECONDS = 1e11
+
 #: Makes a frame of images: takes its id and a timer.
 BuildFrame = Callable[[int, StageTimer], core.Frame]
 
@@ -193,9 +196,14 @@ class Pipeline:
         self.localization.apply()
 
     def _check_timestamp(self, timestamp: float) -> None:
-        if not (is_number(timestamp) and math.isfinite(timestamp)):
+        if not (is_number(timestamp) and -math.inf < timestamp < math.inf):
             raise ImageError(
                 f"the time stamp must be a finite number of seconds, got {shown(timestamp)}"
+            )
+        if abs(timestamp) >= _NO_SECONDS:
+            raise ImageError(
+                f"the time stamp {shown(timestamp)} is too large for seconds; give "
+                "seconds: divide nanoseconds by 1e9"
             )
         if timestamp <= self._last_timestamp:
             raise ImageError(

@@ -13,12 +13,13 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
-from orbslam2py._arguments import is_whole, patience_of, shown
+from orbslam2py._arguments import finite_number, is_whole, path_of, patience_of, shown
 from orbslam2py._call_guard import CallGuard
 from orbslam2py.errors import MapFileError, StateError, WorkerError
 from orbslam2py.maps.contents import MapContents
 from orbslam2py.maps.map_copies import take_contents
 from orbslam2py.maps.map_file import MapFile
+from orbslam2py.maps.map_writer import check_map_target
 from orbslam2py.maps.saved_map import SavedMap
 from orbslam2py.maps.snapshot import (
     MapSnapshot,
@@ -419,6 +420,11 @@ class System:
         bool
             False when `timeout` seconds passed first, or keyframes wait for the end of localization
             mode.
+
+        Raises
+        ------
+        StateError
+            In a callback of the deterministic mode, which the image waits for.
         """
         localization = self.pipeline.localization
         return self.pipeline.back_end.wait_until_idle(
@@ -506,8 +512,20 @@ class System:
             The file; replaced by the first save, which follows after `every` seconds.
         every : float
             Seconds from one save to the next.
+
+        Raises
+        ------
+        MapFileError
+            If no map can be written there.
+        StateError
+            If `every` is not above 0, or the system has been shut down.
         """
-        self.pipeline.keeper.autosave(path, every)
+        if self._shut_down:
+            raise StateError("the system has been shut down; save its map with save_map")
+        target = path_of(path, "path", MapFileError)
+        seconds = finite_number(every, "every", "seconds, more than 0", StateError)
+        check_map_target(target)
+        self.pipeline.keeper.autosave(target, seconds)
 
     def saved_map(self) -> SavedMap:
         """Everything that `save_map` would write at this moment."""

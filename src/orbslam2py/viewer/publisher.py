@@ -23,8 +23,10 @@ import cv2
 import numpy as np
 
 from orbslam2py import _core as core
+from orbslam2py._arguments import finite_number, shown
 from orbslam2py._arrays import ByteArray
 from orbslam2py._files import describe_error
+from orbslam2py.errors import StateError
 from orbslam2py.maps.changes import MapChanges, MapFollower
 from orbslam2py.slam.events import Event
 from orbslam2py.slam.system import System
@@ -45,6 +47,7 @@ _RESTING_PERIOD = 1.0
 _SWITCH_INTERVAL = 5e-4
 #: Images over which the rate is measured.
 _RATE_IMAGES = 30
+_RATES = "how many there may be in a second, more than 0"
 
 
 class Publisher:
@@ -67,6 +70,11 @@ class Publisher:
     every_frame : bool
         Pass over no frame, and look at the map with each: the track call waits until there is room
         for one. For a video of a recorded sequence.
+
+    Raises
+    ------
+    StateError
+        If `system` is none, a watcher lacks something that `Watcher` has, or a rate is not above 0.
     """
 
     def __init__(
@@ -78,10 +86,22 @@ class Publisher:
         map_rate: float = 5.0,
         every_frame: bool = False,
     ) -> None:
+        if not isinstance(system, System):
+            raise StateError(f"a publisher watches a System, not {shown(system)}")
+        for what, rate in (("frame_rate", frame_rate), ("map_rate", map_rate)):
+            if finite_number(rate, what, _RATES, StateError) <= 0:
+                raise StateError(f"{what} is {rate}; give {_RATES}")
+        watchers = list(watchers)
+        for watcher in watchers:
+            if not isinstance(watcher, Watcher):
+                raise StateError(
+                    f"{shown(watcher)} is no watcher; it needs a name, on_frame, on_map, on_event "
+                    "and close"
+                )
         # The parts and not the system: one that is dropped is to end, whoever watches.
         self._pipeline = system.pipeline
         self._rgb = system.settings.camera.rgb
-        self._watchers = list(watchers)
+        self._watchers = watchers
         self._frame_period = 0.0 if every_frame else 1.0 / frame_rate
         self._map_period = 1.0 / map_rate
         self._every_frame = every_frame
@@ -206,6 +226,9 @@ class Publisher:
             self._publish()
         finally:
             sys.setswitchinterval(before)
+            with self._condition:
+                self._watchers = []  # nobody waits for room that a thread which is gone would make
+                self._condition.notify_all()
 
     def _publish(self) -> None:
         closing = False
@@ -227,7 +250,6 @@ class Publisher:
         if self._every_frame:
             self._look_at_map(now=True)
         self._tell(methodcaller("close"))
-        self._watchers = []
 
     def _has_news(self) -> bool:
         view_wanted = bool(self._views) and time.perf_counter() >= self._next_view_at

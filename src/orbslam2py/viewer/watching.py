@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -60,6 +60,7 @@ class FrameView:
         return matched
 
 
+@runtime_checkable
 class Watcher(Protocol):
     """Somebody who looks on: a viewer, a recording, a video.
 

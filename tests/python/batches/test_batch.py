@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import signal
 import sqlite3
 import threading
 from dataclasses import dataclass
@@ -18,7 +19,9 @@ from matplotlib.axes import Axes
 
 import orbslam2py as orb
 from orbslam2py import batches
+from orbslam2py.batches import work
 from orbslam2py.batches.sweep_picture import write_sweep_picture
+from orbslam2py.runs import FrameRow
 from support.batches import jobs_of, make_sequences, reproducible, table
 
 
@@ -110,6 +113,36 @@ def test_resume(sequences: Path, whole: Whole, tmp_path: Path) -> None:
     for row in resumed.rows:
         name = f"runs/{row['run']}/trajectory.txt"
         assert (folder / name).read_bytes() == (whole.folder / name).read_bytes()
+
+
+def test_a_run_ended_by_ctrl_c_is_not_made(
+    sequences: Path, whole: Whole, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In this process the run hears it first, and keeps what it has; half a run is none."""
+    real, document = work.run_sequence, jobs_of(sequences)
+
+    def interrupted(*arguments: Any, **options: Any) -> Any:
+        def press(row: FrameRow, _: orb.System) -> None:
+            if row.index == 1:
+                signal.raise_signal(signal.SIGINT)
+
+        return real(*arguments, **options, progress=press)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(work, "run_sequence", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            orb.batch(document, tmp_path / "out", workers=0)
+    ran: list[str] = []
+    again = orb.batch(
+        document,
+        tmp_path / "out",
+        workers=0,
+        resume=True,
+        progress=lambda row, n, total: ran.append(row["run"]),
+    )
+    assert len(ran) == len(again.rows) == 4
+    assert again.n_failed == 0
+    assert reproducible(tmp_path / "out") == reproducible(whole.folder)
 
 
 def test_a_changed_job_is_run_again(sequences: Path, tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from orbslam2py import (
     MapChanged,
     Relocalized,
     Sensor,
+    StateError,
     System,
     TrackingLost,
     TrackingState,
@@ -46,6 +47,26 @@ class Listener:
 
     def of(self, kind: type) -> list[Any]:
         return [event for event in self.events if type(event) is kind]
+
+
+@pytest.mark.watchdog(20)
+def test_waiting_in_a_callback_of_the_deterministic_mode_is_refused() -> None:
+    """The image waits for the callback, which cannot wait for the image."""
+    refused: list[str] = []
+
+    def waits(_: object) -> None:
+        for wait in (system.wait_until_idle, lambda: system.run([])):
+            with pytest.raises(StateError) as raised:
+                wait()
+            refused.append(str(raised.value))
+
+    with new_system(
+        Sensor.RGBD, callbacks=Callbacks(on_keyframe=waits), deterministic=True
+    ) as system:
+        track(system, 0)
+        assert system.wait_until_idle(5)
+    assert len(refused) == 2
+    assert all("within a callback" in text for text in refused)
 
 
 @pytest.mark.parametrize("deterministic", [False, True])

@@ -268,15 +268,34 @@ def test_a_new_map_is_autosaved_beside_the_old_one(tmp_path: Path) -> None:
 
 def test_autosave_needs_seconds(tmp_path: Path) -> None:
     with small_sequences.new_system(Sensor.RGBD) as slam:
-        for every in (0.0, -1.0, float("nan")):
-            with pytest.raises(StateError, match="positive number of seconds"):
-                slam.autosave(tmp_path / "map.orbmap", every)
+        for every in (0.0, -1.0, float("nan"), "a"):
+            with pytest.raises(StateError, match=r"seconds"):
+                slam.autosave(tmp_path / "map.orbmap", every)  # type: ignore[arg-type]
+
+
+def test_where_no_map_can_be_written_no_autosave_begins(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.txt"
+    mine.write_text("not a map")
+    n_threads = threading.active_count()
+    with small_sequences.new_system(Sensor.RGBD, deterministic=True) as slam:
+        for path in (tmp_path / "none" / "map.orbmap", tmp_path, mine, None, b"map", ""):
+            with pytest.raises(MapFileError):
+                slam.autosave(path, every=1000)  # type: ignore[arg-type]
+        small_sequences.play(slam, 5)
+    with pytest.raises(StateError, match="shut down"):
+        slam.autosave(tmp_path / "map.orbmap")
+    assert threading.active_count() == n_threads
+    assert [file.name for file in tmp_path.iterdir()] == ["mine.txt"]
+    assert mine.read_text() == "not a map"
 
 
 def test_a_last_autosave_that_fails_is_told(tmp_path: Path) -> None:
     slam = small_sequences.new_system(Sensor.RGBD, deterministic=True)
-    slam.autosave(tmp_path / "none" / "map.orbmap", every=1000)
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    slam.autosave(folder / "map.orbmap", every=1000)
     small_sequences.play(slam, 5)
+    folder.rmdir()
     with pytest.raises(MapFileError, match="make the folder"):
         slam.shutdown()
 

@@ -21,6 +21,9 @@ def test_bad_time_stamps(sensor: Sensor) -> None:
         for bad in (1.0, 0.5, float("nan"), float("inf"), -float("inf")):
             with pytest.raises(ImageError, match="time stamp"):
                 track(system, 1, timestamp=bad)
+        for nanoseconds in (1_700_000_000_000_000_000, np.int64(1.7e18), 1.7e18, 10**400):
+            with pytest.raises(ImageError, match=r"too large for seconds.*divide .* by 1e9"):
+                track(system, 1, timestamp=nanoseconds)
         assert track(system, 1, timestamp=1.05).frame_id == 1, "refused images are not counted"
         system.reset()
         assert track(system, 2, timestamp=1.0).frame_id == 0, "a new map begins its own time"

@@ -82,3 +82,40 @@ def test_inline_failure() -> None:
         worker.submit(2)
     with pytest.raises(WorkerError):
         worker.finish()
+
+
+@pytest.mark.parametrize("timeout", [None, 5.0])
+def test_a_step_cannot_wait_for_its_own_end(timeout: float | None) -> None:
+    """It would wait for ever: no other thread is at work."""
+    heard: list[str] = []
+
+    def step(_: int) -> None:
+        with pytest.raises(StateError, match="cannot be waited for within a callback") as raised:
+            worker.wait_until_idle(timeout)
+        heard.append(str(raised.value))
+
+    worker: Worker[int] = Worker(NAME, step, threaded=False)
+    worker.submit(0)
+    assert len(heard) == 1
+    assert NAME in heard[0]
+    assert worker.wait_until_idle(timeout)
+
+
+def test_another_thread_may_wait_for_the_end_of_an_inline_step() -> None:
+    results: list[bool] = []
+    entered, leave = threading.Event(), threading.Event()
+
+    def step(_: int) -> None:
+        entered.set()
+        leave.wait(5)
+
+    worker: Worker[int] = Worker(NAME, step, threaded=False)
+    caller = threading.Thread(target=worker.submit, args=(0,))
+    caller.start()
+    assert entered.wait(5)
+    waiter = threading.Thread(target=lambda: results.append(worker.wait_until_idle(5)))
+    waiter.start()
+    leave.set()
+    caller.join(5)
+    waiter.join(5)
+    assert results == [True]

@@ -5,11 +5,12 @@ from __future__ import annotations
 
 import logging
 import threading
+from typing import Any
 
 import numpy as np
 import pytest
 
-from orbslam2py import MapChanged, Sensor, System, TrackingLost, TrackingState
+from orbslam2py import MapChanged, Sensor, StateError, System, TrackingLost, TrackingState
 from orbslam2py.datasets import Images
 from orbslam2py.viewer import FrameView, Publisher
 from support.small_sequences import SIZE, black, images, new_system, play, track
@@ -211,3 +212,43 @@ def test_nobody_is_told_after_the_end() -> None:
         assert system.pipeline.back_end.events.watchers == ()
     assert len(notebook.views) == 2
     assert notebook.n_closed == 1
+
+
+# ---- what is none --------------------------------------------------------------------------------
+class Nameless:
+    """Watches, but does not say what it is called."""
+
+    def on_frame(self, view: FrameView) -> None: ...
+    def on_map(self, changes: object) -> None: ...
+    def on_event(self, event: object) -> None: ...
+    def close(self) -> None: ...
+
+
+@pytest.mark.parametrize("watcher", [Nameless(), 3, None])
+def test_what_is_no_watcher_is_refused_at_once(watcher: Any) -> None:
+    with new_system(Sensor.RGBD, deterministic=True) as system:
+        with pytest.raises(StateError, match="is no watcher; it needs a name"):
+            Publisher(system, [watcher])
+        assert system.pipeline.frame_watchers == ()
+
+
+@pytest.mark.parametrize("rates", [{"frame_rate": 0}, {"map_rate": -1.0}, {"frame_rate": "a"}])
+def test_rates_are_above_0(rates: dict[str, Any]) -> None:
+    with (
+        new_system(Sensor.RGBD, deterministic=True) as system,
+        pytest.raises(StateError, match="more than 0"),
+    ):
+        Publisher(system, [], **rates)
+    with pytest.raises(StateError, match="watches a System"):
+        Publisher(None, [])  # type: ignore[arg-type]
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_nobody_waits_for_a_publisher_whose_thread_is_gone() -> None:
+    class Ends(Notebook):
+        def on_frame(self, view: FrameView) -> None:
+            raise KeyboardInterrupt
+
+    with new_system(Sensor.RGBD, deterministic=True) as system:
+        watched(system, Ends(), 12, every_frame=True)
+        assert system.n_keyframes > 0
