@@ -17,16 +17,20 @@ from typing import Any
 
 import yaml
 
-from orbslam2py._arguments import cannot_open, is_whole, seed_of, shown
+from orbslam2py._arguments import cannot_open, is_whole, path_of, seed_of, shown
 from orbslam2py.batches.remote import is_remote, name_of, require_protocols
 from orbslam2py.batches.sweep import Sweep, read_sweep
 from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.runs.options import RunOptions
-from orbslam2py.settings import Sensor
+from orbslam2py.settings import BUILTIN_NAMES, Sensor, Settings
+from orbslam2py.settings.builtin import is_builtin_name
+from orbslam2py.settings.settings import looks_like_path
 from orbslam2py.slam.options import SystemOptions
 
 _KEYS = ("sequences", "sensors", "settings", "options", "seeds", "sweep", "output")
 _SEQUENCE_KEYS = ("path", "name", "sensor", "settings", "topics")
+#: A table of so many rows says nothing to anybody, and each job takes memory.
+_MOST_RUNS = 100_000
 #: Options of a run that a batch may have.
 RUN_OPTIONS = ("start", "stride", "max_frames", "realtime", "final_adjustment")
 SYSTEM_OPTIONS = (
@@ -182,11 +186,12 @@ def make_jobs(document: Mapping[str, Any], folder: Path | None = None) -> list[J
                 one["path"],
                 one["name"],
                 None if sensor is None else str(Sensor(sensor)),
-                None if setting is None else _settings_name(str(setting), folder),
+                None if setting is None else _settings_name(setting, folder),
                 one.get("topics"),
                 option,
                 parameters,
             )
+            _require_few(len(jobs) + len(seeds))
             jobs += [dataclasses.replace(job, seed=seed) for seed in seeds]
     for job in jobs:
         job.run_options(Sensor.MONOCULAR)  # says now what would fail in every run
@@ -232,6 +237,9 @@ def _options(values: Any) -> Iterator[tuple[tuple[str, Any], ...]]:
         )
     _refuse_unknown(values, (*RUN_OPTIONS, *SYSTEM_OPTIONS), "option")
     names = sorted(values)
+    for name in names:
+        if _listed(values[name], keep=True) == []:
+            raise SettingsError(f"option {name} has no value; give one, or leave it out")
     for combination in itertools.product(*(_listed(values[name], keep=True) for name in names)):
         yield tuple(zip(names, combination, strict=True))
 
@@ -254,6 +262,7 @@ def _seeds(value: Any) -> list[int]:
     if is_whole(value):
         if value < 1:
             raise SettingsError(f"seeds is {value}; give how many runs, or a list of seeds")
+        _require_few(value)
         return list(range(value))
     seeds = [seed_of(one, "a seed") for one in _listed(value)]
     if not seeds or len(set(seeds)) < len(seeds):
@@ -261,10 +270,30 @@ def _seeds(value: Any) -> list[int]:
     return seeds
 
 
-def _settings_name(name: str, folder: Path) -> str:
+def _require_few(n_runs: int) -> None:
+    if n_runs > _MOST_RUNS:
+        raise SettingsError(
+            f"that would be {n_runs} runs or more; make batches of at most {_MOST_RUNS}"
+        )
+
+
+def _settings_name(choice: Any, folder: Path) -> str:
     """A file beside the job file, or a built-in name."""
+    if isinstance(choice, Settings):
+        raise SettingsError(
+            "settings are a Settings object, which the table cannot name; save it "
+            "(settings.save('camera.yaml')) and give the path"
+        )
+    name = path_of(choice, "settings", SettingsError)
     path = folder / name
-    return str(path.absolute()) if path.exists() else name
+    if path.exists():
+        return str(path.absolute())
+    if not looks_like_path(name) and not is_builtin_name(str(name)):
+        raise SettingsError(
+            f"settings '{name}' are no file in {folder} and none of the built-in ones "
+            f"({', '.join(BUILTIN_NAMES)}); correct the name"
+        )
+    return str(choice)  # a file that may be where the workers are
 
 
 def _listed(value: Any, *, keep: bool = False) -> list[Any]:

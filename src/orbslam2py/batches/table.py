@@ -79,7 +79,8 @@ def _write_database(path: Path, columns: list[str], rows: list[dict[str, Any]]) 
             database.executemany(f"INSERT INTO results VALUES ({marks})", values)
             database.commit()
         except sqlite3.Error as error:
-            raise OSError(f"cannot write {path}: {error}; make room there") from error
+            remedy = "; make room there" if "full" in str(error) else ""
+            raise OSError(f"cannot write {path}: {error}{remedy}") from error
         finally:
             database.close()
         temporary.replace(path)

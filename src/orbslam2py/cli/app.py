@@ -8,8 +8,9 @@ list of commands may take.
 from __future__ import annotations
 
 import importlib
+import itertools
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -19,10 +20,11 @@ import typer.main
 from rich.console import Console
 
 import orbslam2py
+from orbslam2py.cli.closed_pipe import outlive_the_reader
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.interrupts import hold_while_loading
 from orbslam2py.cli.messages import print_error, tell_repeated
-from orbslam2py.errors import OrbSlamError
+from orbslam2py.errors import OrbSlamError, SettingsError
 
 
 @dataclass(frozen=True)
@@ -139,6 +141,11 @@ class _Group(typer.core.TyperGroup):
             self.commands[name] = typer.core.TyperCommand(name, help=subcommand.summary)
         self._lists = False
 
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read the arguments, none of which is empty."""
+        refuse_empty(args)
+        return list(super().parse_args(ctx, args))
+
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """The subcommand itself, but only its name and summary for a list of them."""
         if self._lists or cmd_name not in SUBCOMMANDS:
@@ -175,6 +182,21 @@ app = typer.Typer(
 )
 
 
+def refuse_empty(arguments: Sequence[str]) -> None:
+    """Raise `SettingsError` for an empty argument, as a shell makes of a variable that is not set.
+
+    As a path it would be the present folder.
+    """
+    for before, argument in itertools.pairwise(["", *arguments]):
+        name, sign, value = argument.partition("=")
+        if argument and not (name.startswith("--") and sign and not value):
+            continue
+        named = name or (before if before.startswith("-") else "an argument")
+        raise SettingsError(
+            f"{named} is empty; give a value, or leave it out (is a variable of the shell not set?)"
+        )
+
+
 def _show_version(value: bool) -> None:
     if value:
         typer.echo(f"orbslam2py {orbslam2py.__version__}")
@@ -193,6 +215,7 @@ def _options(
 
 def run_app() -> None:
     """Run the subcommand; errors a person can act on become one message and an exit code."""
+    outlive_the_reader()
     try:
         app()
     except (OrbSlamError, OSError) as error:

@@ -12,6 +12,7 @@ from rich.markup import escape
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.calibration import (
     Board,
     BoardViews,
@@ -93,7 +94,8 @@ def calibrate(
     orb = None if features is None else OrbSettings(n_features=features)
     settings_for_camera(a_camera, sensor, baseline=baseline, depth_factor=depth_factor, orb=orb)
     model = Board.parse(board, square)
-    check_apart({"--output": output, "--plot": plot}, [source])
+    images = [path for path in source.glob("*") if path.suffix.lower() in IMAGE_SUFFIXES]
+    check_apart({"--output": output, "--plot": plot}, [source, *images])
     for path in (output, plot):
         check_target(path, force=force)
     console = Console(quiet=quiet)
@@ -152,6 +154,7 @@ def import_camera(
     quiet: Quiet = False,
 ) -> None:
     """Turn another program's calibration into a settings file."""
+    check_apart({"--output": output}, [file, *([] if right is None else [right])])
     check_target(output, force=force)
     settings = read_camera_file(
         file,

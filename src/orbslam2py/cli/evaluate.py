@@ -18,7 +18,7 @@ from rich.table import Table
 from orbslam2py._arrays import FloatArray
 from orbslam2py._files import atomic_write
 from orbslam2py.cli.messages import log_to
-from orbslam2py.cli.targets import check_figures
+from orbslam2py.cli.targets import check_apart, check_figures
 from orbslam2py.datasets import Layout, is_recording, open_sequence, recognise
 from orbslam2py.datasets.euroc import find_root
 from orbslam2py.datasets.euroc_calibration import read_sensor_yaml
@@ -109,6 +109,8 @@ def evaluate(
             f"{trajectory} is a folder, no trajectory; the trajectory comes first: orbslam2py "
             "evaluate TRAJECTORY GROUND_TRUTH"
         )
+    read = [path for path in (trajectory, ground_truth, times, extrinsics) if path is not None]
+    check_apart({"--json": json}, read)
     sensor = _sensor_of_run(trajectory)
     both = _read_both(trajectory, ground_truth, file_format, times, extrinsics, sensor)
     if offset and not both.on_clocks:

@@ -7,11 +7,13 @@ import itertools
 import logging
 import threading
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from orbslam2py import _core as core
+from orbslam2py._arguments import shown
 from orbslam2py._arrays import ByteArray
 from orbslam2py.calibration.data_misfit import find_data_misfit, find_pair_misfit
 from orbslam2py.calibration.pair_rows import PairRows, disparities_of, measure_rows
@@ -19,11 +21,11 @@ from orbslam2py.calibration.self_calibration import CalibrationGains, calibratio
 from orbslam2py.calibration.tracks import PointTracker, TrackedPair
 from orbslam2py.calibration.two_views import PointPair, without_gross_errors
 from orbslam2py.datasets.base import Images
-from orbslam2py.errors import OrbSlamError
+from orbslam2py.errors import OrbSlamError, SettingsError
 from orbslam2py.settings.comparison import compare_calibrations
 from orbslam2py.settings.fit import FitThresholds, Misfit, find_misfit
 from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import Settings
+from orbslam2py.settings.settings import Settings, resolve_settings
 from orbslam2py.slam.frame_source import FrameSource, timed_images
 
 _log = logging.getLogger(__name__)
@@ -209,7 +211,7 @@ def settings_beside(source: object) -> Settings | None:
 
 def check_calibration(
     source: FrameSource,
-    settings: Settings | None = None,
+    settings: Settings | str | Path | None = None,
     *,
     thresholds: FitThresholds | None = None,
 ) -> Misfit | None:
@@ -224,8 +226,9 @@ def check_calibration(
     source : sequence, or iterable of frames
         As from `orbslam2py.open_sequence`, or whatever gives frames with a ``timestamp`` and
         ``images``, consecutive ones.
-    settings : Settings, optional
-        The calibration; by default the source's own.
+    settings : Settings, str or Path, optional
+        The calibration: settings, or for a source that tells its sensor a file or a built-in name;
+        by default the source's own.
 
     Returns
     -------
@@ -238,6 +241,8 @@ def check_calibration(
     ------
     StateError
         If the source was opened for another sensor than the settings are for.
+    SettingsError
+        If there are no settings, or they cannot be read.
     DatasetError, ImageError
         If images cannot be read.
 
@@ -247,10 +252,28 @@ def check_calibration(
     >>> print(orb.check_calibration(sequence, orb.Settings.load("tum3", "rgbd")))  # doctest: +SKIP
     """
     images_of: Any = source
-    own: Settings = images_of.settings if settings is None else settings
+    own = _settings_for(images_of, settings)
     watch = CalibrationWatch(
         own, own.sensor, known=settings_beside(images_of), thresholds=thresholds
     )
     for _, images in itertools.islice(timed_images(images_of, own.sensor), N_IMAGES):
         watch.look(Images(images.image, images.right, images.depth, images.mask))
     return watch.finish()
+
+
+def _settings_for(source: object, choice: Settings | str | Path | None) -> Settings:
+    """Settings that were given, or come with the images."""
+    choice = getattr(source, "settings", None) if choice is None else choice
+    if choice is None:
+        raise SettingsError(
+            f"{shown(source)} has no settings; give them: check_calibration(images, settings)"
+        )
+    if isinstance(choice, Settings):
+        return choice
+    sensor = getattr(source, "sensor", None)
+    if sensor is None and isinstance(choice, str | Path):
+        raise SettingsError(
+            f"{shown(source)} does not tell its sensor, which settings of a file or a name are "
+            f"read for; give Settings.load({str(choice)!r}, sensor)"
+        )
+    return resolve_settings(choice, sensor or Sensor.MONOCULAR)

@@ -4,17 +4,21 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import threading
 import time
 from collections.abc import Generator
 from dataclasses import dataclass
-from typing import TypeGuard
+from typing import Any, TypeGuard
 
 import numpy as np
 
+from orbslam2py._arguments import shown
 from orbslam2py._arrays import FloatArray
 from orbslam2py.datasets import Images, LiveSource, Sequence
+from orbslam2py.errors import DatasetError
 from orbslam2py.runs.prefetch import prefetch
+from orbslam2py.slam.frame_source import check_images
 
 #: Seconds between two looks at whether the run was stopped.
 _WAIT_SLICE = 0.2
@@ -32,13 +36,16 @@ class FedFrame:
     timestamp, text
         Time stamp in seconds, as a number and as the source wrote it.
     item
-        The images; an exception if they could not be read; None if the frame is to be dropped.
+        The images; an exception if they could not be read.
+    is_dropped
+        Whether real time leaves no room for it.
     """
 
     index: int
     timestamp: float
     text: str
-    item: Images | Exception | None
+    item: Images | Exception
+    is_dropped: bool = False
 
 
 class RecordedFeed:
@@ -52,6 +59,11 @@ class RecordedFeed:
         Places in the sequence of the frames to take, in order.
     realtime : bool
         Play the time stamps, and drop frames that are overtaken.
+
+    Raises
+    ------
+    DatasetError
+        If the time stamp of the first frame is no text.
     """
 
     is_live = False
@@ -63,11 +75,18 @@ class RecordedFeed:
         self._realtime = realtime
         self._clock: _Clock | None = None
         self.n_frames: int | None = len(indices)
+        # Before anything is written: all others are made in the same way.
+        self._text(indices[0])
 
     def frames(self, stop: threading.Event) -> Generator[FedFrame, None, None]:
         """Yield the frames, at the time they are due if real time is played, until `stop` is set.
 
         Frames that cannot be read carry their error.
+
+        Raises
+        ------
+        DatasetError
+            If the sequence gives something else than images, or than text for a time stamp.
         """
         sequence = self._sequence
         clock = _Clock(sequence.timestamps, self._indices, stop) if self._realtime else None
@@ -77,9 +96,13 @@ class RecordedFeed:
                 dropped = clock is not None and clock.must_drop(position)
                 if stop.is_set():
                     return
+                if not isinstance(item, Exception):
+                    check_images(item, f"load({index})")
                 timestamp = float(sequence.timestamps[index])
-                text = sequence.timestamp_text(index)
-                yield FedFrame(index, timestamp, text, None if dropped else item)
+                yield FedFrame(index, timestamp, self._text(index), item, dropped)
+
+    def _text(self, index: int) -> str:
+        return _time_text(self._sequence.timestamp_text(index), f"timestamp_text({index})")
 
     def delay(self, seconds: float) -> None:
         """Nobody has asked for frames for so long: those that come next are due so much later."""
@@ -116,14 +139,17 @@ class LiveFeed:
         Raises
         ------
         DatasetError
-            If the camera cannot be opened or sends no more images.
+            If the camera cannot be opened, sends no more images, or something else than images, or
+            than text for a time stamp.
         """
         index = 0
         with self._camera as camera:
             while not stop.is_set() and index != self._max_frames:
                 frame = camera.take(_WAIT_SLICE)
                 if frame is not None:
-                    yield FedFrame(index, frame.timestamp, frame.text, frame.images)
+                    check_images(frame.images, "the camera")
+                    text = _time_text(frame.text, "the camera")
+                    yield FedFrame(index, frame.timestamp, text, frame.images)
                     index += 1
 
     def delay(self, seconds: float) -> None:
@@ -133,6 +159,19 @@ class LiveFeed:
 def is_sequence(source: Sequence | LiveSource) -> TypeGuard[Sequence]:
     """Whether the source is a sequence, which has a known length, and no camera."""
     return hasattr(source, "__len__")
+
+
+def _time_text(text: Any, giver: str) -> str:
+    """See that a time stamp is text with a number: it goes into files as it is."""
+    try:
+        if isinstance(text, str) and math.isfinite(float(text)):
+            return text
+    except ValueError:
+        pass
+    raise DatasetError(
+        f"{giver} gave {shown(text)} for a time stamp; give the time in seconds as text, such as "
+        "'1305031102.175304'"
+    )
 
 
 class _Clock:

@@ -6,8 +6,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from orbslam2py._arguments import choice_of, is_whole, shown
+from orbslam2py._arguments import choice_of, is_number, is_whole, shown
 from orbslam2py._arrays import FloatArray
 from orbslam2py.datasets.base import LiveSource, Sequence
 from orbslam2py.errors import DatasetError, SettingsError
@@ -17,12 +18,22 @@ from orbslam2py.runs.feeds import is_sequence
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.options import SystemOptions
 
+_SWITCHES = ("realtime", "final_adjustment", "allow_other_setup")
+#: Least number of frames of each option that is one.
+_LEAST = {"start": 0, "stride": 1, "max_frames": 1, "localize_after": 0}
 _MAY_BE_NONE = ("max_frames", "localize_after")
+_OPTION_OF = {"localize_after": "--localize"}
 
 
 @dataclass(frozen=True)
 class RunOptions:
-    """What to run and how."""
+    """What to run and how.
+
+    Raises
+    ------
+    SettingsError, DatasetError
+        If a value is none that its option may have, or options contradict each other.
+    """
 
     sensor: Sensor
     """What the images come from."""
@@ -53,33 +64,67 @@ class RunOptions:
     autosave: float | None = None
     """... and every so many seconds on the way."""
 
+    if TYPE_CHECKING:  # text is taken for a sensor, which the type of the field cannot say
+
+        def __init__(
+            self,
+            sensor: Sensor | str,
+            system: SystemOptions = ...,
+            realtime: bool = False,
+            start: int = 0,
+            stride: int = 1,
+            max_frames: int | None = None,
+            localize_after: int | None = None,
+            final_adjustment: bool = False,
+            load_map: SavedMap | MapFile | None = None,
+            initial_pose: FloatArray | None = None,
+            allow_other_setup: bool = False,
+            save_map: Path | None = None,
+            autosave: float | None = None,
+        ) -> None: ...
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "sensor", Sensor(self.sensor))
+        if not isinstance(self.system, SystemOptions):
+            raise SettingsError(f"system is {shown(self.system)}; give SystemOptions(...)")
+        for name in _SWITCHES:
+            object.__setattr__(self, name, choice_of(getattr(self, name), name))
+        for name, least in _LEAST.items():
+            object.__setattr__(self, name, _count_of(getattr(self, name), name, least))
+        if self.autosave is not None and not is_number(self.autosave):
+            raise SettingsError(f"autosave (--autosave) is {shown(self.autosave)}; give seconds")
+        self._check_together()
+
+    def _check_together(self) -> None:
+        if self.system.deterministic and self.realtime:
+            raise DatasetError(
+                "--deterministic and --realtime exclude each other: dropping frames depends on "
+                "time; leave one of them out"
+            )
         if self.localize_after == 0 and self.load_map is None:
             raise DatasetError(
-                "--localize needs a map from the beginning: load one with --load, or say after how "
-                "many frames the map is to stay as it is"
+                "--localize needs a map from the beginning: load one with --load (load_map), or "
+                "say after how many frames the map is to stay as it is (localize_after)"
             )
         if self.final_adjustment and self.localize_after is not None:
             raise DatasetError(
                 "--final-adjustment changes the map, which --localize leaves as it is; leave out "
-                "one of them"
+                "one of them (final_adjustment, localize_after)"
             )
         if self.initial_pose is not None and self.load_map is None:
-            raise DatasetError("--initial-pose says where in a map the camera is; load one: --load")
+            raise DatasetError(
+                "--initial-pose says where in a map the camera is; load one: --load (load_map)"
+            )
         if self.allow_other_setup and self.load_map is None:
-            raise DatasetError("--allow-other-setup is about a map that is loaded: --load FILE")
+            raise DatasetError(
+                "--allow-other-setup is about a map that is loaded: --load FILE (load_map)"
+            )
         if self.autosave is not None and self.save_map is None:
-            raise DatasetError("--autosave needs the file to save to: --save FILE")
+            raise DatasetError("--autosave needs the file to save to: --save FILE (save_map)")
         if self.autosave is not None and not (math.isfinite(self.autosave) and self.autosave > 0):
-            raise DatasetError(f"--autosave must be more than 0 seconds, got {self.autosave:g}")
-        object.__setattr__(self, "realtime", choice_of(self.realtime, "realtime"))
-        if not isinstance(self.system, SystemOptions):
-            raise SettingsError(f"system is {shown(self.system)}; give SystemOptions(...)")
-        for name in ("start", "stride", "max_frames", "localize_after"):
-            value = getattr(self, name)
-            if not is_whole(value) and not (value is None and name in _MAY_BE_NONE):
-                raise SettingsError(f"{name} is {shown(value)}; give a whole number of frames")
+            raise DatasetError(
+                f"--autosave must be more than 0 seconds, got {self.autosave:g} (autosave)"
+            )
 
     def n_frames(self, source: Sequence | LiveSource) -> int | None:
         """How many frames a run over the source will take; None for a camera without an end.
@@ -100,20 +145,8 @@ class RunOptions:
         Raises
         ------
         DatasetError
-            If there are none, or the options contradict each other.
+            If there are none.
         """
-        if self.system.deterministic and self.realtime:
-            raise DatasetError(
-                "--deterministic and --realtime exclude each other: dropping frames depends on "
-                "time; "
-                "leave one of them out"
-            )
-        if (
-            self.start < 0
-            or self.stride < 1
-            or (self.max_frames is not None and self.max_frames < 1)
-        ):
-            raise DatasetError("--start must be 0 or more, --stride and --max-frames 1 or more")
         indices = list(range(self.start, n_frames, self.stride))
         if not indices:
             raise DatasetError(
@@ -136,5 +169,16 @@ class RunOptions:
         if self.start != 0 or self.stride != 1:
             name = "--start" if self.start != 0 else "--stride"
             raise DatasetError(f"{name} is for recorded images, not for a camera")
-        if self.max_frames is not None and self.max_frames < 1:
-            raise DatasetError("--max-frames must be 1 or more")
+
+
+def _count_of(value: Any, name: str, least: int) -> int | None:
+    """Take a number of frames; a whole number of NumPy's could not be written to report.json."""
+    if value is None and name in _MAY_BE_NONE:
+        return None
+    option = _OPTION_OF.get(name) or f"--{name.replace('_', '-')}"
+    told = f"{name} ({option}) is {shown(value)}; give a whole number of frames, {least} or more"
+    if not is_whole(value):
+        raise SettingsError(told)
+    if value < least:
+        raise DatasetError(told)
+    return int(value)

@@ -14,6 +14,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+try:
+    import fcntl
+except ImportError:  # not on Windows
+    fcntl = None  # type: ignore[assignment]
+
 from orbslam2py._files import atomic_write, reason_of
 from orbslam2py.errors import DatasetError
 from orbslam2py.maps.ply import write_ply
@@ -87,7 +92,10 @@ def prepare_output_folder(folder: Path, *, force: bool, settings: str = "") -> P
     if folder.exists() and not folder.is_dir():
         raise DatasetError(f"{folder} is not a folder; give another one with --output")
     if folder.exists() and any(folder.iterdir()) and not force and not _is_only_begun(folder):
-        raise DatasetError(f"{folder} is not empty; give another --output, or --force to overwrite")
+        raise DatasetError(
+            f"{folder} is not empty; give another --output, or --force to overwrite "
+            "(output, force=True)"
+        )
     if folder.is_dir() and (name := _other_work(folder, settings)):
         raise DatasetError(
             f"{folder} holds {name}, which would be replaced, but no run that has written it (no "
@@ -96,13 +104,42 @@ def prepare_output_folder(folder: Path, *, force: bool, settings: str = "") -> P
     try:
         folder.mkdir(parents=True, exist_ok=True)
         probe = folder / ".write-test"
-        probe.write_bytes(b"x")
-        probe.unlink()
+        try:
+            probe.write_bytes(b"x")
+        finally:
+            probe.unlink(missing_ok=True)  # on a full disk it is made, and stays empty
     except OSError as error:
         raise DatasetError(
             f"cannot write to {folder}: {reason_of(error)}; give another folder with --output"
         ) from error
     return folder
+
+
+@contextlib.contextmanager
+def sole_writer(folder: Path) -> Iterator[None]:
+    """Keep other runs out of a folder; the lock goes with the process, whatever ends it.
+
+    Raises
+    ------
+    DatasetError
+        If another run is writing there.
+    """
+    if fcntl is None:
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise DatasetError(
+                f"another run is writing into {folder}; wait for its end, or give another --output"
+            ) from None
+        except OSError as error:  # not every network disk has locks
+            _log.debug("%s cannot be locked: %s", folder, error)
+        yield
+    finally:
+        os.close(handle)
 
 
 def remove_earlier_results(folder: Path) -> None:

@@ -129,6 +129,7 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         "depth": depth_entry(result),
         "warnings": result.warnings,
         "interrupted": result.interrupted,
+        "error": error_entry(result.error),
         "seconds": result.seconds,
         "frames_per_second": _rate(n_done, result.seconds),
         "slam_frames_per_second": _rate(n_done, result.slam_seconds),
@@ -146,6 +147,16 @@ def make_report(result: RunResult, evaluation: RunEvaluation | None) -> dict[str
         report |= evaluation.figures.as_dict()
         report["ate_keyframes_rmse_m"] = evaluation.keyframes_ate_rmse
     return report
+
+
+def error_entry(error: Exception | None) -> str | None:
+    """What report.json says about what ended the run; None if nothing did."""
+    if error is None:
+        return None
+    if isinstance(error, OrbSlamError | OSError):
+        return describe_error(error)
+    # The text of others alone, such as the key of a KeyError, need not say what happened.
+    return f"{type(error).__name__}: {error}".removesuffix(": ")
 
 
 def loaded_map_entry(loaded: SavedMap | MapFile | None) -> dict[str, Any] | None:

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import threading
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,10 +28,12 @@ from orbslam2py.runs.outputs import (
     mark_as_begun,
     prepare_output_folder,
     remove_earlier_results,
+    sole_writer,
 )
 from orbslam2py.runs.report import RunEvaluation, evaluate_run, make_report
 from orbslam2py.runs.result import RunResult
 from orbslam2py.runs.runner import Progress, SequenceRunner, Watch
+from orbslam2py.settings.settings import Settings
 from orbslam2py.slam.options import Setup
 from orbslam2py.trajectory.trajectory import Trajectory
 from orbslam2py.vocabulary.vocabulary import load_vocabulary
@@ -110,8 +114,8 @@ def run_sequence(
     Raises
     ------
     DatasetError
-        If the options make no sense for the sequence, none of its first images is there, or the
-        folder cannot take results.
+        If the options make no sense for the sequence, none of its first images is there, its time
+        stamps are no text, or the folder cannot take results.
     SettingsError, VocabularyError, MapFileError
         If these cannot be used, or the map could not be saved at the end.
 
@@ -126,6 +130,11 @@ def run_sequence(
     if not hasattr(sequence, "settings"):
         raise DatasetError(
             f"the sequence is {shown(sequence)}; give what orbslam2py.open_sequence returns"
+        )
+    if not isinstance(sequence.settings, Settings):
+        raise SettingsError(
+            f"the settings of the sequence are {shown(sequence.settings)}; give it Settings, as "
+            "Settings.load('camera.yaml', sensor) returns"
         )
     if options is None:
         options = RunOptions(sequence.settings.sensor)
@@ -147,25 +156,27 @@ def run_sequence(
             options.load_map.check()
     runner = SequenceRunner(sequence, sequence.settings, vocabulary, options)
     runner.result.command = command
-    _prepare(folder, options.save_map, sequence.settings.to_yaml(), force=force)
-    result = runner.run(progress, stop, control=control, watch=watch)
-    warning = last_loss_warning(find_losses(result.rows))
-    if warning is not None:
-        _log.warning("%s", warning)
-        result.warnings.append(warning)
-    evaluation = evaluate_run(result)
-    report = make_report(result, evaluation)
-    problems: tuple[str, ...] = ()
-    if folder is not None:
-        writer = OutputWriter(folder)
-        writer.write_all(result, report, evaluation, page=report_page)
-        problems = tuple(writer.problems)
+    settings = sequence.settings.to_yaml()
+    with _prepared(folder, options.save_map, settings, force=force):
+        result = runner.run(progress, stop, control=control, watch=watch)
+        warning = last_loss_warning(find_losses(result.rows))
+        if warning is not None:
+            _log.warning("%s", warning)
+            result.warnings.append(warning)
+        evaluation = evaluate_run(result)
+        report = make_report(result, evaluation)
+        problems: tuple[str, ...] = ()
+        if folder is not None:
+            writer = OutputWriter(folder)
+            writer.write_all(result, report, evaluation, page=report_page)
+            problems = tuple(writer.problems)
     return FinishedRun(result, evaluation, report, folder, problems)
 
 
-def _prepare(
+@contextlib.contextmanager
+def _prepared(
     folder: Path | None, saved_map: str | Path | None, settings: str, *, force: bool
-) -> None:
+) -> Iterator[None]:
     """Make the folder of the results, and see that these and the map can be written."""
     target = None if saved_map is None else path_of(saved_map, "save_map")
     is_among_results = (
@@ -174,6 +185,7 @@ def _prepare(
     if target is not None and not is_among_results:
         check_map_target(target)
     if folder is None:
+        yield
         return
     if target is not None and is_among_results and is_name_of_result(target.name):
         raise DatasetError(
@@ -182,6 +194,8 @@ def _prepare(
     prepare_output_folder(folder, force=force, settings=settings)
     if target is not None and is_among_results:
         check_map_target(target)  # its folder may not have been there before
-    remove_earlier_results(folder)
-    mark_as_begun(folder)
-    link_latest(folder)
+    with sole_writer(folder):
+        remove_earlier_results(folder)
+        mark_as_begun(folder)
+        link_latest(folder)
+        yield

@@ -214,7 +214,7 @@ class SequenceRunner:
                 result.n_lost_by_camera = self._feed.n_lost
 
     def _track(self, system: System, frame: FedFrame) -> FrameRow:
-        if frame.item is None:
+        if frame.is_dropped:
             return _row(frame, None, DROPPED)
         if isinstance(frame.item, Exception):
             if not isinstance(frame.item, (OrbSlamError, OSError)):
@@ -288,6 +288,8 @@ class SequenceRunner:
         self.result.error = error
         if not isinstance(error, OrbSlamError):
             _log.error("unexpected error; please report it", exc_info=error)
+        elif self.result.command is None:  # the command tells its user what its run gives
+            _log.warning("the run failed: %s", describe_error(error))
 
     def _collect(self, system: System) -> None:
         result = self.result

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py._arguments import shown
-from orbslam2py.errors import ImageError, StateError
+from orbslam2py.errors import DatasetError, ImageError, StateError
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.records import TrackingRecord
 
@@ -67,7 +67,9 @@ def timed_images(source: FrameSource, sensor: Sensor) -> Iterator[tuple[float, S
     Raises
     ------
     StateError
-        If the source was opened for another sensor.
+        If the source was opened for another sensor, or a frame is none.
+    DatasetError
+        If what should be images is something else.
     """
     is_recording = hasattr(source, "timestamps") and hasattr(source, "load")
     if not is_recording and (not isinstance(source, Iterable) or isinstance(source, str | bytes)):
@@ -88,10 +90,35 @@ def timed_images(source: FrameSource, sensor: Sensor) -> Iterator[tuple[float, S
                     f"a frame is {shown(frame)}; it must have a timestamp and images, as those of "
                     "orbslam2py.datasets.Frame"
                 )
+            check_images(frame.images, "a frame")
             yield frame.timestamp, frame.images
     else:
         for index, timestamp in enumerate(source.timestamps.tolist()):
-            yield timestamp, source.load(index)
+            images = source.load(index)
+            check_images(images, f"load({index})")
+            yield timestamp, images
+
+
+def check_images(images: object, giver: str) -> None:
+    """See that something has the members of `orbslam2py.datasets.Images`.
+
+    Parameters
+    ----------
+    images
+        What was given.
+    giver
+        What gave it, for the message.
+
+    Raises
+    ------
+    DatasetError
+        If it has not.
+    """
+    if not all(hasattr(images, name) for name in ("image", "right", "depth", "mask")):
+        raise DatasetError(
+            f"{giver} gave {shown(images)} for images; give "
+            "orbslam2py.datasets.Images(image, right=..., depth=..., mask=...)"
+        )
 
 
 def track_images(

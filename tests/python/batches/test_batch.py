@@ -173,6 +173,7 @@ def test_failures_are_rows(sequences: Path, tmp_path: Path) -> None:
     done = orb.batch(document, tmp_path / "out", workers=0)
     rows = {row["sequence"]: row for row in done.rows}
     assert rows["broken"]["state"] == "failed"
+    assert all("error" not in row for row in done.rows), "the reason says it"
     assert "rgb.txt:1: expected 'timestamp path'" in rows["broken"]["reason"]
     assert "\n" not in rows["broken"]["reason"]
     assert rows["one"]["state"] == rows["two"]["state"] == "done"

@@ -71,6 +71,17 @@ def test_file(places: Path) -> None:
         ({"sequences": ["a/01"], "seeds": ["x"]}, "a seed is 'x'"),
         ({"sequences": ["a/01"], "options": {"strid": 2}}, "unknown option 'strid'.* stride?"),
         ({"sequences": ["a/01"], "options": [1]}, "options are a list"),
+        ({"sequences": ["a/01"], "options": {"max_frames": 0}}, "max_frames .* is 0; give"),
+        ({"sequences": ["a/01"], "options": {"final_adjustment": "no"}}, "final_adj.* is 'no'"),
+        (
+            {"sequences": ["a/01"], "options": {"deterministic": True, "realtime": True}},
+            "--deterministic and --realtime exclude each other",
+        ),
+        ({"sequences": ["a/01"], "settings": [3]}, "settings is 3; give a path"),
+        (
+            {"sequences": ["a/01"], "settings": [builtin_settings("tum1", orb.Sensor.RGBD)]},
+            r"settings are a Settings object.*; save it .* and give the path",
+        ),
         ({"sequences": ["a/01"], "options": {"deterministic": "no"}}, "deterministic is 'no'"),
         ({"sequences": ["a/01"], "options": {"effort": "slow"}}, "effort is 'slow'.* fast, normal"),
         ({"sequences": ["a/01"], "sweep": {"ThDepth": ["x"]}}, "^sweep: a value of ThDepth is 'x'"),
@@ -193,3 +204,23 @@ def test_parameters_go_into_the_settings() -> None:
     mono = builtin_settings("tum1", orb.Sensor.MONOCULAR)
     with pytest.raises(orb.SettingsError, match="ThDepth is not used by mono"):
         with_parameters(mono, (("ThDepth", 25.0),))
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ({"seeds": 1_000_000_000}, "1000000000 runs or more; make batches of at most 100000"),
+        ({"seeds": 60_000, "options": {"stride": [1, 2]}}, "120000 runs or more"),
+        ({"options": {"max_frames": []}}, "option max_frames has no value"),
+        ({"settings": ["nothing"]}, "settings 'nothing' are no file"),
+        ({"options": {"max_frames": 0}}, "max-frames"),
+        ({"options": {"check_calibration": 3}}, "check_calibration is 3"),
+    ],
+)
+def test_what_would_fail_in_every_run_is_told_first(
+    tmp_path: Path, more: dict[str, Any], said: str
+) -> None:
+    (tmp_path / "lab").mkdir()
+    with pytest.raises((orb.SettingsError, orb.DatasetError), match=said):
+        orb.batch({"sequences": [str(tmp_path / "lab")], **more}, tmp_path / "out", workers=0)
+    assert not (tmp_path / "out").exists()

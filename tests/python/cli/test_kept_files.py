@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import json
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,6 +15,7 @@ import pytest
 from orbslam2py import Sensor
 from support.command_line import RUN_FILES, CommandLine, Outcome
 from support.files import names_in
+from support.made_up_saved import map_file
 from support.small_sequences import sequence
 
 pytestmark = pytest.mark.watchdog(60)
@@ -254,3 +257,80 @@ def test_a_calibration_writes_two_files(command: CommandLine) -> None:
     )
     refused(command(*board, "-o", "board.mp4"), "--output board.mp4 is what is read")
     assert Path("board.mp4").read_text() == MINE
+
+
+# ---- what is read --------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("arguments", "option"),
+    [
+        (("info", "m.orbmap", "--picture", "m.orbmap"), "--picture"),
+        (("export", "ply", "m.orbmap", "./m.orbmap"), "the output"),
+        (("export", "tum", "m.orbmap", "m.orbmap"), "the output"),
+        (("export", "g2o", "m.orbmap", "m.orbmap"), "the output"),
+    ],
+)
+def test_a_map_is_not_replaced_by_what_is_made_of_it(
+    command: CommandLine, tmp_path: Path, arguments: tuple[str, ...], option: str
+) -> None:
+    before = map_file(tmp_path, name="m.orbmap").read_bytes()
+    refused(command("map", *arguments, "--force"), option, "m.orbmap is what is read")
+    assert Path("m.orbmap").read_bytes() == before
+
+
+def test_a_trajectory_is_not_replaced_by_its_figures(
+    command: CommandLine, finished: Path, rgbd: Path
+) -> None:
+    path = finished / "trajectory.txt"
+    before = path.read_bytes()
+    refused(
+        command("evaluate", path, rgbd, "--json", path, "--force"),
+        "--json r/trajectory.txt is what is read",
+    )
+    assert path.read_bytes() == before
+
+
+def test_calibrations_do_not_replace_what_they_are_made_of(
+    command: CommandLine, tmp_path: Path
+) -> None:
+    Path("board").mkdir()
+    Path("board/00.png").write_text(MINE)
+    board = ("calibrate", "board", "--board", "9x6", "--square", "0.02", "--force", "-o", "s.yaml")
+    refused(command(*board, "--plot", "board/00.png"), "--plot board/00.png is what is read")
+    assert Path("board/00.png").read_text() == MINE
+    calib = sequence(Sensor.STEREO, 2).write(tmp_path / "drive") / "calib.txt"
+    before = calib.read_bytes()
+    refused(command("import-camera", calib, "-o", calib, "--force"), "calib.txt is what is read")
+    assert calib.read_bytes() == before
+
+
+# ---- arguments that are empty, readers that have gone --------------------------------------------
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (("run", "lap", "--output", ""), "--output is empty"),
+        (("run", "lap", "--output="), "--output is empty"),
+        (("run", "lap", "--mask", ""), "--mask is empty"),
+        (("run", ""), "an argument is empty"),
+        (("map", "info", ""), "an argument is empty"),
+        (("synthesize", ""), "an argument is empty"),
+    ],
+)
+def test_an_empty_argument_is_not_the_present_folder(
+    command: CommandLine, rgbd: Path, arguments: tuple[str, ...], named: str
+) -> None:
+    refused(command(*arguments), named, "give a value, or leave it out")
+    assert names_in(Path()) == ["lap"]
+
+
+def test_files_are_written_though_nobody_reads_what_is_printed(tmp_path: Path) -> None:
+    map_file(tmp_path, name="m.orbmap")
+    asked = f"{sys.executable} -m orbslam2py map info m.orbmap --picture p.png"
+    done = subprocess.run(
+        ["bash", "-c", f"set -o pipefail; {asked} | true"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "p.png").stat().st_size > 1000

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import asdict, replace
 from functools import lru_cache
@@ -263,3 +264,25 @@ def test_check_calibration_takes_sequences_and_frames(caplog: pytest.LogCaptureF
         return (Frame(one) for one in images(Sensor.RGBD))
 
     assert check_calibration(frames(), wrong) == misfit
+
+
+def test_check_calibration_takes_what_a_system_takes_for_settings(tmp_path: Path) -> None:
+    right = world(Sensor.RGBD).settings
+    right.save(tmp_path / "camera.yaml")
+    recording = Recording(right, images(Sensor.RGBD)[:3])
+    assert check_calibration(recording, tmp_path / "camera.yaml") is None
+    assert check_calibration(recording, "tum1") == check_calibration(
+        recording, builtin_settings("tum1", Sensor.RGBD)
+    )
+    with pytest.raises(orb.SettingsError, match="settings are 3; give Settings, a file"):
+        check_calibration(recording, 3)  # type: ignore[arg-type]
+
+
+def test_check_calibration_of_frames_needs_settings() -> None:
+    frames = itertools.islice(world(Sensor.RGBD), 3)
+    with pytest.raises(orb.SettingsError, match="an islice has no settings; give them"):
+        check_calibration(frames)
+    with pytest.raises(
+        orb.SettingsError, match=r"tell its sensor.*Settings.load\('tum1', sensor\)"
+    ):
+        check_calibration(frames, "tum1")

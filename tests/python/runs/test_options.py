@@ -5,9 +5,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
-from orbslam2py import DatasetError, Sensor
+from orbslam2py import DatasetError, OrbSlamError, Sensor
 from orbslam2py.runs import RunOptions, SystemOptions
 
 pytestmark = pytest.mark.watchdog(20)
@@ -34,9 +35,33 @@ def test_indices(options: dict[str, int], indices: list[int]) -> None:
         {"start": -1},
         {"stride": 0},
         {"max_frames": 0},
+        {"localize_after": -1},
         {"system": SystemOptions(deterministic=True), "realtime": True},
     ],
 )
 def test_options_that_make_no_sense(options: dict[str, Any]) -> None:
     with pytest.raises(DatasetError, match="--"):
         RunOptions(Sensor.RGBD, **options).indices(5)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"start": -1}, r"start \(--start\) is -1; give a whole number of frames, 0 or more"),
+        ({"stride": 0}, r"stride \(--stride\) is 0; .* 1 or more"),
+        ({"max_frames": 0}, r"max_frames \(--max-frames\) is 0; .* 1 or more"),
+        ({"localize_after": -1}, r"localize_after \(--localize\) is -1; .* 0 or more"),
+        ({"final_adjustment": "no"}, "final_adjustment is 'no'; give True or False"),
+        ({"allow_other_setup": "no"}, "allow_other_setup is 'no'; give True or False"),
+        ({"save_map": "m.orbmap", "autosave": "a"}, r"autosave \(--autosave\) is 'a'; .*seconds"),
+    ],
+)
+def test_a_wrong_value_is_told_when_the_options_are_made(
+    options: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(OrbSlamError, match=message):
+        RunOptions(Sensor.RGBD, **options)
+
+
+def test_numbers_of_numpy_become_those_that_a_report_can_hold() -> None:
+    assert type(RunOptions(Sensor.RGBD, max_frames=np.int64(3)).max_frames) is int  # type: ignore[arg-type]

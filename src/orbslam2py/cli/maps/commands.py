@@ -17,7 +17,7 @@ from orbslam2py.cli.maps.description import describe_map
 from orbslam2py.cli.maps.edits import MapFile, MapNumber, align, crop, optimize, save_edited
 from orbslam2py.cli.maps.export import ExportCommand, export
 from orbslam2py.cli.maps.merge import merge
-from orbslam2py.cli.targets import check_target
+from orbslam2py.cli.targets import check_apart, check_target
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps import MapContents, load_map, map_differences, verify_map_file
 from orbslam2py.maps.edits.parts import map_numbers, take_map
@@ -44,6 +44,7 @@ def info(
 ) -> None:
     """Show what is in a map file: camera, keyframes, points, runs, extent."""
     check_target(picture, force=force)
+    check_apart({"--picture": picture}, [file])
     if number is not None and picture is None:
         raise MapFileError("--map says of which map the picture is to be: --picture FILE.png")
     saved = load_map(file, images=True)

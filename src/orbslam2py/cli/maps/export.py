@@ -19,7 +19,7 @@ from orbslam2py._arrays import ByteArray
 from orbslam2py.cli.calibrate import Force, Quiet
 from orbslam2py.cli.maps.edits import MapNumber
 from orbslam2py.cli.messages import log_to
-from orbslam2py.cli.targets import check_target
+from orbslam2py.cli.targets import check_apart, check_target
 from orbslam2py.datasets import open_input
 from orbslam2py.errors import DatasetError
 from orbslam2py.maps import (
@@ -117,6 +117,7 @@ def export(
     saved = take_map(load_map(file, images=images is None and not without_images), number)
     if file_format not in _FOLDERS:
         check_target(output, force=force)
+        check_apart({"the output": output}, [file, *([] if times is None else [times])])
     console = Console(quiet=quiet, highlight=False, soft_wrap=True)
     source = None if without_images else _image_source(saved, images, fps, times)
     with _progress(console) as bar:

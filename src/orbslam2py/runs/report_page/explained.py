@@ -149,6 +149,7 @@ FIGURES: dict[str, tuple[Figure, ...]] = {
         Figure("weak_frames", "weak frames", "",
                "images whose pose explains much less of what should be seen than usual", -1),
         Figure("interrupted", "interrupted", "", "whether Ctrl-C ended the run"),
+        Figure("error", "error", "", "what ended the run before its end"),
     ),
     "Map": (
         Figure("keyframes", "keyframes", "", "of the main map"),

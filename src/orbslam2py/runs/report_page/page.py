@@ -47,7 +47,9 @@ def run_page(run: RunFolder) -> str:
     subtitle = (
         f"{told}{f', {_date(str(when))}' if when else ''}, orbslam2py {report.get('version')}"
     )
-    body = join(_warnings(report), _notes(report), sections.tiles(story), *parts.values())
+    body = join(
+        _error(report), _warnings(report), _notes(report), sections.tiles(story), *parts.values()
+    )
     return whole_page(run.name, subtitle, links, body, script_data(story))
 
 
@@ -156,6 +158,24 @@ def _said(value: object) -> str:
     return str(value)
 
 
+def _error(report: dict[str, Any]) -> Markup | None:
+    """What ended the run: all below is only of what was done until then."""
+    told = report.get("error")
+    if told is None:
+        return None
+    return element(
+        "div",
+        element("p", element("b", "Error")),
+        element("p", f"The run failed after {_seen(report)}: {told}"),
+        class_="warning serious",
+        role="alert",
+    )
+
+
+def _seen(report: dict[str, Any]) -> str:
+    return f"{report.get('seen_frames')} of {report.get('frames')} frames"
+
+
 def _warnings(report: dict[str, Any]) -> Markup | None:
     """What the result suffers from, as the command has told it."""
     told = report.get("warnings")
@@ -183,8 +203,7 @@ def _notes(report: dict[str, Any]) -> Markup | None:
     if report.get("ate_rmse_m") is not None and is_of_last_map_only(report):
         said.append(f"The errors are {compared_over(report)}: other maps are not in them.")
     if report.get("interrupted"):
-        seen = f"{report.get('seen_frames')} of {report.get('frames')} frames"
-        said.append(f"The run was interrupted after {seen}.")
+        said.append(f"The run was interrupted after {_seen(report)}.")
     if report.get("sensor") == "mono" and report.get("tracked") and not report.get("ate_scale"):
         said.append(
             "Lengths are in the map's own units: a single camera cannot see metres, and no ground "

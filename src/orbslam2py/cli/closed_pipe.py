@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A reader that has seen enough (``| head``) ends what is printed, not what is done."""
+
+from __future__ import annotations
+
+import io
+import os
+import stat
+import sys
+
+
+class _Pipe(io.FileIO):
+    """Standard output into a pipe; once nobody reads it any more, all goes nowhere."""
+
+    def write(self, data: object, /) -> int:
+        """Write bytes."""
+        try:
+            return super().write(data)  # type: ignore[arg-type]
+        except BrokenPipeError:
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, self.fileno())
+            os.close(nowhere)
+            return super().write(data)  # type: ignore[arg-type]
+
+
+def outlive_the_reader() -> None:
+    """Go on when whoever reads standard output has closed it: files are still to be written."""
+    out = sys.stdout
+    if out is not sys.__stdout__ or not isinstance(out, io.TextIOWrapper):
+        return  # somebody catches what is printed
+    if not stat.S_ISFIFO(os.fstat(out.fileno()).st_mode):
+        return
+    out.flush()
+    sys.stdout = io.TextIOWrapper(
+        io.BufferedWriter(_Pipe(out.fileno(), "wb", closefd=False)),
+        encoding=out.encoding,
+        errors=out.errors,
+        line_buffering=out.line_buffering,
+    )
