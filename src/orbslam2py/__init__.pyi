@@ -2,7 +2,7 @@
 # The public names of the package, and where they are. `__init__.py` reads this file.
 
 from ._version import __version__ as __version__
-from .batches import batch as batch
+from .batches.batch import batch as batch
 from .datasets import open_sequence as open_sequence
 from .errors import DatasetError as DatasetError
 from .errors import ImageError as ImageError

@@ -22,14 +22,20 @@ from orbslam2py.errors import DatasetError, OrbSlamError, SettingsError, StateEr
 #: Seeds are unsigned 64-bit numbers in the core.
 LARGEST_SEED = 2**64 - 1
 _LONGEST = 60
+#: How far the product of a rotation and its transpose may be from the identity: a few digits do.
+_ROTATION_TOLERANCE = 1e-2
 
+_Kind = TypeVar("_Kind")
 _Member = TypeVar("_Member", bound=Enum)
 
 
 def shown(value: object) -> str:
     """Say what a value is, in a few words for a message: ``None``, ``a dict``, ``'abc'``."""
     if value is None or isinstance(value, bool | numbers.Number | str):
-        text = repr(value)
+        try:
+            text = repr(value)
+        except ValueError:  # of more digits than Python writes out
+            return "a number of thousands of digits"
         return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
     name = type(value).__name__
     if name == "bytes":
@@ -45,6 +51,19 @@ def is_whole(value: object) -> bool:
 def is_number(value: object) -> bool:
     """Whether a value is a real number, Python's or NumPy's; True and False are none."""
     return isinstance(value, numbers.Real) and not isinstance(value, bool)
+
+
+def float_of(value: Any) -> float:
+    """Convert a number; what no float can hold, such as ``10**400``, becomes infinite."""
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf
+
+
+def is_finite(value: object) -> bool:
+    """Whether a value is a real number that a float can hold."""
+    return is_number(value) and math.isfinite(float_of(value))
 
 
 def choice_of(value: Any, what: str) -> bool:
@@ -114,9 +133,44 @@ def finite_number(
     error
         Raised for anything else.
     """
-    if not is_number(value) or not math.isfinite(value):
+    if not is_finite(value):
         raise error(f"{what} is {shown(value)}; give {remedy}")
     return float(value)
+
+
+def instance_of(
+    value: Any,
+    kind: type[_Kind],
+    what: str,
+    remedy: str,
+    error: type[OrbSlamError],
+) -> _Kind:
+    """Take an object of a class.
+
+    Parameters
+    ----------
+    value
+        What was given.
+    kind
+        The class.
+    what, remedy
+        What it is called, and what to give, for the message.
+    error
+        Raised for anything else.
+    """
+    if not isinstance(value, kind):
+        raise error(f"{what} is {shown(value)}; give {remedy}")
+    return value
+
+
+def number_above_zero(
+    value: Any, what: str, remedy: str, error: type[OrbSlamError] = SettingsError
+) -> float:
+    """Take a finite number above 0; parameters as of `instance_of`."""
+    number = finite_number(value, what, remedy, error)
+    if number <= 0:
+        raise error(f"{what} is {number:g}; give {remedy}")
+    return number
 
 
 def seed_of(value: Any, what: str = "seed", most: int = LARGEST_SEED) -> int:
@@ -140,8 +194,11 @@ def patience_of(timeout: Any) -> float | None:
     StateError
         For anything else.
     """
-    if timeout is None or (is_number(timeout) and timeout >= 0):
-        return None if timeout is None else float(timeout)
+    if timeout is None:
+        return None
+    seconds = float_of(timeout) if is_number(timeout) else math.nan
+    if seconds >= 0 and (seconds < math.inf or timeout == math.inf):
+        return seconds
     raise StateError(f"timeout is {shown(timeout)}; give seconds from 0, or None to wait for ever")
 
 
@@ -161,7 +218,7 @@ def cannot_open(path: object, error: OSError, what: str = "") -> str:
 
 
 def path_of(value: Any, what: str, error: type[OrbSlamError] = DatasetError) -> Path:
-    """Take a path, as text or as a `Path`.
+    """Take a path, as text or as a `Path`; a "~" at its beginning is the user's folder.
 
     Raises
     ------
@@ -173,7 +230,10 @@ def path_of(value: Any, what: str, error: type[OrbSlamError] = DatasetError) -> 
         raise error(f"{what} is {shown(value)}; give a path, as text or as a pathlib.Path")
     if not path or "\0" in path:
         raise error(f"{what} is {path!r}, which is the name of no file; give a path")
-    return Path(path)
+    try:
+        return Path(path).expanduser()
+    except RuntimeError:  # "~name" of nobody: a file may be called so, as for the shell
+        return Path(path)
 
 
 def _text_of(value: object) -> str | None:
@@ -243,6 +303,38 @@ def array_of(
     if finite and not np.isfinite(array).all():
         raise error(f"{what} holds a number that is not finite; leave such entries out")
     return array
+
+
+def are_poses(T: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
+    """Tell which transforms (n, 4, 4) are rigid ones: finite, and with a rotation, no mirror."""
+    finite = np.asarray(np.isfinite(T).all(axis=(1, 2)))
+    T = T.copy()
+    T[~finite] = 0.0
+    R = T[:, :3, :3]
+    with np.errstate(over="ignore", invalid="ignore"):
+        off = np.max(np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)), axis=(1, 2))
+        is_rotation = (off < _ROTATION_TOLERANCE) & (np.linalg.det(R) > 0)
+    rigid: npt.NDArray[np.bool_] = finite & is_rotation & (T[:, 3] == (0, 0, 0, 1)).all(axis=1)
+    return rigid
+
+
+def pose_of(
+    value: Any, what: str, error: type[OrbSlamError] = SettingsError
+) -> npt.NDArray[np.float64]:
+    """Take a pose: a rigid transform, float64 (4, 4).
+
+    Raises
+    ------
+    error
+        For anything else, also for a mirror or a change of scale.
+    """
+    T = array_of(value, what, (4, 4), error)
+    if not are_poses(T[None])[0]:
+        raise error(
+            f"{what} is no pose; give 4 x 4 numbers: a rotation (no mirror, no scale), the "
+            "translation beside it, and the last row 0 0 0 1"
+        )
+    return T
 
 
 def number_of(count: int, noun: str) -> str:

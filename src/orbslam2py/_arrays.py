@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Names of the array types that signatures share.
+"""Names of the array types that signatures share, and records that hold arrays.
 
-They tell the type of the elements; shapes, units and frames are told where an array is described.
+The names tell the type of the elements; shapes, units and frames are told where an array is
+described.
 """
 
 from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import Field, fields
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,3 +17,33 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 ByteArray = NDArray[np.uint8]
+
+
+class EqualByValue:
+    """Gives a dataclass with arrays, made with ``eq=False``, what the usual one has without.
+
+    Two records are equal if all their fields are, arrays number by number; NaN equals NaN, so that
+    a copy is equal. The hash is of those fields only that cannot be changed: no arrays, no dicts.
+    """
+
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        return all(
+            _equal(getattr(self, one.name), getattr(other, one.name))
+            for one in fields(self)
+            if one.compare
+        )
+
+    def __hash__(self) -> int:
+        values = (getattr(self, one.name) for one in fields(self) if one.compare)
+        return hash(tuple(value for value in values if isinstance(value, Hashable)))
+
+
+def _equal(one: Any, other: Any) -> bool:
+    if not (isinstance(one, np.ndarray) and isinstance(other, np.ndarray)):
+        return one is other or bool(np.all(one == other))
+    may_hold_nan = one.dtype.kind in "fc" and other.dtype.kind in "fc"
+    return np.array_equal(one, other, equal_nan=may_hold_nan)

@@ -175,7 +175,7 @@ def make_jobs(document: Mapping[str, Any], folder: Path | None = None) -> list[J
     seeds = _seeds(document.get("seeds", 1))
     options = list(_options(document.get("options") or {}))
     sweep = read_sweep(document["sweep"]) if "sweep" in document else Sweep()
-    jobs = []
+    jobs: list[Job] = []
     for one in itertools.chain.from_iterable(_sequences(entry, folder) for entry in sequences):
         mine = [one["sensor"]] if "sensor" in one else sensors
         own = [one["settings"]] if "settings" in one else settings

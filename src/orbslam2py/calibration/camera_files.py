@@ -14,7 +14,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from orbslam2py._arguments import cannot_open, path_of
+from orbslam2py._arguments import cannot_open, member_of, path_of
 from orbslam2py._arrays import FloatArray
 from orbslam2py.calibration.camera_model import (
     CameraModel,
@@ -53,7 +53,7 @@ class CameraFileFormat(str, Enum):
 
 def read_camera_file(
     path: str | Path,
-    file_format: CameraFileFormat = CameraFileFormat.AUTO,
+    file_format: CameraFileFormat | str = CameraFileFormat.AUTO,
     *,
     camera: int | None = None,
     right: str | Path | None = None,
@@ -70,7 +70,7 @@ def read_camera_file(
     path
         The file.
     file_format
-        Who wrote it; by default told by its content.
+        Who wrote it, also as text (``"kalibr"``); by default told by its content.
     camera
         Number of the camera: ``cam0``, ``cam1`` ... of Kalibr, ``CAMERA_ID`` of COLMAP, ``P0`` to
         ``P3`` of KITTI. By default the only one; of a file of Kalibr or KITTI with several the pair
@@ -93,9 +93,12 @@ def read_camera_file(
     Raises
     ------
     SettingsError
-        If the file cannot be read or understood, or has a camera model that is not supported.
+        If the file cannot be read or understood, or has a camera model that is not supported; also
+        for the name of a format that there is not.
     """
     path = path_of(path, "the calibration file", SettingsError)
+    what = "the format of the calibration file"
+    file_format = member_of(CameraFileFormat, file_format, what, SettingsError)
     text = _read_text(path)
     if file_format is CameraFileFormat.AUTO:
         file_format = _recognise(path, text)
@@ -137,7 +140,7 @@ def _read(
         return ros_camera(path, document).settings(fps)
     if alone:
         raise SettingsError(f"{path} and {right} are a pair; leave --right out for {sensor}")
-    right = Path(right)
+    right = path_of(right, "the file of the right camera", SettingsError)
     return ros_pair_settings((path, document), (right, parse_yaml(right, _read_text(right))), fps)
 
 

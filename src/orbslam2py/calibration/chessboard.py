@@ -11,7 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from orbslam2py._arguments import finite_number, is_whole, shown
+from orbslam2py._arguments import finite_number, is_whole, path_of, shown
 from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py.datasets import VideoReader
 from orbslam2py.datasets.image_folder import image_files
@@ -195,7 +195,7 @@ def find_views(
         If no image can be read.
     """
     result = BoardViews()
-    for name, image in _images(Path(source), every, result):
+    for name, image in _images(path_of(source, "the source"), every, result):
         result.n_searched += 1
         if isinstance(image, ImageError):
             _log.warning("left out: %s", image)

@@ -2,10 +2,19 @@
 """Images: TUM RGB-D, KITTI odometry, EuRoC, bags, folders of images, videos, cameras."""
 
 from orbslam2py.datasets.bags import BagSequence
-from orbslam2py.datasets.base import Images, Layout, LiveFrame, LiveSource, Sequence, Source
+from orbslam2py.datasets.base import (
+    Frame,
+    Images,
+    IterableSequence,
+    Layout,
+    LiveFrame,
+    LiveSource,
+    Sequence,
+    Source,
+)
 from orbslam2py.datasets.depth_folders import DepthFolders
 from orbslam2py.datasets.euroc import EurocSequence
-from orbslam2py.datasets.frames import Frame, FramesInOrder
+from orbslam2py.datasets.frames import FramesInOrder
 from orbslam2py.datasets.image_folder import ImageFolder
 from orbslam2py.datasets.kitti import KittiSequence
 from orbslam2py.datasets.layouts import (
@@ -34,6 +43,7 @@ __all__ = [
     "IclNuimSequence",
     "ImageFolder",
     "Images",
+    "IterableSequence",
     "KittiSequence",
     "Layout",
     "LiveCamera",

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from orbslam2py._arrays import ByteArray, FloatArray
+from orbslam2py._arrays import ByteArray, EqualByValue, FloatArray
 from orbslam2py.errors import DatasetError
 from orbslam2py.settings import Sensor, Settings
 from orbslam2py.trajectory import Trajectory
@@ -43,9 +44,9 @@ class Layout(str, Enum):
         return self.value
 
 
-@dataclass(frozen=True)
-class Images:
-    """The images of one moment, as the tracking calls take them.
+@dataclass(frozen=True, eq=False)
+class Images(EqualByValue):
+    """The images of one moment, as the tracking calls take them; equal if all pixels are.
 
     Attributes
     ----------
@@ -64,6 +65,28 @@ class Images:
     right: ByteArray | None = None
     depth: NDArray[np.generic] | None = None
     mask: ByteArray | None = None
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame of a sequence, as a loop over the sequence gives it.
+
+    Attributes
+    ----------
+    index
+        Place in the sequence, from 0.
+    timestamp
+        Seconds.
+    text
+        The time stamp in decimal seconds, with all digits of the source.
+    images
+        What the camera saw, as the tracking calls take it.
+    """
+
+    index: int
+    timestamp: float
+    text: str
+    images: Images
 
 
 class Source(Protocol):
@@ -150,6 +173,10 @@ class LiveSource(Source, Protocol):
     def __enter__(self) -> LiveSource: ...
     def __exit__(self, *_: object) -> None: ...
 
+    def __iter__(self) -> Iterator[LiveFrame]:
+        """Yield the newest image again and again; see `take`."""
+        ...
+
     def take(self, timeout: float, /) -> LiveFrame | None:
         """Take the newest image that was not taken yet, or wait for one.
 
@@ -231,7 +258,15 @@ class Sequence(Source, Protocol):
         ...
 
 
-@dataclass(frozen=True)
+class IterableSequence(Sequence, Protocol):
+    """A `Sequence` with a loop over its frames, which `FramesInOrder` has ready."""
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Read the frames one after the other, from the first."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
 class Stamps:
     """Time stamps of a list file.
 

@@ -4,31 +4,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
-from orbslam2py.datasets.base import Images, Sequence
-
-
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """A frame of a sequence, as a loop over the sequence gives it.
-
-    Attributes
-    ----------
-    index
-        Place in the sequence, from 0.
-    timestamp
-        Seconds.
-    text
-        The time stamp in decimal seconds, with all digits of the source.
-    images
-        What the camera saw, as the tracking calls take it.
-    """
-
-    index: int
-    timestamp: float
-    text: str
-    images: Images
+from orbslam2py.datasets.base import Frame, Sequence
 
 
 class FramesInOrder:

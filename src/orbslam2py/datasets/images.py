@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import stat
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -110,15 +111,26 @@ def read_any(path: Path) -> NDArray[np.generic]:
     DatasetError
         If there is no such file.
     ImageError
-        If it is no complete image.
+        If it is no complete image, or no file at all: pipes and devices are not opened.
     """
     try:
+        _check_regular(path)
         content = path.read_bytes()
     except FileNotFoundError:
         raise DatasetError(f"image {path} is listed but missing") from None
     except OSError as error:
         raise ImageError(f"cannot read image {path}: {error.strerror or error}") from error
     return decode_any(content, path)
+
+
+def _check_regular(path: Path) -> None:
+    """Raise `ImageError` if a path is no file or folder: to open a pipe is to wait for a writer."""
+    mode = path.stat().st_mode
+    if stat.S_ISREG(mode) or stat.S_ISDIR(mode):
+        return
+    kinds = ((stat.S_ISFIFO, "pipe"), (stat.S_ISSOCK, "socket"))
+    kind = next((name for is_kind, name in kinds if is_kind(mode)), "device")
+    raise ImageError(f"image {path} is a {kind}, not a file; replace it, or leave it out")
 
 
 def decode_any(content: bytes, what: object) -> NDArray[np.generic]:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -290,4 +291,11 @@ class MaskedCamera(_Masked):
     def take(self, timeout: float, /) -> LiveFrame | None:
         """Take the newest image, with the mask; see `datasets.base.LiveSource.take`."""
         frame = self._camera.take(timeout)
-        return frame and replace(frame, images=self._with_mask(0, frame.images))
+        return frame and self._masked(frame)
+
+    def __iter__(self) -> Iterator[LiveFrame]:
+        """Yield the newest image again and again, with the mask."""
+        return map(self._masked, self._camera)
+
+    def _masked(self, frame: LiveFrame) -> LiveFrame:
+        return replace(frame, images=self._with_mask(0, frame.images))

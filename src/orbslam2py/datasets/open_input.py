@@ -12,7 +12,7 @@ import cv2
 from orbslam2py._arguments import is_whole, path_of
 from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.datasets.bags import BagSequence
-from orbslam2py.datasets.base import LiveSource, Sequence
+from orbslam2py.datasets.base import IterableSequence, LiveSource
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.depth_folders import DepthFolders, find_depth_pair
 from orbslam2py.datasets.image_folder import ImageFolder, image_files
@@ -46,7 +46,7 @@ def open_input(
     times: str | Path | None = None,
     mask: str | Path | None = None,
     topics: Mapping[str, str] | str | None = None,
-) -> Sequence | LiveSource:
+) -> IterableSequence | LiveSource:
     """Open a recorded sequence, a bag, a folder of images, a video or a camera.
 
     Parameters
@@ -71,7 +71,7 @@ def open_input(
 
     Returns
     -------
-    Sequence or LiveSource
+    IterableSequence or LiveSource
         A `LiveSource`, opened already, for a camera.
 
     Raises
@@ -98,7 +98,7 @@ def open_input(
         live.open()
         return live
     if is_recording(named):
-        sequence: Sequence = BagSequence(named, sensor, settings=settings, topics=topics)
+        sequence: IterableSequence = BagSequence(named, sensor, settings=settings, topics=topics)
         _refuse_times(named, sequence.layout, fps, times)
     else:
         _refuse_topics(named, topics)
@@ -112,7 +112,7 @@ def _open_recorded(
     settings: SettingsChoice,
     fps: float | None,
     times: str | Path | None,
-) -> Sequence:
+) -> IterableSequence:
     if path.is_file():
         _require_video(path)
         return VideoSequence(path, sensor, settings=settings, fps=fps, times=times)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from orbslam2py._arguments import path_of
 from orbslam2py.datasets.bags import BagSequence, is_bag
-from orbslam2py.datasets.base import Layout, Sequence
+from orbslam2py.datasets.base import IterableSequence, Layout
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.depth_folders import (
     DepthFolders,
@@ -106,7 +106,7 @@ def open_sequence(
     association: str | Path | None = None,
     layout: Layout | str | None = None,
     topics: Mapping[str, str] | str | None = None,
-) -> Sequence:
+) -> IterableSequence:
     """Open the sequence in a folder or a bag, recognised by its files.
 
     Parameters
@@ -129,7 +129,7 @@ def open_sequence(
 
     Returns
     -------
-    Sequence
+    IterableSequence
         A `RecordedSequence`, a `BagSequence`, or what a loader of another package makes; images
         are read when asked for.
 

@@ -22,6 +22,7 @@ from orbslam2py.trajectory import (
     align,
     lengths_along,
 )
+from orbslam2py.trajectory.rotations import require_poses
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ def lap_error(
     Raises
     ------
     DatasetError
-        If no time stamps match, or the estimate ends before the lap does.
+        If no time stamps match, a pose is none, or the estimate ends before the lap does.
     """
     estimated, true, along = _lap(estimate, truth, length, max_difference)
     ends = (np.array([0]), np.array([len(true) - 1]))
@@ -112,8 +113,8 @@ def scale_drift(
     Raises
     ------
     DatasetError
-        If no time stamps match, the estimate ends before the lap does, or a window holds fewer than
-        three poses.
+        If no time stamps match, a pose is none, the estimate ends before the lap does, or a window
+        holds fewer than three poses.
     """
     estimated, true, along = _lap(estimate, truth, length, max_difference)
     metres = 0.1 * along[-1] if window is None else window
@@ -134,6 +135,7 @@ def _lap(
     for name, trajectory in (("estimate", estimate), ("truth", truth)):
         if not isinstance(trajectory, Trajectory):
             raise DatasetError(f"the {name} is {shown(trajectory)}; give an orbslam2py.Trajectory")
+        require_poses(trajectory.T_wc, ~trajectory.lost, f"the {name}")
     estimate = estimate.select(~estimate.lost)
     truth = truth.select(~truth.lost)
     i, j = match_poses(estimate, truth, max_difference)

@@ -25,7 +25,7 @@ from orbslam2py.trajectory import (
     align,
     lengths_along,
 )
-from orbslam2py.trajectory.rotations import inverse_poses, rotation_angles
+from orbslam2py.trajectory.rotations import inverse_poses, require_poses, rotation_angles
 
 #: Lengths of KITTI's path segments [m].
 SEGMENT_LENGTHS = (100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0)
@@ -194,12 +194,13 @@ def evaluate_trajectory(
     Raises
     ------
     DatasetError
-        If no time stamps match.
+        If no time stamps match, or a pose is none: not finite, or without a rotation.
     """
     alignment = Alignment.of(alignment)
     for name, trajectory in (("estimate", estimate), ("truth", truth)):
         if not isinstance(trajectory, Trajectory):
             raise DatasetError(f"the {name} is {shown(trajectory)}; give an orbslam2py.Trajectory")
+        require_poses(trajectory.T_wc, ~trajectory.lost, f"the {name}")
     offset = finite_number(offset, "the offset", "a number of seconds", DatasetError)
     estimate = estimate.select(~estimate.lost).shifted(offset)
     truth = truth.select(~truth.lost)

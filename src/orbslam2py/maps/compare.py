@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbslam2py.maps.contents import MapContents
-from orbslam2py.maps.saved_map import SavedMap
+from orbslam2py.maps.saved_map import SavedMap, saved_of
 
 
 def map_differences(first: SavedMap, second: SavedMap) -> list[str]:
@@ -20,7 +20,14 @@ def map_differences(first: SavedMap, second: SavedMap) -> list[str]:
     -------
     list of str
         One sentence per thing that differs; empty if nothing does.
+
+    Raises
+    ------
+    MapFileError
+        If one of them is no `SavedMap`, such as a path.
     """
+    saved_of(first, "the first map")
+    saved_of(second, "the second map")
     return [
         *_settings(first, second),
         *_contents(first.contents, second.contents),

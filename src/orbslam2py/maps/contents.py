@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orbslam2py._arguments import instance_of
 from orbslam2py._arrays import ByteArray, IntArray
+from orbslam2py.errors import MapFileError
 from orbslam2py.maps.content_groups import (
     ArrayGroup,
     Cameras,
@@ -32,6 +34,8 @@ _WORDS = "keyframes.words"
 @dataclass(frozen=True, eq=False)
 class MapContents:
     """Everything that a map is, of one moment; arrays are not to be changed.
+
+    Exports and edits take it, and refuse a `SavedMap`: give its ``contents``.
 
     Examples
     --------
@@ -157,3 +161,15 @@ class MapContents:
             digest.update(f"\n{name} {array.dtype.str} {array.shape}\n".encode())
             digest.update(np.ascontiguousarray(array).data)
         return digest.hexdigest()
+
+
+def contents_of(value: Any) -> MapContents:
+    """Take the contents of a map.
+
+    Raises
+    ------
+    MapFileError
+        For anything else, also for a `SavedMap`, which has them.
+    """
+    remedy = "its MapContents: saved.contents of saved = load_map(path)"
+    return instance_of(value, MapContents, "the map", remedy, MapFileError)

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from orbslam2py import _core as core
+from orbslam2py._arguments import path_of
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._files import atomic_write
 from orbslam2py.errors import MapFileError
@@ -92,9 +93,12 @@ class MapArrays:
 
         Raises
         ------
+        MapFileError
+            If the path is none.
         OSError
             If it cannot be written.
         """
+        path = path_of(path, "the file of the map", MapFileError)
         arrays = {field.name: getattr(self, field.name) for field in fields(self)}
         arrays["point_positions"] = self.point_positions.astype(np.float32)
         with atomic_write(path, binary=True) as stream:
@@ -111,6 +115,7 @@ class MapArrays:
         OSError
             If it cannot be read.
         """
+        path = path_of(path, "the file of the map", MapFileError)
         try:
             with np.load(path, allow_pickle=False) as file:
                 found = {field.name: file[field.name] for field in fields(cls)}

@@ -19,7 +19,7 @@ from orbslam2py.maps.content_groups import (
     Points,
     RemovedKeyframes,
 )
-from orbslam2py.maps.contents import MapContents
+from orbslam2py.maps.contents import MapContents, contents_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +119,7 @@ def restore_contents(
     MapFileError
         If the contents are impossible; names the thing. Nothing was changed then.
     """
+    contents_of(contents)
     if slam_map is None:
         slam_map = core.Map()
     arrays = contents.as_dict()

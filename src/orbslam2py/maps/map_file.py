@@ -8,12 +8,14 @@ import os
 from collections.abc import Iterator
 
 from orbslam2py import _core as core
+from orbslam2py._arguments import path_of
 from orbslam2py.errors import MapFileError
-from orbslam2py.maps.map_reader import check_frames, opened, read_head
+from orbslam2py.maps.contents import contents_of
+from orbslam2py.maps.map_reader import check_contents, check_frames, opened, read_head
 from orbslam2py.maps.map_rows import all_rows
 from orbslam2py.maps.map_tables import MapTables
 from orbslam2py.maps.map_writer import MapWriter
-from orbslam2py.maps.saved_map import SavedMap
+from orbslam2py.maps.saved_map import SavedMap, saved_of
 from orbslam2py.settings.sensor import Sensor
 
 
@@ -128,11 +130,20 @@ def save_map(saved: SavedMap, path: str | os.PathLike[str]) -> None:
     Raises
     ------
     MapFileError
-        If the map has no keyframes, the file cannot be written, or it is there and is no map; a
-        file that was there is kept.
+        If the map has no keyframes, it is one that `load_map` would refuse, the file cannot be
+        written, or it is there and is no map; a file that was there is kept.
     """
+    contents_of(saved_of(saved).contents)
+    path = path_of(path, "the map file", MapFileError)
     if not len(saved.contents.keyframes):
         raise MapFileError(
             f"cannot write {path}: there are no keyframes in the map yet; save it later"
         )
+    try:
+        check_contents(saved.contents, saved.runs)
+    except MapFileError as error:
+        raise MapFileError(
+            f"cannot write {path}: no map can be made of it ({error}); give one that is whole, a "
+            "file that was there is kept"
+        ) from error
     MapWriter(path, once=True).commit(all_rows(saved))

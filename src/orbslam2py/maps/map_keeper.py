@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
+from orbslam2py._arguments import path_of
 from orbslam2py._arrays import IntArray
 from orbslam2py._version import __version__
 from orbslam2py.errors import MapFileError, StateError
@@ -109,6 +110,7 @@ class MapKeeper:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a map file; see `orbslam2py.System.save_map`."""
+        path = path_of(path, "the map file", MapFileError)
         autosave = self._autosave
         if autosave is not None and os.path.realpath(path) == os.path.realpath(autosave.path):
             autosave.save_now()

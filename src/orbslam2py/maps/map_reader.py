@@ -15,9 +15,11 @@ from typing import NamedTuple
 import numpy as np
 
 from orbslam2py import _core as core
+from orbslam2py._arguments import path_of
 from orbslam2py._arrays import IntArray
 from orbslam2py._files import reason_of
 from orbslam2py.errors import MapFileError, SettingsError
+from orbslam2py.maps.contents import MapContents
 from orbslam2py.maps.map_tables import BlobTable, MapTables, read_one, read_rows
 from orbslam2py.maps.map_writer import connect
 from orbslam2py.maps.saved_map import RecordedFrames, Run, SavedMap, VocabularyIdentity
@@ -63,8 +65,7 @@ def load_map(path: str | os.PathLike[str], *, images: bool = False) -> SavedMap:
     with opened(path) as (connection, tables):
         head = read_head(connection, tables, images=images)
         contents = MapTables(connection, tables).contents()
-        core.check_map_contents(contents.as_dict())
-        check_frames(head.runs, contents.keyframes.ids, contents.removed_keyframes.ids)
+        check_contents(contents, head.runs)
     return SavedMap(contents, *head, source=named)
 
 
@@ -84,7 +85,8 @@ def opened(
     MapFileError
         Naming the file; also for what is found to be wrong with it while it is open.
     """
-    named, file = str(path), Path(path)
+    file = path_of(path, "the map file", MapFileError)
+    named = str(path)
     version = _check_header(file, named)
     with _refusing(named):
         # A writer that was killed may have left a journal: SQLite takes back what it says first.
@@ -209,6 +211,12 @@ def _read_runs(connection: sqlite3.Connection, tables: dict[str, Table]) -> Iter
             raise MapFileError(f"the options of run {number} are not readable")
         recorded = {name: array[first:last].copy() for name, array in arrays.items()}
         yield Run(program, started, seed, chosen, RecordedFrames(**recorded))
+
+
+def check_contents(contents: MapContents, runs: tuple[Run, ...]) -> None:
+    """Raise `MapFileError`, naming the thing, unless this can be a map with its runs."""
+    core.check_map_contents(contents.as_dict())
+    check_frames(runs, contents.keyframes.ids, contents.removed_keyframes.ids)
 
 
 def check_frames(runs: tuple[Run, ...], keyframes: IntArray, removed: IntArray) -> None:

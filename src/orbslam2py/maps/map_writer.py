@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Set
 from pathlib import Path
 from types import MappingProxyType
 
+from orbslam2py._arguments import path_of
 from orbslam2py._files import reason_of
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.map_rows import Row, checksum
@@ -264,7 +265,8 @@ def _remedy_for(message: str) -> str:
 
 def check_map_target(path: str | os.PathLike[str]) -> None:
     """Raise `MapFileError` if a map file cannot be written there, before there is a map."""
-    named, target = str(path), Path(os.path.realpath(path))
+    named = str(path_of(path, "the map file", MapFileError))
+    target = Path(os.path.realpath(path))
     with _naming(named):
         _check_target(target, named)
         probe = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")

@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from orbslam2py._arguments import array_of
+from orbslam2py._arguments import array_of, path_of, shown
 from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py._files import atomic_write
 from orbslam2py.errors import DatasetError
@@ -52,13 +53,15 @@ def write_ply(
     OSError
         If the file cannot be written; an existing file is kept then.
     DatasetError
-        If the points are no such array, or there is not one colour per point.
+        If the points or the colours are no such array, there is not one colour per point, or the
+        path is none.
     """
+    path = path_of(path, "the file of points")
     positions = array_of(points, "points", (-1, 3), finite=False)
     fields = [(name, "<f4") for name in "xyz"]
     if colours is not None:
         fields += [(name, "u1") for name in ("red", "green", "blue")]
-        check_colours(len(positions), len(colours))
+        colours = colours_of(colours, len(positions))
     vertices = np.zeros(len(positions), fields)
     for column, name in enumerate("xyz"):
         vertices[name] = positions[:, column]
@@ -76,10 +79,22 @@ def write_ply(
         stream.write(vertices.tobytes())
 
 
-def check_colours(n_points: int, n_colours: int) -> None:
-    """Raise DatasetError unless there is one colour per point."""
-    if n_points != n_colours:
-        raise DatasetError(f"{n_points} points, but {n_colours} colours; give one per point")
+def colours_of(value: Any, n_points: int) -> ByteArray:
+    """Take one colour per point.
+
+    Raises
+    ------
+    DatasetError
+        For anything but uint8 (p, 3): numbers from 0 to 1 would all be black.
+    """
+    wanted = f"give red, green and blue from 0 to 255, uint8 ({n_points}, 3)"
+    if not isinstance(value, np.ndarray):
+        raise DatasetError(f"colours is {shown(value)}; {wanted}")
+    if value.dtype != np.uint8 or value.shape[1:] != (3,):
+        raise DatasetError(f"colours is of {value.dtype} and shape {value.shape}; {wanted}")
+    if len(value) != n_points:
+        raise DatasetError(f"{n_points} points, but {len(value)} colours; give one per point")
+    return value
 
 
 def read_points(path: str | Path) -> FloatArray:
@@ -97,7 +112,7 @@ def read_points(path: str | Path) -> FloatArray:
     OSError
         If it cannot be read.
     """
-    header, _, body = Path(path).read_bytes().partition(b"end_header\n")
+    header, _, body = path_of(path, "the file of points").read_bytes().partition(b"end_header\n")
     lines = header.decode("ascii", "replace").splitlines()
     if not lines or lines[0] != "ply" or "format binary_little_endian 1.0" not in lines:
         raise DatasetError(f"{path} is no binary PLY file (little-endian)")

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbslam2py._arrays import FloatArray, IntArray
-from orbslam2py.maps.contents import MapContents
+from orbslam2py.maps.contents import MapContents, contents_of
 
 
 def reprojection_errors(contents: MapContents) -> FloatArray:
@@ -17,7 +17,13 @@ def reprojection_errors(contents: MapContents) -> FloatArray:
     -------
     array of float64 (o,)
         Undistorted pixels, one per observation.
+
+    Raises
+    ------
+    MapFileError
+        If `contents` is something else.
     """
+    contents_of(contents)
     keyframes, observations = contents.keyframes, contents.observations
     rows = np.searchsorted(keyframes.ids, observations.keyframe)
     points = np.searchsorted(contents.points.ids, observations.point)

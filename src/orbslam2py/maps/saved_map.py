@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 
 from orbslam2py import _core as core
+from orbslam2py._arguments import instance_of, is_whole, shown
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
+from orbslam2py.errors import MapFileError
 from orbslam2py.maps.contents import MapContents
 from orbslam2py.maps.map_copies import restore_contents
 from orbslam2py.settings.sensor import Sensor
@@ -172,10 +174,19 @@ class SavedMap:
         Trajectory
             Of the images in that map, relative to its first keyframe; empty when the map has no
             runs.
+
+        Raises
+        ------
+        MapFileError
+            If there is no such run, or no such map.
         """
         if not self.runs:
             return Trajectory(np.zeros(0), np.zeros((0, 4, 4)))
-        frames = self.runs[run].frames
+        n = len(self.runs)
+        frames = self.runs[_number_of(run, "run", -n, n)].frames
+        roots = np.flatnonzero(self.contents.keyframes.parent < 0)
+        if map_number is not None:
+            map_number = _number_of(map_number, "map_number", 0, len(roots))
         numbers = self._maps_of(frames.keyframes)
         if map_number is None:
             map_number = int(np.bincount(numbers[numbers >= 0], minlength=1).argmax())
@@ -184,7 +195,7 @@ class SavedMap:
         frames = RecordedFrames(
             **{field.name: getattr(frames, field.name)[chosen] for field in fields(frames)}
         )
-        root = int(np.flatnonzero(self.contents.keyframes.parent < 0)[map_number])
+        root = int(roots[map_number])
         T_rw, scale = self._keyframe_poses(frames.keyframes)
         T_cr = poses_from(
             rotations_from_quaternions(frames.T_cr[:, :4]), scale[:, None] * frames.T_cr[:, 4:]
@@ -240,3 +251,24 @@ class SavedMap:
         T = np.array([pose for pose, _ in poses]).reshape(-1, 4, 4)
         scales = np.array([scale for _, scale in poses])
         return T[places], scales[places]
+
+
+def _number_of(value: Any, what: str, first: int, end: int) -> int:
+    """Take one of the numbers from `first` to below `end`."""
+    if not is_whole(value) or not first <= value < end:
+        raise MapFileError(
+            f"{what} is {shown(value)}; give a whole number from {first} to {end - 1}"
+        )
+    return int(value)
+
+
+def saved_of(value: Any, what: str = "the map") -> SavedMap:
+    """Take a saved map.
+
+    Raises
+    ------
+    MapFileError
+        For anything else, also for a path or for `MapContents`.
+    """
+    remedy = "a SavedMap, as from load_map(path) or System.saved_map()"
+    return instance_of(value, SavedMap, what, remedy, MapFileError)

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from orbslam2py import _core as core
 from orbslam2py.errors import MapFileError, SettingsError
 from orbslam2py.maps.map_file import MapFile
-from orbslam2py.maps.saved_map import SavedMap, VocabularyIdentity
+from orbslam2py.maps.saved_map import SavedMap, VocabularyIdentity, saved_of
 from orbslam2py.settings.keys import KEYS
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
@@ -35,7 +35,13 @@ def check_sensor(saved: SavedMap | MapFile, sensor: Sensor) -> None:
 
 
 def check_made_alike(files: Sequence[SavedMap | MapFile]) -> None:
-    """Raise `SettingsError`, naming both, unless maps were made with one sensor and one camera."""
+    """Raise `SettingsError`, naming both, unless maps were made with one sensor and one camera.
+
+    What is no saved map, such as a path, gets a `MapFileError`.
+    """
+    for saved in files:
+        if not isinstance(saved, MapFile):
+            saved_of(saved, "one of the maps")
     for saved in files[1:]:
         first = files[0]
         name, other = first.source or "in memory", saved.source or "in memory"

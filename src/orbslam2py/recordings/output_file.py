@@ -10,6 +10,7 @@ import shutil
 from collections.abc import Iterable
 from pathlib import Path
 
+from orbslam2py._arguments import path_of
 from orbslam2py._files import reason_of
 from orbslam2py.errors import OutputFileError
 
@@ -45,7 +46,7 @@ class OutputFile:
     """
 
     def __init__(self, path: str | os.PathLike[str], what: str, suffixes: Iterable[str]) -> None:
-        self.path = Path(path)
+        self.path = path_of(path, f"the {what}", OutputFileError)
         self._what = what
         _check_name(self.path, what, list(suffixes))
         target = Path(os.path.realpath(self.path))

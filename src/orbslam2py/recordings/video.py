@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from orbslam2py._arguments import instance_of, number_above_zero
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
 from orbslam2py.errors import OutputFileError
 from orbslam2py.maps import MapChanges
@@ -65,7 +66,8 @@ class VideoWriter:
     Raises
     ------
     OutputFileError
-        If it can be told already that there will be no video.
+        If it can be told already that there will be no video, or if a rate, a duration or a true
+        path is none.
     """
 
     name = "the video"
@@ -86,7 +88,17 @@ class VideoWriter:
                 f"a video cannot be {size[0]} x {size[1]} pixels large; take even numbers from "
                 "320 x 240 on"
             )
-        self._frames_per_second = float(np.clip(frames_per_second, 1.0, 240.0))
+        rate = number_above_zero(
+            frames_per_second, "frames_per_second", "images a second, above 0", OutputFileError
+        )
+        # A recording of one image lasts for no time.
+        if duration is not None and duration != 0:
+            remedy = "seconds, 0 or more, or None"
+            duration = number_above_zero(duration, "duration", remedy, OutputFileError)
+        if ground_truth is not None:
+            remedy = "an orbslam2py.Trajectory, or None"
+            instance_of(ground_truth, Trajectory, "ground_truth", remedy, OutputFileError)
+        self._frames_per_second = float(np.clip(rate, 1.0, 240.0))
         self._file = VideoFile(path, size, self._frames_per_second)
         self._in_time = in_time
         self._unit = unit

@@ -23,6 +23,8 @@ _LEAST, _MOST = 0.05, 200.0
 #: Factors in use, the commonest first: millimetres, TUM, metres, centimetres, 0.1 mm.
 _USUAL = (1000.0, 5000.0, 1.0, 100.0, 10_000.0)
 _TUM_FACTOR, _MILLIMETRES = 5000.0, 1000.0
+#: Numbers beyond say nothing that these do not.
+_SENSIBLE = (1e-100, 1e100)
 #: Nearer than this the factor of TUM is doubted in other data [m].
 _NEAR = 0.5
 #: Where the median of a depth image usually lies [m].
@@ -113,7 +115,8 @@ def _median_of_known(depth: npt.NDArray[np.generic]) -> float | None:
     known = depth[np.isfinite(depth) & (depth > 0)]  # type: ignore[operator]
     if depth.dtype.kind in "ui":
         known = known[known != np.iinfo(depth.dtype).max]  # type: ignore[type-var]
-    return float(np.median(known.astype(np.float64))) if len(known) else None
+    # Halfway between the largest floats, and the power of ten below the smallest, are none.
+    return float(np.median(np.clip(known, *_SENSIBLE, dtype=np.float64))) if len(known) else None
 
 
 def _fitting_factor(median: float) -> float:

@@ -12,7 +12,7 @@ from typing import TypedDict
 
 import numpy as np
 
-from orbslam2py._arguments import array_of, choice_of, is_whole, numbers_of, shown
+from orbslam2py._arguments import array_of, choice_of, is_whole, numbers_of, pose_of, shown
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings.keys import check_group
@@ -108,7 +108,7 @@ class CameraSettings:
         """
         positions = array_of(points, "points", (-1, 3), SettingsError, finite=False)
         if T_cw is not None:
-            T = array_of(T_cw, "T_cw", (4, 4), SettingsError)
+            T = pose_of(T_cw, "T_cw")
             positions = positions @ T[:3, :3].T + T[:3, 3]
         coefficients = (self.k1, self.k2, self.p1, self.p2, self.k3)
         plane = on_image_plane(positions, coefficients if choice_of(distort, "distort") else None)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orbslam2py._arguments import is_number, shown
+from orbslam2py._arguments import float_of, is_number, shown
 from orbslam2py.settings.sensor import Sensor
 
 _ALL = frozenset(Sensor)
@@ -271,7 +271,7 @@ def check_group(group: str, values: object) -> list[str]:
         if key.name == "Camera.bf" and value == 0:
             continue  # a camera without depth
         try:
-            object.__setattr__(values, key.field, convert(key, float(value)))
+            object.__setattr__(values, key.field, convert(key, float_of(value)))
         except ValueError as error:
             problems.append(str(error))
     return problems

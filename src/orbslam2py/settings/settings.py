@@ -9,9 +9,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from orbslam2py._arguments import path_of, shown
 from orbslam2py._files import atomic_write
@@ -47,11 +48,12 @@ class Settings:
     Attributes
     ----------
     sensor
-        What the settings are for.
+        What the settings are for; may be given as text.
     camera, orb
-        The (rectified) camera and the extraction.
+        The (rectified) camera and the extraction. For one camera `CameraSettings.bf`, which it does
+        not have, becomes 0.
     depth
-        For stereo and RGB-D, None for one camera.
+        For stereo and RGB-D; None for one camera, whatever is given.
     rectification
         How raw stereo pairs are rectified before they are tracked; None if they come rectified.
     viewer
@@ -70,9 +72,25 @@ class Settings:
     rectification: StereoRectification | None = None
     viewer: ViewerSettings = field(default_factory=ViewerSettings)
 
+    if TYPE_CHECKING:  # text is taken for a sensor, which the type of the field cannot say
+
+        def __init__(
+            self,
+            sensor: Sensor | str,
+            camera: CameraSettings,
+            orb: OrbSettings = ...,
+            depth: DepthSettings | None = None,
+            rectification: StereoRectification | None = None,
+            viewer: ViewerSettings = ...,
+        ) -> None: ...
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "sensor", Sensor(self.sensor))
         self._check_types()
+        if self.sensor is Sensor.MONOCULAR:  # as a file is read: its depth is another sensor's
+            if self.camera.bf:
+                object.__setattr__(self, "camera", replace(self.camera, bf=0.0))
+            object.__setattr__(self, "depth", None)
         problems = []
         if self.sensor.has_depth:
             if not self.camera.bf > 0:

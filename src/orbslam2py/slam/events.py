@@ -16,15 +16,15 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from orbslam2py._arguments import shown
-from orbslam2py._arrays import FloatArray
+from orbslam2py._arrays import EqualByValue, FloatArray
 from orbslam2py._worker import Worker
 from orbslam2py.errors import SettingsError
 
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class LoopClosed:
+@dataclass(frozen=True, eq=False)
+class LoopClosed(EqualByValue):
     """A place was seen again, and the drift gathered meanwhile was taken out."""
 
     map_index: int
@@ -53,8 +53,8 @@ class LoopClosed:
     """Time per step: detect, verify, wait, plan, graph, apply."""
 
 
-@dataclass(frozen=True)
-class KeyframeAdded:
+@dataclass(frozen=True, eq=False)
+class KeyframeAdded(EqualByValue):
     """Local mapping is through with a new keyframe."""
 
     map_index: int
@@ -78,8 +78,8 @@ class MapStarted:
     """Seconds."""
 
 
-@dataclass(frozen=True)
-class MapsMerged:
+@dataclass(frozen=True, eq=False)
+class MapsMerged(EqualByValue):
     """Two maps showed the same place and are one now, in the world of the older one."""
 
     map_index: int
@@ -118,8 +118,8 @@ class TrackingLost:
     reason: str
 
 
-@dataclass(frozen=True)
-class Relocalized:
+@dataclass(frozen=True, eq=False)
+class Relocalized(EqualByValue):
     """A pose was found again."""
 
     map_index: int

@@ -15,6 +15,7 @@ from orbslam2py.settings.depth_check import DepthCheck
 from orbslam2py.settings.fit import find_misfit
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
+from orbslam2py.slam.pair_check import PairCheck
 
 #: Pixels per side from which on an image has room for a cell of corners (30 pixels) between its
 #: borders (16 on each side): `features/corner_grid.hpp`.
@@ -56,11 +57,12 @@ class FrontEnd:
         self._pair_extractor = core.PairExtractor(options) if sensor is Sensor.STEREO else None
         self._check_calibration = check_calibration
         self.depth_check = DepthCheck(settings.depth_factor)
+        self.pair_check = PairCheck()
 
     @property
     def depth_warning(self) -> str | None:
-        """What the first depth images said against the factor of the settings."""
-        return self.depth_check.warning
+        """Why depth will be wrong, as the first images say: its factor, or pairs that are none."""
+        return self.depth_check.warning or self.pair_check.warning
 
     def reset(self) -> None:
         """Let the next image have any size: a new map begins."""
@@ -115,6 +117,8 @@ class FrontEnd:
         left_mask, right_mask = mask if isinstance(mask, tuple) else (mask, mask)
         _check_mask(left_mask, left, "left mask")
         _check_mask(right_mask, right, "right mask")
+        if not self.pair_check.done:
+            self.pair_check.look(left, right)
         context = self._context_for(left)
         with timer("extract"):
             left_grey = core.to_grey(left, self._settings.camera.rgb)
@@ -142,6 +146,8 @@ class FrontEnd:
         if not isinstance(depth, np.ndarray) or depth.ndim != 2:
             shape = getattr(depth, "shape", None)
             raise ImageError(f"depth must be an array of shape (height, width), got {shape}")
+        # Where a masked array hides the depth there is none; nor may a matrix's own rules count.
+        depth = np.asarray(np.ma.filled(depth, 0))
         if depth.shape != image.shape[:2]:
             raise ImageError(
                 f"depth has size {depth.shape}, the image {image.shape[:2]}; "
@@ -173,6 +179,7 @@ class FrontEnd:
     def _check(self, image: npt.NDArray[np.uint8], what: str) -> None:
         if not isinstance(image, np.ndarray):
             raise ImageError(f"{what} must be a NumPy array, got {type(image).__name__}")
+        _refuse_masked(image, what)
         if image.dtype != np.uint8:
             raise ImageError(f"{what} must be uint8, got {image.dtype}")
         if image.size == 0:
@@ -218,9 +225,19 @@ def _check_mask(mask: Mask | None, image: npt.NDArray[np.uint8], what: str) -> N
     if not isinstance(mask, np.ndarray) or mask.dtype != np.uint8:
         kind = mask.dtype if isinstance(mask, np.ndarray) else type(mask).__name__
         raise ImageError(f"{what} must be a NumPy array of uint8 (0: ignore), got {kind}")
+    _refuse_masked(mask, what)
     if mask.shape != image.shape[:2]:
         raise ImageError(
             f"{what} has shape {mask.shape}; it must be that of the image, {image.shape[:2]}"
+        )
+
+
+def _refuse_masked(array: npt.NDArray[np.uint8], what: str) -> None:
+    # What lies below its mask would be tracked: there is no grey value for "nothing".
+    if isinstance(array, np.ma.MaskedArray):
+        raise ImageError(
+            f"{what} is a masked array; give its data, and where to look as mask=, uint8 with 0 "
+            "where no keypoint may lie"
         )
 
 

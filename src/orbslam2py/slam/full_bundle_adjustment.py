@@ -15,10 +15,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
 from orbslam2py import _core as core
+from orbslam2py._arguments import number_above_zero
 from orbslam2py._cores import n_cores
 from orbslam2py._timing import StageStatistics, StageTimer
 from orbslam2py._worker import Worker, WorkerState
-from orbslam2py.maps.contents import MapContents
+from orbslam2py.maps.contents import MapContents, contents_of
 from orbslam2py.maps.map_copies import restore_contents, take_contents
 from orbslam2py.maps.units import unit_of
 
@@ -239,7 +240,7 @@ def optimize_map(
     contents
         The map, as from `load_map`.
     time_limit
-        Seconds after which it ends; what was reached by then is used.
+        Seconds, above 0, after which it ends; what was reached by then is used.
 
     Returns
     -------
@@ -251,8 +252,14 @@ def optimize_map(
     Raises
     ------
     MapFileError
-        If the contents are impossible.
+        If the contents are impossible, or something else.
+    SettingsError
+        If the time limit is none.
     """
+    contents_of(contents)
+    if time_limit is not None:
+        remedy = "seconds above 0, or None for no limit"
+        time_limit = number_above_zero(time_limit, "time_limit", remedy)
     slam_map = restore_contents(contents)
     nobody: Worker[int] = Worker("local mapping", lambda _: None, threaded=False)
     adjustment = FullBundleAdjustment(

@@ -3,15 +3,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
-from orbslam2py._arguments import choice_of, is_number, member_of, seed_of, shown
+from orbslam2py._arguments import choice_of, is_finite, member_of, pose_of, seed_of, shown
 from orbslam2py.errors import SettingsError
 from orbslam2py.maps.map_file import MapFile
 from orbslam2py.maps.saved_map import SavedMap
@@ -21,7 +19,10 @@ from orbslam2py.settings.settings import Settings, resolve_settings
 from orbslam2py.slam.effort import Effort
 from orbslam2py.vocabulary.vocabulary import load_vocabulary, vocabulary_name
 
-_SWITCHES = "deterministic", "wait_for_mapping", "loop_closing", "full_adjustment", "several_maps"
+_SWITCHES = (
+    *("deterministic", "wait_for_mapping", "loop_closing", "full_adjustment", "several_maps"),
+    *("check_calibration", "keyframe_images"),
+)
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class SystemOptions:
         object.__setattr__(self, "effort", effort)
         for name in _SWITCHES:
             object.__setattr__(self, name, choice_of(getattr(self, name), name))
-        if not (is_number(self.new_map_after) and 0 <= self.new_map_after < math.inf):
+        if not (is_finite(self.new_map_after) and self.new_map_after >= 0):
             raise SettingsError(
                 "new_map_after must be a number of seconds from 0 on, got "
                 f"{shown(self.new_map_after)}; to wait for the old map for ever, switch "
@@ -63,7 +64,7 @@ class SystemOptions:
         seconds = self.full_adjustment_time_limit
         if seconds is None:
             return
-        if not (is_number(seconds) and math.isfinite(seconds) and seconds > 0):
+        if not (is_finite(seconds) and seconds > 0):
             raise SettingsError(
                 "the time limit of the full adjustment must be more than 0 s, got "
                 f"{shown(seconds)}; give seconds, or leave it out"
@@ -132,8 +133,9 @@ def _pose_given(T_wc: npt.ArrayLike | None) -> core.Pose | None:
     if T_wc is None:
         return None
     try:
-        return core.Pose.from_matrix(np.asarray(T_wc, np.float64)).inverse()
-    except (TypeError, ValueError) as error:
+        return core.Pose.from_matrix(pose_of(T_wc, "initial_pose")).inverse()
+    except SettingsError as error:
         raise SettingsError(
-            "initial_pose must be camera to world, a finite 4x4 matrix with the last row 0 0 0 1"
+            "initial_pose must be camera to world, a finite 4x4 matrix with a rotation (no mirror, "
+            "no scale) and the last row 0 0 0 1"
         ) from error

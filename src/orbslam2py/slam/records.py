@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
-from orbslam2py._arrays import FloatArray, IntArray
+from orbslam2py._arrays import EqualByValue, FloatArray, IntArray
 
 
 class TrackingState(enum.IntEnum):
@@ -126,8 +126,8 @@ class Evidence:
     """The same for its way, metres (one camera: the map's units)."""
 
 
-@dataclass(frozen=True)
-class FrameFeatures:
+@dataclass(frozen=True, eq=False)
+class FrameFeatures(EqualByValue):
     """The keypoints of a frame and what they were matched to (on request)."""
 
     keypoints: npt.NDArray[np.float32]
@@ -144,9 +144,9 @@ class FrameFeatures:
     """(n, 3) red, green, blue of the image at the keypoints; (0, 3) for a grey image."""
 
 
-@dataclass(frozen=True)
-class TrackingRecord:
-    """Result of one track call."""
+@dataclass(frozen=True, eq=False)
+class TrackingRecord(EqualByValue):
+    """Result of one track call; two are equal if all fields are, arrays number by number."""
 
     frame_id: int
     """Number of the image since the last reset, from 0. When a single camera's young map comes to
@@ -211,7 +211,7 @@ def _nothing() -> IntArray:
     return np.zeros(0, np.int64)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PoseEstimate:
     """What one step of tracking found out about a frame's pose.
 
@@ -252,7 +252,7 @@ class PoseEstimate:
         return replace(self, reason=reason)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TrackingOutcome:
     """What tracking one frame gave."""
 

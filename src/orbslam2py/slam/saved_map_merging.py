@@ -57,11 +57,11 @@ def merge_maps(
     MapFileError, SettingsError
         If they are of different cameras, sensors or visual words, or fewer than two.
     """
-    if len(files) < 2:
-        raise MapFileError("merging takes two maps or more; give another map file")
+    if not isinstance(files, Sequence) or len(files) < 2:
+        raise MapFileError("merging takes two maps or more, a list of what load_map returns")
+    check_made_alike(files)
     first = files[0]
     words = vocabulary if isinstance(vocabulary, core.Vocabulary) else load_vocabulary(vocabulary)
-    check_made_alike(files)
     for saved in files:
         check_vocabulary(saved, words, vocabulary_name(vocabulary), may_differ=False)
     together = put_together(files)

@@ -13,7 +13,14 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
-from orbslam2py._arguments import finite_number, is_whole, path_of, patience_of, shown
+from orbslam2py._arguments import (
+    choice_of,
+    finite_number,
+    is_whole,
+    path_of,
+    patience_of,
+    shown,
+)
 from orbslam2py._call_guard import CallGuard
 from orbslam2py.errors import MapFileError, StateError, WorkerError
 from orbslam2py.maps.contents import MapContents
@@ -225,7 +232,8 @@ class System:
         image : array of uint8, (h, w) or (h, w, 3) or (h, w, 4)
             Grey or colour (order by ``Camera.RGB`` of the settings).
         depth : array, (h, w)
-            Raw depth; divided by ``DepthMapFactor`` it is metres. 0, negative or NaN: unknown.
+            Raw depth; divided by ``DepthMapFactor`` it is metres. 0, negative, NaN or hidden in a
+            masked array: unknown.
         timestamp : float
             Seconds; must grow from call to call.
         mask : array of uint8 (h, w), optional
@@ -357,13 +365,13 @@ class System:
         assignment before it counts. Leaving the map, the camera is followed by the depths of the
         frame before (stereo, RGB-D) until a mapped place comes into view again. Keyframes that wait
         for mapping are processed when it goes on. Without a map, also after a reset, the mode comes
-        into force when one has begun.
+        into force when one has begun. What is neither True nor False is a `SettingsError`.
         """
         return self.pipeline.localization.wanted
 
     @localization_mode.setter
     def localization_mode(self, wanted: bool) -> None:
-        self.pipeline.localization.wanted = bool(wanted)
+        self.pipeline.localization.wanted = choice_of(wanted, "localization_mode")
 
     def reset(self) -> None:
         """Ask for a new map; carried out at the beginning of the next track call.

@@ -4,8 +4,11 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from orbslam2py._arguments import are_poses
 from orbslam2py._arrays import FloatArray
+from orbslam2py.errors import DatasetError
 
 
 def quaternions_from_rotations(R: FloatArray) -> FloatArray:
@@ -82,6 +85,37 @@ def poses_from(R: FloatArray, t: FloatArray) -> FloatArray:
     T[:, :3, 3] = t
     T[:, 3, 3] = 1.0
     return T
+
+
+def require_poses(T_wc: FloatArray, which: NDArray[np.bool_], what: str) -> None:
+    """See that transforms are poses, as a file or a comparison needs them.
+
+    Parameters
+    ----------
+    T_wc
+        Transforms (n, 4, 4).
+    which
+        Those that are needed, bool (n,).
+    what
+        Whose they are, for the message.
+
+    Raises
+    ------
+    DatasetError
+        With the number of the first that is none: not finite, or without a rotation.
+    """
+    bad = np.flatnonzero(which & ~are_poses(T_wc))
+    if not len(bad):
+        return
+    number = int(bad[0])
+    reason = (
+        "is no pose: it must be a rotation and a translation above the row 0 0 0 1"
+        if np.isfinite(T_wc[number]).all()
+        else "holds a number that is not finite"
+    )
+    raise DatasetError(
+        f"pose {number} of {what} {reason}; correct it, or leave it out with Trajectory.select"
+    )
 
 
 def inverse_poses(T: FloatArray) -> FloatArray:

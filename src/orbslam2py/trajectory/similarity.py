@@ -7,9 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orbslam2py._arguments import array_of
+from orbslam2py._arguments import array_of, finite_number
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import DatasetError
+from orbslam2py.trajectory.rotations import nearest_rotations
+
+#: Products of a rotation's rows may be off by so much: six digits, as people copy them ...
+_COPIED = 1e-5
+#: ... and by so much when they were computed.
+_COMPUTED = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,14 +27,40 @@ class Similarity:
     scale
         Ratio of lengths, above 0.
     R
-        Rotation, float64 (3, 3).
+        Rotation, float64 (3, 3); made orthonormal if it has been rounded.
     t
         Translation, float64 (3,).
+
+    Raises
+    ------
+    DatasetError
+        If the scale is not above 0, `R` is no rotation, or a number is not finite.
     """
 
     scale: float
     R: FloatArray
     t: FloatArray
+
+    def __post_init__(self) -> None:
+        wanted = "a number above 0"
+        scale = finite_number(self.scale, "the scale of the similarity", wanted, DatasetError)
+        if scale <= 0:
+            raise DatasetError(f"the scale of the similarity is {scale:g}; give {wanted}")
+        R = array_of(self.R, "the rotation R of the similarity", (3, 3), finite=False)
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is no rotation
+            off = float(np.abs(R @ R.T - np.eye(3)).max())
+        if not off <= _COPIED or np.linalg.det(R) < 0:
+            raise DatasetError(
+                "R of the similarity is no rotation; give a matrix with orthonormal rows and "
+                "determinant +1, the scale apart from it"
+            )
+        if off > _COMPUTED:
+            R = nearest_rotations(R)
+        t = array_of(self.t, "the translation t of the similarity", (3,), finite=False)
+        if not np.isfinite(t).all():
+            raise DatasetError("the translation t of the similarity is not finite; give 3 numbers")
+        for name, value in (("scale", scale), ("R", R), ("t", t)):
+            object.__setattr__(self, name, value)
 
     @classmethod
     def identity(cls) -> Similarity:
@@ -73,8 +105,8 @@ def align(points: FloatArray, targets: FloatArray, *, with_scale: bool = False) 
     DatasetError
         If they are no such arrays.
     """
-    points = array_of(points, "points", (-1, 3), finite=False)
-    targets = array_of(targets, "targets", (-1, 3), finite=False)
+    points = array_of(points, "points", (-1, 3))
+    targets = array_of(targets, "targets", (-1, 3))
     if len(points) != len(targets) or not len(points):
         raise DatasetError(
             f"{len(points)} points cannot be aligned to {len(targets)} targets; give one target "

@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbslam2py._arguments import array_of, finite_number, shown
-from orbslam2py._arrays import FloatArray, IntArray
+from orbslam2py._arrays import EqualByValue, FloatArray, IntArray
 from orbslam2py.errors import DatasetError
 from orbslam2py.trajectory.rotations import inverse_poses, quaternions_from_rotations
 from orbslam2py.trajectory.writers import TrajectoryFormat, write_kitti, write_tum
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory:
-    """Poses of a camera over time.
+class Trajectory(EqualByValue):
+    """Poses of a camera over time; two are equal if all their arrays are, number by number.
 
     Attributes
     ----------
@@ -125,7 +125,8 @@ class Trajectory:
         OSError
             If the file cannot be written; an existing file is kept then.
         DatasetError
-            For another format, or frame numbers that do not increase (``"kitti"``).
+            For another format, frame numbers that do not increase (``"kitti"``), or poses that are
+            none: not finite, or without a rotation.
         """
         chosen = TrajectoryFormat.of(format)
         if chosen is TrajectoryFormat.TUM:

@@ -17,7 +17,7 @@ import numpy as np
 from orbslam2py._arguments import is_whole, member_of, shown
 from orbslam2py._files import atomic_write
 from orbslam2py.errors import DatasetError
-from orbslam2py.trajectory.rotations import quaternions_from_rotations
+from orbslam2py.trajectory.rotations import quaternions_from_rotations, require_poses
 
 if TYPE_CHECKING:
     from orbslam2py.trajectory.trajectory import Trajectory
@@ -75,9 +75,10 @@ def write_tum(
     OSError
         If the file cannot be written.
     DatasetError
-        If there is not one text per pose.
+        If there is not one text per pose, or a pose is none: not finite, or without a rotation.
     """
     _check(trajectory)
+    require_poses(trajectory.T_wc, ~trajectory.lost, "the trajectory")
     if timestamp_texts is not None:
         _check_texts(timestamp_texts, len(trajectory))
     quaternions = quaternions_from_rotations(trajectory.T_wc[:, :3, :3])
@@ -110,9 +111,11 @@ def write_kitti(path: str | Path, trajectory: Trajectory, n_frames: int | None =
     OSError
         If the file cannot be written.
     DatasetError
-        If the indices are not increasing or lie beyond `n_frames`.
+        If the indices are not increasing or lie beyond `n_frames`, or a pose is none: not finite,
+        or without a rotation.
     """
     _check(trajectory)
+    require_poses(trajectory.T_wc, np.ones(len(trajectory), bool), "the trajectory")
     if n_frames is not None and not is_whole(n_frames):
         raise DatasetError(f"n_frames is {shown(n_frames)}; give a number of lines, or None")
     indices = trajectory.indices
@@ -154,9 +157,10 @@ def write_euroc(
     OSError
         If the file cannot be written.
     DatasetError
-        If there is not one text per pose.
+        If there is not one text per pose, or a pose is none: not finite, or without a rotation.
     """
     _check(trajectory)
+    require_poses(trajectory.T_wc, ~trajectory.lost, "the trajectory")
     if timestamp_texts is not None:
         _check_texts(timestamp_texts, len(trajectory))
     texts = timestamp_texts or [f"{t:.6f}" for t in trajectory.timestamps]

@@ -96,7 +96,9 @@ def require_well_ended(folder: Path, code: int, errors: str) -> None:
     assert [row["state"] for row in rows] == ["done"] * len(rows)
     assert len(finished(folder)) == len(rows), "what was begun was ended"
     assert len(list((folder / "runs").iterdir())) == len(rows)
-    assert f"{N - len(rows)} runs are left; go on with --resume" in errors
+    n_left = N - len(rows)
+    left = "1 run is left" if n_left == 1 else f"{n_left} runs are left"
+    assert f"{left}; go on with --resume" in errors
     assert "Traceback" not in errors
 
 

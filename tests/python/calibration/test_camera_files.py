@@ -138,3 +138,17 @@ def test_options_that_do_not_fit_the_format(tmp_path: Path) -> None:
         read_camera_file(path, right=path)
     with pytest.raises(SettingsError, match="cannot open"):
         read_camera_file(tmp_path / "none.yaml", CameraFileFormat.ROS)
+
+
+@pytest.mark.parametrize(
+    ("name", "text"), [("opencv", OPENCV), ("kalibr", KALIBR), ("ros", ROS), ("auto", KALIBR)]
+)
+def test_formats_are_named_by_text(tmp_path: Path, name: str, text: str) -> None:
+    path = written(tmp_path, text)
+    assert read_camera_file(path, name) == read_camera_file(path)
+
+
+@pytest.mark.parametrize("name", ["xyz", "", None, 3])
+def test_a_format_that_there_is_not_is_refused(tmp_path: Path, name: Any) -> None:
+    with pytest.raises(SettingsError, match=r"format of the calibration file is .*; give one of"):
+        read_camera_file(written(tmp_path, ROS), name)

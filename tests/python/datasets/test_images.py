@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import os
+import socket
 from pathlib import Path
 
 import cv2
@@ -12,6 +14,7 @@ import pytest
 from orbslam2py import DatasetError, ImageError, Sensor
 from orbslam2py.datasets import open_sequence
 from orbslam2py.datasets.images import quiet_opencv, read_image
+from orbslam2py.datasets.masks import read_mask
 from support.small_folders import SIZE, image, save
 
 
@@ -21,6 +24,29 @@ def test_missing_image(tum: Path) -> None:
     sequence.load(0)
     with pytest.raises(DatasetError, match=r"100\.105000\.png is listed but missing"):
         sequence.load(1)
+
+
+@pytest.mark.parametrize("kind", ["rgb/100.100000.png", "depth/100.105000.png"])
+def test_a_pipe_is_not_opened(tum: Path, kind: str) -> None:
+    path = tum / kind
+    path.unlink()
+    os.mkfifo(path)
+    sequence = open_sequence(tum)
+    sequence.load(0)
+    with pytest.raises(ImageError, match=rf"{path.name} is a pipe, not a file; replace it"):
+        sequence.load(1)
+    with pytest.raises(ImageError, match="is a pipe"):
+        read_mask(path)
+
+
+def test_neither_are_sockets_and_devices(tmp_path: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as end:
+        end.bind(str(tmp_path / "a.png"))
+        with pytest.raises(ImageError, match=r"a\.png is a socket, not a file"):
+            read_image(tmp_path / "a.png", rgb=False)
+    (tmp_path / "b.png").symlink_to("/dev/zero")
+    with pytest.raises(ImageError, match=r"b\.png is a device, not a file"):
+        read_image(tmp_path / "b.png", rgb=False)
 
 
 @pytest.mark.parametrize("kind", ["rgb/100.100000.png", "depth/100.105000.png"])

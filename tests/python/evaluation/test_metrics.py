@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,9 @@ from orbslam2py.evaluation import (
     Similarity,
     align,
     evaluate_trajectory,
+    lap_error,
     one_second_pairs,
+    scale_drift,
     segment_errors,
 )
 from support.made_up_paths import straight, wander
@@ -377,3 +380,35 @@ def test_no_common_time() -> None:
     empty = Trajectory(np.zeros(0), np.zeros((0, 4, 4)))
     with pytest.raises(DatasetError, match="no poses"):
         evaluate_trajectory(empty, truth)
+
+
+NO_POSES = {
+    "nan": (np.full((4, 4), np.nan), "holds a number that is not finite"),
+    "infinite": (np.diag([1, 1, 1, math.inf]), "holds a number that is not finite"),
+    "zero": (np.zeros((4, 4)), "is no pose"),
+    "mirror": (np.diag([1.0, 1, -1, 1]), "is no pose"),
+}
+
+
+@pytest.mark.parametrize("kind", NO_POSES)
+@pytest.mark.parametrize("whose", ["estimate", "truth"])
+@pytest.mark.parametrize("compare", [evaluate_trajectory, lap_error, scale_drift])
+def test_what_is_no_pose_is_told_by_its_number(kind: str, whose: str, compare: Any) -> None:
+    good = wander(20)
+    bad_pose, reason = NO_POSES[kind]
+    T_wc = good.T_wc.copy()
+    T_wc[7] = bad_pose
+    bad = Trajectory(good.timestamps, T_wc)
+    pair = (bad, good) if whose == "estimate" else (good, bad)
+    with pytest.raises(DatasetError, match=f"^pose 7 of the {whose} {reason}.*; correct it, or"):
+        compare(*pair)
+
+
+def test_lost_poses_may_be_anything() -> None:
+    good = wander(20)
+    T_wc = good.T_wc.copy()
+    T_wc[7] = np.nan
+    partly_lost = Trajectory(good.timestamps, T_wc, np.arange(20) == 7)
+    ate = evaluate_trajectory(partly_lost, good).ate
+    assert ate is not None
+    assert ate.rmse == pytest.approx(0, abs=1e-9)

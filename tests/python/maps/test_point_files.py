@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import plyfile
@@ -99,3 +100,22 @@ def test_a_colour_for_every_point(
     with pytest.raises(DatasetError, match="37 points, but 36 colours"):
         write(tmp_path / "points", points, colours=colours[1:])
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("write", [write_ply, write_pcd])
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        np.full((N, 3), 0.9),
+        np.full((N, 3), 300),
+        np.zeros((N, 4), np.uint8),
+        np.zeros(3 * N, np.uint8),
+        [[0, 0, 0]] * N,
+    ],
+)
+def test_colours_are_bytes(
+    tmp_path: Path, points: FloatArray, write: Callable[..., None], wrong: Any
+) -> None:
+    with pytest.raises(DatasetError, match=r"colours is .*from 0 to 255, uint8 \(37, 3\)"):
+        write(tmp_path / "points", points, colours=wrong)
+    assert not any(tmp_path.iterdir())

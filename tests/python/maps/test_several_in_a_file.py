@@ -165,3 +165,12 @@ def test_paths_of_two_maps_are_never_mixed(beginning: SavedMap, elsewhere: Saved
         np.testing.assert_array_equal(mine.timestamps, theirs.timestamps)
         np.testing.assert_allclose(mine.T_wc, theirs.T_wc, atol=1e-12)
     assert len(both.trajectory(0, map_number=1)) == 0
+
+
+def test_only_a_list_of_saved_maps_is_merged(beginning: SavedMap, tmp_path: Path) -> None:
+    saved = beginning
+    for wrong in (saved, "a.orbmap", [saved], ["a.orbmap", "b.orbmap"], None):
+        with pytest.raises(orb.MapFileError, match=r"two maps or more|SavedMap"):
+            merge_maps(wrong)  # type: ignore[arg-type]
+    with pytest.raises(orb.MapFileError, match="SavedMap"):
+        merge_maps([saved, "b.orbmap"], str(tmp_path / "out.orbmap"))  # type: ignore[list-item]

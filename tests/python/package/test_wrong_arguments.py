@@ -117,8 +117,8 @@ CALLS: dict[str, tuple[Call, set[str]]] = {
     "run": (orb.run_sequence, set()),
     "run: options": (lambda x: orb.run_sequence(TWO_FRAMES, x), {"None"}),
     "run: vocabulary": (lambda x: orb.run_sequence(TWO_FRAMES, vocabulary=x), {"None"}),
-    "run: start": (lambda x: runs.RunOptions(orb.Sensor.RGBD, start=x), {"negative"}),
-    "run: limit": (lambda x: runs.RunOptions(orb.Sensor.RGBD, max_frames=x), {"None", "negative"}),
+    "run: start": (lambda x: runs.RunOptions(orb.Sensor.RGBD, start=x), set()),
+    "run: limit": (lambda x: runs.RunOptions(orb.Sensor.RGBD, max_frames=x), {"None"}),
     "run: real time": (lambda x: runs.RunOptions(orb.Sensor.RGBD, realtime=x), {"true"}),
     "run: system": (lambda x: runs.RunOptions(orb.Sensor.RGBD, x), set()),
     "system: seed": (lambda x: runs.SystemOptions(seed=x), set()),
@@ -149,6 +149,7 @@ CALLS: dict[str, tuple[Call, set[str]]] = {
     "points": (lambda x: maps.write_ply("p.ply", x), {"empty list"}),
     "board": (lambda x: calibration.Board(x, x, 0.1), set()),
     "camera file": (calibration.read_camera_file, set()),
+    "camera: pose": (lambda x: CAMERA.project([[0, 0, 1]], x), {"None"}),  # type: ignore[arg-type]
     **{
         f"callbacks: {name}": (lambda x, name=name: orb.Callbacks(**{name: x}), {"None"})
         for name in ("on_loop", "on_keyframe", "on_lost", "on_relocalized", "on_map_change")
@@ -239,6 +240,11 @@ TRACK: dict[str, tuple[str, Callable[[Any, Any], object], set[str]]] = {
     "colour": ("rgbd", lambda slam, x: slam.track_rgbd(x, DEPTH, 1.0), set()),
     "depth": ("rgbd", lambda slam, x: slam.track_rgbd(GREY, x, 1.0), set()),
     "source": ("rgbd", lambda slam, x: slam.run(x), {"empty list"}),
+    "localization": (
+        "mono",
+        lambda slam, x: setattr(slam, "localization_mode", x),
+        {"true"},
+    ),
     "patience": ("mono", lambda slam, x: slam.wait_until_idle(x), {"None", "fraction"}),
     "end": ("mono", lambda slam, x: slam.shutdown(timeout=x), {"None", "fraction"}),
 }

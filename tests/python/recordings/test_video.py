@@ -7,6 +7,7 @@ import logging
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -337,3 +338,23 @@ class NoisyVideo(VideoWriter):
 
     def on_frame(self, view: FrameView) -> None:
         super().on_frame(replace(view, image=noise(view.record.frame_id).image))
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"frames_per_second": 0}, "frames_per_second is 0; give images a second, above 0"),
+        ({"frames_per_second": -1}, "frames_per_second is -1"),
+        ({"frames_per_second": np.nan}, "frames_per_second is nan"),
+        ({"frames_per_second": "a"}, "frames_per_second is 'a'"),
+        ({"duration": -1}, "duration is -1; give seconds, 0 or more, or None"),
+        ({"duration": "a"}, "duration is 'a'"),
+        ({"ground_truth": 3}, "ground_truth is 3; give an orbslam2py.Trajectory, or None"),
+    ],
+)
+def test_rates_durations_and_true_paths_are_those(
+    tmp_path: Path, options: dict[str, Any], words: str
+) -> None:
+    with pytest.raises(OutputFileError, match=words):
+        VideoWriter(tmp_path / "desk.avi", **options)
+    assert names_in(tmp_path) == []

@@ -165,3 +165,9 @@ def test_the_factor_of_tum_is_doubted(factor: float, median: float | None, doubt
     if doubt is not None:
         assert "0.38 m with DepthMapFactor 5000" in doubt
         assert "DepthMapFactor: 1000 makes it 1.90 m" in doubt
+
+
+@pytest.mark.parametrize("raw", [1e308, 5e-324, 3e38])
+def test_depth_of_absurd_numbers_is_told(caplog: pytest.LogCaptureFixture, raw: float) -> None:
+    (message,) = told(1000, np.full((60, 80), raw), log=caplog)
+    assert "do not fit DepthMapFactor 1000" in message

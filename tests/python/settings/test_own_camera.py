@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import math
+import os
+import threading
 from pathlib import Path
 
 import pytest
@@ -16,7 +18,7 @@ from orbslam2py.settings import (
     builtin_settings,
     settings_for_camera,
 )
-from orbslam2py.settings.check import likely_sensor, sensors_of
+from orbslam2py.settings.check import read_choice
 from support.camera_files import KALIBR, KITTI, OPENCV, ROS, written
 from support.settings_files import DEPTH, MONO, refusal, write
 
@@ -142,14 +144,24 @@ def test_a_file_is_told_by_its_keys(tmp_path: Path) -> None:
     rgbd = write(tmp_path / "rgbd.yaml", {**MONO, **DEPTH})
     pair = {name: value for name, value in DEPTH.items() if name != "DepthMapFactor"}
     stereo = write(tmp_path / "stereo.yaml", {**MONO, **pair})
-    assert [likely_sensor(path) for path in (mono, rgbd, stereo)] == [
+    assert [read_choice(path).likely_sensor for path in (mono, rgbd, stereo)] == [
         *(Sensor.MONOCULAR, Sensor.RGBD, Sensor.STEREO),
     ]
-    assert sensors_of(mono) == (Sensor.MONOCULAR,)
-    assert sensors_of(rgbd) == (Sensor.RGBD, Sensor.MONOCULAR)
-    assert sensors_of(stereo) == (Sensor.STEREO, Sensor.MONOCULAR)
-    assert sensors_of("tum1") == (Sensor.RGBD, Sensor.MONOCULAR)
-    assert likely_sensor("kitti06") is Sensor.STEREO
+    assert read_choice(mono).usable_sensors() == (Sensor.MONOCULAR,)
+    assert read_choice(rgbd).usable_sensors() == (Sensor.RGBD, Sensor.MONOCULAR)
+    assert read_choice(stereo).usable_sensors() == (Sensor.STEREO, Sensor.MONOCULAR)
+    assert read_choice("tum1").usable_sensors() == (Sensor.RGBD, Sensor.MONOCULAR)
+    assert read_choice("kitti06").likely_sensor is Sensor.STEREO
+
+
+def test_a_pipe_is_read_once(tmp_path: Path) -> None:
+    whole = write(tmp_path / "rgbd.yaml", {**MONO, **DEPTH}).read_text()
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    threading.Thread(target=pipe.write_text, args=(whole,), daemon=True).start()
+    chosen = read_choice(pipe)
+    assert chosen.usable_sensors() == (Sensor.RGBD, Sensor.MONOCULAR)
+    assert chosen.load(Sensor.RGBD) == Settings.load(tmp_path / "rgbd.yaml", Sensor.RGBD)
 
 
 # ---- other programs' files -----------------------------------------------------------------------

@@ -5,11 +5,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from orbslam2py import SettingsError
+from orbslam2py import SettingsError, System
 from orbslam2py import _core as core
 from orbslam2py.settings import (
     CameraSettings,
@@ -78,3 +79,14 @@ def test_the_extractor_takes_every_threshold_that_settings_take(threshold: int) 
     )
     with pytest.raises(SettingsError, match="1 to 254"):
         core.OrbExtractor(core.OrbOptions(initial_threshold=255, minimum_threshold=7))
+
+
+def test_one_camera_has_no_baseline(tmp_path: Path) -> None:
+    """As its file, which does not hold one."""
+    camera = CameraSettings(525, 525, 319.5, 239.5, bf=40.0)
+    settings = Settings("mono", camera, depth=DepthSettings(35))
+    assert (settings.camera.bf, settings.depth, settings.baseline) == (0.0, None, 0.0)
+    settings.save(tmp_path / "mono.yaml")
+    assert Settings.load(tmp_path / "mono.yaml", "mono") == settings
+    with System(settings) as slam:
+        slam.track_monocular(np.zeros((480, 640), np.uint8), 0.0)

@@ -133,7 +133,9 @@ def test_a_guess_alone_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
         assert track(slam, FRAMES // 2).reason is Reason.SEARCHING_LOADED_MAP
 
 
-@pytest.mark.parametrize("pose", [np.eye(3), "here", np.full((4, 4), np.nan)])
+@pytest.mark.parametrize(
+    "pose", [np.eye(3), "here", np.full((4, 4), np.nan), np.diag([1.0, 1.0, -1.0, 1.0])]
+)
 def test_a_guess_that_is_no_pose_is_refused(pose: object) -> None:
     with pytest.raises(SettingsError, match="initial_pose must be"):
         _loaded(initial_pose=pose)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from orbslam2py import SettingsError
 from orbslam2py.synthetic import SyntheticMotion, SyntheticOptions, SyntheticSequence
 from orbslam2py.trajectory.rotations import rotation_angles
 
@@ -178,6 +179,24 @@ def test_a_hand_covers_the_lens_in_the_middle():
     assert not any(made().covered(i) for i in range(200))
     with pytest.raises(IndexError):
         sequence.covered(200)
+
+
+@pytest.mark.parametrize(
+    ("cover", "why"),
+    [
+        ((50.0, 1.0), r"begins at 50 s .* 20 images ends at 0\.95 s: no image would be covered"),
+        (100.0, r"is 100 s, .* ends at 0\.95 s: it would be dark all the time; give less"),
+        ((0.0, 2.0), "dark all the time"),
+    ],
+)
+def test_a_hand_that_covers_nothing_or_all_is_refused(cover, why):
+    with pytest.raises(SettingsError, match=why):
+        made(frames=20, cover=cover)
+
+
+def test_a_hand_may_come_before_the_last_image_and_stay():
+    assert made(frames=20, cover=(0.9, 50.0)).covered(19)
+    assert not made(frames=20, cover=(0.9, 50.0)).covered(10)
 
 
 def test_the_door_slides_before_the_cabin():

@@ -66,7 +66,7 @@ def test_the_same_options_give_the_same_bytes():
     "change",
     [
         *({"seed": 1}, {"noise": 2.0}, {"exposure": 0.7}, {"lateral": 0.3}, {"yaw": 10.0}),
-        *({"pace": 2.0}, {"blur": 1.0}, {"exposure": (0.3, 0.6)}, {"cover": 1.0}),
+        *({"pace": 2.0}, {"blur": 1.0}, {"exposure": (0.3, 0.6)}, {"cover": 0.05}),
     ],
 )
 def test_every_option_changes_the_image(change):

@@ -10,7 +10,13 @@ import numpy as np
 import pytest
 
 from orbslam2py.errors import DatasetError
-from orbslam2py.trajectory import Trajectory, lengths_along, read_kitti, read_tum
+from orbslam2py.trajectory import (
+    Trajectory,
+    lengths_along,
+    read_kitti,
+    read_tum,
+    write_euroc,
+)
 from support.made_up_paths import made_up
 
 
@@ -88,3 +94,26 @@ def test_lengths_along_a_path() -> None:
     np.testing.assert_array_equal(lengths_along(positions), [0, 5, 17])
     np.testing.assert_array_equal(lengths_along(positions[:1]), [0])
     assert len(lengths_along(positions[:0])) == 0
+
+
+@pytest.mark.parametrize(
+    ("pose", "reason"),
+    [
+        (np.full((4, 4), np.nan), "holds a number that is not finite"),
+        (np.zeros((4, 4)), "is no pose"),
+        (np.diag([1.0, 1, -1, 1]), "is no pose"),
+    ],
+    ids=["nan", "zero", "mirror"],
+)
+@pytest.mark.parametrize("name", ["tum", "kitti"])
+def test_what_could_not_be_read_again_is_not_written(
+    tmp_path: Path, name: str, pose: np.ndarray, reason: str
+) -> None:
+    good = made_up(4)
+    T_wc = good.T_wc.copy()
+    T_wc[2] = pose
+    with pytest.raises(DatasetError, match=f"^pose 2 of the trajectory {reason}.*; correct it"):
+        Trajectory(good.timestamps, T_wc).save(tmp_path / "t.txt", name)
+    with pytest.raises(DatasetError, match=r"^pose 2 of the trajectory"):
+        write_euroc(tmp_path / "t.txt", Trajectory(good.timestamps, T_wc))
+    assert not list(tmp_path.iterdir())

@@ -7,7 +7,7 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
-from orbslam2py.datasets.base import Sequence
+from orbslam2py.datasets.base import IterableSequence
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.layouts.bonn import BonnSequence
 from orbslam2py.datasets.layouts.icl_nuim import IclNuimSequence
@@ -43,7 +43,7 @@ class Loader(Protocol):
         /,
         *,
         settings: SettingsChoice = None,
-    ) -> Sequence:
+    ) -> IterableSequence:
         """Open the sequence.
 
         Raises

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orbslam2py._arguments import array_of, is_number, shown
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.content_groups import Covisibility, Keyframes, Observations, RemovedKeyframes
-from orbslam2py.maps.contents import MapContents
+from orbslam2py.maps.contents import MapContents, contents_of
 from orbslam2py.maps.edits.spanning_tree import count_covisibility, spanning_parents
 
 BoolArray = NDArray[np.bool_]
@@ -30,19 +31,20 @@ def crop_to_times(contents: MapContents, begin: float, end: float) -> MapContent
     contents
         The map.
     begin, end
-        Time stamps [s], both included.
+        Time stamps [s], both included; they may be infinite.
 
     Raises
     ------
     MapFileError
-        If no keyframe is left.
+        If no keyframe is left, or one of them is something else.
     """
     return keep_keyframes(contents, keyframes_of_times(contents, begin, end))
 
 
 def keyframes_of_times(contents: MapContents, begin: float, end: float) -> BoolArray:
     """Which keyframes, bool (k,), are of a span of time; see `crop_to_times`."""
-    times = contents.keyframes.timestamps
+    times = contents_of(contents).keyframes.timestamps
+    begin, end = _seconds(begin, "begin"), _seconds(end, "end")
     kept = (times >= begin) & (times <= end)
     if not kept.any():
         first, last = times.min(initial=np.inf), times.max(initial=-np.inf)
@@ -70,7 +72,7 @@ def crop_to_box(
     Raises
     ------
     MapFileError
-        If no keyframe is left.
+        If no keyframe is left, or one of them is something else.
     """
     kept = keyframes_in_box(contents, low, high)
     points = inside_box(contents.points.positions, low, high) if points_too else None
@@ -79,7 +81,7 @@ def crop_to_box(
 
 def keyframes_in_box(contents: MapContents, low: FloatArray, high: FloatArray) -> BoolArray:
     """Which keyframes, bool (k,), stood in a box; see `crop_to_box`."""
-    centres = contents.keyframes.T_wc[:, :3, 3]
+    centres = contents_of(contents).keyframes.T_wc[:, :3, 3]
     kept = inside_box(centres, low, high)
     if not kept.any():
         raise MapFileError(
@@ -92,6 +94,8 @@ def keyframes_in_box(contents: MapContents, low: FloatArray, high: FloatArray) -
 
 def inside_box(positions: FloatArray, low: FloatArray, high: FloatArray) -> BoolArray:
     """Which positions (n, 3) lie in a box, its faces included; bool (n,)."""
+    low = array_of(low, "the low corner", (3,), MapFileError, finite=False)
+    high = array_of(high, "the high corner", (3,), MapFileError, finite=False)
     return np.asarray(np.all((positions >= low) & (positions <= high), axis=1))
 
 
@@ -122,11 +126,16 @@ def keep_keyframes(
     Raises
     ------
     MapFileError
-        If no keyframe is kept.
+        If no keyframe is kept, or one of them is something else.
     """
+    contents_of(contents)
+    kept = _mask(kept, "kept", len(contents.keyframes), "keyframe")
     if not kept.any():
         raise MapFileError("nothing of the map is left; keep at least one keyframe")
-    stay = np.ones(len(contents.points), bool) if kept_points is None else kept_points
+    n = len(contents.points)
+    stay = (
+        np.ones(n, bool) if kept_points is None else _mask(kept_points, "kept_points", n, "point")
+    )
     sightings = _surviving_observations(contents, kept, stay)
     observations = Observations(
         contents.observations.point[sightings],
@@ -147,6 +156,24 @@ def keep_keyframes(
     cropped = _select_points(cropped, np.isin(contents.points.ids, observations.point))
     root = int(keyframes.ids[0])
     return cropped if root == 0 else _renumbered(cropped, root)
+
+
+def _mask(value: Any, what: str, n: int, noun: str) -> BoolArray:
+    """Take True or False for each of `n`: whole numbers would be taken for indices."""
+    remedy = f"give a bool array of shape ({n},), True for each {noun} that stays"
+    try:
+        mask = np.asarray(value)
+    except ValueError:  # lists of lists of different lengths
+        raise MapFileError(f"{what} is {shown(value)}; {remedy}") from None
+    if mask.dtype != bool or mask.shape != (n,):
+        raise MapFileError(f"{what} is of {mask.dtype} and shape {mask.shape}; {remedy}")
+    return mask
+
+
+def _seconds(value: Any, what: str) -> float:
+    if not is_number(value) or np.isnan(value):
+        raise MapFileError(f"{what} is {shown(value)}; give a time stamp in seconds")
+    return float(value)
 
 
 def _surviving_observations(

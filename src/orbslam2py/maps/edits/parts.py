@@ -67,7 +67,9 @@ def take_map(saved: SavedMap, number: int | None = None) -> SavedMap:
     told = ", ".join(f"{k} ({n} keyframes)" for k, n in enumerate(counts))
     name = saved.source or "the file"
     if number is None and len(counts) > 1:
-        raise MapFileError(f"{name} holds {len(counts)} maps: {told}; say which one with --map")
+        raise MapFileError(
+            f"{name} holds {len(counts)} maps: {told}; say which one (--map, number)"
+        )
     if number is not None and not 0 <= number < len(counts):
         raise MapFileError(f"{name} has no map {number}; it holds {told}")
     return saved if len(counts) == 1 else crop_saved_map(saved, numbers == number)

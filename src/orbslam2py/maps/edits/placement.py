@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from orbslam2py._arguments import array_of, instance_of, number_above_zero
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import MapFileError
-from orbslam2py.maps.contents import MapContents
+from orbslam2py.maps.contents import MapContents, contents_of
 from orbslam2py.maps.units import unit_of
 from orbslam2py.trajectory import MAX_DIFFERENCE, Similarity, Trajectory, align, associate
 
@@ -67,10 +68,11 @@ def place_by_trajectory(
     Raises
     ------
     MapFileError
-        If fewer than three keyframes have a true pose at their time, all stood at one place, or a
-        position is farther away than anything is.
+        If fewer than three keyframes have a true pose at their time, all stood at one place, a
+        position is farther away than anything is, or one of them is something else.
     """
-    keyframes = contents.keyframes
+    keyframes = contents_of(contents).keyframes
+    instance_of(truth, Trajectory, "the truth", "an orbslam2py.Trajectory", MapFileError)
     there = truth.select(~truth.lost)
     rows, poses = associate(keyframes.timestamps, there.timestamps, max_difference)
     if len(rows) < _FEWEST:
@@ -98,9 +100,16 @@ def place_by_points(contents: MapContents, positions: FloatArray, known: FloatAr
     Raises
     ------
     MapFileError
-        If there are fewer than three, all are at one place or on one line, or one is farther away
-        than anything is.
+        If there are fewer than three, all are at one place or on one line, one is farther away
+        than anything is, or they are no such arrays.
     """
+    contents_of(contents)
+    positions = array_of(positions, "positions", (-1, 3), MapFileError, finite=False)
+    known = array_of(known, "known", (-1, 3), MapFileError, finite=False)
+    if len(positions) != len(known):
+        raise MapFileError(
+            f"{len(positions)} positions, but {len(known)} known ones; give one for each"
+        )
     if len(positions) < _FEWEST:
         raise MapFileError(
             f"{len(positions)} known points do not tell how the map lies; give at least {_FEWEST}, "
@@ -153,20 +162,23 @@ def place_by_length(
         If the map has metres already, the places are one, or the length or a place is none that
         can be meant.
     """
-    if unit_of(contents) == "m":
+    if unit_of(contents_of(contents)) == "m":
         raise MapFileError(
             "the map has metres already, from the baseline or the depth images; correct these in "
             "the settings if its lengths are wrong"
         )
-    if not (np.isfinite(metres) and metres > 0):
-        raise MapFileError(f"a length of {metres:g} m says nothing; give one above 0")
+    ends = [
+        array_of(end, f"the {name} position", (3,), MapFileError, finite=False)
+        for name, end in (("first", first), ("second", second))
+    ]
+    metres = number_above_zero(metres, "the length", "metres, above 0", MapFileError)
     if not _SAME_PLACE <= metres <= FARTHEST:
         raise MapFileError(
             f"a length of {metres:g} m cannot be meant; give metres, from {_SAME_PLACE:g} to "
             f"{FARTHEST:g}"
         )
-    _check_near(np.stack([first, second]))
-    distance = float(np.linalg.norm(np.subtract(second, first)))
+    _check_near(np.stack(ends))
+    distance = float(np.linalg.norm(ends[1] - ends[0]))
     if distance < _SAME_PLACE:
         raise MapFileError("both ends of the length are at one place; give two that are apart")
     # Keyframe 0 stays where it is: the origin as a rule, so nothing moves but for the size.

@@ -9,7 +9,7 @@ import numpy as np
 
 from orbslam2py._arrays import IntArray
 from orbslam2py.maps.edits.crop import BoolArray, keep_keyframes
-from orbslam2py.maps.saved_map import RecordedFrames, SavedMap
+from orbslam2py.maps.saved_map import RecordedFrames, SavedMap, saved_of
 
 
 def crop_saved_map(
@@ -35,10 +35,11 @@ def crop_saved_map(
     Raises
     ------
     MapFileError
-        If no keyframe is kept.
+        If no keyframe is kept, or one of them is something else.
     """
+    saved_of(saved)
     contents = keep_keyframes(saved.contents, kept, kept_points)
-    old = saved.contents.keyframes.ids[kept]
+    old = saved.contents.keyframes.ids[np.asarray(kept)]
     new = dict(zip(old.tolist(), contents.keyframes.ids.tolist(), strict=True))
     ids = np.concatenate([old, contents.removed_keyframes.ids])
     renumbered = np.concatenate([contents.keyframes.ids, contents.removed_keyframes.ids])

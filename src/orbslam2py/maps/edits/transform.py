@@ -7,7 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from orbslam2py.maps.contents import MapContents
+from orbslam2py._arguments import instance_of
+from orbslam2py.errors import MapFileError
+from orbslam2py.maps.contents import MapContents, contents_of
 from orbslam2py.trajectory import Similarity
 from orbslam2py.trajectory.rotations import inverse_poses
 
@@ -31,7 +33,14 @@ def transform_map(contents: MapContents, similarity: Similarity) -> MapContents:
     -------
     MapContents
         The same map in the new world; `similarity`'s inverse leads back but for rounding.
+
+    Raises
+    ------
+    MapFileError
+        If one of them is something else.
     """
+    contents_of(contents)
+    instance_of(similarity, Similarity, "the similarity", "a Similarity(scale, R, t)", MapFileError)
     keyframes, points, cameras = contents.keyframes, contents.points, contents.cameras
     scale = similarity.scale
     moved = keyframes.with_poses(inverse_poses(similarity.apply_to_poses(keyframes.T_wc)))

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from orbslam2py._files import atomic_write
-from orbslam2py.maps.contents import MapContents
+from orbslam2py.maps.contents import MapContents, contents_of
 from orbslam2py.maps.exports.colmap_model import (
     MODEL_IDS,
     ColmapCamera,
@@ -64,6 +64,10 @@ def export_colmap(
     ------
     DatasetError
         If the folder holds something that must stay, or no keyframe has an image.
+    ImageError
+        If an image is not one that fits its camera.
+    MapFileError
+        If `contents`, `images` or `image_names` are something else.
     OSError
         If something cannot be written; what was there is kept then.
 
@@ -71,6 +75,7 @@ def export_colmap(
     --------
     >>> export_colmap(contents, "desk", images=images_of(contents, sequence))  # doctest: +SKIP
     """
+    contents_of(contents)
     with export_folder(folder, {"sparse", "images"}, replace=replace) as made:
         if images is None:
             views = views_without_images(contents, image_names)

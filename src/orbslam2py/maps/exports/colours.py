@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from orbslam2py._arrays import ByteArray
-from orbslam2py.maps.contents import MapContents
-from orbslam2py.maps.exports.images import ImageOfKeyframe
+from orbslam2py.maps.contents import MapContents, contents_of
+from orbslam2py.maps.exports.images import ImageOfKeyframe, image_of_row
 
 
 class ColourSampler:
@@ -79,11 +79,19 @@ def with_colours(contents: MapContents, images: ImageOfKeyframe) -> MapContents:
     -------
     MapContents
         The same map; `MapContents.point_colours` then knows the points' colours.
+
+    Raises
+    ------
+    ImageError
+        If an image is not one that fits its camera.
+    MapFileError
+        If `contents` or `images` is something else.
     """
+    contents_of(contents)
     sampler = ColourSampler(contents)
-    for row, number in enumerate(contents.keyframes.ids.tolist()):
+    for row in range(len(contents.keyframes)):
         if not contents.keyframes.has_colours[row]:
-            image = images(number)
+            image = image_of_row(contents, row, images)
             if image is not None:
                 sampler.look_at(row, image)
     return sampler.coloured()

@@ -10,12 +10,19 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from orbslam2py._arguments import path_of
 from orbslam2py._arrays import ByteArray
 from orbslam2py._files import atomic_folder, atomic_write
 from orbslam2py.errors import DatasetError
 from orbslam2py.maps.contents import MapContents
 from orbslam2py.maps.exports.colours import ColourSampler
-from orbslam2py.maps.exports.images import ImageOfKeyframe, Progress, View, image_name
+from orbslam2py.maps.exports.images import (
+    ImageOfKeyframe,
+    Progress,
+    View,
+    image_name,
+    image_of_row,
+)
 
 
 @contextlib.contextmanager
@@ -38,14 +45,14 @@ def export_folder(folder: str | Path, made_of: set[str], *, replace: bool) -> It
     OSError
         If it cannot be written.
     """
-    folder = Path(folder)
+    folder = path_of(folder, "the folder of the export")
     if folder.exists() and not folder.is_dir():
         raise DatasetError(f"{folder} is not a folder; give another one")
     held = {path.name for path in folder.iterdir()} if folder.exists() else set()
     if held and not replace:
         raise DatasetError(
             f"{folder} is not empty; give another folder, or ask for an earlier export to be "
-            "replaced (--force)"
+            "replaced (--force, replace=True)"
         )
     if held - made_of:
         raise DatasetError(
@@ -87,6 +94,8 @@ def write_images(
     ------
     DatasetError
         If no keyframe has an image.
+    ImageError
+        If an image is not one that fits its camera.
     OSError
         If one cannot be written.
     """
@@ -95,7 +104,7 @@ def write_images(
     sampler = ColourSampler(contents)
     ids = contents.keyframes.ids.tolist()
     for row, number in enumerate(ids):
-        image = images(number)
+        image = image_of_row(contents, row, images)
         if image is not None:
             sampler.look_at(row, image)
             straight = _undistorted(contents, row, image)

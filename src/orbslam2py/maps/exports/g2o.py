@@ -7,9 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from orbslam2py._arguments import path_of
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._files import atomic_write
-from orbslam2py.maps.contents import MapContents
+from orbslam2py.errors import MapFileError
+from orbslam2py.maps.contents import MapContents, contents_of
 from orbslam2py.maps.units import unit_of
 from orbslam2py.trajectory.rotations import inverse_poses, quaternions_from_rotations
 
@@ -49,10 +51,13 @@ def export_g2o(
 
     Raises
     ------
+    MapFileError
+        If `contents` or `path` is something else.
     OSError
         If it cannot be written; an existing file is kept then.
     """
-    keyframes = contents.keyframes
+    keyframes = contents_of(contents).keyframes
+    path = path_of(path, "the file of the pose graph", MapFileError)
     T_wc = keyframes.T_wc
     edges = pose_graph_edges(contents, least_weight)
     i, j = np.searchsorted(keyframes.ids, edges).T

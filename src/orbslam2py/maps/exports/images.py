@@ -9,9 +9,10 @@ from typing import Protocol
 
 import numpy as np
 
+from orbslam2py._arguments import instance_of, shown
 from orbslam2py._arrays import ByteArray, FloatArray
-from orbslam2py.errors import DatasetError
-from orbslam2py.maps.contents import MapContents
+from orbslam2py.errors import DatasetError, ImageError, MapFileError
+from orbslam2py.maps.contents import MapContents, contents_of
 from orbslam2py.settings import Settings
 from orbslam2py.trajectory import associate
 
@@ -70,8 +71,10 @@ def images_of(contents: MapContents, sequence: ImageSequence) -> ImageOfKeyframe
     ------
     DatasetError
         If no keyframe's time stamp is in the sequence.
+    MapFileError
+        If `contents` is something else.
     """
-    keyframes = contents.keyframes
+    keyframes = contents_of(contents).keyframes
     rows, indices = associate(keyframes.timestamps, sequence.timestamps, _SAME_TIME)
     if not len(rows):
         raise DatasetError(
@@ -92,6 +95,57 @@ def images_of(contents: MapContents, sequence: ImageSequence) -> ImageOfKeyframe
         return np.ascontiguousarray(image[:, :, 2::-1] if to_rgb else image[:, :, :3])
 
     return image_of
+
+
+def image_of_row(contents: MapContents, row: int, images: ImageOfKeyframe) -> ByteArray | None:
+    """Ask for the image of a keyframe; small copies will do.
+
+    Parameters
+    ----------
+    contents
+        The map.
+    row
+        Of the keyframe.
+    images
+        Where the image comes from.
+
+    Raises
+    ------
+    ImageError
+        If it is no image of bytes, or not of the shape of its camera's.
+    MapFileError
+        If `images` is no function.
+    """
+    if not callable(images):
+        raise MapFileError(
+            f"images is {shown(images)}; give a function image(keyframe_id), such as "
+            "images_of(contents, sequence)"
+        )
+    number = int(contents.keyframes.ids[row])
+    image: object = images(number)
+    if image is None:
+        return None
+    name = f"the image of keyframe {number}"
+    wanted = "give uint8 (h, w) grey or (h, w, 3) RGB, or None if there is none"
+    if not isinstance(image, np.ndarray):
+        raise ImageError(f"{name} is {shown(image)}; {wanted}")
+    fits = image.ndim == 2 or (image.ndim == 3 and image.shape[2] == 3)
+    if image.dtype != np.uint8 or not fits or not image.size:
+        raise ImageError(f"{name} is of {image.dtype} and shape {image.shape}; {wanted}")
+    _check_aspect(contents, row, image, name)
+    return image
+
+
+def _check_aspect(contents: MapContents, row: int, image: ByteArray, name: str) -> None:
+    """Refuse an image that is no scaled one of the camera, but for rounding of its size."""
+    cameras, camera = contents.cameras, int(contents.keyframes.camera[row])
+    full_width, full_height = int(cameras.width[camera]), int(cameras.height[camera])
+    height, width = image.shape[:2]
+    if abs(width * full_height - height * full_width) > max(full_width, full_height):
+        raise ImageError(
+            f"{name} has {width} x {height} pixels, but its camera has {full_width} x "
+            f"{full_height}; give that image, or a smaller copy of the same shape"
+        )
 
 
 def _span(timestamps: FloatArray) -> str:
@@ -125,6 +179,9 @@ def views_without_images(contents: MapContents, names: Mapping[int, str] | None)
     names
         Files by keyframe id; by default ``keyframe_000012.png`` and so on.
     """
+    if names is not None:
+        remedy = "a dict from keyframe ids to names of files"
+        instance_of(names, Mapping, "image_names", remedy, MapFileError)  # type: ignore[type-abstract]
     keyframes, cameras = contents.keyframes, contents.cameras
     distorts = np.any(cameras.distortion != 0, axis=1)
     return [

@@ -12,8 +12,9 @@ import numpy as np
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py._files import atomic_write
+from orbslam2py.errors import DatasetError, MapFileError
 from orbslam2py.maps.content_groups import Cameras
-from orbslam2py.maps.contents import MapContents
+from orbslam2py.maps.contents import MapContents, contents_of
 from orbslam2py.maps.exports.folder import export_folder, write_images
 from orbslam2py.maps.exports.images import (
     ImageOfKeyframe,
@@ -73,13 +74,21 @@ def export_nerfstudio(
     ------
     DatasetError
         If the folder holds something that must stay, or no keyframe has an image.
+    ImageError
+        If an image is not one that fits its camera.
+    MapFileError
+        If `contents`, `images` or `image_names` are something else, or the map has no keyframes.
     OSError
         If something cannot be written; what was there is kept then.
     """
+    if not len(contents_of(contents).keyframes):
+        raise MapFileError("the map has no keyframes, and nerfstudio takes no empty data; map more")
     with export_folder(folder, {"transforms.json", _POINTS, "images"}, replace=replace) as made:
         if images is None:
             views = views_without_images(contents, image_names)
             below = "" if image_names is not None else "images/"
+            if not views:
+                raise DatasetError("image_names names no keyframe of the map; give its keyframes")
         else:
             views, contents = write_images(contents, made / "images", images, progress)
             below = "images/"

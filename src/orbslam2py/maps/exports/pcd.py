@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from orbslam2py._arguments import array_of
+from orbslam2py._arguments import array_of, path_of
 from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py._files import atomic_write
-from orbslam2py.maps.ply import FIRST_KEYFRAME_AXES, check_colours
+from orbslam2py.maps.ply import FIRST_KEYFRAME_AXES, colours_of
 
 _HEADER = """\
 # .PCD v0.7 - Point Cloud Data file format
@@ -60,14 +60,15 @@ def write_pcd(
     OSError
         If the file cannot be written; an existing file is kept then.
     DatasetError
-        If the points are no such array, or there is not one colour per point.
+        If the points or the colours are no such array, there is not one colour per point, or the
+        path is none.
     """
+    path = path_of(path, "the file of points")
     names = ["x", "y", "z"]
     table = array_of(points, "points", (-1, 3), finite=False).astype("<f4")
     if colours is not None:
-        check_colours(len(points), len(colours))
         names.append("rgb")
-        red, green, blue = colours.astype("<u4").reshape(-1, 3).T
+        red, green, blue = colours_of(colours, len(table)).astype("<u4").T
         packed = (red << 16 | green << 8 | blue).astype("<u4").view("<f4")
         table = np.column_stack([table, packed])
     count = len(names)
@@ -77,7 +78,7 @@ def write_pcd(
         fours=" ".join(["4"] * count),
         types=" ".join(["F"] * count),
         ones=" ".join(["1"] * count),
-        n=len(points),
+        n=len(table),
     )
     with atomic_write(path, binary=True) as stream:
         stream.write(header.encode())

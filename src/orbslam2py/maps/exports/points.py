@@ -5,8 +5,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from orbslam2py._arguments import path_of
 from orbslam2py.errors import MapFileError
-from orbslam2py.maps.contents import MapContents
+from orbslam2py.maps.contents import MapContents, contents_of
 from orbslam2py.maps.exports.pcd import write_pcd
 from orbslam2py.maps.ply import write_ply
 from orbslam2py.maps.units import unit_of
@@ -27,11 +28,12 @@ def export_points(contents: MapContents, path: str | Path, file_format: str | No
     Raises
     ------
     MapFileError
-        If the format is another, or not told.
+        If the format is another, or not told, or one of them is something else.
     OSError
         If it cannot be written; an existing file is kept then.
     """
-    path = Path(path)
+    contents_of(contents)
+    path = path_of(path, "the file of points", MapFileError)
     writers = {"ply": write_ply, "pcd": write_pcd}
     wanted = file_format or path.suffix.lower().lstrip(".")
     if wanted not in writers:

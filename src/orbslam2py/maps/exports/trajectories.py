@@ -5,8 +5,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from orbslam2py._arguments import instance_of, path_of
 from orbslam2py.errors import DatasetError
-from orbslam2py.maps.contents import MapContents
+from orbslam2py.maps.contents import MapContents, contents_of
 from orbslam2py.trajectory import (
     Trajectory,
     TrajectoryFormat,
@@ -18,7 +19,8 @@ from orbslam2py.trajectory import (
 
 def keyframe_path(contents: MapContents) -> Trajectory:
     """Return the keyframes' poses in the map's world, in the order of their ids."""
-    return Trajectory(contents.keyframes.timestamps, contents.keyframes.T_wc)
+    keyframes = contents_of(contents).keyframes
+    return Trajectory(keyframes.timestamps, keyframes.T_wc)
 
 
 def export_trajectory(
@@ -39,10 +41,13 @@ def export_trajectory(
     Raises
     ------
     DatasetError
-        For ``auto``, or what is no format.
+        For ``auto``, what is no format, and what is no trajectory or no path.
     OSError
         If it cannot be written; an existing file is kept then.
     """
+    remedy = "an orbslam2py.Trajectory, such as keyframe_path(contents)"
+    instance_of(trajectory, Trajectory, "the trajectory", remedy, DatasetError)
+    path = path_of(path, "the file of the trajectory")
     kept = trajectory.select(~trajectory.lost)
     kept = Trajectory(kept.timestamps, kept.T_wc)
     file_format = TrajectoryFormat.of(file_format)

@@ -139,8 +139,8 @@ def test_a_known_length() -> None:
     ("depth", "second", "metres", "words"),
     [
         (True, [1, 0, 0], 1.0, "has metres already"),
-        (False, [1, 0, 0], 0.0, "a length of 0 m says nothing"),
-        (False, [1, 0, 0], np.nan, "a length of nan m says nothing"),
+        (False, [1, 0, 0], 0.0, "the length is 0; give metres, above 0"),
+        (False, [1, 0, 0], np.nan, "the length is nan; give metres"),
         (
             False,
             [1, 0, 0],

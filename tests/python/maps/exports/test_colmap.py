@@ -209,7 +209,7 @@ def test_any_map(
 # ---- the folder ----------------------------------------------------------------------------------
 def test_an_earlier_export_is_replaced_only_if_asked(tmp_path: Path) -> None:
     export_colmap(made_up_map(5), tmp_path / "out", images=grey_images)
-    with pytest.raises(DatasetError, match=r"out is not empty.*--force"):
+    with pytest.raises(DatasetError, match=r"out is not empty.*\(--force, replace=True\)"):
         export_colmap(made_up_map(3), tmp_path / "out")
     assert read(tmp_path / "out").num_images() == 5
     export_colmap(made_up_map(3), tmp_path / "out", images=grey_images, replace=True)

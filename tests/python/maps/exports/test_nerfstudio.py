@@ -12,8 +12,10 @@ import numpy as np
 import plyfile
 import pytest
 
+from orbslam2py import DatasetError, MapFileError
+from orbslam2py import _core as core
 from orbslam2py._arrays import ByteArray, FloatArray
-from orbslam2py.maps import MapContents, export_nerfstudio
+from orbslam2py.maps import MapContents, export_nerfstudio, take_contents
 from orbslam2py.maps.exports.nerfstudio import camera_to_world
 from support.made_up_map import CX, CY, FX, FY, HEIGHT, LENS, WIDTH, made_up_map
 
@@ -124,3 +126,11 @@ def test_axes_of_a_camera() -> None:
     np.testing.assert_array_equal(-pose[:3, 2], [0, 1, 0])
     np.testing.assert_array_equal(pose[:3, 1], [0, 0, 1])
     np.testing.assert_array_equal(pose[:3, 0], [1, 0, 0])
+
+
+def test_there_is_something_to_export(tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match="image_names names no keyframe of the map; give"):
+        export_nerfstudio(made_up_map(), tmp_path / "out", image_names={})
+    with pytest.raises(MapFileError, match="the map has no keyframes"):
+        export_nerfstudio(take_contents(core.Map()), tmp_path / "out")
+    assert not any(tmp_path.iterdir())

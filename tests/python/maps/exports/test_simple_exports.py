@@ -3,17 +3,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import plyfile
 import pytest
 from evo.tools import file_interface
 
-from orbslam2py import DatasetError, MapFileError, Sensor, Settings
+from orbslam2py import DatasetError, ImageError, MapFileError, Sensor, Settings
 from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py.maps import (
+    export_colmap,
+    export_nerfstudio,
     export_points,
     export_trajectory,
     images_of,
@@ -154,3 +158,44 @@ def test_grey_images_give_grey_points() -> None:
 def test_no_images_no_colours() -> None:
     contents = made_up_map()
     assert with_colours(contents, lambda _: None).point_colours() is None
+
+
+@pytest.mark.parametrize(
+    ("image", "words"),
+    [
+        (np.full((HEIGHT, WIDTH, 3), 0.5), r"is of float64 and shape \(240, 320, 3\); give uint8"),
+        (np.zeros((HEIGHT, WIDTH, 4), np.uint8), r"shape \(240, 320, 4\); give uint8 \(h, w\)"),
+        (np.zeros((0, 0), np.uint8), r"shape \(0, 0\)"),
+        (np.zeros(WIDTH, np.uint8), r"shape \(320,\)"),
+        ("keyframe.png", "is 'keyframe.png'; give uint8"),
+        (np.zeros((WIDTH, HEIGHT), np.uint8), "has 240 x 320 pixels, but its camera has 320 x 240"),
+        (np.zeros((HEIGHT, HEIGHT), np.uint8), "has 240 x 240 pixels"),
+    ],
+)
+def test_images_that_do_not_fit_are_refused(tmp_path: Path, image: Any, words: str) -> None:
+    contents = made_up_map()
+    for use in (
+        lambda images: with_colours(contents, images),
+        lambda images: export_colmap(contents, tmp_path / "out", images=images),
+        lambda images: export_nerfstudio(contents, tmp_path / "out", images=images),
+    ):
+        with pytest.raises(ImageError, match=f"the image of keyframe 0 .*{words}"):
+            use(lambda _: image)
+    assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("size", [(HEIGHT, WIDTH), (120, 160), (80, 107), (80, 106), (480, 640)])
+def test_images_of_the_same_shape_are_taken(size: tuple[int, int]) -> None:
+    coloured = with_colours(made_up_map(), lambda _: np.full(size, 7, np.uint8))
+    assert (coloured.keyframes.colours == 7).all()
+
+
+def test_images_come_from_a_function() -> None:
+    with pytest.raises(MapFileError, match=r"images is a dict; give a function"):
+        with_colours(made_up_map(), {0: np.zeros((HEIGHT, WIDTH), np.uint8)})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("export", [export_colmap, export_nerfstudio])
+def test_names_of_images_are_by_keyframe(tmp_path: Path, export: Callable[..., None]) -> None:
+    with pytest.raises(MapFileError, match="image_names is a list; give a dict from keyframe ids"):
+        export(made_up_map(), tmp_path / "out", image_names=["a.png"])

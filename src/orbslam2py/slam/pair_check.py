@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Whether the two images of the first stereo pairs are two.
+
+One image given twice looks like a world infinitely far away: a map comes of it, of nonsense.
+"""
+
+from __future__ import annotations
+
+import logging
+
+from orbslam2py._arrays import ByteArray
+
+_log = logging.getLogger(__name__)
+
+#: So many pairs are looked at, not counting those without any picture: a camera may begin dark.
+N_CHECKED, N_LOOKED_AT = 3, 100
+_TEXT = (
+    "the left and the right image of a pair are the same one, which shows no depth: give the "
+    "images of both cameras, the left one first"
+)
+
+
+class PairCheck:
+    """Warns once if a pair is one image twice.
+
+    Attributes
+    ----------
+    warning : str or None
+        What was told.
+    """
+
+    def __init__(self) -> None:
+        self._left = N_CHECKED
+        self._chances = N_LOOKED_AT
+        self.warning: str | None = None
+
+    @property
+    def done(self) -> bool:
+        """Whether nothing further needs to be looked at."""
+        return self._left == 0 or self._chances == 0
+
+    def look(self, left: ByteArray, right: ByteArray) -> None:
+        """Judge a pair of equal shape; one without any picture does not count."""
+        if self.done:
+            return
+        self._chances -= 1
+        if left.min() == left.max():
+            return
+        self._left -= 1
+        if (left != right).any():
+            return
+        self._left = 0
+        self.warning = _TEXT
+        _log.warning("%s", _TEXT)
