@@ -7,13 +7,25 @@ import os
 import sys
 
 from orbslam2py.cli.exit_codes import ExitCode
-from orbslam2py.cli.interrupts import hold_while_loading
+from orbslam2py.cli.interrupts import EndingSignals, hold_while_loading
 from orbslam2py.cli.terminal_encoding import accept_all_letters
 
 
 def main() -> None:
     """Run the command line; errors a person can act on become one message and an exit code."""
     accept_all_letters()
+    with EndingSignals() as ending:
+        try:
+            _run()
+        except KeyboardInterrupt:
+            sys.exit(ending.exit_code)
+        except SystemExit as end:
+            if end.code == ExitCode.INTERRUPTED:
+                sys.exit(ending.exit_code)
+            raise
+
+
+def _run() -> None:
     try:
         # FFmpeg writes of broken videos by itself, beside the message.
         os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
@@ -22,8 +34,6 @@ def main() -> None:
             from orbslam2py.cli.app import run_app  # noqa: PLC0415
 
         run_app()
-    except KeyboardInterrupt:
-        sys.exit(ExitCode.INTERRUPTED)
     except ImportError as error:
         if error.name != "orbslam2py._core":
             raise

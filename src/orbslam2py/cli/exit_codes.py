@@ -13,5 +13,9 @@ class ExitCode(IntEnum):
     BAD_INPUT = 2
     """Bad input or usage; nothing was run."""
     NOTHING_TRACKED = 3
+    HUNG_UP = 129
+    """The terminal was closed (SIGHUP); what was done until then is saved."""
     INTERRUPTED = 130
     """Ctrl-C; what was done until then is saved."""
+    TERMINATED = 143
+    """Asked to end (SIGTERM); what was done until then is saved."""

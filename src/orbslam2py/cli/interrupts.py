@@ -1,46 +1,113 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Ctrl-C as a request, so that nothing is broken off half-way."""
+"""Ctrl-C, and what else asks for an end, as a request: nothing is broken off half-way."""
 
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from types import FrameType
+
+from orbslam2py.cli.exit_codes import ExitCode
+
+_Handler = Callable[[int, "FrameType | None"], object]
+
+#: What asks for an end besides Ctrl-C, and what the program ends with then: ``kill``, ``timeout``
+#: and managers of jobs; a terminal that is closed, or a connection to it that breaks.
+_ENDINGS = {signal.SIGTERM: ExitCode.TERMINATED, signal.SIGHUP: ExitCode.HUNG_UP}
+#: Within so many seconds they are one request: ``timeout`` sends its signal to the program and to
+#: all of its group, and a shell passes on that its terminal is closed.
+_ECHO_SECONDS = 1.0
+
+
+class EndingSignals:
+    """In its ``with`` block SIGTERM and SIGHUP interrupt as Ctrl-C does.
+
+    Where one is ignored (SIGHUP by ``nohup``) it stays ignored. Processes that are started
+    meanwhile do not inherit it.
+
+    Attributes
+    ----------
+    exit_code : ExitCode
+        What to end with if the program was interrupted.
+    """
+
+    def __init__(self) -> None:
+        self.exit_code = ExitCode.INTERRUPTED
+        self._raised_at = -_ECHO_SECONDS
+        self._installed: list[signal.Signals] = []
+        self._terminals: list[int] = []
+
+    def __enter__(self) -> EndingSignals:
+        if threading.current_thread() is threading.main_thread():
+            self._terminals = [number for number in range(3) if os.isatty(number)]
+            for number in _ENDINGS:
+                if signal.getsignal(number) is signal.SIG_DFL:
+                    signal.signal(number, self._on_signal)
+                    self._installed.append(number)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number in self._installed:
+            signal.signal(number, signal.SIG_DFL)
+
+    def _on_signal(self, number: int, _frame: FrameType | None) -> None:
+        if self.exit_code is ExitCode.INTERRUPTED:
+            self.exit_code = _ENDINGS[signal.Signals(number)]
+        self._leave_closed_terminals()
+        now = time.monotonic()
+        if now - self._raised_at >= _ECHO_SECONDS:
+            self._raised_at = now
+            raise KeyboardInterrupt
+
+    def _leave_closed_terminals(self) -> None:
+        """Let what is still said go nowhere, where it would be an error that ends the program."""
+        for number in self._terminals:
+            if not os.isatty(number):
+                nowhere = os.open(os.devnull, os.O_RDWR)
+                os.dup2(nowhere, number)
+                os.close(nowhere)
 
 
 class StopOnInterrupt:
     """In its ``with`` block the first Ctrl-C sets `event`; the next ones interrupt as usual.
 
-    Where Ctrl-C is ignored (a job in the background) it stays ignored.
+    So do the signals of `EndingSignals`. Where Ctrl-C is ignored (a job in the background) it stays
+    ignored.
 
     Attributes
     ----------
     event : threading.Event
-        Set once Ctrl-C was pressed.
+        Set once an end was asked for.
     """
 
     def __init__(self) -> None:
         self.event = threading.Event()
+        self._before: dict[int, _Handler] = {}
 
     def __enter__(self) -> StopOnInterrupt:
-        self._before = signal.getsignal(signal.SIGINT)
-        self._installed = (
-            callable(self._before) and threading.current_thread() is threading.main_thread()
-        )
-        if self._installed:
-            signal.signal(signal.SIGINT, self._on_interrupt)
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGINT, *_ENDINGS):
+                before = signal.getsignal(number)
+                if callable(before):
+                    self._before[number] = before
+                    signal.signal(number, self._on_interrupt)
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._installed:
-            signal.signal(signal.SIGINT, self._before)
+        for number, before in self._before.items():
+            signal.signal(number, before)
 
-    def _on_interrupt(self, _number: int, _frame: FrameType | None) -> None:
-        if self.event.is_set():
-            raise KeyboardInterrupt
-        self.event.set()
+    def _on_interrupt(self, number: int, frame: FrameType | None) -> None:
+        try:
+            self._before[number](number, frame)
+        except KeyboardInterrupt:
+            if self.event.is_set():
+                raise
+            self.event.set()
 
 
 @contextlib.contextmanager

@@ -25,12 +25,10 @@ from orbslam2py.settings import (
     Sensor,
     Settings,
     builtin_settings,
-    resolve_settings,
     settings_for_camera,
 )
-from orbslam2py.settings.builtin import BUILTIN_DATA, builtin_sensors, is_builtin_name
-from orbslam2py.settings.check import likely_sensor, sensors_of
-from orbslam2py.settings.settings import looks_like_path
+from orbslam2py.settings.builtin import BUILTIN_DATA, builtin_sensors
+from orbslam2py.settings.check import read_choice
 
 app = typer.Typer(
     help="Make, show, check and list settings files.",
@@ -99,17 +97,20 @@ def new(
 def show(choice: Choice, sensor: OfSensor = None) -> None:
     """Print settings as a complete file, to look at or to start from."""
     log_to(Console(stderr=True), quiet=False)
-    typer.echo(resolve_settings(choice, sensor or _likely(choice)).to_yaml(), nl=False)
+    chosen = read_choice(choice)
+    typer.echo(chosen.load(sensor or chosen.likely_sensor).to_yaml(), nl=False)
 
 
 def check(choice: Choice, sensor: OfSensor = None) -> None:
     """Check a settings file as a whole: say what is wrong, doubtful, and what it is good for."""
     log_to(Console(stderr=True), quiet=False)
-    settings = resolve_settings(choice, sensor or _likely(choice))
+    chosen = read_choice(choice)
+    settings = chosen.load(sensor or chosen.likely_sensor)
     console = Console(highlight=False, soft_wrap=True)
     _describe(console, settings)
-    usable = [str(one) for one in sensors_of(choice)]
-    console.print(f"{choice} is complete for {', '.join(usable)}", markup=False)
+    # What is asked for is loaded, as a run does it: it is complete for that, too.
+    usable = dict.fromkeys((*([sensor] if sensor else []), *chosen.usable_sensors()))
+    console.print(f"{choice} is complete for {', '.join(map(str, usable))}", markup=False)
 
 
 def list_names() -> None:
@@ -122,13 +123,6 @@ def list_names() -> None:
         words = ", ".join(map(str, sensors))
         table.add_row(name, words, size, f"{camera.fx:.1f}", BUILTIN_DATA[name])
     Console(highlight=False).print(table)
-
-
-def _likely(choice: str) -> Sensor:
-    """The sensor that a name or a file is for; what is neither is refused like by run."""
-    if looks_like_path(choice) or is_builtin_name(choice):
-        return likely_sensor(choice)
-    return resolve_settings(choice, Sensor.MONOCULAR).sensor
 
 
 def _coefficients(text: str | None) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from orbslam2py._arguments import number_of
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import Sensor
 from orbslam2py.synthetic import (
@@ -191,7 +192,8 @@ def synthesize(
     console = Console(quiet=quiet)
     _write(sequence, folder, layout, force=force, console=console)
     console.print(
-        f"{len(sequence)} frames are in [bold]{escape(str(folder))}[/]",
+        f"{number_of(len(sequence), 'frame')} {'is' if len(sequence) == 1 else 'are'} in "
+        f"[bold]{escape(str(folder))}[/]",
         highlight=False,
         soft_wrap=True,
     )

@@ -3,49 +3,85 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
+from orbslam2py._arguments import path_of
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings.builtin import builtin_sensors, is_builtin_name
 from orbslam2py.settings.opencv_yaml import scan
-from orbslam2py.settings.reader import read_groups, read_text
+from orbslam2py.settings.reader import groups_of_text, read_text
 from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import Settings
+from orbslam2py.settings.settings import Settings, looks_like_path, resolve_settings
 
 
-def sensors_of(choice: str | PathLike[str]) -> tuple[Sensor, ...]:
-    """Sensors for which a built-in name or a file is complete, the likely one first.
+@dataclass(frozen=True)
+class ChosenSettings:
+    """Built-in settings, or a file whose text was read once: it may be a pipe.
 
-    A file with distortion, or for depth images, is not for a pair of rectified cameras.
+    Attributes
+    ----------
+    choice
+        The built-in name, or the path of the file.
+    text
+        What the file holds; None for built-in settings.
     """
-    if is_builtin_name(str(choice)):
-        return builtin_sensors(str(choice))
-    likely = likely_sensor(choice)
-    others = [one for one in Sensor if one is Sensor.MONOCULAR or likely is Sensor.STEREO]
-    sensors = [likely, *(one for one in others if one is not likely)]
-    return tuple(sensor for sensor in sensors if _is_complete(Path(choice), sensor))
+
+    choice: str
+    text: str | None
+
+    def load(self, sensor: Sensor) -> Settings:
+        """Make the settings for a sensor; see `Settings.load`."""
+        if self.text is None:
+            return resolve_settings(self.choice, sensor)
+        return Settings.from_yaml(self.text, sensor, source=self.choice)
+
+    @property
+    def likely_sensor(self) -> Sensor:
+        """What they were made for, as the keys of a file tell."""
+        if self.text is None:
+            return builtin_sensors(self.choice)[0]
+        keys = scan(self.text).entries
+        if "DepthMapFactor" in keys:
+            return Sensor.RGBD
+        return Sensor.STEREO if {"Camera.bf", "ThDepth"} & set(keys) else Sensor.MONOCULAR
+
+    def usable_sensors(self) -> tuple[Sensor, ...]:
+        """Sensors for which they are complete, the likely one first.
+
+        A file with distortion, or for depth images, is not taken to be for a pair of rectified
+        cameras, though it may be complete for it.
+        """
+        if self.text is None:
+            return builtin_sensors(self.choice)
+        likely = self.likely_sensor
+        others = [one for one in Sensor if one is Sensor.MONOCULAR or likely is Sensor.STEREO]
+        sensors = [likely, *(one for one in others if one is not likely)]
+        return tuple(sensor for sensor in sensors if _is_complete(self.text, self.choice, sensor))
 
 
-def likely_sensor(choice: str | PathLike[str]) -> Sensor:
-    """Tell by its keys what a settings file was written for.
+def read_choice(choice: str | PathLike[str]) -> ChosenSettings:
+    """Find built-in settings, or read a settings file.
 
     Raises
     ------
     SettingsError
-        If the file cannot be read.
+        If it is neither a name nor a file that can be read.
     """
     if is_builtin_name(str(choice)):
-        return builtin_sensors(str(choice))[0]
-    keys = scan(read_text(Path(choice))).entries
-    if "DepthMapFactor" in keys:
-        return Sensor.RGBD
-    return Sensor.STEREO if {"Camera.bf", "ThDepth"} & set(keys) else Sensor.MONOCULAR
+        return ChosenSettings(str(choice), None)
+    if not looks_like_path(choice):
+        resolve_settings(choice, Sensor.MONOCULAR)  # says which names there are
+    path = path_of(choice, "the settings file", SettingsError)
+    return ChosenSettings(str(path), read_text(path))
 
 
-def _is_complete(path: Path, sensor: Sensor) -> bool:
+def _is_complete(text: str, source: str, sensor: Sensor) -> bool:
     try:
-        groups = read_groups(path, sensor, allow_unknown=False, warn=lambda _: None)
+        groups = groups_of_text(
+            text, Path(source), sensor, allow_unknown=False, warn=lambda _: None
+        )
         settings = Settings(sensor=sensor, **groups)
     except SettingsError:
         return False

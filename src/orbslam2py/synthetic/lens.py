@@ -9,7 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from orbslam2py._arguments import number_of
 from orbslam2py._arrays import ByteArray, FloatArray
+from orbslam2py.errors import SettingsError
 from orbslam2py.settings import CameraSettings
 from orbslam2py.trajectory.rotations import inverse_poses
 
@@ -124,6 +126,24 @@ def hand_rows(seconds: float, begin: float, end: float, height: int) -> int:
     """How many rows of the image, from below, a hand covers that comes and goes at these times."""
     share = min((seconds - begin) / _HAND_SLIDES + 1, (end - seconds) / _HAND_SLIDES + 1)
     return round(height * min(1.0, max(0.0, share)))
+
+
+def check_cover(begin: float, lasting: float, seconds: FloatArray) -> None:
+    """Raise `SettingsError` unless a hand covers some of the images of these times, but not all."""
+    if lasting == 0:
+        return
+    end = begin + lasting
+    length = f"the sequence of {number_of(len(seconds), 'image')} ends at {seconds[-1]:g} s"
+    if np.all((seconds >= begin) & (seconds <= end)):
+        raise SettingsError(
+            f"cover is {lasting:g} s, and {length}: it would be dark all the time; give less, or "
+            "more frames"
+        )
+    if not np.any((seconds > begin - _HAND_SLIDES) & (seconds < end + _HAND_SLIDES)):
+        raise SettingsError(
+            f"cover begins at {begin:g} s and lasts {lasting:g} s, and {length}: no image would be "
+            "covered; give another time, or more frames"
+        )
 
 
 def covered(

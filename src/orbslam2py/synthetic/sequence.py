@@ -68,6 +68,8 @@ class SyntheticSequence(FramesInOrder):
         nanoseconds = np.arange(self._n_frames, dtype=np.float64) * (1e9 / self._fps)
         #: Time stamps, int64 (n,), nanoseconds from the start.
         self.nanoseconds: IntArray = np.rint(nanoseconds).astype(np.int64)
+        self._covered = self._seconds_of_cover()
+        lens.check_cover(*self._covered, self.timestamps)
 
     def _seconds_on_way(self, index: int) -> float:
         """When the camera is on its way where an image is taken."""
@@ -222,15 +224,18 @@ class SyntheticSequence(FramesInOrder):
     def _hand_rows(self, index: int) -> int:
         if self._arrangement.dark[index]:
             return self._size[1]
-        cover = self.options.cover
-        if isinstance(cover, tuple | list):
-            begin, lasting = cover
-        else:
-            begin, lasting = (self._n_frames / self._fps - cover) / 2, cover
+        begin, lasting = self._covered
         if lasting == 0:
             return 0
         seconds = float(self.timestamps[index])
         return lens.hand_rows(seconds, begin, begin + lasting, self._size[1])
+
+    def _seconds_of_cover(self) -> tuple[float, float]:
+        """When the hand comes, and how long it stays."""
+        cover = self.options.cover
+        if isinstance(cover, tuple | list):
+            return cover[0], cover[1]
+        return (self._n_frames / self._fps - cover) / 2, cover
 
     def view(self, T_wc: FloatArray, number: int = 0, *, exposure: float | None = None) -> Images:
         """Render the images seen from anywhere: without smear and without a hand over the lens.

@@ -189,19 +189,25 @@ def open_for_a_reader(pipe: Path) -> int:
 
 
 def test_while_an_image_does_not_come(lap: Path) -> None:
-    """A network drive that hangs: here a pipe into which nobody writes."""
-    path = sorted((lap / "rgb").iterdir())[12]
-    path.unlink()
-    os.mkfifo(path)
-    process = start(lap.parent, "orbslam2py.cli.display", "Display.show", 12, 0)
-    pipe = open_for_a_reader(path)
+    """A network drive that hangs: here a pipe into which nobody writes is read in its place."""
+    pipe = lap.parent / "pipe"
+    os.mkfifo(pipe)
+    name = sorted((lap / "rgb").iterdir())[12].name
+    hang = (
+        "import pathlib\n"
+        "read = pathlib.Path.read_bytes\n"
+        f"pathlib.Path.read_bytes = lambda self: read("
+        f"pathlib.Path({str(pipe)!r}) if self.name == {name!r} else self)\n"
+    )
+    process = start(lap.parent, "orbslam2py.cli.display", "Display.show", 12, 0, before=hang)
+    writing = open_for_a_reader(pipe)
     try:
         assert process.stdout is not None
         assert [process.stdout.readline() for _ in range(2)] == ["ready\n", "so far\n"]
         process.send_signal(signal.SIGINT)
         code, err = finish(process)
     finally:
-        os.close(pipe)
+        os.close(writing)
     assert code == 130
     assert "an image is still being read" in err
     assert Results(lap.parent / "r").report["tracked"] == 12

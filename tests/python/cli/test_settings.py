@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import os
+import threading
 from pathlib import Path
 
 import pytest
@@ -97,6 +99,31 @@ def test_settings_are_checked(command: CommandLine) -> None:
     done = command("settings", "check", "mine.yaml")
     assert done.code == 0
     assert done.err.count("Warning: mine.yaml: Camera.cx 700 lies outside the image") == 1
+
+
+def test_the_sensor_that_is_asked_for_is_confirmed_or_refused(command: CommandLine) -> None:
+    new = ("settings", "new", *NUMBERS, "--sensor")
+    assert command(*new, "rgbd", "--baseline", "0.1", "-o", "depth.yaml").code == 0
+    assert command(*new, "mono", "-o", "mono.yaml").code == 0
+    assert "complete for rgbd, mono" in command("settings", "check", "depth.yaml").out
+    done = command("settings", "check", "depth.yaml", "--sensor", "stereo")
+    assert (done.code, done.err) == (0, "")
+    assert "depth.yaml is complete for stereo, rgbd, mono" in done.out
+    done = command("settings", "check", "mono.yaml", "--sensor", "stereo")
+    assert (done.code, done.out) == (2, "")
+    assert "complete for mono, not for stereo: take it for mono" in done.err
+
+
+@pytest.mark.parametrize("action", ["show", "check"])
+def test_settings_may_come_through_a_pipe(command: CommandLine, action: str) -> None:
+    builtin_settings("tum1", Sensor.RGBD).save("mine.yaml")
+    usual = command("settings", action, "mine.yaml")
+    text = Path("mine.yaml").read_text()
+    os.mkfifo("pipe.yaml")
+    threading.Thread(target=Path("pipe.yaml").write_text, args=(text,), daemon=True).start()
+    done = command("settings", action, "pipe.yaml")
+    assert (done.code, done.err) == (0, "")
+    assert done.out.replace("pipe.yaml", "mine.yaml") == usual.out
 
 
 def test_built_in_settings_are_listed(command: CommandLine) -> None:

@@ -64,6 +64,12 @@ def test_the_command_cuts_a_way_into_pieces(tmp_path):
     assert len(list((folder / "rgb").iterdir())) == 4 + 2 + 4
 
 
+def test_one_frame_is_called_so(tmp_path):
+    for count, words in (("1", "1 frame is in "), ("2", "2 frames are in ")):
+        result = run_command(str(tmp_path / count), "--frames", count, "--size", "64x64")
+        assert words in result.output
+
+
 def test_the_command_refuses_bad_input(tmp_path):
     assert run_command(str(tmp_path / "x"), "--world", "moon").exit_code == 2
     result = run_command(str(tmp_path / "x"), "--size", "big")

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from orbslam2py._arguments import number_of
 from orbslam2py.batches import BatchResult, Spread
 from orbslam2py.batches import batch as run_batch
 from orbslam2py.cli.batches.arguments import (
@@ -85,7 +86,7 @@ batch.__doc__ = f"{batch.__doc__}\n{EXAMPLE}"
 
 
 def _table(done: BatchResult) -> Table:
-    table = Table(title=f"{len(done.rows)} runs, {done.n_failed} failed")
+    table = Table(title=f"{number_of(len(done.rows), 'run')}, {done.n_failed} failed")
     table.add_column("run")
     for name in ("runs", "failed", "ATE [m]", "tracked [%]", "frames/s", "memory [MB]"):
         table.add_column(name, justify="right")

@@ -14,6 +14,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
+from orbslam2py._arguments import number_of
 from orbslam2py.batches import BatchResult
 from orbslam2py.batches.batch import Progress as OnProgress
 from orbslam2py.batches.engine import Watch
@@ -82,7 +83,10 @@ def watched_runs(
 def exit_as_it_ended(done: BatchResult, errors: Console) -> None:
     """End with the exit code of runs that are left or failed; do nothing if all is well."""
     if done.n_left:
-        errors.print(f"{done.n_left} runs are left; go on with --resume", highlight=False)
+        verb = "is" if done.n_left == 1 else "are"
+        errors.print(
+            f"{number_of(done.n_left, 'run')} {verb} left; go on with --resume", highlight=False
+        )
         raise typer.Exit(ExitCode.INTERRUPTED)
     if done.n_failed:
         raise typer.Exit(ExitCode.FAILED)

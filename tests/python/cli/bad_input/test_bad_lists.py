@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from pathlib import Path
 
@@ -88,6 +89,14 @@ def test_associated_image_that_does_not_exist(command: CommandLine, rgbd: Path) 
     pairs[BAD][3] = "depth/elsewhere.png"
     associate(rgbd, pairs)
     expect_skipped(run(command, rgbd), "r", "depth/elsewhere.png is listed but missing")
+
+
+@pytest.mark.parametrize("images", ["rgb", "depth"])
+def test_a_pipe_among_the_images(command: CommandLine, rgbd: Path, images: str) -> None:
+    path = sorted((rgbd / images).iterdir())[BAD]
+    path.unlink()
+    os.mkfifo(path)
+    expect_skipped(run(command, rgbd), "r", f"{images}/{path.name} is a pipe, not a file")
 
 
 @pytest.mark.parametrize("images", ["rgb", "depth"])

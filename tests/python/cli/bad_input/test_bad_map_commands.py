@@ -67,8 +67,8 @@ EXPORT = "map export colmap a.orbmap out"
         (f"{LENGTH} 0 1,2", "--between is '1,2'", "like 1.5,0,-2"),
         (f"{LENGTH} 0 99", "99 s is not within the map", "0 to 3.5 s"),
         (f"{LENGTH} 0 0", "at one place", "two that are apart"),
-        (f"{ALIGN} --length 0 --between 0 1", "a length of 0 m", "above 0"),
-        (f"{ALIGN} --length -2 --between 0 1", "a length of -2 m", "above 0"),
+        (f"{ALIGN} --length 0 --between 0 1", "the length is 0", "above 0"),
+        (f"{ALIGN} --length -2 --between 0 1", "the length is -2", "above 0"),
         (
             "map align metric.orbmap -o out --length 1 --between 0 1",
             "has metres already",
