@@ -218,7 +218,7 @@ def cannot_open(path: object, error: OSError, what: str = "") -> str:
 
 
 def path_of(value: Any, what: str, error: type[OrbSlamError] = DatasetError) -> Path:
-    """Take a path, as text or as a `Path`; a "~" at its beginning is the user's folder.
+    """Take a path, as text or as a `Path`.
 
     Raises
     ------
@@ -230,10 +230,7 @@ def path_of(value: Any, what: str, error: type[OrbSlamError] = DatasetError) -> 
         raise error(f"{what} is {shown(value)}; give a path, as text or as a pathlib.Path")
     if not path or "\0" in path:
         raise error(f"{what} is {path!r}, which is the name of no file; give a path")
-    try:
-        return Path(path).expanduser()
-    except RuntimeError:  # "~name" of nobody: a file may be called so, as for the shell
-        return Path(path)
+    return Path(path)
 
 
 def _text_of(value: object) -> str | None:

@@ -44,6 +44,8 @@ class EqualByValue:
 
 def _equal(one: Any, other: Any) -> bool:
     if not (isinstance(one, np.ndarray) and isinstance(other, np.ndarray)):
+        if isinstance(one, float) and isinstance(other, float) and np.isnan(one):
+            return bool(np.isnan(other))
         return one is other or bool(np.all(one == other))
     may_hold_nan = one.dtype.kind in "fc" and other.dtype.kind in "fc"
     return np.array_equal(one, other, equal_nan=may_hold_nan)

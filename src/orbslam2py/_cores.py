@@ -4,6 +4,12 @@
 from __future__ import annotations
 
 import os
+import threading
+from collections.abc import Callable, Iterable
+from typing import TypeVar
+
+_Item = TypeVar("_Item")
+_Result = TypeVar("_Result")
 
 
 def n_cores() -> int:
@@ -27,3 +33,47 @@ def n_threads(most: int) -> int:
     wanted = os.environ.get("OMP_NUM_THREADS", "").split(",")[0].strip()  # one per nested level
     limit = int(wanted) if wanted.isdecimal() and int(wanted) > 0 else most
     return max(1, min(most, limit, n_cores()))
+
+
+def side_by_side(work: Callable[[_Item], _Result], items: Iterable[_Item]) -> list[_Result]:
+    """Call ``work(item)`` for all items in as many threads as `n_threads` gives.
+
+    No `concurrent.futures.ThreadPoolExecutor`: it takes no work any more once the main thread has
+    ended, though another one may still deliver images.
+
+    Parameters
+    ----------
+    work
+        What is done; in several threads at a time.
+    items
+        To be worked on, each once.
+
+    Returns
+    -------
+    list
+        The results, in the order of the items.
+    """
+    left = list(enumerate(items))[::-1]
+    results: dict[int, _Result] = {}
+    errors: list[BaseException] = []
+
+    def take() -> None:
+        while not errors:
+            try:
+                number, item = left.pop()  # one at a time, by the interpreter's lock
+            except IndexError:
+                return
+            try:
+                results[number] = work(item)
+            except BaseException as error:
+                errors.append(error)
+
+    helpers = [threading.Thread(target=take) for _ in range(n_threads(len(left)) - 1)]
+    for helper in helpers:
+        helper.start()
+    take()
+    for helper in helpers:
+        helper.join()
+    if errors:
+        raise errors[0]
+    return [results[number] for number in sorted(results)]

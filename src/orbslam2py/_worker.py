@@ -368,12 +368,14 @@ class Worker(Generic[Job]):
         Raises
         ------
         StateError
-            If a step that runs in this very thread would have to end first.
+            If a step that runs in this very thread would have to end first, and no time is given.
         """
         deadline = None if timeout is None else time.monotonic() + timeout
         with self._condition:
             while not condition():
                 if self._inline_in == threading.get_ident():
+                    if timeout is not None:
+                        return False
                     raise StateError(
                         f"{self.name} is at work in this very call, whose end cannot be waited "
                         "for within a callback; wait when the image has been tracked"

@@ -143,7 +143,8 @@ class _Group(typer.core.TyperGroup):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read the arguments, none of which is empty."""
-        refuse_empty(args)
+        if not ctx.resilient_parsing:  # as it is for what a shell completes
+            refuse_empty(args)
         return list(super().parse_args(ctx, args))
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
@@ -182,6 +183,10 @@ app = typer.Typer(
 )
 
 
+#: Options whose value is text that says nothing to the program.
+_MAY_BE_EMPTY = ("--note",)
+
+
 def refuse_empty(arguments: Sequence[str]) -> None:
     """Raise `SettingsError` for an empty argument, as a shell makes of a variable that is not set.
 
@@ -191,7 +196,9 @@ def refuse_empty(arguments: Sequence[str]) -> None:
         name, sign, value = argument.partition("=")
         if argument and not (name.startswith("--") and sign and not value):
             continue
-        named = name or (before if before.startswith("-") else "an argument")
+        if before in _MAY_BE_EMPTY or name in _MAY_BE_EMPTY:
+            continue
+        named = name or (f"what follows {before}" if before.startswith("-") else "an argument")
         raise SettingsError(
             f"{named} is empty; give a value, or leave it out (is a variable of the shell not set?)"
         )

@@ -31,9 +31,12 @@ def outlive_the_reader() -> None:
     if not stat.S_ISFIFO(os.fstat(out.fileno()).st_mode):
         return
     out.flush()
+    pipe = _Pipe(out.fileno(), "wb", closefd=False)
     sys.stdout = io.TextIOWrapper(
-        io.BufferedWriter(_Pipe(out.fileno(), "wb", closefd=False)),
+        # Nothing is held back for who wants it at once (python -u).
+        pipe if out.write_through else io.BufferedWriter(pipe),
         encoding=out.encoding,
         errors=out.errors,
         line_buffering=out.line_buffering,
+        write_through=out.write_through,
     )

@@ -100,7 +100,7 @@ def timed_images(source: FrameSource, sensor: Sensor) -> Iterator[tuple[float, S
 
 
 def check_images(images: object, giver: str) -> None:
-    """See that something has the members of `orbslam2py.datasets.Images`.
+    """See that something is like `orbslam2py.datasets.Images`, at least for a single camera.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def check_images(images: object, giver: str) -> None:
     DatasetError
         If it has not.
     """
-    if not all(hasattr(images, name) for name in ("image", "right", "depth", "mask")):
+    if not (hasattr(images, "image") and hasattr(images, "mask")):
         raise DatasetError(
             f"{giver} gave {shown(images)} for images; give "
             "orbslam2py.datasets.Images(image, right=..., depth=..., mask=...)"
@@ -137,9 +137,9 @@ def track_images(
     if system.sensor is Sensor.MONOCULAR:
         return system.track_monocular(images.image, timestamp, mask=mask, details=details)
     if system.sensor is Sensor.RGBD:
-        depth = _present(images.depth, "depth image", timestamp)
+        depth = _present(getattr(images, "depth", None), "depth image", timestamp)
         return system.track_rgbd(images.image, depth, timestamp, mask=mask, details=details)
-    right = _present(images.right, "right image", timestamp)
+    right = _present(getattr(images, "right", None), "right image", timestamp)
     # The mask is the left image's; what it hides there needs no partner.
     pair = None if mask is None else (mask, None)
     return system.track_stereo(images.image, right, timestamp, mask=pair, details=details)

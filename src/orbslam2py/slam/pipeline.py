@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 
 from orbslam2py import _core as core
-from orbslam2py._arguments import is_number, shown
+from orbslam2py._arguments import is_finite, shown
 from orbslam2py._arrays import ByteArray
 from orbslam2py._timing import StageStatistics, StageTimer
 from orbslam2py.errors import ImageError
@@ -118,6 +118,7 @@ class Pipeline:
         self._drops_one_map = False
         self._next_frame_id = 0
         self._last_timestamp = -math.inf
+        self._told_of_seconds = False
         if setup.loaded is not None:
             setup.loaded.restore(back_end.map, setup.vocabulary, back_end.keyframe_index)
             self.tracking.begin_in_loaded_map(setup.initial_pose)
@@ -196,14 +197,16 @@ class Pipeline:
         self.localization.apply()
 
     def _check_timestamp(self, timestamp: float) -> None:
-        if not (is_number(timestamp) and -math.inf < timestamp < math.inf):
+        if not is_finite(timestamp):
             raise ImageError(
                 f"the time stamp must be a finite number of seconds, got {shown(timestamp)}"
             )
-        if abs(timestamp) >= _NO_SECONDS:
-            raise ImageError(
-                f"the time stamp {shown(timestamp)} is too large for seconds; give "
-                "seconds: divide nanoseconds by 1e9"
+        if abs(timestamp) >= _NO_SECONDS and not self._told_of_seconds:
+            self._told_of_seconds = True
+            _log.warning(
+                "the time stamp %s is too large for seconds, so that seconds after which something "
+                "happens pass at once; divide nanoseconds by 1e9",
+                shown(timestamp),
             )
         if timestamp <= self._last_timestamp:
             raise ImageError(

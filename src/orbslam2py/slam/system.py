@@ -432,7 +432,8 @@ class System:
         Raises
         ------
         StateError
-            In a callback of the deterministic mode, which the image waits for.
+            In a callback of the deterministic mode, which the image waits for; False if a time is
+            given.
         """
         localization = self.pipeline.localization
         return self.pipeline.back_end.wait_until_idle(

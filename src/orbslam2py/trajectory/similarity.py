@@ -12,8 +12,8 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import DatasetError
 from orbslam2py.trajectory.rotations import nearest_rotations
 
-#: Products of a rotation's rows may be off by so much: six digits, as people copy them ...
-_COPIED = 1e-5
+#: Products of a rotation's rows may be off by so much: a few digits, as people copy them ...
+_COPIED = 1e-3
 #: ... and by so much when they were computed.
 _COMPUTED = 1e-12
 

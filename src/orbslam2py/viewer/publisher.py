@@ -23,7 +23,7 @@ import cv2
 import numpy as np
 
 from orbslam2py import _core as core
-from orbslam2py._arguments import finite_number, shown
+from orbslam2py._arguments import is_number, shown
 from orbslam2py._arrays import ByteArray
 from orbslam2py._files import describe_error
 from orbslam2py.errors import StateError
@@ -89,8 +89,8 @@ class Publisher:
         if not isinstance(system, System):
             raise StateError(f"a publisher watches a System, not {shown(system)}")
         for what, rate in (("frame_rate", frame_rate), ("map_rate", map_rate)):
-            if finite_number(rate, what, _RATES, StateError) <= 0:
-                raise StateError(f"{what} is {rate}; give {_RATES}")
+            if not (is_number(rate) and rate > 0):
+                raise StateError(f"{what} is {shown(rate)}; give {_RATES}")
         watchers = list(watchers)
         for watcher in watchers:
             if not isinstance(watcher, Watcher):

@@ -33,7 +33,7 @@ def read_training_images(folder: str | os.PathLike[str]) -> list[Path]:
     VocabularyError
         If there are none.
     """
-    root = path_of(folder, "the folder of images", VocabularyError)
+    root = path_of(folder, "the folder of images", VocabularyError).expanduser()
     images = sorted(p for p in root.rglob("*") if p.suffix.lower() in IMAGE_SUFFIXES)
     if not images:
         if not root.is_dir():

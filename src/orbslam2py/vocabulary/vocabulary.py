@@ -71,7 +71,7 @@ def load_vocabulary(
     """
     if path is None:
         path = os.environ.get(ENVIRONMENT_VARIABLE) or default_vocabulary_path()
-    chosen = path_of(path, "the vocabulary", VocabularyError)
+    chosen = path_of(path, "the vocabulary", VocabularyError).expanduser()
     file_format = detect_format(chosen)
     if file_format is VocabularyFormat.BINARY:
         return core.Vocabulary.open(str(chosen))
@@ -174,7 +174,7 @@ def save_vocabulary(
         raise VocabularyError(
             f"the vocabulary is {shown(vocabulary)}; give one that load_vocabulary returned"
         )
-    target = path_of(path, "the file of the vocabulary", VocabularyError)
+    target = path_of(path, "the file of the vocabulary", VocabularyError).expanduser()
     if target.suffix == ".bvoc":
         vocabulary.save(str(target), comment, core.VocabularySource())
     elif target.suffix == ".txt":

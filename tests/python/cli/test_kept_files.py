@@ -307,10 +307,11 @@ def test_calibrations_do_not_replace_what_they_are_made_of(
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
-        (("run", "lap", "--output", ""), "--output is empty"),
+        (("run", "lap", "--output", ""), "what follows --output is empty"),
         (("run", "lap", "--output="), "--output is empty"),
-        (("run", "lap", "--mask", ""), "--mask is empty"),
+        (("run", "lap", "--mask", ""), "what follows --mask is empty"),
         (("run", ""), "an argument is empty"),
+        (("run", "--force", ""), "what follows --force is empty"),
         (("map", "info", ""), "an argument is empty"),
         (("synthesize", ""), "an argument is empty"),
     ],

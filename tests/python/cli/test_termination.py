@@ -22,7 +22,9 @@ from support.command_line import RUN_FILES, Results
 pytestmark = pytest.mark.watchdog(90)
 
 COMMAND = [sys.executable, "-m", "orbslam2py"]
-DEMO = ["demo", "--output", "d", "--quiet"]
+#: Takes far longer than any of the tests.
+DEMO = ["demo", "--output", "d", "--frames", "3000", "--quiet"]
+STREET = ["synthesize", "s", "--world", "street", "--frames", "3000", "--quiet"]
 ENDINGS = [(signal.SIGTERM, 143), (signal.SIGHUP, 129)]
 
 
@@ -38,9 +40,24 @@ def hidden(folder: Path) -> list[str]:
     return [path.name for path in folder.iterdir() if path.name.startswith(".")]
 
 
+def hears_all() -> None:
+    """Undo what the tests may have been started with: ``nohup``, a job in the background."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+
+
+def deaf_to(number: signal.Signals) -> Callable[[], None]:
+    def prepare() -> None:
+        hears_all()
+        signal.signal(number, signal.SIG_IGN)
+
+    return prepare
+
+
 def begun(
     folder: Path, *arguments: str, before: list[str] | None = None, **more: Any
 ) -> subprocess.Popen[bytes]:
+    more.setdefault("preexec_fn", hears_all)
     return subprocess.Popen(
         [*(before or []), *COMMAND, *arguments],
         cwd=folder,
@@ -52,9 +69,9 @@ def begun(
 
 
 def in_the_middle(folder: Path, process: subprocess.Popen[bytes]) -> None:
-    """Wait until some images are tracked; the whole of the demonstration takes seconds."""
+    """Wait until some images are tracked."""
     wait_until((folder / "d" / "frames.csv").is_file, process)
-    time.sleep(1.0)
+    time.sleep(3.0)
 
 
 def ended(process: subprocess.Popen[bytes]) -> tuple[int, str]:
@@ -87,7 +104,7 @@ def test_a_run_saves_what_was_done(tmp_path: Path, number: signal.Signals, code:
 
 @pytest.mark.parametrize(("number", "code"), ENDINGS)
 def test_what_is_half_written_goes(tmp_path: Path, number: signal.Signals, code: int) -> None:
-    process = begun(tmp_path, "synthesize", "s", "--world", "street", "--quiet")
+    process = begun(tmp_path, *STREET)
     wait_until(lambda: hidden(tmp_path), process)
     process.send_signal(number)
     assert ended(process) == (code, "")
@@ -95,9 +112,9 @@ def test_what_is_half_written_goes(tmp_path: Path, number: signal.Signals, code:
 
 
 @pytest.mark.skipif(shutil.which("timeout") is None, reason="coreutils are not installed")
-@pytest.mark.parametrize("arguments", [DEMO, ["synthesize", "s", "--world", "street", "--quiet"]])
+@pytest.mark.parametrize("arguments", [DEMO, STREET])
 def test_a_signal_that_comes_twice_is_one_request(tmp_path: Path, arguments: list[str]) -> None:
-    process = begun(tmp_path, *arguments, before=["timeout", "4"], start_new_session=True)
+    process = begun(tmp_path, *arguments, before=["timeout", "8"], start_new_session=True)
     code, err = ended(process)
     assert code == 124, err
     assert "Traceback" not in err
@@ -110,8 +127,9 @@ def test_a_terminal_that_is_closed(tmp_path: Path) -> None:
     """Then also whatever is still said is an error, and the signal comes as a rule twice."""
     pid, terminal = pty.fork()
     if pid == 0:
+        hears_all()
         os.chdir(tmp_path)
-        os.execv(sys.executable, [*COMMAND, "demo", "--output", "d"])
+        os.execv(sys.executable, [*COMMAND, *DEMO[:-1]])
     shown = b""
     while b"frames/s" not in shown:
         shown += os.read(terminal, 65536)
@@ -125,7 +143,7 @@ def test_under_nohup_it_goes_on(tmp_path: Path) -> None:
     process = begun(
         tmp_path,
         *DEMO,
-        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN),
+        preexec_fn=deaf_to(signal.SIGHUP),
     )
     in_the_middle(tmp_path, process)
     process.send_signal(signal.SIGHUP)
@@ -140,7 +158,7 @@ def test_a_job_that_is_deaf_to_ctrl_c_hears_them(tmp_path: Path) -> None:
     process = begun(
         tmp_path,
         *DEMO,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN),
+        preexec_fn=deaf_to(signal.SIGINT),
     )
     in_the_middle(tmp_path, process)
     process.send_signal(signal.SIGTERM)
@@ -171,4 +189,4 @@ def test_the_command_line_leaves_no_handlers_behind() -> None:
         "assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL\n"
         "assert signal.getsignal(signal.SIGHUP) is signal.SIG_DFL\n"
     )
-    subprocess.run([sys.executable, "-c", code], check=True)
+    subprocess.run([sys.executable, "-c", code], check=True, preexec_fn=hears_all)

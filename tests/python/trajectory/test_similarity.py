@@ -40,11 +40,11 @@ def test_what_is_no_similarity_is_refused(scale: Any, R: Any, t: Any, words: str
         Similarity(scale, R, t)
 
 
-@pytest.mark.parametrize("R", [TURN.round(6), TURN.astype(np.float32), TURN.round(6).tolist()])
+@pytest.mark.parametrize("R", [TURN.round(4), TURN.astype(np.float32), TURN.round(6).tolist()])
 def test_a_rounded_rotation_is_made_orthonormal(R: Any) -> None:
     made = Similarity(2, R, [1, 2, 3]).R  # type: ignore[arg-type]
     np.testing.assert_allclose(made @ made.T, np.eye(3), atol=1e-14)
-    np.testing.assert_allclose(made, TURN, atol=2e-6)
+    np.testing.assert_allclose(made, TURN, atol=1e-4)
 
 
 def test_an_exact_rotation_stays_as_it_is() -> None:

@@ -129,6 +129,8 @@ def image_of_row(contents: MapContents, row: int, images: ImageOfKeyframe) -> By
     wanted = "give uint8 (h, w) grey or (h, w, 3) RGB, or None if there is none"
     if not isinstance(image, np.ndarray):
         raise ImageError(f"{name} is {shown(image)}; {wanted}")
+    if image.ndim == 3 and image.shape[2] == 1:
+        image = image[:, :, 0]
     fits = image.ndim == 2 or (image.ndim == 3 and image.shape[2] == 3)
     if image.dtype != np.uint8 or not fits or not image.size:
         raise ImageError(f"{name} is of {image.dtype} and shape {image.shape}; {wanted}")

@@ -11,14 +11,13 @@ from __future__ import annotations
 import functools
 import itertools
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
-from orbslam2py._cores import n_threads
+from orbslam2py._cores import side_by_side
 from orbslam2py.slam.front_end import intrinsics
 from orbslam2py.slam.initialization.kept_views import View
 from orbslam2py.slam.initialization.third_view import (
@@ -123,9 +122,8 @@ class SeveralViews:
         """
         draws = range(self._limits.further_draws + 1)
         # Nothing else is mapped yet, so the other cores are free. The order is that of the draws.
-        with ThreadPoolExecutor(n_threads(len(draws))) as pool:
-            judge = functools.partial(self._judged, motion, seed)
-            judged = list(itertools.chain.from_iterable(pool.map(judge, draws)))
+        judge = functools.partial(self._judged, motion, seed)
+        judged = list(itertools.chain.from_iterable(side_by_side(judge, draws)))
         found, costs = [placed for placed, _ in judged], [cost for _, cost in judged]
         best = int(np.argmin(costs))
         chosen = found[best].motion
