@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -46,6 +47,22 @@ def test_run_of_a_class_of_ones_own(sensor: Sensor) -> None:
     with new_system(sensor, wait_for_mapping=True) as system:
         assert len(system.run(Recording(sensor))) == N
         assert len(system.trajectory()) == N
+
+
+def test_images_need_only_have_what_the_sensor_needs(sensor: Sensor) -> None:
+    second = "right" if sensor is Sensor.STEREO else "depth"
+
+    def frames() -> Iterator[SimpleNamespace]:
+        for frame in islice(sequence(sensor), 3):
+            given = {name: getattr(frame.images, name) for name in ("image", "mask", second)}
+            yield SimpleNamespace(timestamp=frame.timestamp, images=SimpleNamespace(**given))
+
+    with new_system(sensor, deterministic=True) as system:
+        records = system.run(frames())  # type: ignore[arg-type]
+        assert [record.state for record in records] == [TrackingState.OK] * 3
+        mono = SimpleNamespace(image=sequence(sensor).load(3).image, mask=None)
+        with pytest.raises(ImageError, match=f"has no {second} image"):
+            system.run([SimpleNamespace(timestamp=9.0, images=mono)])  # type: ignore[list-item]
 
 
 def test_run_of_a_single_camera() -> None:

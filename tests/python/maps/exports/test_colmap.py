@@ -108,6 +108,14 @@ def test_exact_projections_have_no_error(
     assert check_errors(read(tmp_path / "out")) < 1e-4
 
 
+def test_a_grey_image_may_have_a_channel_of_its_own(tmp_path: Path) -> None:
+    export_colmap(made_up_map(2), tmp_path / "one", images=lambda i: grey_images(i)[:, :, None])
+    export_colmap(made_up_map(2), tmp_path / "none", images=grey_images)
+    for path in sorted((tmp_path / "none" / "images").iterdir()):
+        same = tmp_path / "one" / "images" / path.name
+        assert same.read_bytes() == path.read_bytes()
+
+
 @pytest.mark.parametrize("lens", [None, LENS])
 def test_with_images_the_camera_is_a_pinhole(
     tmp_path: Path, lens: tuple[float, ...] | None
