@@ -94,8 +94,8 @@ def atomic_write(path: str | os.PathLike[str], *, binary: bool = False) -> Itera
             yield stream
         return
     temporary = target.with_name(f".{target.name}.{os.getpid()}-{secrets.token_hex(4)}.tmp")
-    stream = _open(path, temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, binary)
-    try:
+    try:  # a Ctrl-C may come as soon as it is there
+        stream = _open(path, temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, binary)
         try:
             yield stream
         except BaseException:
@@ -136,15 +136,15 @@ def atomic_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
     target = Path(os.path.realpath(path_of(path, "the folder to write")))
     token = secrets.token_hex(4)
     temporary = target.with_name(f".{target.name}.{token}.tmp")
-    try:
-        temporary.mkdir(parents=True)
-    except OSError as error:
-        raise OSError(
-            error.errno,
-            f"cannot write to {path}: {reason_of(error)}; give another folder",
-            str(path),
-        ) from error
-    try:
+    try:  # a Ctrl-C may come as soon as it is there
+        try:
+            temporary.mkdir(parents=True)
+        except OSError as error:
+            raise OSError(
+                error.errno,
+                f"cannot write to {path}: {reason_of(error)}; give another folder",
+                str(path),
+            ) from error
         yield temporary
         if target.exists() and any(target.iterdir()):
             old = target.with_name(f".{target.name}.{token}.old")

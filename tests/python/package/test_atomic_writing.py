@@ -6,10 +6,12 @@ from __future__ import annotations
 import errno
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from orbslam2py._files import atomic_write
+from orbslam2py import _files
+from orbslam2py._files import atomic_folder, atomic_write
 from support.files import names_in
 
 
@@ -120,3 +122,22 @@ def test_links_are_followed(tmp_path: Path) -> None:
         stream.write("new")
     assert (tmp_path / "link").is_symlink()
     assert (tmp_path / "real").read_text() == "new"
+
+
+@pytest.mark.parametrize("write", [atomic_write, atomic_folder])
+def test_a_ctrl_c_right_after_the_temporary_one_is_made_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, write: Any
+) -> None:
+    def interrupted(real: Any) -> Any:
+        def make(*arguments: Any, **options: Any) -> None:
+            real(*arguments, **options)
+            raise KeyboardInterrupt
+
+        return make
+
+    monkeypatch.setattr(Path, "mkdir", interrupted(Path.mkdir))
+    monkeypatch.setattr(_files, "_open", interrupted(_files._open))
+    with pytest.raises(KeyboardInterrupt), write(tmp_path / "x"):
+        pass
+    monkeypatch.undo()
+    assert list(tmp_path.iterdir()) == []
