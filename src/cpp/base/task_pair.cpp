@@ -6,7 +6,7 @@
 namespace orbslam {
 namespace {
 
-/// Between two pairs of a bundle adjustment lie some tens of microseconds, seldom 200.
+/// How long the helper looks for the next pair before it sleeps.
 constexpr std::chrono::microseconds patience{200};
 
 }  // namespace

@@ -10,9 +10,9 @@
 namespace orbslam {
 
 /// Two tasks at a time for two threads: the caller's and a helper. For many short pairs one right
-/// after the other: between them the helper looks for the next one before it sleeps, since being
-/// woken takes as long as such a task. On a busy computer, where the helper does not come, the
-/// caller does both; nothing is waited for that has not begun.
+/// after the other: between them the helper looks for the next one before it sleeps, since waking
+/// it for each would take away what it brings. On a busy computer, where the helper does not come,
+/// the caller does both; nothing is waited for that has not begun.
 class TaskPair {
  public:
   TaskPair();
