@@ -27,7 +27,7 @@ SymmetricEigen symmetric_eigen(const SmallMatrix& matrix);
 Eigen::Matrix4d symmetric_eigenvectors_4(const Eigen::Matrix4d& matrix);
 
 /// Unit eigenvector of the least eigenvalue of a symmetric matrix without negative ones, N x N with
-/// N = 4 or 9; the lower triangle is read. By inverse iteration, which is several times faster
+/// N = 4 or 9; the lower triangle is read. By inverse iteration, which is faster
 /// where that eigenvalue lies well below the others, as it does where a linear model fits its
 /// equations.
 template <int N>

@@ -139,28 +139,16 @@ def test_a_terminal_that_is_closed(tmp_path: Path) -> None:
     is_saved(tmp_path / "d")
 
 
-def test_under_nohup_it_goes_on(tmp_path: Path) -> None:
-    process = begun(
-        tmp_path,
-        *DEMO,
-        preexec_fn=deaf_to(signal.SIGHUP),
-    )
+@pytest.mark.parametrize("ignored", [signal.SIGHUP, signal.SIGINT])
+def test_what_is_ignored_stays_so_and_the_rest_is_heard(
+    tmp_path: Path, ignored: signal.Signals
+) -> None:
+    """As under ``nohup``, and in a job in the background."""
+    process = begun(tmp_path, *DEMO, preexec_fn=deaf_to(ignored))
     in_the_middle(tmp_path, process)
-    process.send_signal(signal.SIGHUP)
+    process.send_signal(ignored)
     time.sleep(0.5)
     assert process.poll() is None
-    process.send_signal(signal.SIGTERM)
-    assert ended(process)[0] == 143
-    is_saved(tmp_path / "d")
-
-
-def test_a_job_that_is_deaf_to_ctrl_c_hears_them(tmp_path: Path) -> None:
-    process = begun(
-        tmp_path,
-        *DEMO,
-        preexec_fn=deaf_to(signal.SIGINT),
-    )
-    in_the_middle(tmp_path, process)
     process.send_signal(signal.SIGTERM)
     assert ended(process)[0] == 143
     is_saved(tmp_path / "d")
