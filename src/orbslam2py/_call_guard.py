@@ -16,13 +16,25 @@ class CallGuard:
     def __init__(self, what: str) -> None:
         self._what = what
         self._lock = threading.Lock()
+        self._owner: int | None = None  # the thread that is in the call
 
     @contextlib.contextmanager
     def __call__(self) -> Iterator[None]:
         """Enter the guarded call."""
         if not self._lock.acquire(blocking=False):
             raise StateError(f"{self._what} is already running in another thread")
+        self._owner = threading.get_ident()
         try:
             yield
         finally:
+            self._owner = None
             self._lock.release()
+
+    def wait_until_left(self, timeout: float | None = None) -> bool:
+        """Wait until no other thread is in the call; False when `timeout` seconds passed first."""
+        if self._owner == threading.get_ident():
+            return True
+        if not self._lock.acquire(timeout=-1 if timeout is None else timeout):
+            return False
+        self._lock.release()
+        return True

@@ -7,6 +7,7 @@ the caller.
 Nobody waits for somebody who waits for him, because pauses are counted tickets, a reset is
 acknowledged while paused as well, and no lock of the map is held while waiting. A worker can also
 run inline (``threaded=False``): the same steps in the caller's thread, which makes two runs equal.
+Callers in several threads then take turns.
 The whole protocol: ``docs/method/threads.md#workers``.
 """
 
@@ -18,8 +19,8 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
-from typing import Generic, TypeVar
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, Generic, TypeVar
 
 from orbslam2py import _core as core
 from orbslam2py._waiting import WAIT_SLICE
@@ -96,6 +97,7 @@ class Worker(Generic[Job]):
         self._error: BaseException | None = None
         self._thread: threading.Thread | None = None
         self._inline_in: int | None = None  # the thread that a step runs in for its caller
+        self._turn = threading.RLock()  # held while inline steps run
         #: Raised when the running step should end early; lowered when a step begins.
         self.interrupt_flag = core.StopFlag()
         #: Raised when nobody wants the running step's result any more (reset, finish).
@@ -141,6 +143,8 @@ class Worker(Generic[Job]):
             self.interrupt_flag.set()
             self.cancel_flag.set()
             self._condition.notify_all()
+        if not self._threaded and not self.wait_until(self._is_idle_elsewhere, timeout):
+            raise WorkerError(f"{self.name} did not end within {timeout} s")
         if thread is not None:
             deadline = None if timeout is None else time.monotonic() + timeout
             while thread.is_alive():
@@ -198,20 +202,28 @@ class Worker(Generic[Job]):
         return True
 
     def _run_inline(self) -> None:
-        outer, self._inline_in = self._inline_in, threading.get_ident()
-        try:
-            while self._queue:
+        with self._turn:
+            outer, self._inline_in = self._inline_in, threading.get_ident()
+            try:
+                while True:
+                    with self._condition:
+                        if not self._queue:
+                            break
+                        job = self._take()
+                    self._step(job)
+            except BaseException as error:
                 with self._condition:
-                    job = self._take()
-                self._step(job)
-        except Exception as error:
-            self._error = error
-            self.raise_if_failed()
-        finally:
-            self._inline_in = outer
-            self._queue.clear()  # after an error or Ctrl-C
-            self.waiting_flag.clear()
-            self._busy = False
+                    self._queue.clear()
+                    self.waiting_flag.clear()
+                if not isinstance(error, Exception):
+                    raise  # Ctrl-C: it goes on with the next job
+                self._error = error
+            finally:
+                with self._condition:
+                    self._inline_in = outer
+                    self._busy = outer is not None
+                    self._condition.notify_all()
+        self.raise_if_failed()
 
     def _take(self) -> Job:
         job = self._queue.popleft()
@@ -247,8 +259,9 @@ class Worker(Generic[Job]):
     def off_duty(self) -> Iterator[None]:
         """Entered by a step for a long part that leaves the map alone.
 
-        A pause or a reset does not wait for that part; its end waits for the end of the pause.
-        Afterwards the step must look at `cancel_flag`, and end if it is raised.
+        A pause or a reset does not wait for that part; its end waits for the end of the pause, or
+        raises `cancel_flag` if the worker runs inline. Afterwards the step must look at that flag,
+        and end if it is raised.
         """
         with self._condition:
             self._off_duty = True
@@ -259,13 +272,16 @@ class Worker(Generic[Job]):
             with self._condition:
                 while self._threaded and self._pauses and not self.cancel_flag.is_set():
                     self._condition.wait(WAIT_SLICE)
+                if not self._threaded and self._pauses:
+                    # Another thread holds it, and may wait for the turn that this one has.
+                    self.cancel_flag.set()
                 self._off_duty = False
 
     # ---- pauses ----------------------------------------------------------------------------------
     def pause(self, *, brief: bool = False) -> PauseTicket:
         """Ask the worker to stand still after the running step; see `PauseTicket`.
 
-        An inline worker stands still whenever somebody else's code runs.
+        An inline worker stands still whenever other code of its caller runs.
 
         Parameters
         ----------
@@ -313,7 +329,8 @@ class Worker(Generic[Job]):
     @property
     def ended(self) -> bool:
         """`finish` was called and no thread is left."""
-        return self._finish_requested and self._thread is None
+        no_thread = self._thread is None and (self._threaded or self._is_idle_elsewhere())
+        return self._finish_requested and no_thread
 
     @property
     def n_waiting(self) -> int:
@@ -391,7 +408,11 @@ class Worker(Generic[Job]):
         return not self._queue and not self._busy
 
     def _leaves_map_alone(self) -> bool:
-        return not self._threaded or not self._busy or self._off_duty
+        return self._off_duty or self._is_idle_elsewhere()
+
+    def _is_idle_elsewhere(self) -> bool:
+        """No step runs, but for one that this call is part of."""
+        return not self._busy or self._inline_in == threading.get_ident()
 
     def _run(self) -> None:
         while True:
@@ -416,3 +437,10 @@ class Worker(Generic[Job]):
             with self._condition:
                 self._busy = False
                 self._condition.notify_all()
+
+
+def take_turns(workers: Iterable[Worker[Any]]) -> None:
+    """Let no two of these workers run inline at once, for callers in different threads."""
+    turn = threading.RLock()
+    for worker in workers:
+        worker._turn = turn

@@ -11,7 +11,7 @@ from typing import Any
 
 from orbslam2py import _core as core
 from orbslam2py._cores import n_threads
-from orbslam2py._worker import Worker
+from orbslam2py._worker import Worker, take_turns
 from orbslam2py.errors import MapFileError, WorkerError
 from orbslam2py.maps.map_keeper import MapKeeper
 from orbslam2py.settings.sensor import Sensor
@@ -81,6 +81,7 @@ class BackEnd:
             on_merge=_announce_merge(self.events),
         )
         self.mapping.on_done = _pass_on_keyframe(self.map, self.loop_closing, self.events)
+        take_turns(self.workers)
 
     @property
     def map_workers(self) -> tuple[Worker[int], ...]:
@@ -117,11 +118,13 @@ class BackEnd:
         self.map.clear()
         self.events.post(MapChanged(ended, MapChangeCause.RESET))
 
-    def drop_map(self, timeout: float, *, keep: Callable[[int], None]) -> None:
+    def drop_map(self, map_index: int, timeout: float, *, keep: Callable[[int], None]) -> None:
         """Drop the active map alone: the youngest of the others becomes the active one.
 
         Parameters
         ----------
+        map_index : int
+            Its number. If it has become part of another one meanwhile, nothing is dropped.
         timeout : float
             Seconds to wait for each worker.
         keep : callable
@@ -136,11 +139,12 @@ class BackEnd:
         for worker in (self.mapping.worker, self.loop_closing.worker):
             if not worker.wait_until_idle(timeout):
                 raise WorkerError(f"{worker.name} did not end its work within {timeout} s")
-        ended = self.map.active_map
-        keep(ended)
-        for keyframe in self.map.erase_map(ended).tolist():
+        if self.map.active_map != map_index:
+            return
+        keep(map_index)
+        for keyframe in self.map.erase_map(map_index).tolist():
             self.keyframe_index.erase(keyframe)
-        self.events.post(MapChanged(ended, MapChangeCause.RESET))
+        self.events.post(MapChanged(map_index, MapChangeCause.RESET))
 
     def wait_until_idle(self, timeout: float | None, *, close_loop: bool = False) -> bool:
         """Wait until every worker is idle.

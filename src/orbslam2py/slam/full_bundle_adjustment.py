@@ -110,12 +110,12 @@ class FullBundleAdjustment:
     def start(self, map_index: int | None = None) -> int:
         """Begin one, of the active map if no other is named; a running one is given up.
 
-        Returns its number.
+        None begins while the system ends. Returns its number.
         """
         self.cancel()
         number = next(self._numbers)
         self._wanted = number, self._map.active_map if map_index is None else map_index
-        self.worker.submit(number)
+        self.worker.offer(number)
         return number
 
     def start_and_wait(

@@ -51,13 +51,21 @@ class LocalizationSwitch:
         if wanted == self.on:
             return
         if wanted:
-            self._tickets = [worker.pause() for worker in self._workers]
-            for ticket in self._tickets:
-                ticket.wait()
+            self._hold()
         else:
             self.release()
         self.on = wanted
         _log.info("localization mode %s", "on" if wanted else "off")
+
+    def _hold(self) -> None:
+        self._tickets = [worker.pause() for worker in self._workers]
+        try:
+            for ticket in self._tickets:
+                ticket.wait()
+        except BaseException:
+            # A Ctrl-C: the mode is not in force, and the next image tries again.
+            self.release()
+            raise
 
     def release(self) -> None:
         """Let the workers go on; what waits for them is processed."""

@@ -86,7 +86,7 @@ class Pipeline:
     keeper : MapKeeper
         The map in files.
     reset_requested : threading.Event
-        When set, the next image begins a new map.
+        When set, the next image begins a new map, and all before it is forgotten.
     frame_watchers : tuple of callables
         Told of every image; assign another tuple to add one. They must be quick and not raise.
     """
@@ -113,9 +113,9 @@ class Pipeline:
         self.frame_watchers: tuple[FrameWatcher, ...] = ()
         self.n_resets = 0
         self._limits = InitializationThresholds()
+        # The map that came to nothing, and is given up before the next image.
+        self._given_up: int | None = None
         self._start_failed = False
-        self._keeps_frames = False
-        self._drops_one_map = False
         self._next_frame_id = 0
         self._last_timestamp = -math.inf
         self._told_of_seconds = False
@@ -191,7 +191,7 @@ class Pipeline:
     def _make_ready(self, timestamp: float) -> None:
         for worker in self.back_end.workers:
             worker.raise_if_failed()
-        if self.reset_requested.is_set():
+        if self.reset_requested.is_set() or self._given_up is not None:
             self._reset()
         self._check_timestamp(timestamp)
         self.localization.apply()
@@ -238,12 +238,9 @@ class Pipeline:
     def _keep(self, frame: core.TrackedFrame, outcome: TrackingOutcome) -> None:
         if outcome.reset_needed:
             self._start_failed = outcome.estimate.reason is Reason.INITIAL_MAP_FAILED
-            # Depths begin a map with one frame; one camera's frames from before serve it again.
-            self._keeps_frames = not self._sensor.has_depth
-            self._drops_one_map = len(self.back_end.map.maps) > 1
             if not self._start_failed:
                 _log.info("lost soon after initialization; starting a new map")
-            self.reset_requested.set()
+            self._given_up = self.back_end.map.active_map
         elif outcome.state in (TrackingState.OK, TrackingState.LOST):
             evidence = outcome.estimate.evidence
             if outcome.earlier:
@@ -311,29 +308,47 @@ class Pipeline:
 
     def request_reset(self) -> None:
         """Begin a new map with the next image, and forget all before it."""
-        self._keeps_frames = self._drops_one_map = False
         self.reset_requested.set()
 
     # ---- a new map -------------------------------------------------------------------------------
     def _reset(self) -> None:
         _log.info("resetting: map %d ends", self.back_end.map.active_map)
-        if self._drops_one_map:
-            self.back_end.drop_map(RESET_PATIENCE, keep=self.recorder.end_map)
-            self.tracking.go_back()
-        elif self._keeps_frames:
-            self.back_end.reset(RESET_PATIENCE, keep=self.recorder.end_maps)
-            self.tracking.restart()
-        else:
-            self.back_end.reset(RESET_PATIENCE, keep=self.recorder.end_maps)
-            self.tracking.reset()
-            self.front_end.reset()
-            self._next_frame_id = 0
-            self._last_timestamp = -math.inf
-        self._keeps_frames = self._drops_one_map = False
+        # Cleared first: a reset that is asked for while this one is carried out is another one.
+        asked = self.reset_requested.is_set()
         self.reset_requested.clear()
+        try:
+            if asked or self._given_up is None:
+                self._forget_all()
+            else:
+                self._give_up(self._given_up)
+        except BaseException:
+            if asked:
+                self.reset_requested.set()
+            raise
+        self._given_up = None
         # A map that never began was not given up.
         self.n_resets += not self._start_failed
         self._start_failed = False
+
+    def _forget_all(self) -> None:
+        self.back_end.reset(RESET_PATIENCE, keep=self.recorder.end_maps)
+        self.tracking.reset()
+        self.front_end.reset()
+        self._next_frame_id = 0
+        self._last_timestamp = -math.inf
+
+    def _give_up(self, map_index: int) -> None:
+        slam_map = self.back_end.map
+        if len(slam_map.maps) > 1 or slam_map.active_map != map_index:
+            self.back_end.drop_map(map_index, RESET_PATIENCE, keep=self.recorder.end_map)
+            self.tracking.go_back()
+        elif self._sensor.has_depth:
+            # Depths begin a map with one frame.
+            self._forget_all()
+        else:
+            # One camera's frames from before serve again.
+            self.back_end.reset(RESET_PATIENCE, keep=self.recorder.end_maps)
+            self.tracking.restart()
 
 
 def _make_search(

@@ -406,10 +406,15 @@ class System:
         Raises
         ------
         StateError
-            In localization mode, where the map is not to change.
+            In localization mode, where the map is not to change, or if an argument is none.
+        IndexError
+            If no map of that number has begun. Of one that is no more nothing is refined.
         WorkerError
             If a worker has failed.
         """
+        self._check_map_index(map_index)
+        if not (stop is None or callable(getattr(stop, "is_set", None))):
+            raise StateError(f"stop is {shown(stop)}; give a threading.Event, or None")
         localization = self.pipeline.localization
         if localization.wanted or localization.on:
             raise StateError("optimize changes the map; switch localization mode off first")
@@ -459,7 +464,7 @@ class System:
             Let a running full adjustment end as well; otherwise it is given up, and the map stays
             as it was before it.
         timeout : float, optional
-            Seconds to wait for each worker.
+            Seconds to wait for each worker, and for a track call in another thread.
 
         Raises
         ------
@@ -479,7 +484,11 @@ class System:
             drain=drain, wait_for_adjustment=wait_for_adjustment, timeout=timeout
         )
         ended = all(worker.ended for worker in back_end.workers)
+        if ended and not self._guard.wait_until_left(timeout):
+            errors.append(WorkerError(f"tracking did not end within {timeout} s"))
+            ended = False
         if ended:
+            # Nobody else moves the frames any more.
             self.pipeline.recorder.settle()
         try:
             self.pipeline.keeper.stop_autosave()

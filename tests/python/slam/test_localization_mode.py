@@ -12,6 +12,7 @@ from benchmarks.accuracy.mapped_world import MappedWorld
 
 from orbslam2py import Sensor, System, TrackingRecord, TrackingState
 from orbslam2py import _core as core
+from orbslam2py._worker import PauseTicket
 from orbslam2py.evaluation import pose_error
 from orbslam2py.slam.local_mapping import LocalMapping
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
@@ -303,3 +304,29 @@ def test_system_has_the_mode_off() -> None:
     system = System("tum1", "mono")
     assert not system.localization_mode
     system.shutdown()
+
+
+def test_an_interrupted_switch_holds_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The mode is not in force: mapping goes on, and the next image may try again."""
+    with new_system(Sensor.RGBD) as system:
+        play(system, 10)
+        switch = system.pipeline.localization
+        workers = system.pipeline.back_end.map_workers
+
+        def interrupted(*_: object) -> bool:
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr(PauseTicket, "wait", interrupted)
+        system.localization_mode = True
+        with pytest.raises(KeyboardInterrupt):
+            track(system, 10)
+        monkeypatch.undo()
+        assert not switch.on
+        assert not any(worker.pausing for worker in workers)
+        system.localization_mode = False
+        play(system, 20, first=10)
+        assert system.wait_until_idle(20)
+        system.localization_mode = True
+        track(system, 30)
+        assert switch.on
+        assert all(worker.pausing for worker in workers)

@@ -163,10 +163,20 @@ def test_a_map_is_not_dropped_while_its_keyframes_wait() -> None:
         pause = worker.pause()
         worker.submit(0)
         with pytest.raises(orb.WorkerError, match="local mapping did not end its work"):
-            back_end.drop_map(0.05, keep=lambda _: pytest.fail("the map was ended"))
+            back_end.drop_map(0, 0.05, keep=lambda _: pytest.fail("the map was ended"))
         assert back_end.map.n_keyframes == n_keyframes
         worker.reset()  # the job was made up
         pause.release()
+
+
+def test_a_map_that_became_part_of_another_is_not_dropped() -> None:
+    sequence = cut(corridor("rgbd"), range(30))
+    with orb.System(settings_of(sequence), "rgbd", deterministic=True) as slam:
+        track(slam, sequence)
+        back_end = slam.pipeline.back_end
+        n_keyframes = back_end.map.n_keyframes
+        back_end.drop_map(1, 5.0, keep=lambda _: pytest.fail("the map was ended"))
+        assert back_end.map.n_keyframes == n_keyframes > 0
 
 
 def test_patience_is_a_setting() -> None:

@@ -4,11 +4,21 @@
 from __future__ import annotations
 
 import gc
+import threading
+from typing import Any
 
 import numpy as np
 import pytest
 
-from orbslam2py import Reason, Sensor, StateError, TrackingState, WorkerError, _core
+from orbslam2py import (
+    Reason,
+    Sensor,
+    StateError,
+    TrackingRecord,
+    TrackingState,
+    WorkerError,
+    _core,
+)
 from support.scripts import run_to_the_end
 from support.small_sequences import ate, black, elsewhere, new_system, play, sequence, track
 from support.watchdog import worker_threads
@@ -199,6 +209,113 @@ def test_a_young_map_is_given_up_when_lost(sensor: Sensor) -> None:
         assert track(system, 7).state is TrackingState.OK
         assert system.n_resets == 1
         assert [len(t) for t in system.trajectories()] == [5, 1]
+
+
+@pytest.mark.parametrize("moment", ["while it is lost", "while it is given up"])
+def test_a_reset_is_more_than_giving_up_a_young_map(
+    moment: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever asks first: time stamps and sizes may be others after a reset."""
+    with new_system(Sensor.MONOCULAR, deterministic=True) as system:
+        records: list[TrackingRecord] = []
+        while system.n_keyframes < 4:
+            records += play(system, 1, first=len(records))
+        assert records[-1].state is TrackingState.OK
+        assert system.n_keyframes <= 5, "the map is given up when it is lost"
+        pipeline = system.pipeline
+        if moment == "while it is lost":
+            keep = pipeline._keep
+
+            def reset_and_keep(*arguments: Any) -> None:
+                system.reset()
+                keep(*arguments)
+
+            monkeypatch.setattr(pipeline, "_keep", reset_and_keep)
+            assert (
+                track(system, len(records), shown=elsewhere(Sensor.MONOCULAR)).state
+                is TrackingState.LOST
+            )
+            monkeypatch.undo()
+        else:
+            assert (
+                track(system, len(records), shown=elsewhere(Sensor.MONOCULAR)).state
+                is TrackingState.LOST
+            )
+            end = pipeline.recorder.end_maps
+
+            def end_and_reset() -> None:
+                end()
+                system.reset()
+
+            monkeypatch.setattr(pipeline.recorder, "end_maps", end_and_reset)
+            track(system, len(records) + 1)
+            monkeypatch.undo()
+        first = track(system, 0, timestamp=0.0)
+        assert first.frame_id == 0
+
+
+def test_a_reset_that_fails_is_carried_out_later(monkeypatch: pytest.MonkeyPatch) -> None:
+    with new_system(Sensor.RGBD, deterministic=True) as system:
+        play(system, 5)
+        system.reset()
+
+        def interrupted() -> None:
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr(system.pipeline.recorder, "end_maps", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            track(system, 5)
+        monkeypatch.undo()
+        assert track(system, 0, timestamp=0.0).frame_id == 0
+        assert system.n_resets == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "says"),
+    [
+        ({"map_index": "0"}, StateError, "the number of the map is '0'; give a number of those"),
+        ({"map_index": 1.5}, StateError, r"the number of the map is 1\.5"),
+        ({"map_index": -1}, IndexError, "there is no map -1; 1 has begun so far"),
+        ({"map_index": 2**70}, IndexError, "there is no map 1180591620717411303424"),
+        ({"stop": 5}, StateError, r"stop is 5; give a threading\.Event"),
+    ],
+)
+def test_optimize_refuses_what_it_cannot_do_and_goes_on(
+    arguments: dict[str, Any], error: type[Exception], says: str
+) -> None:
+    with new_system(Sensor.STEREO) as system:
+        play(system, 5)
+        with pytest.raises(error, match=says):
+            system.optimize(**arguments)
+        assert system.optimize(map_index=0).map_index == 0
+        assert track(system, 5).state is TrackingState.OK
+
+
+def test_optimize_in_another_thread_beside_a_deterministic_run() -> None:
+    """Workers without threads take turns."""
+    stop = threading.Event()
+    errors: list[Exception] = []
+    with new_system(Sensor.STEREO, deterministic=True) as system:
+        play(system, 5)
+
+        def refine() -> None:
+            try:
+                while not stop.is_set():
+                    system.optimize()
+            except Exception as error:
+                errors.append(error)
+
+        thread = threading.Thread(target=refine)
+        thread.start()
+        try:
+            records = play(system, 30, first=5)
+        finally:
+            stop.set()
+            thread.join(30)
+        assert errors == []
+        assert {record.state for record in records} == {TrackingState.OK}
+        assert len(system.full_adjustments) > 0
+        assert system.check_map() == []
 
 
 def test_a_young_map_outlives_the_dark(sensor: Sensor) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 
 import pytest
@@ -259,3 +260,26 @@ def test_tickets_of_a_failed_worker_do_not_wait(stage: Stage) -> None:
         released.set()
     assert released.is_set()
     failing_end(system)
+
+
+def test_no_adjustment_begins_while_the_system_ends(slam: System) -> None:
+    """Loop closing may end later than it, and is not to fail for that."""
+    adjustment = slam.pipeline.back_end.adjustment
+    adjustment.worker.finish()
+    adjustment.start()
+    assert not adjustment.start_and_wait().used
+    assert slam.full_adjustments == []
+
+
+def test_shutdown_waits_for_an_image_in_another_thread(slam: System, stage: Stage) -> None:
+    """What settles the frames must not read one while it is tracked."""
+    gate = stage.gate("select_local_map")
+    call = Call(track, slam, 40)
+    gate.wait_entered()
+    with pytest.raises(WorkerError, match=r"tracking did not end within 0\.05 s"):
+        slam.shutdown(timeout=0.05)
+    gate.open()
+    with contextlib.suppress(StateError):  # it may have become a keyframe that nobody maps
+        call.result()
+    slam.shutdown(timeout=30)
+    assert worker_threads() == []

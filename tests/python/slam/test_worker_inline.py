@@ -3,12 +3,14 @@
 
 from __future__ import annotations
 
+import sys
 import threading
+from collections.abc import Iterator
 
 import pytest
 
 from orbslam2py import StateError, WorkerError
-from orbslam2py._worker import Worker, WorkerState
+from orbslam2py._worker import Worker, WorkerState, take_turns
 from support.worker_steps import NAME, failing
 
 pytestmark = pytest.mark.watchdog(10)
@@ -119,3 +121,110 @@ def test_another_thread_may_wait_for_the_end_of_an_inline_step() -> None:
     caller.join(5)
     waiter.join(5)
     assert results == [True]
+
+
+# ---- callers in several threads ------------------------------------------------------------------
+@pytest.fixture
+def hasty() -> Iterator[None]:
+    """Threads change over as often as they can."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(before)
+
+
+@pytest.mark.usefixtures("hasty")
+def test_callers_in_two_threads_take_turns() -> None:
+    done: list[int] = []
+    at_work: list[int] = []
+
+    def step(job: int) -> None:
+        at_work.append(job)
+        assert len(at_work) == 1, "two steps at once"
+        done.append(job)
+        at_work.pop()
+
+    second: Worker[int] = Worker("second", step, threaded=False)
+    first = Worker("first", second.submit, threaded=False)
+    take_turns((first, second))
+    errors: list[Exception] = []
+
+    def call(worker: Worker[int], jobs: range) -> None:
+        try:
+            for job in jobs:
+                worker.submit(job)
+                assert job in done, "all is done on return"
+        except Exception as error:
+            errors.append(error)
+
+    callers = [
+        threading.Thread(target=call, args=(worker, range(begin, begin + 300)))
+        for worker, begin in ((first, 0), (second, 300), (first, 600))
+    ]
+    for caller in callers:
+        caller.start()
+    for caller in callers:
+        caller.join()
+    assert errors == []
+    assert sorted(done) == list(range(900))
+    assert first.idle
+    assert second.idle
+
+
+class Elsewhere:
+    """A worker whose step runs inline in another thread, until it is told to end."""
+
+    def __init__(self) -> None:
+        self.entered, self.leave = threading.Event(), threading.Event()
+        self.off_duty = False
+        self.cancelled: list[bool] = []
+        self.worker: Worker[int] = Worker(NAME, self._step, threaded=False)
+        self._caller = threading.Thread(target=self.worker.submit, args=(0,))
+
+    def _step(self, _: int) -> None:
+        if self.off_duty:
+            with self.worker.off_duty():
+                self._stay()
+        else:
+            self._stay()
+        self.cancelled.append(self.worker.cancel_flag.is_set())
+
+    def _stay(self) -> None:
+        self.entered.set()
+        assert self.leave.wait(5)
+
+    def begin(self) -> None:
+        self._caller.start()
+        assert self.entered.wait(5)
+
+    def end(self) -> None:
+        self.leave.set()
+        self._caller.join(5)
+
+
+def test_who_needs_the_map_waits_for_an_inline_step_elsewhere() -> None:
+    elsewhere = Elsewhere()
+    worker = elsewhere.worker
+    elsewhere.begin()
+    with worker.pause(brief=True) as ticket:
+        assert not ticket.wait(0.02)
+    with pytest.raises(WorkerError, match="did not acknowledge the reset"):
+        worker.reset(0.02)
+    with pytest.raises(WorkerError, match=r"did not end within 0\.02 s"):
+        worker.finish(timeout=0.02)
+    assert not worker.ended
+    elsewhere.end()
+    worker.finish(timeout=5)
+    assert worker.ended
+    assert elsewhere.cancelled == [True]
+
+
+def test_an_inline_step_off_duty_gives_up_for_a_pause_elsewhere() -> None:
+    """The one that holds the pause may wait for its turn: nobody waits for the other."""
+    elsewhere = Elsewhere()
+    elsewhere.off_duty = True
+    elsewhere.begin()
+    with elsewhere.worker.pause() as ticket:
+        assert ticket.wait(5)
+        elsewhere.end()
+    assert elsewhere.cancelled == [True]

@@ -162,6 +162,20 @@ def test_guard_allows_one_call_at_a_time() -> None:
         pass
 
 
+def test_guard_waits_for_a_call_in_another_thread() -> None:
+    guard = CallGuard("tracking")
+    assert guard.wait_until_left()
+    with guard():
+        assert guard.wait_until_left(), "a call cannot wait for its own end"
+        left: list[bool] = []
+        waiting = threading.Thread(target=lambda: left.append(guard.wait_until_left(0.02)))
+        waiting.start()
+        waiting.join()
+        assert left == [False]
+    with guard():
+        pass
+
+
 def test_many_controls_from_several_threads() -> None:
     done: list[int] = []
 
