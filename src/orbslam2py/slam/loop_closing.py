@@ -95,7 +95,11 @@ class LoopClosing:
         self._on_loop = on_loop
         self._on_merge = on_merge
         self._merging = MapMerging(
-            slam_map, self._confirm, self._find_alike, fix_scale=self._fix_scale
+            slam_map,
+            self._confirm,
+            self._find_alike,
+            self._lease,
+            fix_scale=self._fix_scale,
         )
         self._waiting = WaitingLoop(slam_map, self._confirm, self._release, self._limits)
         self._consistency = core.LoopConsistency()
@@ -273,11 +277,28 @@ class LoopClosing:
                 return
             with timer("apply"):
                 result = core.apply_loop_correction(self._map, correction)
-        if not result.applied:
-            return
+            if not result.applied:
+                return
+            # While mapping stands still: it may cull the place that was seen again.
+            closed = self._record(loop, result, timer)
         self._consistency.clear()
         self._next_search = loop.current + self._limits.gap
-        closed = LoopClosed(
+        self.loops.append(closed)
+        _log.info(
+            "loop closed: keyframe %d shows the place of %d; moved by %.3f m",
+            loop.current,
+            loop.matched,
+            result.translation,
+        )
+        self._on_loop(closed)
+        if self._adjust:
+            self._adjustment.start(closed.map_index)
+            self._seam = None
+
+    def _record(
+        self, loop: core.Loop, result: core.LoopCorrectionResult, timer: StageTimer
+    ) -> LoopClosed:
+        return LoopClosed(
             map_index=self._map.map_of(loop.current),
             current_keyframe=loop.current,
             matched_keyframe=loop.matched,
@@ -292,14 +313,3 @@ class LoopClosing:
             rotation_deg=math.degrees(result.rotation),
             milliseconds=dict(timer.milliseconds),
         )
-        self.loops.append(closed)
-        _log.info(
-            "loop closed: keyframe %d shows the place of %d; moved by %.3f m",
-            loop.current,
-            loop.matched,
-            result.translation,
-        )
-        self._on_loop(closed)
-        if self._adjust:
-            self._adjustment.start(closed.map_index)
-            self._seam = None

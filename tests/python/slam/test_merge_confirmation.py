@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
 from types import SimpleNamespace
 
 import numpy as np
@@ -64,7 +66,13 @@ def merging(monkeypatch: pytest.MonkeyPatch) -> MapMerging:
         near = abs((keyframe - 20) - candidate) <= 1
         return place(keyframe, candidate) if near and keyframe >= 20 else None
 
-    return MapMerging(TwoMaps(), verify, lambda keyframe: [], fix_scale=True)  # type: ignore[arg-type]
+    maps = TwoMaps()
+
+    @contextlib.contextmanager
+    def lease(keyframe: int) -> Iterator[bool]:
+        yield maps.has_keyframe(keyframe)
+
+    return MapMerging(maps, verify, lambda keyframe: [], lease, fix_scale=True)  # type: ignore[arg-type]
 
 
 def shown(merging: MapMerging, current: int, matched: int, off: float = 0.0) -> bool:
@@ -85,6 +93,14 @@ def test_what_should_be_seen_must_be_found(
 def test_a_keyframe_that_was_culled_meanwhile_shows_nothing() -> None:
     loop = SimpleNamespace(current=3)
     assert explained_share(core.Map(), loop, 0.87) == 0.0  # type: ignore[arg-type]
+
+
+def test_a_place_that_was_culled_meanwhile_is_none(merging: MapMerging) -> None:
+    assert not shown(merging, 23, 4)
+    merging._map.dead.add(5)
+    assert not shown(merging, 25, 5)
+    merging._map.dead.clear()
+    assert shown(merging, 25, 5)
 
 
 def test_one_keyframe_and_one_neighbour_are_too_few(merging: MapMerging) -> None:

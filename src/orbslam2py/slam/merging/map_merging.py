@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 
 import numpy as np
 
@@ -26,6 +27,8 @@ _log = logging.getLogger(__name__)
 Verify = Callable[[int, int], core.Loop | None]
 #: Keyframes of any map that look like one.
 FindAlike = Callable[[int], list[int]]
+#: Keeps a keyframe alive; gives False when it is dead already.
+Lease = Callable[[int], AbstractContextManager[bool]]
 
 
 class MapMerging:
@@ -35,12 +38,14 @@ class MapMerging:
     ----------
     slam_map : orbslam2py._core.Map
         The maps.
-    fix_scale : bool
-        Depth is measured: the maps have one scale.
     verify : callable
         ``verify(current, candidate)``: a loop or None.
     find_alike : callable
         Keyframes that look like one and share no point with it.
+    lease : callable
+        Keeps a keyframe alive that mapping might cull.
+    fix_scale : bool
+        Depth is measured: the maps have one scale.
     thresholds : MergeThresholds, optional
         Limits.
     """
@@ -50,6 +55,7 @@ class MapMerging:
         slam_map: core.Map,
         verify: Verify,
         find_alike: FindAlike,
+        lease: Lease,
         *,
         fix_scale: bool,
         thresholds: MergeThresholds | None = None,
@@ -58,6 +64,7 @@ class MapMerging:
         self._fix_scale = fix_scale
         self._verify = verify
         self._find_alike = find_alike
+        self._lease = lease
         self._limits = thresholds or MergeThresholds()
         # What keyframes showed that alone were not enough: the far keyframe and S_cm, by keyframe.
         self._shown: dict[int, tuple[int, FloatArray]] = {}
@@ -84,18 +91,22 @@ class MapMerging:
         best = core.choose_merge(self._map, list(consistent), self._fix_scale)
         if best is None:
             return None
+        with self._lease(best.matched) as alive:
+            return best if alive and self._is_sound(best, others) else None
+
+    def _is_sound(self, best: core.Loop, others: Callable[[], Sequence[core.Loop]]) -> bool:
         if not self._is_alone(best, others()):
             _log.info("keyframe %d looks like several places; no maps joined", best.current)
-            return None
+            return False
         if not self._is_confirmed(best):
             _log.info("keyframe %d alone shows a place of another map", best.current)
             self._remember(best)
-            return None
+            return False
         if not self._is_explained(best):
             _log.info("keyframe %d shows too little of the other map's place", best.current)
             self._remember(best)
-            return None
-        return best
+            return False
+        return True
 
     def _is_alone(self, best: core.Loop, others: Sequence[core.Loop]) -> bool:
         """Whether no other place looks like both ends."""
