@@ -36,6 +36,9 @@ _log = logging.getLogger(__name__)
 #: Seconds that saving keeps the interpreter's lock, and that it leaves to others after them.
 _LONGEST_STRETCH, _BREAK = 0.0005, 0.0005
 
+#: So many images may be kept before it is looked whether their keyframes live.
+_FEW_IMAGES = 100
+
 #: Gives the frames of a map that hang on known keyframes: ``recorded(map_index, keyframe_ids)``.
 Recorded = Callable[[int, IntArray], RecordedFrames]
 
@@ -61,11 +64,6 @@ class MapKeeper:
         Those of the system, by their names.
     earlier : SavedMap or MapFile, optional
         What the map was loaded from.
-
-    Attributes
-    ----------
-    images : dict
-        JPEG images of keyframes, by their ids; belong to the map of `images_of`.
     """
 
     def __init__(
@@ -84,35 +82,54 @@ class MapKeeper:
         self._settings = settings
         self._vocabulary = vocabulary
         self._earlier_runs = earlier.runs if earlier is not None else ()
-        self._images: dict[int, bytes] = dict(earlier.images) if earlier is not None else {}
         self._first_map = slam_map.epoch
+        #: JPEG images by the keyframes of the map that had this number.
+        self._images: dict[int, bytes] = dict(earlier.images) if earlier is not None else {}
         self._images_of = self._first_map
+        self._images_lock = threading.Lock()
+        self._next_look = _FEW_IMAGES
         started = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
         self._run = Run(f"orbslam2py {__version__}", started, seed, options)
         self._autosave: _Autosave | None = None
 
     def keep_image(self, keyframe: int, jpeg: bytes) -> None:
         """Remember the image of a keyframe of the present map."""
-        if self._map.epoch != self._images_of:
-            self._images, self._images_of = {}, self._map.epoch
-        self._images[keyframe] = jpeg
+        with self._images_lock:
+            if self._map.epoch != self._images_of:
+                self._images, self._images_of = {}, self._map.epoch
+            self._images[keyframe] = jpeg
+            if len(self._images) > self._next_look:
+                self._drop_images(set())
+
+    def _images_in(self, contents: MapContents) -> dict[int, bytes]:
+        """Images of the keyframes of a map, by ascending ids; those of dead ones are forgotten."""
+        with self._images_lock:
+            if contents.map_index != self._images_of or not self._images:
+                return {}
+            ids = contents.keyframes.ids.tolist()
+            self._drop_images(set(ids))
+            return {number: self._images[number] for number in ids if number in self._images}
+
+    def _drop_images(self, but: set[int]) -> None:
+        """Forget the images of keyframes that have gone, but for some; the lock is held."""
+        # Those of keyframes that wait for mapping stay, which contents do not have yet.
+        wanted = but | set(self._map.keyframe_ids().tolist())
+        self._images = {k: jpeg for k, jpeg in self._images.items() if k in wanted}
+        self._next_look = max(_FEW_IMAGES, 2 * len(self._images))
 
     # ---- whole files -----------------------------------------------------------------------------
     def saved_map(self) -> SavedMap:
         """Everything that a map file holds, of this moment."""
         contents = take_contents(self._map)
-        ids = set(contents.keyframes.ids.tolist())
-        images = {i: self._images[i] for i in sorted(ids & self._images.keys())}
-        if contents.map_index != self._images_of:
-            images = {}
         runs = (*self._runs_before(contents), self._present_run(contents))
+        images = self._images_in(contents)
         return SavedMap(contents, self._settings, self._vocabulary(), runs, images)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a map file; see `orbslam2py.System.save_map`."""
         path = path_of(path, "the map file", MapFileError)
         autosave = self._autosave
-        if autosave is not None and os.path.realpath(path) == os.path.realpath(autosave.path):
+        if autosave is not None and autosave.writes(path):
             autosave.save_now()
         else:
             save_map(self.saved_map(), path)
@@ -134,16 +151,27 @@ class MapKeeper:
         self.stop_autosave()
         self._autosave = _Autosave(self, path, every)
 
-    def stop_autosave(self) -> None:
-        """Save a last time and end; raises `MapFileError` if that does not work."""
-        autosave, self._autosave = self._autosave, None
-        if autosave is not None:
-            autosave.finish()
+    @property
+    def is_saving_here(self) -> bool:
+        """Whether this very thread is the one that saves by itself."""
+        return self._autosave is not None and self._autosave.is_here
 
-    def update(
-        self, writer: MapWriter, before: ChangedContents | None, *, gently: bool = False
-    ) -> ChangedContents | None:
-        """Bring a file up to date; returns what it holds then, or None as long as there is no map.
+    def stop_autosave(self) -> None:
+        """Save a last time and end; raises `MapFileError` if that does not work.
+
+        Should a Ctrl-C come before, it can be called again, and saves then.
+        """
+        if self._autosave is None:
+            return
+        try:
+            self._autosave.finish()
+        except MapFileError:
+            self._autosave = None
+            raise
+        self._autosave = None
+
+    def changes(self, writer: MapWriter, before: ChangedContents | None) -> ChangedContents:
+        """Copy what a file lacks of the map of this moment, which may be another one than it holds.
 
         Parameters
         ----------
@@ -151,16 +179,31 @@ class MapKeeper:
             Of the file.
         before : ChangedContents, optional
             What the file holds: only what has changed since is looked at. None: everything.
+        """
+        known = np.array(sorted(key[0] for key in writer.keys("keypoints")), np.int64)
+        return take_changes(self._map, known, before)
+
+    def update(
+        self, writer: MapWriter, changes: ChangedContents, *, partly: bool, gently: bool = False
+    ) -> bool:
+        """Bring a file up to date; False as long as there is no map that could be saved.
+
+        Parameters
+        ----------
+        writer : MapWriter
+            Of the file.
+        changes : ChangedContents
+            What the file lacks, from `changes`; of the map that it holds.
+        partly : bool
+            Only what has changed was looked at.
         gently : bool
             Leave time to other threads all the while.
         """
-        known = np.array(sorted(key[0] for key in writer.keys("keypoints")), np.int64)
-        changes = take_changes(self._map, known, before)
         contents = changes.contents
         if gently:
             time.sleep(_BREAK)
         if not len(contents.keyframes):
-            return None
+            return False
         looked_at = set(zip(changes.pages.tolist(), strict=True))
         same = set(zip(contents.keyframes.ids[~changes.changed_keyframes].tolist(), strict=True))
         kept = {
@@ -169,10 +212,10 @@ class MapKeeper:
             "map_points": writer.keys("map_points") - looked_at,
             "observations": writer.keys("observations") - looked_at,
         }
-        rows = self._rows(changes, writer, partly=before is not None)
+        rows = self._rows(changes, writer, partly=partly)
         n = writer.commit(_leaving_time(rows) if gently else rows, kept)
         _log.debug("%d rows written to %s", n, writer.path)
-        return changes
+        return True
 
     def _rows(
         self, changes: ChangedContents, writer: MapWriter, *, partly: bool
@@ -188,19 +231,13 @@ class MapKeeper:
         keys = zip(contents.keyframes.ids.tolist(), strict=True)
         written = writer.keys("keypoints")
         yield from keypoint_rows(contents, [i for i, key in enumerate(keys) if key not in written])
-        for keyframe, jpeg in list(self._images.items()):
-            if self._images_of == contents.map_index and not writer.has("images", keyframe):
-                yield from self._image_rows(contents, keyframe, jpeg)
+        for keyframe, jpeg in self._images_in(contents).items():
+            if not writer.has("images", keyframe):
+                yield "images", (keyframe, jpeg)
 
     @cached_property
     def _head(self) -> list[tuple[str, Row]]:
         return list(settings_rows(self._settings, self._vocabulary()))
-
-    @staticmethod
-    def _image_rows(contents: MapContents, keyframe: int, jpeg: bytes) -> Iterator[tuple[str, Row]]:
-        with contextlib.suppress(KeyError):
-            contents.keyframes.row_of(keyframe)
-            yield "images", (keyframe, jpeg)
 
 
 class _Autosave:
@@ -222,41 +259,68 @@ class _Autosave:
         self._thread = threading.Thread(target=self._work, name="autosave", daemon=True)
         self._thread.start()
 
+    def writes(self, path: Path) -> bool:
+        """Whether a file is the one that was asked for, or that of the present map."""
+        return os.path.realpath(path) in (os.path.realpath(self.path), str(self._writer.path))
+
+    @property
+    def is_here(self) -> bool:
+        """Whether this very thread is the one that saves."""
+        return threading.current_thread() is self._thread
+
     def save_now(self, *, everything: bool = True) -> None:
         """Commit the present state; `everything`: also the tracker's counters of points."""
         with self._lock:
-            self._follow_reset()
             before = None if everything else self._held
-            self._held = self._keeper.update(self._writer, before, gently=not everything)
+            changes = self._keeper.changes(self._writer, before)
+            while changes.contents.map_index != self._map_index:
+                self._follow_reset(changes.contents.map_index)
+                before = None
+                changes = self._keeper.changes(self._writer, before)
+            is_there = self._keeper.update(
+                self._writer, changes, partly=before is not None, gently=not everything
+            )
+            self._held = changes if is_there else None
 
     def finish(self) -> None:
-        """Commit a last time and end the thread."""
+        """Commit a last time and end the thread; may be repeated after a Ctrl-C."""
         self._stop.set()
         self._thread.join()
         try:
             self.save_now()
-        finally:
-            with self._lock:
-                self._writer.close()
+        except MapFileError:
+            with contextlib.suppress(MapFileError):  # the first one says why
+                self._close()
+            raise
+        self._close()
+
+    def _close(self) -> None:
+        with self._lock:
+            self._writer.close()
 
     def _work(self) -> None:
         while not self._stop.wait(self._every):
             try:
                 self.save_now(everything=False)
-            except MapFileError as error:
-                _log.warning("autosave failed and will be tried again: %s", error)
+            except Exception as error:
+                # Whatever it is: without this thread nothing would be saved any more, unnoticed.
+                told = str(error) if isinstance(error, MapFileError) else repr(error)
+                _log.warning("autosave failed and will be tried again: %s", told)
+                _log.debug("in full:", exc_info=error)
 
-    def _follow_reset(self) -> None:
-        epoch = self._keeper._map.epoch
-        if epoch == self._map_index:
-            return
-        self._map_index, self._held = epoch, None
-        if not self._writer.keys("map"):
-            return  # nothing of the old map was written
-        self._writer.close()
-        path = self.path.with_stem(f"{self.path.stem}-{epoch - self._first_map}")
-        self._writer = MapWriter(path)
-        _log.warning("the map was given up; the new one is saved as %s, the old one stays", path)
+    def _follow_reset(self, map_index: int) -> None:
+        """Give another map a file of its own, if there is something in the present one."""
+        old = self._writer
+        if old.begun:
+            path = self.path.with_stem(f"{self.path.stem}-{map_index - self._first_map}")
+            self._writer = MapWriter(path)
+            _log.warning(
+                "the map was given up; the new one is saved as %s, the old one stays", path
+            )
+        # Only now: as long as the number is the old map's, nothing of the new one is written.
+        self._held, self._map_index = None, map_index
+        if old is not self._writer:
+            old.close()
 
 
 def _leaving_time(rows: Iterable[tuple[str, Row]]) -> Iterator[tuple[str, Row]]:

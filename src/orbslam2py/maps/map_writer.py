@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import secrets
 import sqlite3
@@ -23,6 +24,8 @@ from orbslam2py.maps.schema import (
     application_of,
     create_script,
 )
+
+_log = logging.getLogger(__name__)
 
 #: Tables whose rows never change and are written once.
 WRITTEN_ONCE = frozenset({"keypoints", "images", "frames", "runs", "settings", "vocabulary"})
@@ -62,15 +65,25 @@ class MapWriter:
         The map file; replaced by the first commit.
     once
         There will be one commit only: nothing is touched any more once the file is in its place.
+
+    Attributes
+    ----------
+    path : Path
+        The file itself, where `path` is a link to it.
+    begun : bool
+        The file may hold what was committed, also if that failed afterwards.
     """
 
     def __init__(self, path: str | os.PathLike[str], *, once: bool = False) -> None:
         self._once = once
         self.path = Path(os.path.realpath(path))
+        self.begun = False
         self._named = str(path)
+        #: To the file that the first commit has put in its place. As long as there is none, nothing
+        #: counts as written: the next commit replaces the file, and has to be all of it.
         self._connection: sqlite3.Connection | None = None
         #: Checksum of every row in the file, by table and key.
-        self._written: dict[str, dict[Row, int]] = {name: {} for name in TABLES}
+        self._written = _nothing()
 
     def has(self, table: str, *key: int) -> bool:
         """Whether the file holds a row."""
@@ -108,12 +121,45 @@ class MapWriter:
             return self._change(self._connection, rows, kept)
 
     def close(self) -> None:
-        """End with a single file, without a log beside it; idempotent."""
-        connection, self._connection = self._connection, None
+        """End with a single file, without a log beside it; idempotent.
+
+        While another program has the file open, the log stays, and a warning says so: the two hold
+        all that was committed. If a Ctrl-C comes before it is done, the file is still open, and can
+        be written and closed.
+
+        Raises
+        ------
+        MapFileError
+            If what was committed may not be on the disk. The file is closed all the same.
+        """
+        connection = self._connection
         if connection is None:
             return
-        with _naming(self._named), contextlib.closing(connection):
+        try:
+            with _naming(self._named):
+                self._end_log(connection)
+        except Exception:
+            self._disconnect(connection)
+            raise
+        self._disconnect(connection)
+
+    def _end_log(self, connection: sqlite3.Connection) -> None:
+        try:
             connection.execute("PRAGMA journal_mode = DELETE")
+        except sqlite3.OperationalError as error:
+            if "locked" not in str(error):
+                raise
+            # As much as the readers let through: less is lost should somebody copy the file alone.
+            connection.execute("PRAGMA wal_checkpoint(PASSIVE)")
+            _log.warning(
+                "another program has %s open; keep %s-wal beside it, it belongs to the map",
+                self._named,
+                self.path.name,
+            )
+
+    def _disconnect(self, connection: sqlite3.Connection) -> None:
+        self._connection, self._written = None, _nothing()
+        connection.close()
 
     def _commit_first(self, rows: Iterable[tuple[str, Row]]) -> int:
         _check_target(self.path, self._named)
@@ -131,16 +177,18 @@ class MapWriter:
                     connection.execute("PRAGMA journal_mode = WAL")
             _sync(temporary)
             _end_old_log(self.path)
+            self.begun = True
             temporary.replace(self.path)
             _sync(self.path.parent)
+            if not self._once:
+                connection = connect(self.path, "rw")
+                connection.execute("PRAGMA synchronous = NORMAL")
+                self._connection = connection
         except BaseException:
-            self._written = {name: {} for name in TABLES}
+            self._written = _nothing()
             with contextlib.suppress(OSError):
                 temporary.unlink()
             raise
-        if not self._once:
-            self._connection = connect(self.path, "rw")
-            self._connection.execute("PRAGMA synchronous = NORMAL")
         return n
 
     def _change(
@@ -151,9 +199,9 @@ class MapWriter:
     ) -> int:
         written = {name: dict(known) for name, known in self._written.items()}
         seen: dict[str, set[Row]] = {name: set() for name in TABLES}
-        n = 0
-        connection.execute("BEGIN IMMEDIATE")
+        n, complete = 0, False
         try:
+            connection.execute("BEGIN IMMEDIATE")
             for name, row in rows:
                 table = TABLES[name]
                 key, total = row[: len(table.keys)], checksum(row)
@@ -169,13 +217,28 @@ class MapWriter:
                 n += 1
             if n:
                 _write_totals(connection, written)
+            complete = True
             connection.execute("COMMIT")
+        except sqlite3.Error:
+            _roll_back(connection)
+            raise
         except BaseException:
-            with contextlib.suppress(sqlite3.Error):
-                connection.execute("ROLLBACK")
+            # A Ctrl-C that comes while SQLite commits is heard when that is done.
+            if complete and not connection.in_transaction:
+                self._written = written
+            _roll_back(connection)
             raise
         self._written = written
         return n
+
+
+def _nothing() -> dict[str, dict[Row, int]]:
+    return {name: {} for name in TABLES}
+
+
+def _roll_back(connection: sqlite3.Connection) -> None:
+    with contextlib.suppress(sqlite3.Error):  # maybe it has not begun, or SQLite has done it
+        connection.execute("ROLLBACK")
 
 
 def connect(path: Path, mode: str) -> sqlite3.Connection:

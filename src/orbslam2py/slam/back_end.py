@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import threading
 import time
 from collections.abc import Callable
 from typing import Any
@@ -202,6 +203,11 @@ class BackEnd:
 
 def abandon(back_end: BackEnd, keeper: MapKeeper) -> None:
     """End the threads of a system that was dropped without shutdown."""
+    if keeper.is_saving_here:
+        # What drops things that refer to each other runs in any thread, and this one cannot wait
+        # for its own end.
+        threading.Thread(target=abandon, args=(back_end, keeper), name="abandon").start()
+        return
     try:
         keeper.stop_autosave()
     except MapFileError as unsaved:

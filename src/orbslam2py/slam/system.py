@@ -452,9 +452,10 @@ class System:
         wait_for_adjustment: bool = False,
         timeout: float | None = None,
     ) -> None:
-        """Stop the workers and join their threads; idempotent, to be repeated after a time-out.
+        """Stop the workers and join their threads; idempotent.
 
-        Results remain available. Also called at the end of a ``with`` block.
+        To be repeated after a time-out or a Ctrl-C. Results remain available. Also called at the
+        end of a ``with`` block.
 
         Parameters
         ----------

@@ -14,7 +14,11 @@ from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.content_groups import Covisibility, Keyframes, Observations, RemovedKeyframes
 from orbslam2py.maps.contents import MapContents, contents_of
-from orbslam2py.maps.edits.spanning_tree import count_covisibility, spanning_parents
+from orbslam2py.maps.edits.spanning_tree import (
+    count_covisibility,
+    map_numbers,
+    spanning_parents,
+)
 
 BoolArray = NDArray[np.bool_]
 
@@ -65,7 +69,8 @@ def crop_to_box(
     contents
         The map.
     low, high
-        Corners (3,) of the box in the map's world, both included.
+        Corners (3,) of the box in the map's world, both included. Of several maps, in the world of
+        each.
     points_too
         Drop points that lie outside of the box as well.
 
@@ -109,6 +114,9 @@ def keep_keyframes(
     parent went hang on their strongest neighbour. If keyframe 0 went, the first one that is left
     takes its number, since it becomes the root. The world stays.
 
+    Of several maps each stays a map of its own: if its root went, the first of its keyframes that
+    is left becomes the root.
+
     Parameters
     ----------
     contents
@@ -144,7 +152,8 @@ def keep_keyframes(
     )
     keyframes = _select(contents.keyframes, kept)
     covisibility = count_covisibility(observations, keyframes.ids)
-    parents, provisional = spanning_parents(keyframes, covisibility)
+    maps = map_numbers(contents.keyframes)[kept]
+    parents, provisional = spanning_parents(keyframes, covisibility, maps)
     cropped = replace(
         contents,
         keyframes=replace(keyframes, parent=parents, provisional_parent=provisional),

@@ -26,20 +26,10 @@ from orbslam2py.maps.content_groups import (
 )
 from orbslam2py.maps.contents import MapContents
 from orbslam2py.maps.edits.saved import crop_saved_map
+from orbslam2py.maps.edits.spanning_tree import map_numbers
 from orbslam2py.maps.saved_map import Run, SavedMap
 
-
-def map_numbers(keyframes: Keyframes) -> IntArray:
-    """Number of the map of every keyframe, int64 (k,): 0 for the oldest one in the file."""
-    ids, parents = keyframes.ids, keyframes.parent
-    rows = np.arange(len(ids))
-    above = np.where(parents < 0, rows, np.searchsorted(ids, np.maximum(parents, 0)))
-    while True:
-        higher = above[above]
-        if np.array_equal(higher, above):
-            break
-        above = higher
-    return np.asarray(np.unique(above, return_inverse=True)[1], np.int64)
+__all__ = ["map_numbers", "put_together", "take_map"]
 
 
 def take_map(saved: SavedMap, number: int | None = None) -> SavedMap:

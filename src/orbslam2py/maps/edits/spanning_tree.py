@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What connects the keyframes of a map that has lost some: shared points, and a tree."""
+"""What connects the keyframes of a map, also when it has lost some: shared points, and a tree."""
 
 from __future__ import annotations
 
@@ -48,43 +48,64 @@ def count_covisibility(observations: Observations, keyframe_ids: IntArray) -> Co
     return Covisibility(keyframe_ids[a], keyframe_ids[b], weight)
 
 
+def map_numbers(keyframes: Keyframes) -> IntArray:
+    """Number of the map of every keyframe, int64 (k,): 0 for the oldest one in the file."""
+    parents = _parent_rows(keyframes)
+    above = np.where(parents == _NONE, np.arange(len(parents)), parents)
+    while True:
+        higher = above[above]
+        if np.array_equal(higher, above):
+            break
+        above = higher
+    return np.asarray(np.unique(above, return_inverse=True)[1], np.int64)
+
+
 def spanning_parents(
-    keyframes: Keyframes, covisibility: Covisibility
+    keyframes: Keyframes, covisibility: Covisibility, maps: IntArray
 ) -> tuple[IntArray, NDArray[np.bool_]]:
-    """Make a spanning tree of what is left of one.
+    """Make a spanning tree of what is left of one, for each map.
 
     A keyframe keeps its parent if that is there. Otherwise it hangs on its strongest neighbour that
     is not in its own subtree (of equals, the lower id), and without one provisionally on the
-    keyframe before it (``docs/method/map.md#spanning-tree``).
+    keyframe of its map before it (``docs/method/map.md#spanning-tree``).
 
     Parameters
     ----------
     keyframes
-        Those that are there, by ascending id; the first becomes the root. Parents may be missing.
+        Those that are there, by ascending id; the first of each map becomes its root, if it is not.
+        Parents may be missing.
     covisibility
         Of these keyframes.
+    maps
+        Numbers (k,) of the maps that they belong to: nothing leads from one to another.
 
     Returns
     -------
     parents, provisional
-        Ids int64 (k,), -1 for the root; and bool (k,).
+        Ids int64 (k,), -1 for the roots; and bool (k,).
     """
     ids = keyframes.ids
-    place = np.searchsorted(ids, keyframes.parent)
-    there = (keyframes.parent >= 0) & (ids[np.minimum(place, len(ids) - 1)] == keyframes.parent)
-    parents = np.where(there, place, _NONE)
-    parents[0] = _NONE
-    provisional = keyframes.provisional_parent & there
-    provisional[0] = False
+    parents = _parent_rows(keyframes)
+    provisional = keyframes.provisional_parent & (parents != _NONE)
+    roots = np.unique(maps, return_index=True)[1]
+    parents[roots], provisional[roots] = _NONE, False
     neighbours = _neighbours(ids, covisibility)
-    for child in range(1, len(ids)):
-        if parents[child] == _NONE:
-            near = [n for n in neighbours[child] if not _is_above(parents, child, n)]
-            # The root has no parent, so it is in nobody's subtree: the search always ends.
-            before = (n for n in range(child - 1, -1, -1) if not _is_above(parents, child, n))
-            parents[child] = near[0] if near else next(before)
-            provisional[child] = not near
+    for child in np.setdiff1d(np.flatnonzero(parents == _NONE), roots).tolist():
+        mine = maps == maps[child]
+        near = [n for n in neighbours[child] if mine[n] and not _is_above(parents, child, n)]
+        # The root has no parent, so it is in nobody's subtree: the search always ends.
+        rows = np.flatnonzero(mine[:child])[::-1].tolist()
+        before = (n for n in rows if not _is_above(parents, child, n))
+        parents[child] = near[0] if near else next(before)
+        provisional[child] = not near
     return np.where(parents == _NONE, _NONE, ids[parents]), provisional
+
+
+def _parent_rows(keyframes: Keyframes) -> IntArray:
+    """Row of the parent of each keyframe (k,), -1 if it has none that is there."""
+    ids, parents = keyframes.ids, keyframes.parent
+    place = np.minimum(np.searchsorted(ids, parents), len(ids) - 1)
+    return np.where((parents >= 0) & (ids[place] == parents), place, _NONE)
 
 
 def _neighbours(ids: IntArray, covisibility: Covisibility) -> list[list[int]]:

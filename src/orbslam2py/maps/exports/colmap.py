@@ -9,7 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from orbslam2py._arguments import shown
 from orbslam2py._files import atomic_write
+from orbslam2py.errors import MapFileError
 from orbslam2py.maps.contents import MapContents, contents_of
 from orbslam2py.maps.exports.colmap_model import (
     MODEL_IDS,
@@ -20,7 +22,7 @@ from orbslam2py.maps.exports.colmap_model import (
     colmap_model,
 )
 from orbslam2py.maps.exports.folder import export_folder, write_images
-from orbslam2py.maps.exports.images import ImageOfKeyframe, Progress, views_without_images
+from orbslam2py.maps.exports.images import ImageOfKeyframe, Progress, View, views_without_images
 
 
 def export_colmap(
@@ -28,7 +30,7 @@ def export_colmap(
     folder: str | Path,
     *,
     images: ImageOfKeyframe | None = None,
-    image_names: Mapping[int, str] | None = None,
+    image_names: Mapping[int, str | Path] | None = None,
     binary: bool = True,
     replace: bool = False,
     progress: Progress | None = None,
@@ -52,7 +54,8 @@ def export_colmap(
         ``OPENCV`` (k1, k2, p1, p2) or ``FULL_OPENCV`` (k3 as well).
     image_names
         Names for images that are elsewhere, by keyframe id, where `images` is not given; keyframes
-        without one are left out. By default ``keyframe_000012.png`` and so on.
+        without one are left out. By default ``keyframe_000012.png`` and so on. Names with spaces
+        take ``.bin`` files: COLMAP reads those in text files up to the first space.
     binary
         ``.bin`` files, or the text files.
     replace
@@ -67,7 +70,8 @@ def export_colmap(
     ImageError
         If an image is not one that fits its camera.
     MapFileError
-        If `contents`, `images` or `image_names` are something else.
+        If `contents`, `images` or `image_names` are something else, or a name is none that COLMAP
+        would read.
     OSError
         If something cannot be written; what was there is kept then.
 
@@ -79,6 +83,8 @@ def export_colmap(
     with export_folder(folder, {"sparse", "images"}, replace=replace) as made:
         if images is None:
             views = views_without_images(contents, image_names)
+            if not binary:
+                _check_names(contents, views)
         else:
             views, contents = write_images(contents, made / "images", images, progress)
         sparse = made / "sparse" / "0"
@@ -91,6 +97,20 @@ def export_colmap(
 
 
 # ---- text ----------------------------------------------------------------------------------------
+#: Of C, which COLMAP goes by; others are letters to it.
+_SPACES = frozenset(" \t\n\v\f\r")
+
+
+def _check_names(contents: MapContents, views: list[View]) -> None:
+    for view in views:
+        if not _SPACES.isdisjoint(view.name):
+            number = int(contents.keyframes.ids[view.row])
+            raise MapFileError(
+                f"image_names[{number}] is {shown(view.name)}, which COLMAP reads up to the space "
+                "in a text file; give another name, or write .bin files (binary=True)"
+            )
+
+
 def _write_text(folder: Path, model: ColmapModel) -> None:
     with atomic_write(folder / "cameras.txt") as stream:
         stream.write("# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n")
@@ -177,7 +197,7 @@ def _image_bytes(image: ColmapImage) -> bytes:
     keypoints = np.empty(len(image.point_ids), _KEYPOINT)
     keypoints["x"], keypoints["y"] = image.pixels.T
     keypoints["point"] = image.point_ids
-    name = image.name.encode() + b"\0"
+    name = image.name.encode("utf-8", "surrogateescape") + b"\0"
     head = np.array(pose, _IMAGE_HEAD).tobytes()
     return head + name + _count(len(keypoints)) + keypoints.tobytes()
 

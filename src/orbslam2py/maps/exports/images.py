@@ -5,11 +5,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 
-from orbslam2py._arguments import instance_of, shown
+from orbslam2py._arguments import instance_of, path_of, shown
 from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py.errors import DatasetError, ImageError, MapFileError
 from orbslam2py.maps.contents import MapContents, contents_of
@@ -171,7 +172,9 @@ class View:
     """The image shows what a pinhole camera sees; otherwise the lens distorts it."""
 
 
-def views_without_images(contents: MapContents, names: Mapping[int, str] | None) -> list[View]:
+def views_without_images(
+    contents: MapContents, names: Mapping[int, str | Path] | None
+) -> list[View]:
     """Views of all keyframes on images that are elsewhere, as the camera took them.
 
     Parameters
@@ -180,6 +183,11 @@ def views_without_images(contents: MapContents, names: Mapping[int, str] | None)
         The map.
     names
         Files by keyframe id; by default ``keyframe_000012.png`` and so on.
+
+    Raises
+    ------
+    MapFileError
+        If `names` is no mapping, or what it has for a keyframe can be no file's name.
     """
     if names is not None:
         remedy = "a dict from keyframe ids to names of files"
@@ -189,7 +197,7 @@ def views_without_images(contents: MapContents, names: Mapping[int, str] | None)
     return [
         View(
             row,
-            image_name(number) if names is None else names[number],
+            image_name(number) if names is None else _name_given(names[number], number),
             int(cameras.width[camera]),
             int(cameras.height[camera]),
             not distorts[camera],
@@ -199,6 +207,21 @@ def views_without_images(contents: MapContents, names: Mapping[int, str] | None)
         )
         if names is None or number in names
     ]
+
+
+def _name_given(value: Any, keyframe_id: int) -> str:
+    """Take the name of the file of a keyframe's image, as formats of lines of text can have it."""
+    what = f"image_names[{keyframe_id}]"
+    path = path_of(value, what, MapFileError)
+    name = value if isinstance(value, str) else path.as_posix()
+    if "\n" in name or "\r" in name:
+        raise MapFileError(f"{what} is {shown(name)}; give a name of one line")
+    try:
+        # Surrogates that Python puts for bytes of names are those bytes again in the file.
+        name.encode("utf-8", "surrogateescape")
+    except UnicodeEncodeError:
+        raise MapFileError(f"{what} is {shown(name)}; give a name that UTF-8 can spell") from None
+    return name
 
 
 def image_name(keyframe_id: int) -> str:

@@ -41,7 +41,7 @@ def export_nerfstudio(
     folder: str | Path,
     *,
     images: ImageOfKeyframe | None = None,
-    image_names: Mapping[int, str] | None = None,
+    image_names: Mapping[int, str | Path] | None = None,
     replace: bool = False,
     progress: Progress | None = None,
 ) -> None:

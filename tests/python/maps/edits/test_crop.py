@@ -12,15 +12,20 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 from orbslam2py import MapFileError
+from orbslam2py import _core as core
 from orbslam2py.maps import (
+    Covisibility,
     MapContents,
     RemovedKeyframes,
     crop_to_box,
     crop_to_times,
     keep_keyframes,
+    restore_contents,
 )
-from orbslam2py.maps.edits.spanning_tree import count_covisibility
+from orbslam2py.maps.edits.parts import map_numbers, put_together
+from orbslam2py.maps.edits.spanning_tree import count_covisibility, spanning_parents
 from support.made_up_map import FIRST_TIME, STEP, counted, made_up_map
+from support.made_up_saved import made_up_saved
 from support.map_invariants import check_invariants
 
 FAR = np.array([9.0, 9.0, 9.0])
@@ -195,6 +200,82 @@ def test_shared_points_are_counted(n: int, seed: int) -> None:
     for name in ("a", "b", "weight"):
         np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
         assert getattr(found, name).dtype == getattr(expected, name).dtype
+
+
+# ---- several maps --------------------------------------------------------------------------------
+def several_maps(*sizes: int, seed: int = 0) -> MapContents:
+    """Maps of so many keyframes, each in a world of its own."""
+    maps = [made_up_map(n, 60, seed=seed + number) for number, n in enumerate(sizes)]
+    return put_together([made_up_saved(contents) for contents in maps]).contents
+
+
+@hypothesis_settings(deadline=None, max_examples=40)
+@given(
+    sizes=st.lists(st.integers(2, 6), min_size=2, max_size=3),
+    seed=st.integers(0, 50),
+    data=st.data(),
+)
+def test_maps_stay_apart(sizes: list[int], seed: int, data: st.DataObject) -> None:
+    contents = several_maps(*sizes, seed=seed)
+    numbers, n = map_numbers(contents.keyframes), sum(sizes)
+    kept = np.array(data.draw(st.lists(st.booleans(), min_size=n, max_size=n).filter(any)))
+    cropped = keep_keyframes(contents, kept)
+    assert core.check_invariants(restore_contents(cropped), require_words=False) == []
+    left, expected = np.unique(numbers[kept], return_inverse=True)
+    found = map_numbers(cropped.keyframes)
+    np.testing.assert_array_equal(found, expected)
+    # What is left of each is what cropping it alone gives, but for who made points: the number 0 is
+    # given away twice there.
+    for place, number in enumerate(left):
+        alone = keep_keyframes(contents, numbers == number)
+        both = (
+            keep_keyframes(cropped, found == place),
+            keep_keyframes(alone, kept[numbers == number]),
+        )
+        one, other = (
+            replace(
+                part, points=replace(part.points, first_keyframe=part.points.reference_keyframe)
+            )
+            for part in both
+        )
+        assert one.first_difference(other) is None
+
+
+def test_keeping_all_of_several_maps_changes_nothing() -> None:
+    contents = several_maps(5, 2, 7)
+    everything = np.ones(14, bool)
+    assert keep_keyframes(contents, everything).first_difference(contents) is None
+    assert crop_to_times(contents, -np.inf, np.inf).first_difference(contents) is None
+    assert crop_to_box(contents, -FAR, FAR).first_difference(contents) is None
+
+
+def test_a_root_that_went_is_followed_by_the_first_of_its_map() -> None:
+    cropped = keep_keyframes(several_maps(4, 4), ~np.isin(np.arange(8), [0, 4]))
+    keyframes = cropped.keyframes
+    assert keyframes.ids.tolist() == [0, 2, 3, 5, 6, 7]
+    assert keyframes.ids[keyframes.parent < 0].tolist() == [0, 5]
+    assert not keyframes.provisional_parent[keyframes.parent < 0].any()
+
+
+def test_who_shares_nothing_hangs_on_the_keyframe_before_it_in_its_own_map() -> None:
+    """Of two maps that were made by turns: 0, 1, 4, 5 and 2, 3."""
+    keyframes = replace(
+        made_up_map(6).keyframes,
+        parent=np.array([-1, 0, -1, 2, 1, 4]),
+        provisional_parent=np.array([False, True, False, True, False, False]),
+    )
+    left = np.array([0, 2, 3, 4, 5])
+    keyframes = replace(
+        keyframes,
+        ids=keyframes.ids[left],
+        parent=keyframes.parent[left],
+        provisional_parent=keyframes.provisional_parent[left],
+    )
+    nothing = np.zeros(0, np.int64)
+    nobody = Covisibility(nothing, nothing, nothing.astype(np.int32))
+    parents, provisional = spanning_parents(keyframes, nobody, np.array([0, 1, 1, 0, 0]))
+    assert parents.tolist() == [-1, -1, 2, 0, 4]
+    assert provisional.tolist() == [False, False, True, True, False]
 
 
 # ---- nothing left --------------------------------------------------------------------------------

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from orbslam2py.maps import RemovedKeyframes, SavedMap, crop_saved_map, transform_map
+from orbslam2py.maps.edits.parts import map_numbers, put_together
 from orbslam2py.trajectory import Similarity
 from support.made_up_map import made_up_map
 from support.made_up_saved import FRAMES_PER_KEYFRAME, made_up_saved
@@ -61,6 +62,21 @@ def test_frames_that_hang_on_what_went_are_left_out(saved: SavedMap) -> None:
     cropped = crop_saved_map(saved, np.arange(8) < 5)  # 5 went, and the culled one with it
     assert len(cropped.contents.removed_keyframes) == 0
     assert set(cropped.runs[0].frames.keyframes.tolist()) == {0, 1, 2, 3, 4}
+
+
+def test_frames_of_several_maps_stay_in_theirs() -> None:
+    both = put_together([made_up_saved(made_up_map(6, seed=seed), images=True) for seed in (1, 2)])
+    cropped = crop_saved_map(both, ~np.isin(np.arange(12), [0, 2, 6]))
+    assert np.bincount(map_numbers(cropped.contents.keyframes)).tolist() == [4, 5]
+    assert sorted(cropped.images) == [0, 3, 4, 5, 7, 8, 9, 10, 11]
+    for number, first in enumerate((1, 7)):
+        before, after = both.trajectory(number), cropped.trajectory(number)
+        stay = np.isin(before.timestamps, after.timestamps)
+        assert len(after) == (4 + number) * FRAMES_PER_KEYFRAME == stay.sum()
+        # Paths are relative to the first keyframe of their map, which has become another one.
+        T_wc = both.contents.keyframes.T_wc
+        moved = np.linalg.inv(T_wc[first]) @ T_wc[6 * number] @ before.T_wc[stay]
+        np.testing.assert_allclose(after.T_wc, moved, atol=1e-12)
 
 
 def test_frames_follow_a_change_of_size(saved: SavedMap) -> None:

@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from orbslam2py import DatasetError
+from orbslam2py import DatasetError, MapFileError
 from orbslam2py._arrays import ByteArray
 from orbslam2py.maps import MapContents, export_colmap
 from support.made_up_map import BF, CX, CY, FX, FY, HEIGHT, LENS, WIDTH, made_up_map
@@ -192,6 +192,33 @@ def test_names_of_images_elsewhere(tmp_path: Path) -> None:
         2: "rgb/a.png",
         4: "rgb/b.png",
     }
+
+
+@BINARY
+@pytest.mark.parametrize("name", ["é/#1.png", Path("rgb/a.png")])
+def test_any_name_of_a_file_elsewhere(tmp_path: Path, binary: bool, name: str | Path) -> None:
+    export_colmap(made_up_map(), tmp_path / "out", image_names={1: name}, binary=binary)  # type: ignore[dict-item]
+    (image,) = read(tmp_path / "out").images.values()
+    assert image.name == str(name)
+
+
+@pytest.mark.parametrize("name", ["a b.png", " a.png", "a.png ", "a\tb.png"])
+def test_a_name_with_a_space_is_whole_or_refused(tmp_path: Path, name: str) -> None:
+    """COLMAP reads its text files up to the next space."""
+    export_colmap(made_up_map(), tmp_path / "out", image_names={1: name})
+    (image,) = read(tmp_path / "out").images.values()
+    assert image.name == name
+    with pytest.raises(MapFileError, match=r"image_names\[1\] is .* space.*binary=True"):
+        export_colmap(made_up_map(), tmp_path / "text", image_names={1: name}, binary=False)
+    assert not (tmp_path / "text").exists()
+
+
+def test_names_are_written_as_their_bytes(tmp_path: Path) -> None:
+    """Bytes that are no UTF-8 stand in Python's names as surrogates."""
+    for binary, file in ((True, "images.bin"), (False, "images.txt")):
+        folder = tmp_path / file
+        export_colmap(made_up_map(), folder, image_names={1: "\udcff.png"}, binary=binary)
+        assert b"\xff.png" in (folder / "sparse" / "0" / file).read_bytes()
 
 
 @hypothesis_settings(

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -199,3 +200,33 @@ def test_images_come_from_a_function() -> None:
 def test_names_of_images_are_by_keyframe(tmp_path: Path, export: Callable[..., None]) -> None:
     with pytest.raises(MapFileError, match="image_names is a list; give a dict from keyframe ids"):
         export(made_up_map(), tmp_path / "out", image_names=["a.png"])
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        (5, r"image_names\[2\] is 5; give a path"),
+        (None, r"image_names\[2\] is None; give a path"),
+        (b"a.png", r"image_names\[2\] is bytes; give a path"),
+        ("", r"image_names\[2\] is '', which is the name of no file; give a path"),
+        (
+            "a\0b.png",
+            r"image_names\[2\] is 'a\\x00b.png', which is the name of no file; give",
+        ),
+        ("a\nb.png", r"image_names\[2\] is 'a\\nb.png'; give a name of one line"),
+        ("a.png\r", r"image_names\[2\] is 'a.png\\r'; give a name of one line"),
+        ("\ud800.png", r"image_names\[2\] is .*; give a name that UTF-8 can spell"),
+    ],
+)
+@pytest.mark.parametrize(
+    "export",
+    [export_colmap, functools.partial(export_colmap, binary=False), export_nerfstudio],
+    ids=["colmap", "colmap text", "nerfstudio"],
+)
+def test_names_of_images_are_names_of_files(
+    tmp_path: Path, export: Callable[..., None], name: object, said: str
+) -> None:
+    with pytest.raises(MapFileError, match=said) as caught:
+        export(made_up_map(), tmp_path / "out", image_names={0: "a.png", 2: name})
+    assert str(caught.value).isascii()
+    assert not any(tmp_path.iterdir())
