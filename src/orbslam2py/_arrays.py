@@ -39,13 +39,20 @@ class EqualByValue:
 
     def __hash__(self) -> int:
         values = (getattr(self, one.name) for one in fields(self) if one.compare)
-        return hash(tuple(value for value in values if isinstance(value, Hashable)))
+        # NaN equals NaN here, but the hash of each is its own.
+        same = (None if _is_nan(value) else value for value in values)
+        return hash(tuple(value for value in same if isinstance(value, Hashable)))
 
 
 def _equal(one: Any, other: Any) -> bool:
     if not (isinstance(one, np.ndarray) and isinstance(other, np.ndarray)):
-        if isinstance(one, float) and isinstance(other, float) and np.isnan(one):
-            return bool(np.isnan(other))
-        return one is other or bool(np.all(one == other))
+        if one is None or other is None:
+            return one is other
+        both_nan = _is_nan(one) and _is_nan(other)
+        return both_nan or one is other or bool(np.all(one == other))
     may_hold_nan = one.dtype.kind in "fc" and other.dtype.kind in "fc"
     return np.array_equal(one, other, equal_nan=may_hold_nan)
+
+
+def _is_nan(value: Any) -> bool:
+    return isinstance(value, float) and value != value  # noqa: PLR0124 (only NaN is not itself)

@@ -50,7 +50,8 @@ def write_sweep_picture(path: Path, rows: list[dict[str, Any]]) -> bool:
         axes = figure.add_subplot(lines, columns, number + 1)
         _draw(axes, key, rows)
         if number == 0:
-            axes.legend(fontsize="small")
+            for text in axes.legend(fontsize="small").get_texts():
+                text.set_parse_math(False)  # names may have dollars
     with atomic_write(path, binary=True) as stream:
         figure.savefig(stream, format="png", dpi=120)
     return True

@@ -54,6 +54,7 @@ def draw_residuals(path: str | PathLike[str], calibration: Calibration, *, title
         f"{title}\nreprojection error {calibration.rms:.3f} pixels (RMS), {n} views, fx "
         f"{K[0, 0]:.1f}, fy {K[1, 1]:.1f}, cx {K[0, 2]:.1f}, cy {K[1, 2]:.1f}",
         fontsize=11,
+        parse_math=False,  # names may have dollars
     )
     _draw_image(figure.add_subplot(grid[0, 0]), calibration)
     _draw_cloud(figure.add_subplot(grid[0, 1]), calibration)

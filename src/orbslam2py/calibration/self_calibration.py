@@ -133,7 +133,7 @@ def calibration_gains(
 def _with_depth(pair: PointPair) -> PointPair:
     if pair.depths is None:
         return pair
-    known = pair.depths > 0
+    known = np.isfinite(pair.depths) & (pair.depths > 0)
     return PointPair(pair.first[known], pair.second[known], pair.depths[known])
 
 

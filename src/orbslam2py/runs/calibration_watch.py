@@ -23,6 +23,7 @@ from orbslam2py.calibration.two_views import PointPair, without_gross_errors
 from orbslam2py.datasets.base import Images
 from orbslam2py.errors import OrbSlamError, SettingsError
 from orbslam2py.settings.comparison import compare_calibrations
+from orbslam2py.settings.depth_check import is_known
 from orbslam2py.settings.fit import FitThresholds, Misfit, find_misfit
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings, resolve_settings
@@ -181,8 +182,9 @@ class CalibrationWatch:
             height, width = images.depth.shape
             columns, rows = np.rint(first).astype(np.int64).T
             rows, columns = np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)
-            depths = np.nan_to_num(images.depth[rows, columns].astype(np.float64))
-            return PointPair(first, second, depths)
+            depths = images.depth[rows, columns]
+            known = np.where(is_known(depths), depths, 0).astype(np.float64)
+            return PointPair(first, second, known)
         if self._sensor is Sensor.STEREO and images.right is not None:
             found = disparities_of(self._grey(images.image), self._grey(images.right), first)
             with np.errstate(divide="ignore"):

@@ -100,7 +100,13 @@ def draw_trajectory(
     figure = Figure(figsize=(10, 8), dpi=110)
     FigureCanvasAgg(figure)
     above, below = figure.subplots(2, 1, height_ratios=[3.2, 1], gridspec_kw=_MARGINS)
-    figure.suptitle(f"{title}\n{subtitle}" if subtitle else title, fontsize=11, y=0.99, va="top")
+    figure.suptitle(
+        f"{title}\n{subtitle}" if subtitle else title,
+        fontsize=11,
+        y=0.99,
+        va="top",
+        parse_math=False,  # names may have dollars
+    )
 
     estimate = _Path(seconds, positions, gaps_in_time(seconds) if gaps is None else gaps)
     true = None if truth is None else _Path(*truth, gaps_in_time(truth[0]))

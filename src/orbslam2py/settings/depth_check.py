@@ -110,11 +110,17 @@ def doubt_of_tum_factor(factor: float, median: float | None) -> str | None:
     )
 
 
-def _median_of_known(depth: npt.NDArray[np.generic]) -> float | None:
-    """Median of what is above 0 and finite [raw]; the largest integer stands for unknown, too."""
-    known = depth[np.isfinite(depth) & (depth > 0)]  # type: ignore[operator]
+def is_known(depth: npt.NDArray[np.generic]) -> npt.NDArray[np.bool_]:
+    """Whether raw depths are above 0 and finite; the largest integer stands for unknown, too."""
+    known: npt.NDArray[np.bool_] = np.isfinite(depth) & (depth > 0)  # type: ignore[operator]
     if depth.dtype.kind in "ui":
-        known = known[known != np.iinfo(depth.dtype).max]  # type: ignore[type-var]
+        known &= depth != np.iinfo(depth.dtype).max  # type: ignore[type-var]
+    return known
+
+
+def _median_of_known(depth: npt.NDArray[np.generic]) -> float | None:
+    """Median of what is known [raw]."""
+    known = depth[is_known(depth)]
     # Halfway between the largest floats, and the power of ten below the smallest, are none.
     return float(np.median(np.clip(known, *_SENSIBLE, dtype=np.float64))) if len(known) else None
 

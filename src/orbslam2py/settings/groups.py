@@ -259,7 +259,8 @@ class CameraRectification:
         )
 
     def __hash__(self) -> int:
-        return hash((self.width, self.height, self.K.tobytes(), self.P.tobytes()))
+        # Adding 0 makes one zero of both.
+        return hash((self.width, self.height, (self.K + 0.0).tobytes(), (self.P + 0.0).tobytes()))
 
 
 @dataclass(frozen=True)

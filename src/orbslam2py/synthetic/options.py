@@ -152,7 +152,7 @@ class SyntheticOptions:
             raise SettingsError(f"corners are sharp on ways with corners: {names}; take one")
 
     def _check_length(self) -> None:
-        _check_range("length", self.length, 50, 20_000)
+        _check_range("length", self.length, 50, 3500)  # pictures of more take too much memory
         if self.length is not None and self.world is not SyntheticWorld.STREET:
             raise SettingsError(
                 f"length does not apply to the {self.world}, whose size is fixed; take the street"

@@ -29,7 +29,7 @@ class SyntheticWorld(str, Enum):
     FIGURE_EIGHT = "figure-eight"
     """Two corridors with a common leg; two loops and a bit."""
     STREET = "street"
-    """A drive along a straight street, of 600 m or any length."""
+    """A drive along a straight street, of 600 m or up to 3500 m."""
     STREET_LAP = "street-lap"
     """A drive around a block of houses; one lap (600 m) and a bit."""
     TWO_ROOMS = "two-rooms"

@@ -16,6 +16,8 @@ from orbslam2py.trajectory.rotations import nearest_rotations
 _COPIED = 1e-3
 #: ... and by so much when they were computed.
 _COMPUTED = 1e-12
+#: Points lie on a line, but for rounding, if they covary so much less across it with their targets.
+_ROUNDED = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +86,13 @@ class Similarity:
         return moved
 
 
-def align(points: FloatArray, targets: FloatArray, *, with_scale: bool = False) -> Similarity:
+def align(
+    points: FloatArray,
+    targets: FloatArray,
+    *,
+    with_scale: bool = False,
+    on_a_line: bool | None = None,
+) -> Similarity:
     """Find the transform that moves points nearest to their targets (Umeyama, PAMI 1991).
 
     Parameters
@@ -93,7 +101,11 @@ def align(points: FloatArray, targets: FloatArray, *, with_scale: bool = False) 
         float64 (n, 3), at least one.
     with_scale
         Whether lengths may change. They do not if one of the sets is a single place, where no
-        scale can be seen; a rotation that cannot be seen is chosen so that nothing is turned.
+        scale can be seen.
+    on_a_line
+        Whether one of the sets is taken for a straight line, around which no turn can be seen; by
+        default if it is one, but for rounding. Then only the line is turned, and nothing around it;
+        of a single place nothing is turned at all.
 
     Returns
     -------
@@ -116,10 +128,32 @@ def align(points: FloatArray, targets: FloatArray, *, with_scale: bool = False) 
     x, y = points - centre, targets - target_centre
     U, stretch, Vt = np.linalg.svd(y.T @ x / len(x))
     signs = np.array([1.0, 1.0, np.sign(np.linalg.det(U) * np.linalg.det(Vt))])
-    R = U @ (signs[:, None] * Vt) if stretch[0] > 0 else np.eye(3)
+    if on_a_line is None:
+        on_a_line = bool(stretch[1] <= _ROUNDED * stretch[0])
+    if stretch[0] <= 0:
+        R = np.eye(3)
+    elif on_a_line:
+        R = _least_rotation(Vt[0], U[:, 0])
+    else:
+        R = U @ (signs[:, None] * Vt)
     scale = 1.0
     spread, target_spread = np.mean(np.sum(x**2, axis=1)), np.mean(np.sum(y**2, axis=1))
     if with_scale and spread > 1e-18 and target_spread > 1e-18:
         fitted = float(np.sum(stretch * signs) / spread)
         scale = fitted if fitted > 1e-12 else 1.0
     return Similarity(scale, R, target_centre - scale * R @ centre)
+
+
+def _least_rotation(direction: FloatArray, target: FloatArray) -> FloatArray:
+    """Rotation (3, 3) that takes one unit vector to another by the smallest turn."""
+    cosine = float(direction @ target)
+    if cosine < -1 + 1e-9:
+        # Half a turn, around any axis across: the one nearest to an axis of the world.
+        across = np.eye(3)[np.argmin(np.abs(direction))]
+        axis = across - (across @ direction) * direction
+        half_turn: FloatArray = 2 * np.outer(axis, axis) / (axis @ axis) - np.eye(3)
+        return half_turn
+    x, y, z = np.cross(direction, target)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    R: FloatArray = np.eye(3) + cross + cross @ cross / (1 + cosine)
+    return R

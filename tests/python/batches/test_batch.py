@@ -207,7 +207,7 @@ def test_runs_without_a_result_are_in_the_picture(
 
     monkeypatch.setattr(Axes, "plot", watched)
     rows: list[dict[str, Any]] = [
-        {"sequence": "a", "sweep.ThDepth": value, "ate_rmse_m": error}
+        {"sequence": "a $strange_$ name", "sweep.ThDepth": value, "ate_rmse_m": error}
         for value, error in ((30, 0.1), (30, 0.3), (40, 0.2), (50, None))
     ]
     assert write_sweep_picture(tmp_path / "p.png", rows)

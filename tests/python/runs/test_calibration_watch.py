@@ -286,3 +286,23 @@ def test_check_calibration_of_frames_needs_settings() -> None:
         orb.SettingsError, match=r"tell its sensor.*Settings.load\('tum1', sensor\)"
     ):
         check_calibration(frames, "tum1")
+
+
+@pytest.mark.parametrize("unknown", [np.nan, np.inf, -np.inf])
+def test_depth_that_is_not_known_does_not_count(unknown: float) -> None:
+    """Beyond the sensor's reach cameras tell 0, NaN or infinity, as their makers like."""
+    settings = world(Sensor.RGBD).settings
+    gains = []
+    for filled in (0.0, unknown):
+        watch = CalibrationWatch(settings, Sensor.RGBD)
+        for one in images(Sensor.RGBD):
+            assert one.depth is not None
+            depth = one.depth.astype(np.float32)
+            depth[(depth > np.median(depth)) | (depth == 0)] = filled
+            watch.look(replace(one, depth=depth))
+        watch.finish()
+        gains.append(watch.gains)
+    first, second = gains
+    assert first is not None
+    assert second is not None
+    assert (first.n_points, first.residual) == (second.n_points, second.residual)

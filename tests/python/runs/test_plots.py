@@ -28,7 +28,7 @@ def test_picture(tmp_path: Path, n: int, with_truth: bool) -> None:
     path = tmp_path / "t.png"
     draw_trajectory(
         path,
-        title="a $strange_ name [x]",
+        title="a $strange_$ name [x]",
         positions=positions,
         seconds=np.arange(float(n)),
         keyframes=positions[::20],

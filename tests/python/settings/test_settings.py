@@ -57,6 +57,16 @@ def test_settings_cannot_change() -> None:
         builtin_settings("tum1", Sensor.RGBD).camera.fx = 1.0  # type: ignore[misc]
 
 
+def test_equal_settings_have_equal_hashes() -> None:
+    """Zero has two signs."""
+    euroc = builtin_settings("euroc", Sensor.STEREO)
+    assert euroc.rectification is not None
+    first = euroc.rectification.left
+    second = dataclasses.replace(first, K=np.where(first.K == 0, -0.0, first.K))
+    assert first == second
+    assert hash(first) == hash(second)
+
+
 def test_distortion_vector() -> None:
     camera = CameraSettings(500, 500, 320, 240, p2=0.1)
     np.testing.assert_array_equal(camera.distortion, [0, 0, 0, 0.1])

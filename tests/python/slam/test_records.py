@@ -6,7 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from orbslam2py import Reason, TrackingRecord, TrackingState
+from orbslam2py import Reason, Relocalized, TrackingRecord, TrackingState
+from orbslam2py.datasets import Images
 
 pytestmark = pytest.mark.watchdog(20)
 
@@ -29,3 +30,17 @@ def test_record_inverts_its_pose() -> None:
 def test_reasons_print_as_text() -> None:
     assert str(Reason.NONE) == ""
     assert f"{Reason.TOO_FEW_DEPTHS}" == "too few keypoints with depth"
+
+
+# ---- equal records -------------------------------------------------------------------------------
+def test_equal_records_have_equal_hashes() -> None:
+    found = [Relocalized(0, 3, float("nan"), np.eye(4)) for _ in range(2)]
+    assert found[0] == found[1]
+    assert len(set(found)) == 1
+
+
+def test_no_image_is_not_an_empty_one() -> None:
+    image, empty = np.zeros((4, 4), np.uint8), np.zeros((0, 0), np.uint8)
+    assert Images(image) != Images(image, right=empty)
+    assert Images(image, right=empty) != Images(image)
+    assert Images(image) == Images(image.copy())

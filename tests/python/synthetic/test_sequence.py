@@ -330,5 +330,5 @@ def test_a_street_is_as_long_as_asked_for() -> None:
 def test_only_the_street_has_a_length() -> None:
     with pytest.raises(SettingsError, match="length does not apply to the room"):
         SyntheticOptions(length=100)
-    with pytest.raises(SettingsError, match=r"length is 1000000\.0; allowed: 50 to 20000"):
+    with pytest.raises(SettingsError, match=r"length is 1000000\.0; allowed: 50 to 3500"):
         SyntheticOptions(world="street", length=1e6)

@@ -132,13 +132,15 @@ def _place(contents: MapContents, positions: FloatArray, known: FloatArray) -> P
     spreads = [_spread(places) for places in (positions, known)]
     if min(spread[0] for spread in spreads) < _SAME_PLACE:
         raise MapFileError("the known points are all at one place; give some that are apart")
-    similarity = align(positions, known, with_scale=unit_of(contents) != "m")
+    on_a_line = any(map(_is_thin, spreads))
+    scaled = unit_of(contents) != "m"
+    similarity = align(positions, known, with_scale=scaled, on_a_line=on_a_line)
     left = np.linalg.norm(similarity.apply(positions) - known, axis=1)
     return Placement(
         similarity=similarity,
         n_pairs=len(positions),
         rmse=float(np.sqrt(np.mean(left**2))),
-        on_a_line=any(map(_is_thin, spreads)),
+        on_a_line=on_a_line,
     )
 
 

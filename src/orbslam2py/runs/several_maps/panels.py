@@ -57,7 +57,7 @@ def draw_maps(
     said = "Each map has a world of its own: where one lies beside another means nothing."
     if len(shown) < len(maps):
         said += f" The {len(shown)} longest of {len(maps)} maps."
-    figure.suptitle(f"{title}\n{said}", fontsize=10)
+    figure.suptitle(f"{title}\n{said}", fontsize=10, parse_math=False)  # names may have dollars
     panels = figure.subplots(n_rows, n_columns, squeeze=False).ravel()
     for panel in panels[len(shown) :]:
         panel.set_axis_off()
@@ -74,6 +74,7 @@ def draw_maps(
             unit=unit,
         )
         text = f"{one.title}{' (main)' if one.number == main else ''}"
-        panel.set_title(text, fontsize=10, loc="left", color=hexadecimal(colour))
+        ink = hexadecimal(colour)
+        panel.set_title(text, fontsize=10, loc="left", color=ink, parse_math=False)
     with atomic_write(path, binary=True) as stream:
         figure.savefig(stream, format="png")
