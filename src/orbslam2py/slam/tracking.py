@@ -262,6 +262,7 @@ class Tracking:
         if localize:
             self._kept_maps.add(self._map.active_map)
             strategy = self._in_fixed_map
+        self._search.map_is_fixed = localize
         with timer("predict"):
             estimate = strategy.estimate(frame, lost=lost)
         if lost and not estimate.found:

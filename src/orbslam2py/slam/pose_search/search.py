@@ -63,6 +63,8 @@ class PoseSearch:
     last_relocalization : int
         Id of the frame in which the camera was last found again. 0 at the beginning, as if the
         first frame had been: a single camera's young map has to prove itself.
+    map_is_fixed : bool
+        The map is not to change: what is seen of it is not counted.
     searches_loaded_map : bool
         The camera was not found yet in the map that was loaded.
     initial_pose : Pose or None
@@ -96,6 +98,7 @@ class PoseSearch:
         self._was_found_again = False
         self.initial_pose: core.Pose | None = None
         self.searches_loaded_map = False
+        self.map_is_fixed = False
         self._place_of_loss: PlaceOfLoss | None = None
         if self._relocalizer is not None:
             self._relocalizer.reset()
@@ -340,7 +343,8 @@ class PoseSearch:
         self.local_map = local_map = refined.local_map
         if local_map.reference_keyframe >= 0:
             self.reference_keyframe = local_map.reference_keyframe
-        core.count_sightings(self._map, refined.frame, refined.visible)
+        if not self.map_is_fixed:
+            core.count_sightings(self._map, refined.frame, refined.visible)
         if self._sensor.has_depth:
             refined.frame.discard_outliers()
 
