@@ -170,11 +170,11 @@ void BM_EraseKeyframe(benchmark::State& state) {  // the longest write section o
 }
 BENCHMARK(BM_EraseKeyframe)->UseManualTime()->Unit(benchmark::kMillisecond)->Iterations(30);
 
-void BM_SnapshotPoints(benchmark::State& state) {
+void BM_SnapshotMap(benchmark::State& state) {
   const auto map = make_map();
-  measure(state, [&] { benchmark::DoNotOptimize(snapshot_points(*map)); });
+  measure(state, [&] { benchmark::DoNotOptimize(snapshot_map(*map)); });
 }
-BENCHMARK(BM_SnapshotPoints)->Unit(benchmark::kMillisecond);
+BENCHMARK(BM_SnapshotMap)->Unit(benchmark::kMillisecond);
 
 void BM_CheckInvariants(benchmark::State& state) {
   const auto map = make_map();

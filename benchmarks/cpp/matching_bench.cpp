@@ -210,22 +210,18 @@ void match_keyframe_by_words(benchmark::State& state, const Size& size) {
 BENCHMARK_CAPTURE(match_keyframe_by_words, kitti, kKitti)->UseManualTime();
 BENCHMARK_CAPTURE(match_keyframe_by_words, tum, kTum)->UseManualTime();
 
-void match_for_initialization(benchmark::State& state, const Size& size) {
+void match_views(benchmark::State& state, const Size& size) {
   World world(size, 1);
   std::vector<int> sources;
-  const auto initial = world.make_frame(world.random_pose(), sources);
+  const auto first = world.make_frame(world.random_pose(), sources);
   const auto current = world.make_frame(world.random_pose(), sources);
-  std::vector<Eigen::Vector2f> positions;
-  for (const Keypoint& keypoint : initial->keypoints) {
-    positions.emplace_back(keypoint.x, keypoint.y);
-  }
+  std::vector<Eigen::Vector2f> expected;
+  for (const Keypoint& keypoint : first->keypoints) expected.emplace_back(keypoint.x, keypoint.y);
   measure_prepared(
-      state, [&] { return positions; },
-      [&](std::vector<Eigen::Vector2f>& previous) {
-        match_for_initialization(*initial, *current, previous, 100, 0.9F);
-      });
+      state, [] { return ViewMatchOptions(); },
+      [&](const ViewMatchOptions& options) { match_views(*first, *current, expected, options); });
 }
-BENCHMARK_CAPTURE(match_for_initialization, tum, kTum)->UseManualTime();
+BENCHMARK_CAPTURE(match_views, tum, kTum)->UseManualTime();
 
 void create_new_points(benchmark::State& state, const Size& size) {
   std::size_t n = 0;

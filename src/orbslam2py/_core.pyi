@@ -13,7 +13,7 @@ from orbslam2py.errors import SettingsError
 from orbslam2py.errors import StateError
 from orbslam2py.errors import VocabularyError
 import typing
-__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'ChangedIds', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FrameSightings', 'FullBundleCommit', 'FullBundleOptions', 'FullBundleResult', 'GatheredBundle', 'ImageBounds', 'ImageError', 'ImageRotation', 'InlierSpread', 'KeyFrameIndex', 'KeyFramePoses', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapChanges', 'MapFileError', 'MapFollower', 'MapMerge', 'MapMergeResult', 'MapRestorer', 'MapSnapshot', 'MapStamp', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewMotion', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'align_rotation', 'anchor_frame', 'apply_loop_correction', 'apply_map_merge', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'changed_since', 'check_invariants', 'check_map_contents', 'choose_loop', 'choose_merge', 'commit_full_bundle', 'corridor_way', 'count_map_points', 'count_sightings', 'count_staying', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'decode_png', 'describe', 'direct_index_of', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'fine_detail', 'follow_map', 'full_bundle_adjustment', 'fundamental_matrix', 'fuse_points', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'keep_small_image', 'keyframes_of_seam', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'map_contents', 'match_for_initialization', 'match_for_triangulation', 'match_keyframe_by_descriptors', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'match_views', 'may_be_one_place', 'median_displacement', 'median_match_error', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'place_points', 'plan_loop_correction', 'plan_map_merge', 'pose_covariance', 'poses_of_map', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'refresh_associations', 'render', 'room_T_wc', 'sample_colours', 'seed_of', 'select_local_map', 'sharpness', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'snapshot_points', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'spread_from_seam', 'spread_of_inliers', 'stamp_of', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'vector_units', 'verify_loop_candidate', 'words_of']
+__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'ChangedIds', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FrameSightings', 'FullBundleCommit', 'FullBundleOptions', 'GatheredBundle', 'ImageBounds', 'ImageError', 'ImageRotation', 'InlierSpread', 'KeyFrameIndex', 'KeyFramePoses', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapChanges', 'MapFileError', 'MapFollower', 'MapMerge', 'MapMergeResult', 'MapRestorer', 'MapSnapshot', 'MapStamp', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewMotion', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'align_rotation', 'anchor_frame', 'apply_loop_correction', 'apply_map_merge', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'changed_since', 'check_invariants', 'check_map_contents', 'choose_loop', 'choose_merge', 'commit_full_bundle', 'corridor_way', 'count_map_points', 'count_sightings', 'count_staying', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'decode_png', 'describe', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'fine_detail', 'follow_map', 'fundamental_matrix', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'keep_small_image', 'keyframes_of_seam', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'map_contents', 'match_keyframe_by_descriptors', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'match_views', 'may_be_one_place', 'median_displacement', 'median_match_error', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'place_points', 'plan_loop_correction', 'plan_map_merge', 'pose_covariance', 'poses_of_map', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'render', 'room_T_wc', 'sample_colours', 'seed_of', 'select_local_map', 'sharpness', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'spread_from_seam', 'spread_of_inliers', 'stamp_of', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'vector_units', 'verify_loop_candidate']
 class Pose:
     """
     Rigid transform. `T_ab` maps coordinates of frame b into frame a.
@@ -23,7 +23,7 @@ class Pose:
     @staticmethod
     def exp(xi: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 1]"]) -> Pose:
         """
-        Exponential map of a tangent vector (6,).
+        Exponential map of a tangent vector (6,). Raises ValueError unless it is finite.
         """
     @staticmethod
     def from_matrix(matrix: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"]) -> Pose:
@@ -41,6 +41,7 @@ class Pose:
     def __init__(self, quaternion_xyzw: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 1]"], translation: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"]) -> None:
         """
         From a quaternion (4,) in the order x y z w, normalised here, and a translation (3,).
+        Raises ValueError unless both are finite and the quaternion is not zero.
         """
     @typing.overload
     def __matmul__(self, other: Pose) -> Pose:
@@ -693,13 +694,10 @@ class Map:
         """
         An empty map.
         """
-    def activate_map(self, map: typing.SupportsInt | typing.SupportsIndex) -> None:
-        """
-        New keyframes belong to this map. Raises StateError if it holds none.
-        """
     def activate_map_of(self, keyframe: int) -> int:
         """
-        The same for the map of a keyframe, living or culled; its number.
+        New keyframes belong to the map of a keyframe, living or culled; its number. Raises
+        StateError if no map holds it.
         """
     def add_keyframe(self, frame: Frame, T_cw: Pose) -> int:
         """
@@ -728,7 +726,7 @@ class Map:
         """
     def best_neighbours(self, id: int, n: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
         """
-        The first n neighbours: (<= n,) int64.
+        The first n neighbours, none of a culled keyframe: (<= n,) int64.
         """
     def clear(self) -> None:
         """
@@ -761,6 +759,10 @@ class Map:
     def erase_point(self, id: int) -> None:
         """
         Remove a point.
+        """
+    def frame_of(self, id: int) -> int:
+        """
+        The frame that a living keyframe was made of; -1 if it was culled.
         """
     def has_keyframe(self, id: int) -> bool:
         """
@@ -818,10 +820,6 @@ class Map:
     def neighbours(self, id: int) -> numpy.typing.NDArray[numpy.int64]:
         """
         Covisible keyframes by descending number of shared points: (n,) int64.
-        """
-    def neighbours_by_weight(self, id: int, w: typing.SupportsInt | typing.SupportsIndex) -> numpy.typing.NDArray[numpy.int64]:
-        """
-        The neighbours sharing at least w points: (n,) int64.
         """
     def observation_count(self, id: int) -> int:
         """
@@ -1498,7 +1496,7 @@ class TrainingOptions:
     @property
     def n_threads(self) -> int:
         """
-        0: one per core. The result does not depend on it.
+        0: one per core, at most OMP_NUM_THREADS. The result does not depend on it.
         """
     @n_threads.setter
     def n_threads(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None:
@@ -2258,7 +2256,7 @@ class LocalBundleResult:
         """
 class FullBundleOptions:
     """
-    How full_bundle_adjustment works.
+    How solve_full_bundle works.
     """
     def __init__(self, iterations: typing.SupportsInt | typing.SupportsIndex = 10, robust: bool = True, max_seconds: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         ...
@@ -2287,35 +2285,6 @@ class FullBundleOptions:
     @robust.setter
     def robust(self, arg0: bool) -> None:
         ...
-class FullBundleResult:
-    """
-    What full_bundle_adjustment did.
-    """
-    @property
-    def committed(self) -> bool:
-        """
-        Whether the map was changed.
-        """
-    @property
-    def n_keyframes(self) -> int:
-        """
-        Keyframes, fixed ones included.
-        """
-    @property
-    def n_observations(self) -> int:
-        """
-        Observations used.
-        """
-    @property
-    def n_points(self) -> int:
-        """
-        Points refined.
-        """
-    @property
-    def summary(self) -> BundleSummary:
-        """
-        Of the solver.
-        """
 class GatheredBundle:
     """
     A copy of the keyframes and points of a map to be refined together.
@@ -3022,10 +2991,6 @@ def describe(frame: Frame, vocabulary: Vocabulary) -> None:
     """
     Computes words and direct index of a frame that no other thread uses yet; a second call does nothing.
     """
-def direct_index_of(frame: Frame) -> DirectIndex:
-    """
-    The direct index of a described frame (a copy).
-    """
 def discard_temporary(frame: TrackedFrame) -> int:
     """
     Drop the frame's associations with temporary points; their number.
@@ -3036,7 +3001,7 @@ def figure_eight_way(length: typing.SupportsFloat | typing.SupportsIndex, breadt
     """
 def find_loop_candidates(index: KeyFrameIndex, map: Map, id: int, min_score: typing.SupportsFloat | typing.SupportsIndex) -> list[PlaceCandidate]:
     """
-    Keyframes not connected to this one that look like it, by ascending id. Raises StateError when it is dead.
+    Keyframes not connected to this one that look like it, by ascending id; none when it has died.
     """
 def find_problem(branching: typing.SupportsInt | typing.SupportsIndex, depth: typing.SupportsInt | typing.SupportsIndex, parents: typing.Annotated[numpy.typing.ArrayLike, numpy.uint32], is_word: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8], centres: typing.Annotated[numpy.typing.ArrayLike, numpy.uint8], weights: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> tuple[int, str] | None:
     """
@@ -3057,24 +3022,10 @@ def follow_map(map: Map, frame: TrackedFrame) -> tuple[PointBatch, float]:
     successors, dead ones are dropped. Returns (PointBatch of the frame's points, by how much
     lengths around the frame have been multiplied since).
     """
-def full_bundle_adjustment(map: Map, options: FullBundleOptions = ..., abort: StopFlag | None = None, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> FullBundleResult:
-    """
-    Refine all keyframes (but 0), unpublished ones included, and all points.
-
-    gather_full_bundle, solve_full_bundle and commit_full_bundle in one call. After an
-    abort, or when the map was cleared meanwhile, the map stays as it was. No observation is
-    erased. Takes the map's locks for short sections only.
-    """
 def fundamental_matrix(T_1w: Pose, T_2w: Pose, K_1: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"], K_2: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 3]"]:
     """
     The (3, 3) matrix F_12 with x_1^T F_12 x_2 = 0 for pixels (u, v, 1) of cameras with
     calibration matrices K_1 and K_2.
-    """
-def fuse_points(map: Map, keyframe: int, points: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], radius_factor: typing.SupportsFloat | typing.SupportsIndex = 3.0) -> int:
-    """
-    Project points, (n,) int64 ids, into a keyframe and merge them with what they meet there.
-
-    Of two points the one with more observations survives. Returns the number of changes.
     """
 def fuse_with_neighbours(map: Map, current: int, n_neighbours: typing.SupportsInt | typing.SupportsIndex) -> int:
     """
@@ -3086,7 +3037,8 @@ def gather_full_bundle(map: Map, which: typing.SupportsInt | typing.SupportsInde
     Copy all keyframes of a map (-1: the active one) that points tie to each other, and
     these points.
 
-    First of three steps, between which the map may change. Takes the read lock.
+    First of the three steps of a full bundle adjustment, which refines them all and
+    erases no observation. The map may change between the steps. Takes the read lock.
     """
 def gather_points(map: Map, ids: typing.Annotated[numpy.typing.ArrayLike, numpy.int64]) -> PointBatch:
     """
@@ -3159,19 +3111,6 @@ def map_contents(map: Map, known: typing.Annotated[numpy.typing.ArrayLike, numpy
     orbslam2py.maps.MapContents. The keypoints of the keyframes `known` ((m,) int64
     ascending), which never change, are left out. With the stamps and incomplete pages
     of an earlier call, points come only of pages that may have changed since.
-    """
-def match_for_initialization(initial: Frame, current: Frame, previous: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], window: typing.SupportsFloat | typing.SupportsIndex = 100.0, ratio: typing.SupportsFloat | typing.SupportsIndex = 0.8999999761581421) -> tuple[numpy.typing.NDArray[numpy.int32], numpy.typing.NDArray[numpy.float32]]:
-    """
-    Search the level-0 keypoints of `initial` in `current` around `previous`, (n, 2) pixels.
-
-    Returns (matches, previous): (n,) int32 index in `current` or -1, and the positions to
-    search around next time, (n, 2) float32.
-    """
-def match_for_triangulation(map: Map, a: int, b: int) -> numpy.typing.NDArray[numpy.int64]:
-    """
-    Features without points of two keyframes that agree with the epipolar geometry.
-
-    Returns (n, 2) int64: feature of a (ascending), feature of b; one to one.
     """
 def match_keyframe_by_descriptors(map: Map, keyframe: int, frame: TrackedFrame, ratio: typing.SupportsFloat | typing.SupportsIndex) -> int:
     """
@@ -3327,10 +3266,6 @@ def reconstruct_two_views(initial: typing.Annotated[numpy.typing.ArrayLike, nump
     of those drawn from `seed`. `two_threads` does not change the result. Raises ValueError
     for bad shapes, indices or options.
     """
-def refresh_associations(map: Map, frame: TrackedFrame) -> None:
-    """
-    Exchange replaced points of a frame, refresh positions, drop dead ones.
-    """
 def render(world: World, T_cw: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"], fx: typing.SupportsFloat | typing.SupportsIndex, fy: typing.SupportsFloat | typing.SupportsIndex, cx: typing.SupportsFloat | typing.SupportsIndex, cy: typing.SupportsFloat | typing.SupportsIndex, width: typing.SupportsInt | typing.SupportsIndex, height: typing.SupportsInt | typing.SupportsIndex, noise: typing.SupportsFloat | typing.SupportsIndex = 0.0, exposure: typing.SupportsFloat | typing.SupportsIndex = 1.0, noise_seed: typing.SupportsInt | typing.SupportsIndex = 0, threads: typing.SupportsInt | typing.SupportsIndex = 1) -> tuple[numpy.typing.NDArray[numpy.uint8], numpy.typing.NDArray[numpy.float32]]:
     """
     Grey image (height, width) uint8 and depth along z (height, width) float32 [m], 0 where nothing is hit. The same bytes for any number of threads.
@@ -3376,10 +3311,6 @@ def snapshot_map(map: Map, which: typing.SupportsInt | typing.SupportsIndex = -1
 def snapshot_observations(map: Map, which: typing.SupportsInt | typing.SupportsIndex = -1) -> ObservationSnapshot:
     """
     Copy who observes what, as compressed rows, of a map (-1: the active one).
-    """
-def snapshot_points(map: Map, which: typing.SupportsInt | typing.SupportsIndex = -1) -> PointSnapshot:
-    """
-    Copy ids, positions and observation counts of the points, of a map (-1: the active one).
     """
 def solve_bundle(T_cw: collections.abc.Sequence[Pose], fixed: collections.abc.Sequence[bool], intrinsics: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 1]"], bf: typing.SupportsFloat | typing.SupportsIndex, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], camera_index: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], point_index: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], inverse_sigma2: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], options: BundleOptions = ..., abort: StopFlag | None = None) -> tuple:
     """
@@ -3460,9 +3391,5 @@ def verify_loop_candidate(map: Map, current: int, candidate: int, options: LoopV
     Matches by words, a similarity by RANSAC, guided matching, refinement, projection of
     the points around the candidate. Returns a Loop, or None when a step finds too little or
     a keyframe is dead. The map is not changed.
-    """
-def words_of(frame: Frame) -> WordVector:
-    """
-    The word vector of a described frame (a copy).
     """
 FIRST_TEMPORARY_POINT: int = 4611686018427387904

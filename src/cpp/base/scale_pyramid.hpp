@@ -37,7 +37,7 @@ class ScalePyramid {
   std::vector<int> features_per_level(int n_features) const;
 
   /// The level at which a point is expected that was seen at most `max_distance` away:
-  /// ceil(ln(max_distance / distance) / ln factor), limited to the pyramid. distance > 0.
+  /// ceil(ln(max_distance / distance) / ln factor), limited to the pyramid; 0 if that is no number.
   int predict_level(double max_distance, double distance) const;
 
  private:

@@ -69,6 +69,7 @@ Pose from_quaternion(const Eigen::Vector4d& xyzw, const Eigen::Vector3d& transla
   if (!xyzw.allFinite() || !(xyzw.norm() > 0)) {
     throw py::value_error("the quaternion must be finite and not zero");
   }
+  if (!translation.allFinite()) throw py::value_error("the translation must be finite");
   return Pose(Eigen::Quaterniond(xyzw[3], xyzw[0], xyzw[1], xyzw[2]), translation);
 }
 
@@ -78,6 +79,11 @@ Pose from_matrix(const Eigen::Matrix4d& matrix) {
     throw py::value_error("a pose matrix must be finite with the last row 0 0 0 1");
   }
   return Pose::from_matrix(matrix);
+}
+
+Pose from_tangent(const Vector6d& xi) {
+  if (!xi.allFinite()) throw py::value_error("the tangent vector must be finite");
+  return Pose::exp(xi);
 }
 
 RowPoints transform_points(const Pose& pose, const Eigen::Ref<const RowPoints>& points) {
@@ -91,11 +97,14 @@ void bind_pose(py::module_& module) {
 Tangent vectors are (6,) float64: rotation (radians) first, then translation; they act on the left.)")
       .def(py::init<>(), "The identity.")
       .def(py::init(&from_quaternion), py::arg("quaternion_xyzw"), py::arg("translation"),
-           "From a quaternion (4,) in the order x y z w, normalised here, and a translation (3,).")
+           "From a quaternion (4,) in the order x y z w, normalised here, and a translation (3,).\n"
+           "Raises ValueError unless both are finite and the quaternion is not zero.")
       .def_static("from_matrix", &from_matrix, py::arg("matrix"),
                   "From a 4x4 homogeneous matrix; the rotation is projected onto SO(3). Raises "
                   "ValueError unless it is finite and its last row is 0 0 0 1.")
-      .def_static("exp", &Pose::exp, py::arg("xi"), "Exponential map of a tangent vector (6,).")
+      .def_static(
+          "exp", &from_tangent, py::arg("xi"),
+          "Exponential map of a tangent vector (6,). Raises ValueError unless it is finite.")
       .def("log", &Pose::log, "Tangent vector (6,); rotation angle in [0, pi].")
       .def(
           "difference",

@@ -8,6 +8,7 @@
 #include "base/errors.hpp"
 #include "bindings/arrays.hpp"
 #include "bindings/bindings.hpp"
+#include "bindings/one_thread.hpp"
 #include "features/orb_extractor.hpp"
 
 namespace orbslam::bindings {
@@ -51,26 +52,20 @@ cv::Mat copy_of(const py::array& array, const char* what) {
 /// Refuses a second thread instead of letting two share the scratch buffers.
 struct SharedExtractor {
   OrbExtractor extractor;
-  bool busy = false;  ///< guarded by the interpreter lock
+  OneThread one_thread;
 
   SharedExtractor(const OrbOptions& options, const std::string& kernels)
       : extractor(options, vector_unit(kernels)) {}
 
   Extraction extract(const py::array& image, const py::object& mask) {
-    if (busy) {
-      throw StateError("this extractor is extracting in another thread; give each thread its own");
-    }
+    const OneThread::Use use(
+        one_thread, "this extractor is extracting in another thread; give each thread its own");
     // Level 0 of the result shares the pixels it was made from, which must outlive the caller's
     // array and not change while other Python threads run.
     const cv::Mat pixels = copy_of(image, "the image");
     const cv::Mat allowed = mask.is_none() ? cv::Mat() : copy_of(py::array(mask), "the mask");
     if (!mask.is_none() && allowed.empty()) throw ImageError("the mask is empty; pass None");
-    struct Busy {
-      bool& flag;
-      explicit Busy(bool& f) : flag(f) { flag = true; }
-      ~Busy() { flag = false; }
-    } guard(busy);
-    py::gil_scoped_release release;
+    const py::gil_scoped_release release;
     return extractor.extract(pixels, allowed);
   }
 };

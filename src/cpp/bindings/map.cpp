@@ -123,6 +123,14 @@ void bind_queries(MapClass& map) {
           },
           "id"_a, Release(),
           "What a living keyframe saw: keypoints, descriptors, depths, colours, words.")
+      .def(
+          "frame_of",
+          [](const Map& self, KeyFrameId id) {
+            const auto lock = self.read_lock();
+            const KeyFrame* keyframe = self.find(id);
+            return keyframe ? keyframe->frame->id : FrameId{-1};
+          },
+          "id"_a, Release(), "The frame that a living keyframe was made of; -1 if it was culled.")
       .def("living", reader(&Map::living), "id"_a, Release(),
            "The keyframe itself, or the nearest of its ancestors that lives; -1 if unknown.")
       .def(
@@ -163,13 +171,7 @@ void bind_queries(MapClass& map) {
           [](const Map& self, KeyFrameId id, std::size_t n) {
             return to_array(reading(self, [&] { return self.best_neighbours(id, n); }));
           },
-          "id"_a, "n"_a, "The first n neighbours: (<= n,) int64.")
-      .def(
-          "neighbours_by_weight",
-          [](const Map& self, KeyFrameId id, int w) {
-            return to_array(reading(self, [&] { return self.neighbours_by_weight(id, w); }));
-          },
-          "id"_a, "w"_a, "The neighbours sharing at least w points: (n,) int64.")
+          "id"_a, "n"_a, "The first n neighbours, none of a culled keyframe: (<= n,) int64.")
       .def("weight", reader(&Map::weight), "a"_a, "b"_a, Release(),
            "Number of points that two keyframes share.")
       .def(
@@ -225,8 +227,6 @@ void bind_parts(MapClass& map) {
       .def("begin_map", writer(&Map::begin_map), Release(),
            "The next keyframe begins a map, which becomes the active one; its number. Nothing\n"
            "changes while the active one has no keyframe.")
-      .def("activate_map", writer(&Map::activate_map), "map"_a, Release(),
-           "New keyframes belong to this map. Raises StateError if it holds none.")
       .def(
           "activate_map_of",
           [](Map& self, KeyFrameId id) {
@@ -236,7 +236,8 @@ void bind_parts(MapClass& map) {
             return found;
           },
           "keyframe"_a, Release(),
-          "The same for the map of a keyframe, living or culled; its number.")
+          "New keyframes belong to the map of a keyframe, living or culled; its number. Raises\n"
+          "StateError if no map holds it.")
       .def(
           "erase_map",
           [](Map& self, MapIndex which) {
@@ -260,7 +261,8 @@ void bind_changes(MapClass& map) {
            const auto lock = self.write_lock();
            return self.add_keyframe(std::move(frame), T_cw);
          },
-         "frame"_a, "T_cw"_a, Release(), "A new, unpublished keyframe with empty slots; its id.")
+         "frame"_a.none(false), "T_cw"_a, Release(),
+         "A new, unpublished keyframe with empty slots; its id.")
       .def("publish", writer(&Map::publish), "id"_a, Release(),
            "Make a keyframe part of the keyframe set.")
       .def("set_pose", writer(&Map::set_pose), "id"_a, "T_cw"_a, Release(),
@@ -353,8 +355,6 @@ void bind_local_map(py::module_& module) {
       .def_readonly("points", &LocalMap::points, "All points of the local keyframes, each once.")
       .def_readonly("reference_keyframe", &LocalMap::reference_keyframe,
                     "Shares most points with the frame; -1 without votes.");
-  module.def("refresh_associations", &refresh_associations, "map"_a, "frame"_a, Release(),
-             "Exchange replaced points of a frame, refresh positions, drop dead ones.");
   module.def("anchor_frame", &anchor_frame, "map"_a, "frame"_a, "keyframe"_a, Release(),
              "Make a frame's pose relative to a keyframe (living or culled) as it is now.");
   module.def(

@@ -8,6 +8,7 @@
 #include "base/parallel.hpp"
 #include "bindings/arrays.hpp"
 #include "bindings/bindings.hpp"
+#include "bindings/one_thread.hpp"
 #include "map/contents.hpp"
 #include "map/stored_map.hpp"
 #include "places/keyframe_index.hpp"
@@ -354,6 +355,7 @@ class MapRestorer {
   }
 
   void add(const py::dict& part, std::size_t n_keyframes) {
+    const OneThread::Use use(one_thread_, kRefusal);
     if (n_keyframes > stored_.keyframes.ids.size - frames_.size()) {
       throw MapFileError("there are keypoints of more keyframes than there are");
     }
@@ -362,11 +364,13 @@ class MapRestorer {
     Arrays arrays(part);
     auto n = static_cast<py::ssize_t>(offsets[end] - offsets[first]);
     const StoredKeypoints keypoints{first, end, read_keypoints(arrays, n)};
+    const std::size_t n_threads = threads_for(n_keyframes);
     const py::gil_scoped_release release;
     check_stored_keypoints(stored_, keypoints);
     frames_.resize(end);
     try {
-      for_each_in_parallel(n_keyframes, [&](std::size_t i) { make_frame(keypoints, first + i); });
+      for_each_in_parallel(n_keyframes, n_threads,
+                           [&](std::size_t i) { make_frame(keypoints, first + i); });
     } catch (...) {
       frames_.resize(first);
       throw;
@@ -374,6 +378,7 @@ class MapRestorer {
   }
 
   void finish(Map& map, KeyFrameIndex* index) {
+    const OneThread::Use use(one_thread_, kRefusal);
     const py::gil_scoped_release release;
     if (frames_.size() != stored_.keyframes.ids.size) {
       throw MapFileError("the keypoints of some keyframes are missing");
@@ -386,6 +391,8 @@ class MapRestorer {
   }
 
  private:
+  static constexpr const char* kRefusal = "this map is being restored in another thread";
+
   void make_frame(const StoredKeypoints& keypoints, std::size_t row) {
     const std::shared_ptr<Frame> frame = restore_frame(stored_, keypoints, row, cameras_, scales_);
     if (vocabulary_ && words_fit_ && keypoints.columns.words) {
@@ -403,6 +410,7 @@ class MapRestorer {
     frames_[row] = frame;
   }
 
+  OneThread one_thread_;
   Arrays arrays_;
   StoredMap stored_;
   std::shared_ptr<const Vocabulary> vocabulary_;

@@ -132,29 +132,6 @@ void bind_by_words(py::module_& module) {
 
 void bind_for_initialization(py::module_& module) {
   module.def(
-      "match_for_initialization",
-      [](const std::shared_ptr<Frame>& initial, const std::shared_ptr<Frame>& current,
-         const PositionArray& previous, float window, float ratio) {
-        if (previous.ndim() != 2 || previous.shape(1) != 2) {
-          throw py::value_error("previous must be an (n, 2) array of float32 pixels");
-        }
-        std::vector<Eigen::Vector2f> positions(static_cast<std::size_t>(previous.shape(0)));
-        for (std::size_t i = 0; i < positions.size(); ++i) {
-          positions[i] = {previous.data()[2 * i], previous.data()[2 * i + 1]};
-        }
-        const std::vector<int> matches = released(
-            [&] { return match_for_initialization(*initial, *current, positions, window, ratio); });
-        return py::make_tuple(
-            copy_to_array<std::int32_t>(matches.data(), {static_cast<py::ssize_t>(matches.size())}),
-            copy_to_array<float>(positions.data(),
-                                 {static_cast<py::ssize_t>(positions.size()), 2}));
-      },
-      "initial"_a, "current"_a, "previous"_a, "window"_a = 100.0F, "ratio"_a = 0.9F,
-      "Search the level-0 keypoints of `initial` in `current` around `previous`, (n, 2) pixels.\n\n"
-      "Returns (matches, previous): (n,) int32 index in `current` or -1, and the positions to\n"
-      "search around next time, (n, 2) float32.");
-
-  module.def(
       "match_views",
       [](const std::shared_ptr<Frame>& first, const std::shared_ptr<Frame>& current,
          const PositionArray& expected, float window, float ratio, int level_difference,
@@ -172,8 +149,8 @@ void bind_for_initialization(py::module_& module) {
         return copy_to_array<std::int32_t>(matches.data(),
                                            {static_cast<py::ssize_t>(matches.size())});
       },
-      "first"_a, "current"_a, "expected"_a, "window"_a = ViewMatchOptions{}.window,
-      "ratio"_a = ViewMatchOptions{}.ratio,
+      "first"_a.none(false), "current"_a.none(false), "expected"_a,
+      "window"_a = ViewMatchOptions{}.window, "ratio"_a = ViewMatchOptions{}.ratio,
       "level_difference"_a = ViewMatchOptions{}.level_difference,
       "highest_level"_a = ViewMatchOptions{}.highest_level,
       "Search the keypoints of `first` up to a level in `current` around `expected`, (n, 2)\n"
@@ -181,15 +158,6 @@ void bind_for_initialization(py::module_& module) {
 }
 
 void bind_for_triangulation(py::module_& module) {
-  module.def(
-      "match_for_triangulation",
-      [](const Map& map, KeyFrameId a, KeyFrameId b) {
-        return to_pair_array(released([&] { return match_for_triangulation(map, a, b); }));
-      },
-      "map"_a, "a"_a, "b"_a,
-      "Features without points of two keyframes that agree with the epipolar geometry.\n\n"
-      "Returns (n, 2) int64: feature of a (ascending), feature of b; one to one.");
-
   py::class_<NewPointOptions>(module, "NewPointOptions", "Options of create_new_points().")
       .def(py::init([](bool monocular, std::size_t n_neighbours) {
              return NewPointOptions{monocular, n_neighbours};
@@ -215,15 +183,6 @@ void bind_for_triangulation(py::module_& module) {
 }
 
 void bind_fuse(py::module_& module) {
-  module.def(
-      "fuse_points",
-      [](Map& map, KeyFrameId keyframe, const IdArray& points, float radius_factor) {
-        const auto ids = to_point_ids(points);
-        return released([&] { return fuse_points(map, keyframe, ids, radius_factor); });
-      },
-      "map"_a, "keyframe"_a, "points"_a, "radius_factor"_a = 3.0F,
-      "Project points, (n,) int64 ids, into a keyframe and merge them with what they meet there.\n"
-      "\nOf two points the one with more observations survives. Returns the number of changes.");
   module.def("fuse_with_neighbours", &fuse_with_neighbours, "map"_a, "current"_a, "n_neighbours"_a,
              Release(),
              "Fuse a keyframe's points with those of its first and second neighbours, both ways;\n"

@@ -285,7 +285,8 @@ void bind_full_bundle_steps(py::module_& module) {
              py::call_guard<py::gil_scoped_release>(),
              "Copy all keyframes of a map (-1: the active one) that points tie to each other, and\n"
              "these points.\n\n"
-             "First of three steps, between which the map may change. Takes the read lock.");
+             "First of the three steps of a full bundle adjustment, which refines them all and\n"
+             "erases no observation. The map may change between the steps. Takes the read lock.");
   module.def(
       "solve_full_bundle",
       [](GatheredBundle& bundle, const FullBundleOptions& options,
@@ -306,7 +307,7 @@ void bind_full_bundle_steps(py::module_& module) {
 }
 
 void bind_full_bundle(py::module_& module) {
-  py::class_<FullBundleOptions>(module, "FullBundleOptions", "How full_bundle_adjustment works.")
+  py::class_<FullBundleOptions>(module, "FullBundleOptions", "How solve_full_bundle works.")
       .def(py::init([](int iterations, bool robust, double max_seconds) {
              return FullBundleOptions{iterations, robust, max_seconds};
            }),
@@ -316,23 +317,6 @@ void bind_full_bundle(py::module_& module) {
       .def_readwrite("max_seconds", &FullBundleOptions::max_seconds,
                      "No step is begun that would probably end later; what was reached is used.\n"
                      "0: no limit, and results do not depend on the speed of the machine.");
-  py::class_<FullBundleResult>(module, "FullBundleResult", "What full_bundle_adjustment did.")
-      .def_readonly("n_keyframes", &FullBundleResult::n_keyframes,
-                    "Keyframes, fixed ones included.")
-      .def_readonly("n_points", &FullBundleResult::n_points, "Points refined.")
-      .def_readonly("n_observations", &FullBundleResult::n_observations, "Observations used.")
-      .def_readonly("committed", &FullBundleResult::committed, "Whether the map was changed.")
-      .def_readonly("summary", &FullBundleResult::summary, "Of the solver.");
-  module.def(
-      "full_bundle_adjustment",
-      [](Map& map, const FullBundleOptions& options, const std::shared_ptr<StopFlag>& abort,
-         int n_threads) { return full_bundle_adjustment(map, options, flag_of(abort), n_threads); },
-      "map"_a, py::arg_v("options", FullBundleOptions(), "FullBundleOptions()"),
-      "abort"_a = py::none(), "n_threads"_a = 1, py::call_guard<py::gil_scoped_release>(),
-      "Refine all keyframes (but 0), unpublished ones included, and all points.\n\n"
-      "gather_full_bundle, solve_full_bundle and commit_full_bundle in one call. After an\n"
-      "abort, or when the map was cleared meanwhile, the map stays as it was. No observation is\n"
-      "erased. Takes the map's locks for short sections only.");
   bind_full_bundle_steps(module);
 }
 

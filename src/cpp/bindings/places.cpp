@@ -145,12 +145,6 @@ void bind_words(py::module_& module) {
       py::arg("frame"), py::arg("vocabulary"), py::call_guard<py::gil_scoped_release>(),
       "Computes words and direct index of a frame that no other thread uses yet; a second call "
       "does nothing.");
-  module.def(
-      "words_of", [](const Frame& frame) { return frame.words; }, py::arg("frame"),
-      "The word vector of a described frame (a copy).");
-  module.def(
-      "direct_index_of", [](const Frame& frame) { return frame.direct_index; }, py::arg("frame"),
-      "The direct index of a described frame (a copy).");
 }
 
 void bind_vocabulary_types(py::module_& module) {
@@ -192,7 +186,8 @@ void bind_vocabulary_types(py::module_& module) {
       .def_readwrite("minimum_weight", &TrainingOptions::minimum_weight,
                      "Words below it are stopped (weight 0).")
       .def_readwrite("n_threads", &TrainingOptions::n_threads,
-                     "0: one per core. The result does not depend on it.")
+                     "0: one per core, at most OMP_NUM_THREADS. The result does not depend "
+                     "on it.")
       .def("check", &TrainingOptions::check, "Raises SettingsError when one is out of range.");
 }
 
@@ -278,8 +273,8 @@ void bind_keyframe_index(py::module_& module) {
       "reach. 1 without neighbours.");
   module.def("find_loop_candidates", &find_loop_candidates, py::arg("index"), py::arg("map"),
              py::arg("id"), py::arg("min_score"), unlocked(),
-             "Keyframes not connected to this one that look like it, by ascending id. Raises "
-             "StateError when it is dead.");
+             "Keyframes not connected to this one that look like it, by ascending id; none when it "
+             "has died.");
   module.def("find_relocalization_candidates", &find_relocalization_candidates, py::arg("index"),
              py::arg("map"), py::arg("frame"), unlocked(),
              "Keyframes that look like a described frame, by ascending id.");

@@ -22,6 +22,12 @@ struct Pinhole {
     const double inverse_z = 1.0 / p_c.z();
     return {fx * p_c.x() * inverse_z + cx, fy * p_c.y() * inverse_z + cy};
   }
+  /// The calibration matrix K.
+  Eigen::Matrix3d matrix() const {
+    Eigen::Matrix3d K;
+    K << fx, 0, cx, 0, fy, cy, 0, 0, 1;
+    return K;
+  }
   /// The point at depth z [m] seen at pixel (u, v).
   Eigen::Vector3d unproject(double u, double v, double z) const {
     return {(u - cx) * z / fx, (v - cy) * z / fy, z};

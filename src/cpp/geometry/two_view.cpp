@@ -94,12 +94,6 @@ std::vector<MotionSupport> check_motions(const std::vector<Motion>& motions,
   return supports;
 }
 
-Eigen::Matrix3d calibration_matrix(const Pinhole& pinhole) {
-  Eigen::Matrix3d K;
-  K << pinhole.fx, 0, pinhole.cx, 0, pinhole.fy, pinhole.cy, 0, 0, 1;
-  return K;
-}
-
 /// From one entry per match to one per initial keypoint.
 template <class Item>
 std::vector<Item> spread(const std::vector<Item>& per_match, const std::vector<int>& matches,
@@ -147,7 +141,7 @@ std::vector<TwoViewMotion> alternatives(const std::vector<Motion>& motions,
 /// Chooses among the motions of the chosen model and completes the result.
 void recover_motion(const Models& models, const PointPairs& pairs, const TwoViewInput& input,
                     const TwoViewOptions& options, WorkerThread* helper, TwoViewResult& result) {
-  const Eigen::Matrix3d K = calibration_matrix(input.pinhole);
+  const Eigen::Matrix3d K = input.pinhole.matrix();
   const bool planar = result.model == TwoViewModel::homography;
   const ScoredModel& model = planar ? models.homography : models.fundamental;
   const std::vector<Motion> motions =

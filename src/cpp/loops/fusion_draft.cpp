@@ -6,10 +6,6 @@
 namespace orbslam {
 namespace {
 
-bool precedes(const Observation& observation, KeyFrameId keyframe) {
-  return observation.keyframe < keyframe;
-}
-
 bool is_observed(const std::vector<Observation>& observations, KeyFrameId keyframe) {
   const auto at = std::lower_bound(observations.begin(), observations.end(), keyframe, precedes);
   return at != observations.end() && at->keyframe == keyframe;

@@ -29,7 +29,7 @@ FollowedMap follow_map(const Map& map, TrackedFrame& frame) {
   FollowedMap followed;
   const auto lock = map.read_lock();
   followed.stretched = move_with_anchor(map, frame);
-  refresh_associations_locked(map, frame);
+  refresh_associations(map, frame);
   for (const MapPointId id : frame.map_points) {
     if (const MapPoint* point = map.find(id)) followed.points.push_back(*point);
   }

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "map/anchor.hpp"
+#include "map/keyframe_tally.hpp"
 
 namespace orbslam {
 namespace {
@@ -15,7 +16,7 @@ constexpr std::size_t kTriedNeighbours = 10;
 
 }  // namespace
 
-void refresh_associations_locked(const Map& map, TrackedFrame& frame) {
+void refresh_associations(const Map& map, TrackedFrame& frame) {
   for (std::size_t i = 0; i < frame.map_points.size(); ++i) {
     const MapPointId id = frame.map_points[i];
     if (!id.valid() || is_temporary(id)) continue;
@@ -39,17 +40,25 @@ void refresh_associations_locked(const Map& map, TrackedFrame& frame) {
 
 namespace {
 
-/// A set of ids as one bit each: small enough to stay in the cache for any local map, emptied in
-/// time proportional to its content.
+/// A set of ids as one bit each: small enough to stay in the cache for any local map. Its owner
+/// keeps the bits, all zero; when the set goes, also by an exception, they are zero again.
 template <class IdType>
 class IdBits {
  public:
+  explicit IdBits(std::vector<std::uint64_t>& words) : words_(words) {}
+  ~IdBits() {
+    for (const std::size_t word : used_) words_[word] = 0;
+  }
+  IdBits(const IdBits&) = delete;
+  IdBits& operator=(const IdBits&) = delete;
+
   /// False when the id was there already.
   bool insert(IdType id) {
     const auto word = static_cast<std::size_t>(id.value) / 64;
     const std::uint64_t mask = std::uint64_t{1} << (id.value % 64);
     if (word >= words_.size()) words_.resize(word + 1 + word / 4, 0);
     if (words_[word] & mask) return false;
+    if (words_[word] == 0) used_.push_back(word);
     words_[word] |= mask;
     return true;
   }
@@ -57,37 +66,31 @@ class IdBits {
     const auto word = static_cast<std::size_t>(id.value) / 64;
     return word < words_.size() && (words_[word] >> (id.value % 64) & 1) != 0;
   }
-  void clear(const std::vector<IdType>& content) {
-    for (const IdType id : content) words_[static_cast<std::size_t>(id.value) / 64] = 0;
-  }
 
  private:
-  std::vector<std::uint64_t> words_;
+  std::vector<std::uint64_t>& words_;
+  std::vector<std::size_t> used_;
 };
 
 /// Number of the frame's points that each keyframe observes; ascending ids.
 std::vector<std::pair<KeyFrameId, int>> count_votes(const Map& map, const TrackedFrame& frame) {
-  thread_local std::vector<int> votes;  // per keyframe id; all zero between calls
-  std::vector<std::pair<KeyFrameId, int>> result;
+  thread_local std::vector<int> counters;
+  KeyFrameTally votes(counters);
   for (const MapPointId id : frame.map_points) {
     const MapPoint* point = map.find(id);
     if (!point) continue;
-    for (const Observation& observation : point->observations) {
-      const auto k = static_cast<std::size_t>(observation.keyframe.value);
-      if (k >= votes.size()) votes.resize(k + 1 + k / 4, 0);
-      if (votes[k]++ == 0) result.emplace_back(observation.keyframe, 0);
-    }
+    for (const Observation& observation : point->observations) votes.add(observation.keyframe);
   }
+  std::vector<std::pair<KeyFrameId, int>> result;
+  for (const KeyFrameId id : votes.counted()) result.emplace_back(id, votes.of(id));
   std::sort(result.begin(), result.end());
-  for (auto& [keyframe, count] : result) {
-    std::swap(count, votes[static_cast<std::size_t>(keyframe.value)]);
-  }
   return result;
 }
 
 /// Adds for each voted keyframe at most one neighbour, one child and the parent.
 void extend(const Map& map, std::vector<KeyFrameId>& keyframes) {
-  thread_local IdBits<KeyFrameId> listed;
+  thread_local std::vector<std::uint64_t> bits;
+  IdBits<KeyFrameId> listed(bits);
   for (const KeyFrameId id : keyframes) listed.insert(id);
   const auto add = [&](KeyFrameId id) {
     if (!map.find(id) || !listed.insert(id)) return false;
@@ -105,12 +108,12 @@ void extend(const Map& map, std::vector<KeyFrameId>& keyframes) {
     }
     add(voted.parent);
   }
-  listed.clear(keyframes);
 }
 
 void collect_points(const Map& map, const std::vector<KeyFrameId>& keyframes, PointBatch& points) {
-  thread_local IdBits<MapPointId> collected;
+  thread_local std::vector<std::uint64_t> bits;
   thread_local std::vector<const MapPoint*> found;
+  IdBits<MapPointId> collected(bits);
   found.clear();
   for (const KeyFrameId id : keyframes) {
     for (const MapPointId point_id : map.find(id)->map_points) {
@@ -123,22 +126,16 @@ void collect_points(const Map& map, const std::vector<KeyFrameId>& keyframes, Po
   }
   points.reserve(found.size());
   for (const MapPoint* point : found) points.push_back(*point);
-  collected.clear(points.ids);
 }
 
 }  // namespace
-
-void refresh_associations(const Map& map, TrackedFrame& frame) {
-  const auto lock = map.read_lock();
-  refresh_associations_locked(map, frame);
-}
 
 LocalMap select_local_map(const Map& map, TrackedFrame& frame) {
   LocalMap local;
   const auto lock = map.read_lock();
   // Predicted in a map that has moved since: from here on the frame is in the present one.
   if (frame.anchor.big_change != map.big_change_index()) move_with_anchor(map, frame);
-  refresh_associations_locked(map, frame);
+  refresh_associations(map, frame);
   int most = 0;
   for (const auto& [keyframe, votes] : count_votes(map, frame)) {
     local.keyframes.push_back(keyframe);

@@ -17,10 +17,8 @@ struct LocalMap {
 
 /// Exchanges replaced points of the frame for their living successors, refreshes the copies of
 /// positions, and drops associations with dead points. Of two keypoints whose points were merged
-/// one keeps the survivor. Temporary points stay. Takes the read lock.
+/// one keeps the survivor. Temporary points stay. The caller holds a lock.
 void refresh_associations(const Map& map, TrackedFrame& frame);
-/// The same; the caller holds a lock.
-void refresh_associations_locked(const Map& map, TrackedFrame& frame);
 
 /// Keyframes that observe points of the frame (each point votes for its observers, ascending ids),
 /// then for each of these at most one of its ten best neighbours, one child and the parent, until

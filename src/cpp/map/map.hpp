@@ -201,10 +201,8 @@ class Map {
   /// gives the keyframe its parent (the strongest neighbour that is not its descendant) the first
   /// time that it has neighbours.
   void update_connections(KeyFrameId id);
-  /// The first n of KeyFrame::neighbours.
+  /// The first n of KeyFrame::neighbours; none of a keyframe that was culled, maybe just now.
   std::vector<KeyFrameId> best_neighbours(KeyFrameId id, std::size_t n) const;
-  /// The part of KeyFrame::neighbours with weight >= w.
-  std::vector<KeyFrameId> neighbours_by_weight(KeyFrameId id, int w) const;
   int weight(KeyFrameId a, KeyFrameId b) const;
 
   // ---- the map as a whole ----------------------------------------------------------------------

@@ -2,6 +2,7 @@
 // Map: the covisibility graph. Weights are kept symmetric: every change is made on both ends.
 #include <algorithm>
 
+#include "map/keyframe_tally.hpp"
 #include "map/map.hpp"
 
 namespace orbslam {
@@ -44,28 +45,25 @@ void Map::sort_neighbours(KeyFrame& owner) {
 void Map::update_connections(KeyFrameId id) {
   KeyFrame& updated = keyframe(id);
 
-  thread_local std::vector<int> shared;  // per keyframe id; all zero between calls
-  thread_local std::vector<KeyFrameId> counted;
-  shared.resize(static_cast<std::size_t>(next_keyframe_.value), 0);
-  counted.clear();
+  thread_local std::vector<int> counters;
+  KeyFrameTally shared(counters);
   for (const MapPointId point_id : updated.map_points) {
     const MapPoint* seen = find(point_id);
     if (!seen) continue;
     for (const Observation& observation : seen->observations) {
-      if (observation.keyframe == id) continue;
-      int& count = shared[static_cast<std::size_t>(observation.keyframe.value)];
-      if (count++ == 0) counted.push_back(observation.keyframe);
+      if (observation.keyframe != id) shared.add(observation.keyframe);
     }
   }
 
   // Neighbours that share nothing any more get the weight 0 along with the others.
+  std::vector<KeyFrameId> others = shared.counted();
   for (const auto& [other, weight] : updated.weights) {
-    if (shared[static_cast<std::size_t>(other.value)] == 0) counted.push_back(other);
+    if (shared.of(other) == 0) others.push_back(other);
   }
-  std::sort(counted.begin(), counted.end());
+  std::sort(others.begin(), others.end());
   bool changed = false;
-  for (const KeyFrameId other : counted) {
-    int& count = shared[static_cast<std::size_t>(other.value)];
+  for (const KeyFrameId other : others) {
+    const int count = shared.of(other);
     KeyFrame& neighbour = keyframe(other);
     if (set_weight(updated, other, count)) {
       set_weight(neighbour, id, count);
@@ -73,7 +71,6 @@ void Map::update_connections(KeyFrameId id) {
       keyframes_.touch(other);
       changed = true;
     }
-    count = 0;
   }
   if (changed) {
     sort_neighbours(updated);
@@ -96,16 +93,10 @@ void Map::forget_covisibility(KeyFrame& dying) {
 }
 
 std::vector<KeyFrameId> Map::best_neighbours(KeyFrameId id, std::size_t n) const {
-  const auto& all = keyframe(id).neighbours;
+  const KeyFrame* owner = find(id);
+  if (!owner) return {};
+  const auto& all = owner->neighbours;
   return {all.begin(), all.begin() + static_cast<std::ptrdiff_t>(std::min(n, all.size()))};
-}
-
-std::vector<KeyFrameId> Map::neighbours_by_weight(KeyFrameId id, int w) const {
-  const KeyFrame& owner = keyframe(id);
-  const auto end =
-      std::find_if(owner.neighbours.begin(), owner.neighbours.end(),
-                   [&](KeyFrameId neighbour) { return owner.weights.at(neighbour) < w; });
-  return {owner.neighbours.begin(), end};
 }
 
 int Map::weight(KeyFrameId a, KeyFrameId b) const {

@@ -16,6 +16,11 @@ struct Observation {
   bool has_depth = false;   ///< a stereo observation counts 2, a monocular one 1
 };
 
+/// The order of a point's observations, for binary searches.
+inline bool precedes(const Observation& observation, KeyFrameId keyframe) {
+  return observation.keyframe < keyframe;
+}
+
 /// Where a point is, and what follows from that and the poses of its observers.
 struct PointGeometry {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();

@@ -12,10 +12,6 @@ namespace {
 /// A point that loses an observation dies when its weighted count is not above this.
 constexpr int kDyingCount = 2;
 
-bool precedes(const Observation& observation, KeyFrameId keyframe) {
-  return observation.keyframe < keyframe;
-}
-
 int weight_of(const Observation& observation) { return observation.has_depth ? 2 : 1; }
 
 }  // namespace

@@ -63,13 +63,6 @@ EdgeSnapshot snapshot_edges(const Map& map, int min_weight, MapIndex which) {
   return snapshot;
 }
 
-PointSnapshot snapshot_points(const Map& map, MapIndex which) {
-  PointSnapshot snapshot;
-  const auto lock = map.read_lock();
-  copy_points(map, chosen(map, which), snapshot);
-  return snapshot;
-}
-
 MapSnapshot snapshot_map(const Map& map, MapIndex which) {
   MapSnapshot snapshot;
   const auto lock = map.read_lock();

@@ -59,8 +59,6 @@ KeyFrameSnapshot snapshot_keyframes(const Map& map, MapIndex which = kNoMap);
 /// Edges between published keyframes with weight >= min_weight.
 EdgeSnapshot snapshot_edges(const Map& map, int min_weight = Map::kCovisibilityThreshold,
                             MapIndex which = kNoMap);
-/// The points.
-PointSnapshot snapshot_points(const Map& map, MapIndex which = kNoMap);
 /// The observations of the points, those by unpublished keyframes included.
 ObservationSnapshot snapshot_observations(const Map& map, MapIndex which = kNoMap);
 /// Keyframes, loop edges and points together.

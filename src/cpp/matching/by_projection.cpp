@@ -16,7 +16,6 @@ namespace orbslam {
 namespace {
 
 constexpr int kAllBits = 256;
-constexpr double kLeastViewCosine = 0.5;  // 60 degrees from the mean direction
 constexpr float kLocalMapRatio = 0.8F;
 constexpr std::int32_t kUnmatched = -1;
 
@@ -186,13 +185,13 @@ void look_at(const Projector& projector, const ScalePyramid& scales, const Point
   const Eigen::Vector3d ray = points.positions[i] - projector.center();
   const double distance = ray.norm();
   if (!in_scale_range(distance, points.min_distances[i], points.max_distances[i])) return;
-  const double cosine = ray.dot(points.mean_directions[i]) / distance;
-  if (!(cosine >= kLeastViewCosine)) return;
+  const double along = ray.dot(points.mean_directions[i]);
+  if (!seen_from_near_direction(along, distance)) return;
 
   view.u = static_cast<float>(image.u);
   view.v = static_cast<float>(image.v);
   view.right_u = static_cast<float>(image.right_u);
-  view.view_cosine = static_cast<float>(cosine);
+  view.view_cosine = static_cast<float>(along / distance);
   view.level = scales.predict_level(points.max_distances[i], distance);
   view.visible = true;
 }

@@ -7,17 +7,6 @@
 
 namespace orbslam {
 
-/// Searches the level-0 keypoints of `initial` among those of `current`, each within `window`
-/// pixels of its entry in `previous` (one position per initial keypoint; updated to the matched
-/// positions, so that the search follows a feature over several frames). A match has at most
-/// kDescriptorLow differing bits and fewer than `ratio` times those of the second best; of two
-/// initial keypoints that want the same one the more similar gets it. Matches whose rotation
-/// disagrees with the majority are dropped. Returns per initial keypoint the index in `current` or
-/// -1. Throws StateError when `previous` has another length. See docs/method/start.md#one-camera.
-std::vector<int> match_for_initialization(const Frame& initial, const Frame& current,
-                                          std::vector<Eigen::Vector2f>& previous, float window,
-                                          float ratio);
-
 /// How two views of a scene that is not known yet are compared.
 struct ViewMatchOptions {
   float window = 100;        ///< half width around each expected position, level-0 pixels
@@ -29,10 +18,11 @@ struct ViewMatchOptions {
 /// Searches keypoints of `first` on levels up to `highest_level` among those of `current`, each
 /// within `window` pixels of its expected position (one per keypoint of `first`). One corner may
 /// give keypoints on several levels, so the second best counts only more than 2 pixels of its
-/// level away from the best. Else as match_for_initialization: at most kDescriptorLow bits, one to
-/// one, agreeing with the majority's rotation. Returns per keypoint of `first` the index in
-/// `current` or -1. Throws StateError when `expected` has another length. See
-/// docs/method/start.md#matches-between-views.
+/// level away from the best. A match has at most kDescriptorLow differing bits and fewer than
+/// `ratio` times those of the second best; of two keypoints of `first` that want the same one the
+/// more similar gets it; matches whose rotation disagrees with the majority are dropped. Returns
+/// per keypoint of `first` the index in `current` or -1. Throws StateError when `expected` has
+/// another length. See docs/method/start.md#matches-between-views.
 std::vector<int> match_views(const Frame& first, const Frame& current,
                              const std::vector<Eigen::Vector2f>& expected,
                              const ViewMatchOptions& options);

@@ -38,19 +38,13 @@ std::optional<FreeFeatures> gather(const Map& map, KeyFrameId id) {
   return view;
 }
 
-Eigen::Matrix3d calibration_matrix(const Pinhole& pinhole) {
-  Eigen::Matrix3d K;
-  K << pinhole.fx, 0, pinhole.cx, 0, pinhole.fy, pinhole.cy, 0, 0, 1;
-  return K;
-}
-
 // What the relative pose of two cameras says about a feature of 2 for a given feature of 1.
 class EpipolarGeometry {
  public:
   EpipolarGeometry(const FreeFeatures& a, const FreeFeatures& b) : scales_(*b.frame->scales) {
     const Pinhole& pinhole_b = b.frame->camera->pinhole();
-    F_ = fundamental_matrix(a.T_cw, b.T_cw, calibration_matrix(a.frame->camera->pinhole()),
-                            calibration_matrix(pinhole_b));
+    F_ =
+        fundamental_matrix(a.T_cw, b.T_cw, a.frame->camera->pinhole().matrix(), pinhole_b.matrix());
     const Eigen::Vector3d center = b.T_cw * a.T_cw.center();
     if (center.z() > 0) epipole_ = pinhole_b.project(center);
   }

@@ -16,7 +16,7 @@ constexpr double kFuseMonoGate = 5.99;         // chi-square, 95 %, 2 degrees of
 constexpr double kFuseStereoGate = 7.8;        // 3 degrees of freedom, rounded as in the original
 constexpr std::size_t kSecondDegree = 5;       // neighbours of a neighbour that take part
 constexpr std::size_t kRefreshedAtOnce = 200;  // points per write section, to keep it short
-constexpr float kNeighbourRadius = 3.0F;
+constexpr float kNeighbourRadius = 3.0F;       // pixels of the predicted level
 
 // A keyframe as the search sees it, copied under the lock.
 struct Target {
@@ -46,7 +46,7 @@ bool reprojection_agrees(const Frame& frame, std::size_t keypoint, const ImagePo
 // The batch's points that are not `observed` in the target and match one of its keypoints, in the
 // order of the batch.
 void find_fusions(const PointBatch& points, const std::vector<std::uint8_t>& observed,
-                  const Target& target, float radius_factor, std::vector<Fusion>& fusions) {
+                  const Target& target, std::vector<Fusion>& fusions) {
   thread_local std::vector<std::uint32_t> candidates;
   const Frame& frame = *target.frame;
   const Projector projector(frame, target.T_cw);
@@ -58,7 +58,7 @@ void find_fusions(const PointBatch& points, const std::vector<std::uint8_t>& obs
     const auto& [image, level] = view;
     frame.grid.features_in_area(
         frame.keypoints, static_cast<float>(image.u), static_cast<float>(image.v),
-        radius_factor * frame.scales->scale(level), level - 1, level, candidates);
+        kNeighbourRadius * frame.scales->scale(level), level - 1, level, candidates);
     int best = kDescriptorLow + 1;
     std::uint32_t match = 0;
     for (const std::uint32_t candidate : candidates) {
@@ -73,12 +73,9 @@ void find_fusions(const PointBatch& points, const std::vector<std::uint8_t>& obs
   }
 }
 
-// Whether points that gain an observation are refreshed at once or all together afterwards.
-enum class Refresh { kNow, kLater };
-
 // Under the write lock: only what still stands is changed. Returns the number of changes.
 int apply_fusions(Map& map, const Target& target, const PointBatch& points,
-                  const std::vector<Fusion>& fusions, Refresh when) {
+                  const std::vector<Fusion>& fusions) {
   const KeyFrame* keyframe = map.find(target.id);
   if (!stands_at(keyframe, target.T_cw)) return 0;
   int changes = 0;
@@ -89,7 +86,6 @@ int apply_fusions(Map& map, const Target& target, const PointBatch& points,
     const MapPoint* present = map.find(keyframe->map_points[fusion.keypoint]);
     if (!present) {
       map.add_observation(id, target.id, fusion.keypoint);
-      if (when == Refresh::kNow) map.update_point(id);
     } else if (present->observation_count > point->observation_count) {
       map.replace_point(id, present->id);
     } else {
@@ -102,12 +98,12 @@ int apply_fusions(Map& map, const Target& target, const PointBatch& points,
 
 // Searches and commits; the write lock is only taken when there is something to change.
 int fuse_into(Map& map, std::uint64_t epoch, const Target& target, const PointBatch& points,
-              const std::vector<std::uint8_t>& observed, float radius_factor, Refresh when) {
+              const std::vector<std::uint8_t>& observed) {
   thread_local std::vector<Fusion> fusions;
-  find_fusions(points, observed, target, radius_factor, fusions);
+  find_fusions(points, observed, target, fusions);
   if (fusions.empty()) return 0;
   const auto lock = map.write_lock();
-  return map.epoch() == epoch ? apply_fusions(map, target, points, fusions, when) : 0;
+  return map.epoch() == epoch ? apply_fusions(map, target, points, fusions) : 0;
 }
 
 // First and second degree neighbours, each once, without the keyframe itself.
@@ -150,7 +146,7 @@ int fuse_forward(Map& map, std::uint64_t epoch, const std::vector<KeyFrameId>& t
       const std::int32_t point = index.find(slot);
       if (point != PointIdIndex::kNone) observed[static_cast<std::size_t>(point)] = 1;
     }
-    changes += fuse_into(map, epoch, target, points, observed, kNeighbourRadius, Refresh::kLater);
+    changes += fuse_into(map, epoch, target, points, observed);
   }
   return changes;
 }
@@ -182,7 +178,7 @@ int fuse_backward(Map& map, std::uint64_t epoch, const std::vector<KeyFrameId>& 
     }
   }
   const std::vector<std::uint8_t> observed(points.size(), 0);
-  return fuse_into(map, epoch, target, points, observed, kNeighbourRadius, Refresh::kLater);
+  return fuse_into(map, epoch, target, points, observed);
 }
 
 // Descriptors, directions and scale ranges of the keyframe's points, then its connections.
@@ -210,8 +206,7 @@ void refresh(Map& map, std::uint64_t epoch, KeyFrameId id) {
 
 }  // namespace
 
-int fuse_points(Map& map, KeyFrameId keyframe, const std::vector<MapPointId>& points,
-                float radius_factor) {
+int fuse_points(Map& map, KeyFrameId keyframe, const std::vector<MapPointId>& points) {
   Target target{keyframe, nullptr, Pose()};
   PointBatch batch;
   std::uint64_t epoch = 0;
@@ -228,7 +223,7 @@ int fuse_points(Map& map, KeyFrameId keyframe, const std::vector<MapPointId>& po
     }
   }
   const std::vector<std::uint8_t> observed(batch.size(), 0);
-  return fuse_into(map, epoch, target, batch, observed, radius_factor, Refresh::kNow);
+  return fuse_into(map, epoch, target, batch, observed);
 }
 
 int fuse_with_neighbours(Map& map, KeyFrameId current, std::size_t n_neighbours) {

@@ -10,14 +10,14 @@ namespace orbslam {
 /// Projects the living points among `points` that the keyframe does not observe yet into it; where
 /// a keypoint matches, the point is added to it or merged with the point that is there. Of two
 /// points the one with more observations survives, of equal ones the projected one. A point that
-/// the keyframe should show (expect_in_keyframe()) is searched within `radius_factor` pixels of its
-/// predicted level, on that level or the next finer one; of the keypoints that pass the chi-square
+/// the keyframe should show (expect_in_keyframe()) is searched within 3 pixels of its predicted
+/// level, on that level or the next finer one; of the keypoints that pass the chi-square
 /// gate of its reprojection error the one with the most similar descriptor matches, unless more
 /// than kDescriptorLow bits differ. The search runs without a lock on copies, the changes are made
 /// in one write section after checking that everything still stands: map not cleared, keyframe
-/// neither dead nor moved, point alive. Returns the number of changes, 0 for a dead keyframe.
-int fuse_points(Map& map, KeyFrameId keyframe, const std::vector<MapPointId>& points,
-                float radius_factor = 3.0F);
+/// neither dead nor moved, point alive. Descriptors, directions and scale ranges are left to be
+/// refreshed. Returns the number of changes, 0 for a dead keyframe.
+int fuse_points(Map& map, KeyFrameId keyframe, const std::vector<MapPointId>& points);
 
 /// Fuses the points of `current` with those of its best `n_neighbours` covisible keyframes (10, for
 /// a single camera 20) and of five neighbours of each, as fuse_points() does: its points into all

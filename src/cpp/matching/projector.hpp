@@ -64,6 +64,13 @@ inline bool in_scale_range(double distance, double min_distance, double max_dist
   return distance >= kNearestFactor * min_distance && distance <= kFarthestFactor * max_distance;
 }
 
+/// Whether a point is seen from at most 60 degrees off its mean viewing direction; `along` is the
+/// part of the ray from the camera in that direction.
+inline bool seen_from_near_direction(double along, double distance) {
+  constexpr double kLeastViewCosine = 0.5;
+  return along >= kLeastViewCosine * distance;
+}
+
 /// Where a keyframe should show a point, and on which level of its pyramid.
 struct ExpectedView {
   ImagePoint image;
@@ -74,12 +81,11 @@ struct ExpectedView {
 /// or more than 60 degrees from its mean viewing direction.
 inline bool expect_in_keyframe(const Projector& projector, const Frame& frame,
                                const PointBatch& points, std::size_t i, ExpectedView& view) {
-  constexpr double kLeastViewCosine = 0.5;
   if (!projector.project_into_keyframe(points.positions[i], view.image)) return false;
   const Eigen::Vector3d ray = points.positions[i] - projector.center();
   const double distance = ray.norm();
   if (!in_scale_range(distance, points.min_distances[i], points.max_distances[i])) return false;
-  if (!(ray.dot(points.mean_directions[i]) >= kLeastViewCosine * distance)) return false;
+  if (!seen_from_near_direction(ray.dot(points.mean_directions[i]), distance)) return false;
   view.level = frame.scales->predict_level(points.max_distances[i], distance);
   return true;
 }

@@ -61,7 +61,7 @@ int FrameSightings::settle(const Map& map, TrajectoryRecorder& recorder, std::si
   };
   std::vector<Task> tasks;
   for (auto it = frames_.begin(); it != end; ++it) tasks.push_back({it->first, &it->second, {}});
-  for_each_in_parallel(tasks.size(), [&](std::size_t i) {
+  for_each_in_parallel(tasks.size(), threads_for(tasks.size()), [&](std::size_t i) {
     tasks[i].T_cw = settled_pose(map, recorder, tasks[i].frame, *tasks[i].sightings);
   });
   int n_settled = 0;

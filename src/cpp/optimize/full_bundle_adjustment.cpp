@@ -42,16 +42,4 @@ BundleSummary solve_full_bundle(GatheredBundle& bundle, const FullBundleOptions&
   return summary;
 }
 
-FullBundleResult full_bundle_adjustment(Map& map, const FullBundleOptions& options,
-                                        const std::atomic<bool>* abort, int n_threads) {
-  FullBundleResult result;
-  GatheredBundle bundle = gather_full_bundle(map);
-  result.n_keyframes = static_cast<int>(bundle.keyframes.size());
-  result.n_points = static_cast<int>(bundle.points.size());
-  result.n_observations = static_cast<int>(bundle.problem.observations.size());
-  result.summary = solve_full_bundle(bundle, options, abort, n_threads);
-  result.committed = commit_full_bundle(map, bundle).committed;
-  return result;
-}
-
 }  // namespace orbslam

@@ -17,35 +17,22 @@ struct FullBundleOptions {
   double max_seconds = 0;
 };
 
-struct FullBundleResult {
-  int n_keyframes = 0;  ///< cameras, fixed ones included
-  int n_points = 0, n_observations = 0;
-  bool committed = false;  ///< the map was changed
-  BundleSummary summary;
-};
-
-/// Full bundle adjustment: refines all keyframes, unpublished ones included, and all points; the
-/// first keyframe is fixed and no observation is erased. One after the other the three steps below.
-/// `abort` is polled once per iteration; nullptr: never. After an abort, or when the map was
-/// cleared meanwhile, the map stays as it was. See
-/// docs/method/adjustment.md#full-bundle-adjustment.
-FullBundleResult full_bundle_adjustment(Map& map, const FullBundleOptions& options,
-                                        const std::atomic<bool>* abort, int n_threads = 1);
-
-// Its steps, for those that let the map change between them: after a loop, tracking and mapping go
-// on while it is solved. See docs/method/loops.md#after-a-loop.
+// Full bundle adjustment refines all keyframes, unpublished ones included, and all points; no
+// observation is erased. Its steps let the map change between them: after a loop, tracking and
+// mapping go on while it is solved. See docs/method/adjustment.md#full-bundle-adjustment and
+// docs/method/loops.md#after-a-loop.
 
 /// All keyframes of a map (kNoMap: the active one) that are tied to each other by points, and these
-/// points. Others (a keyframe that
-/// was just inserted and has not been processed) are left out: nothing says where they are relative
-/// to the rest. If the map falls apart, the part with most keyframes is taken. The first keyframe
-/// of the bundle is fixed: it is the root unless that one has lost its points. Takes the read
-/// lock in short sections, so that tracking does not wait for a large map; what changes between
-/// them is taken as it is found.
+/// points. Others (a keyframe that was just inserted and has not been processed) are left out:
+/// nothing says where they are relative to the rest. If the map falls apart, the part with most
+/// keyframes is taken. The first keyframe of the bundle is fixed: it is the root unless that one
+/// has lost its points. Takes the read lock in short sections, so that tracking does not wait for a
+/// large map; what changes between them is taken as it is found.
 GatheredBundle gather_full_bundle(const Map& map, MapIndex which = kNoMap);
 
 /// Solves a gathered bundle in place, without a lock. It counts as solved, and may be committed,
-/// unless there was no step that lowered the cost, the result is not finite or `abort` was raised.
+/// unless there was no step that lowered the cost, the result is not finite or `abort` was raised,
+/// which is polled once per iteration; nullptr: never.
 BundleSummary solve_full_bundle(GatheredBundle& bundle, const FullBundleOptions& options,
                                 const std::atomic<bool>* abort, int n_threads);
 

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
-#include <exception>
 #include <random>
-#include <thread>
+
+#include "base/parallel.hpp"
 
 namespace orbslam {
 namespace {
@@ -132,8 +132,7 @@ class KMeans {
   bool iterate() {
     previous_ = result.cluster_of;
     std::fill(counters_.begin(), counters_.end(), BitCounter());
-    run_on_threads(static_cast<int>(n_threads_),
-                   [this](int thread) { assign_part(static_cast<std::size_t>(thread)); });
+    for_each_in_parallel(n_threads_, n_threads_, [this](std::size_t part) { assign_part(part); });
     for (std::size_t i = n_clusters(); i < counters_.size(); ++i) {
       counters_[i % n_clusters()].add(counters_[i]);
     }
@@ -201,7 +200,7 @@ class KMeans {
   std::size_t n_threads_;
   std::vector<std::uint16_t> distances_;
   std::vector<std::uint8_t> previous_;
-  std::vector<BitCounter> counters_;  // per thread, per cluster
+  std::vector<BitCounter> counters_;  // per part, per cluster
 };
 
 }  // namespace
@@ -221,24 +220,6 @@ Clustering cluster_descriptors(const DescriptorSet& set, const ClusteringOptions
     if (!k_means.iterate() || !keep_going()) break;
   }
   return std::move(k_means.result);
-}
-
-void run_on_threads(int n, const std::function<void(int)>& work) {
-  std::vector<std::exception_ptr> errors(static_cast<std::size_t>(std::max(n, 1)));
-  const auto guarded = [&](int i) {
-    try {
-      work(i);
-    } catch (...) {
-      errors[static_cast<std::size_t>(i)] = std::current_exception();
-    }
-  };
-  std::vector<std::thread> threads;
-  for (int i = 1; i < n; ++i) threads.emplace_back(guarded, i);
-  guarded(0);
-  for (std::thread& thread : threads) thread.join();
-  for (const std::exception_ptr& error : errors) {
-    if (error) std::rethrow_exception(error);
-  }
 }
 
 }  // namespace orbslam

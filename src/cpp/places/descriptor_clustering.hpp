@@ -37,7 +37,4 @@ struct Clustering {
 Clustering cluster_descriptors(const DescriptorSet& set, const ClusteringOptions& options,
                                std::uint64_t seed, const std::function<bool()>& keep_going);
 
-/// Calls work(0) .. work(n - 1), each on its own thread; 0 on the calling one.
-void run_on_threads(int n, const std::function<void(int)>& work);
-
 }  // namespace orbslam

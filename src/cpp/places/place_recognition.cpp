@@ -2,9 +2,7 @@
 #include "places/place_recognition.hpp"
 
 #include <algorithm>
-#include <string>
 
-#include "base/errors.hpp"
 #include "places/vocabulary.hpp"
 
 namespace orbslam {
@@ -21,8 +19,7 @@ std::vector<PlaceCandidate> query_living(const KeyFrameIndex& index, const Map& 
                                          const WordVector& words, const PlaceQuery& query) {
   auto candidates = index.query(words, query, [&map](KeyFrameId id) {
     const auto lock = map.read_lock();
-    return map.find(id) == nullptr ? std::vector<KeyFrameId>()
-                                   : map.best_neighbours(id, KeyFrameIndex::kGroupNeighbours);
+    return map.best_neighbours(id, KeyFrameIndex::kGroupNeighbours);
   });
   const auto lock = map.read_lock();
   const auto is_dead = [&map](const PlaceCandidate& candidate) {
@@ -69,9 +66,7 @@ std::vector<PlaceCandidate> find_loop_candidates(const KeyFrameIndex& index, con
   {
     const auto lock = map.read_lock();
     const KeyFrame* keyframe = map.find(id);
-    if (keyframe == nullptr) {
-      throw StateError("keyframe " + std::to_string(id.value) + " is not in the map");
-    }
+    if (keyframe == nullptr) return {};
     frame = keyframe->frame;
     for (const auto& [neighbour, weight] : keyframe->weights) query.excluded.push_back(neighbour);
   }

@@ -20,7 +20,7 @@ void index_keyframe(KeyFrameIndex& index, const Map& map, KeyFrameId id);
 double lowest_neighbour_score(const Map& map, KeyFrameId id);
 
 /// Keyframes that may close a loop with this one: not connected to it, and at least as similar as
-/// `min_score`. Ascending ids, living ones only. Throws StateError when the keyframe is dead. See
+/// `min_score`. Ascending ids, living ones only; none when the keyframe has died. See
 /// docs/method/loops.md#detection.
 std::vector<PlaceCandidate> find_loop_candidates(const KeyFrameIndex& index, const Map& map,
                                                  KeyFrameId id, double min_score);

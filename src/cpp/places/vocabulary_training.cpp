@@ -8,6 +8,7 @@
 #include <unordered_map>
 
 #include "base/errors.hpp"
+#include "base/parallel.hpp"
 #include "places/descriptor_clustering.hpp"
 #include "places/vocabulary_builder.hpp"
 
@@ -32,7 +33,7 @@ struct Node {
 
 class TreeGrower {
  public:
-  TreeGrower(const TrainingSet& images, const TrainingOptions& options, int n_threads,
+  TreeGrower(const TrainingSet& images, const TrainingOptions& options, std::size_t n_threads,
              const TrainingProgress& progress)
       : options_(options), n_threads_(n_threads), progress_(progress) {
     std::unordered_map<Descriptor, std::size_t, DescriptorHash> place_of;
@@ -62,7 +63,9 @@ class TreeGrower {
       const auto small = std::stable_partition(level.begin(), level.end(), [](const Node* node) {
         return node->end - node->begin > kLargeNode;
       });
-      for (auto node = level.begin(); node != small; ++node) split(**node, n_threads_, 0);
+      for (auto node = level.begin(); node != small && !cancelled_; ++node) {
+        split(**node, n_threads_);
+      }
       split_side_by_side({small, level.end()});
       if (cancelled_) return false;
 
@@ -79,24 +82,22 @@ class TreeGrower {
 
  private:
   void split_side_by_side(const std::vector<Node*>& nodes) {
-    std::atomic<std::size_t> next{0};
-    run_on_threads(n_threads_, [&](int thread) {
-      for (std::size_t i = next++; i < nodes.size() && !cancelled_; i = next++) {
-        split(*nodes[i], 1, thread);
-      }
+    for_each_in_parallel(nodes.size(), n_threads_, [&](std::size_t i) {
+      if (!cancelled_) split(*nodes[i], 1);
     });
   }
 
-  void split(Node& node, int n_threads, int thread) {
+  void split(Node& node, std::size_t n_threads) {
     const ClusteringOptions clustering_options{options_.branching, options_.max_iterations,
-                                               options_.distance_power, n_threads};
+                                               options_.distance_power,
+                                               static_cast<int>(n_threads)};
     const std::size_t size = node.end - node.begin;
     const DescriptorSet set{&descriptors_[node.begin], &multiplicities_[node.begin], size};
-    const Clustering clustering = cluster_descriptors(
-        set, clustering_options, node.seed, [&] { return report(thread, n_threads > 1); });
+    const Clustering clustering = cluster_descriptors(set, clustering_options, node.seed,
+                                                      [&] { return report(n_threads > 1); });
     adopt(node, clustering);
     finished_ += size;
-    report(thread, false);
+    report(false);
   }
 
   /// Makes the children and sorts the node's descriptors by child, keeping their order.
@@ -131,11 +132,12 @@ class TreeGrower {
 
   /// False when cancelled. Only the calling thread may speak to the caller, and it does so when
   /// a thousandth more is done, or once per iteration while a large node takes all threads.
-  bool report(int thread, bool always) {
-    if (thread != 0 || !progress_) return !cancelled_;
+  bool report(bool always) {
+    if (cancelled_) return false;
+    if (!progress_ || std::this_thread::get_id() != caller_) return true;
     const double done = static_cast<double>(finished_) / static_cast<double>(level_size_);
     const double fraction = kTreeShare * (depth_ + done) / options_.depth;
-    if (!always && fraction < reported_ + 1e-3) return !cancelled_;
+    if (!always && fraction < reported_ + 1e-3) return true;
     reported_ = fraction;
     try {
       if (!progress_(fraction)) cancelled_ = true;
@@ -147,8 +149,9 @@ class TreeGrower {
   }
 
   const TrainingOptions& options_;
-  int n_threads_;
+  std::size_t n_threads_;
   const TrainingProgress& progress_;
+  std::thread::id caller_ = std::this_thread::get_id();
   std::vector<Descriptor> descriptors_;
   std::vector<std::uint32_t> multiplicities_;
   std::atomic<std::size_t> finished_{0};
@@ -174,14 +177,13 @@ void list_nodes(const Node& node, std::uint32_t id, NodeTable& table) {
 
 /// Per word: the number of images in which it occurs.
 std::vector<std::uint32_t> count_images(const TrainingSet& images, const Vocabulary& vocabulary,
-                                        int n_threads) {
-  std::vector<std::vector<std::uint32_t>> counts(static_cast<std::size_t>(n_threads));
+                                        std::size_t n_threads) {
+  std::vector<std::vector<std::uint32_t>> counts(n_threads);
   const std::size_t n_images = images.image_ends.size();
-  run_on_threads(n_threads, [&](int thread) {
+  for_each_in_parallel(n_threads, n_threads, [&](std::size_t part) {
     std::vector<std::uint32_t> n_seen(vocabulary.n_words(), 0);
     std::vector<std::size_t> last_seen(vocabulary.n_words(), n_images);
-    for (auto image = static_cast<std::size_t>(thread); image < n_images;
-         image += static_cast<std::size_t>(n_threads)) {
+    for (std::size_t image = part; image < n_images; image += n_threads) {
       const std::size_t begin = image == 0 ? 0 : images.image_ends[image - 1];
       for (std::size_t i = begin; i < images.image_ends[image]; ++i) {
         const std::uint32_t word = vocabulary.quantise(images.descriptors[i]).word;
@@ -189,11 +191,11 @@ std::vector<std::uint32_t> count_images(const TrainingSet& images, const Vocabul
         last_seen[word] = image;
       }
     }
-    counts[static_cast<std::size_t>(thread)] = std::move(n_seen);
+    counts[part] = std::move(n_seen);
   });
-  for (std::size_t thread = 1; thread < counts.size(); ++thread) {
+  for (std::size_t part = 1; part < counts.size(); ++part) {
     for (std::size_t word = 0; word < counts[0].size(); ++word) {
-      counts[0][word] += counts[thread][word];
+      counts[0][word] += counts[part][word];
     }
   }
   return counts[0];
@@ -233,7 +235,7 @@ void TrainingOptions::check() const {
   check("max_iterations (0 or more)", max_iterations, 0, 1e9);
   check("distance_power (1 or 2)", distance_power, 1, 2);
   check("minimum_weight (0 or more)", minimum_weight, 0, 1e9);
-  check("n_threads (0 to 256)", n_threads, 0, 256);
+  check("n_threads (0 to 256)", n_threads, 0, kMostThreads);
 }
 
 std::shared_ptr<const Vocabulary> train_vocabulary(const TrainingSet& images,
@@ -241,8 +243,8 @@ std::shared_ptr<const Vocabulary> train_vocabulary(const TrainingSet& images,
                                                    const TrainingProgress& progress) {
   options.check();
   check_set(images);
-  const int n_cores = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-  const int n_threads = options.n_threads > 0 ? options.n_threads : n_cores;
+  const auto given = static_cast<std::size_t>(options.n_threads);
+  const std::size_t n_threads = given > 0 ? given : threads_for(TrainingOptions::kMostThreads);
 
   Node root;
   if (!TreeGrower(images, options, n_threads, progress).grow(root)) return nullptr;

@@ -17,7 +17,8 @@ struct TrainingOptions {
   int max_iterations = 100;   ///< per k-means; 0: until an assignment repeats itself
   int distance_power = 1;     ///< of the k-means++ seeding, 1 or 2
   double minimum_weight = 0;  ///< words below it are stopped (weight 0)
-  int n_threads = 0;          ///< 0: one per core. The result does not depend on it
+  int n_threads = 0;          ///< 0: see threads_for(). The result does not depend on it
+  static constexpr int kMostThreads = 256;
 
   /// Throws SettingsError naming the option that is out of range.
   void check() const;
@@ -29,7 +30,8 @@ struct TrainingSet {
   std::vector<std::size_t> image_ends;  ///< per image: one past its last descriptor
 };
 
-/// Hears the fraction done, 0 to 1, on the calling thread; false cancels.
+/// Hears the fraction done, 0 to 1, on the calling thread; false cancels, and nothing more is
+/// heard.
 using TrainingProgress = std::function<bool(double)>;
 
 /// Hierarchical k-means (Nister and Stewenius, 2006, on binary descriptors as in Galvez-Lopez and

@@ -2,9 +2,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <thread>
 
 #include "base/errors.hpp"
+#include "base/parallel.hpp"
 #include "synthetic/hash.hpp"
 #include "synthetic/row_kernels.hpp"
 #include "synthetic/texture.hpp"
@@ -208,17 +208,15 @@ Rendering render(const World& world, const Pose& T_cw, const RenderOptions& opti
   Rendering image{cv::Mat(options.size.height, options.size.width, CV_8UC1),
                   cv::Mat(options.size.height, options.size.width, CV_32FC1)};
   const int bands = std::min(options.threads, options.size.height);
-  const auto cast_band = [&](int band) {
+  const auto n_bands = static_cast<std::size_t>(bands);
+  for_each_in_parallel(n_bands, n_bands, [&](std::size_t i) {
+    const auto band = static_cast<int>(i);
     RowCaster caster(facets, options);
     const int end = options.size.height * (band + 1) / bands;
     for (int y = options.size.height * band / bands; y < end; ++y) {
       caster.cast(y, image.grey.ptr<std::uint8_t>(y), image.depth.ptr<float>(y));
     }
-  };
-  std::vector<std::thread> helpers;
-  for (int band = 1; band < bands; ++band) helpers.emplace_back(cast_band, band);
-  cast_band(0);
-  for (std::thread& helper : helpers) helper.join();
+  });
   return image;
 }
 

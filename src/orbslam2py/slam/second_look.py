@@ -48,7 +48,7 @@ class SecondLook:
             return followed
         core.follow_map(self._map, followed)
         keyframe = self._map.living(followed.reference_keyframe)
-        if keyframe >= 0 and self._map.keyframe_frame(keyframe).id == frame.id:
+        if keyframe >= 0 and self._map.frame_of(keyframe) == frame.id:
             return followed
         found = followed
         for _ in range(_MOST_LOOKS if in_doubt else 1):

@@ -46,6 +46,23 @@ TEST(ScalePyramid, PredictedLevelsEqualTheReference) {
   }
 }
 
+TEST(ScalePyramid, PredictedLevelsStayInThePyramid) {
+  const ScalePyramid scales(1.2F, 8);
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  // The nearer the coarser; nobody knows where a distance is no number.
+  EXPECT_EQ(scales.predict_level(1, 1e-300), 7);
+  EXPECT_EQ(scales.predict_level(1, 0), 7);
+  EXPECT_EQ(scales.predict_level(kInfinity, 1), 7);
+  EXPECT_EQ(scales.predict_level(1, 1e300), 0);
+  EXPECT_EQ(scales.predict_level(1, kInfinity), 0);
+  EXPECT_EQ(scales.predict_level(0, 1), 0);
+  EXPECT_EQ(scales.predict_level(0, 0), 0);
+  EXPECT_EQ(scales.predict_level(-1, 1), 0);
+  EXPECT_EQ(scales.predict_level(nan, 1), 0);
+  EXPECT_EQ(scales.predict_level(1, nan), 0);
+}
+
 TEST(ScalePyramid, FeaturesPerLevel) {
   const ScalePyramid scales(1.2F, 8);
   EXPECT_EQ(scales.features_per_level(1000),

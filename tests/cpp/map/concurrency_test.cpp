@@ -47,7 +47,7 @@ TEST(Concurrency, ReadersSeeConsistentMapsWhileAWriterWorks) {
   insert(0);
 
   std::thread tracker([&] {
-    const std::vector<MapPointId> seen = snapshot_points(map).ids;
+    const std::vector<MapPointId> seen = snapshot_map(map).points.ids;
     TrajectoryRecorder recorder;
     while (!done) {
       TrackedFrame frame(make_raster_frame(0, seen.size()));
@@ -91,7 +91,7 @@ TEST(Concurrency, SightingsAreCountedWhileOthersRead) {
   TrackedFrame frame(project_cloud(0, cloud, Pose()).frame);
   frame.T_cw = Pose();
   insert_keyframe(map, frame, true);
-  const std::vector<MapPointId> seen = snapshot_points(map).ids;
+  const std::vector<MapPointId> seen = snapshot_map(map).points.ids;
   constexpr int kTimes = 100;
   const auto count = [&] {
     for (int i = 0; i < kTimes; ++i) count_sightings(map, frame, seen);

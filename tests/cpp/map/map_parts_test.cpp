@@ -66,7 +66,7 @@ TEST(SeveralMaps, SnapshotsAndTrajectoriesAreOfOneMap) {
   TwoMaps two;
   EXPECT_THAT(snapshot_keyframes(two.map).ids, ElementsAre(kf(4), kf(5), kf(6)));
   EXPECT_EQ(snapshot_keyframes(two.map, 0).ids.size(), 4U);
-  EXPECT_EQ(snapshot_points(two.map, 0).ids.size(), 20U);
+  EXPECT_EQ(snapshot_map(two.map, 0).points.ids.size(), 20U);
   EXPECT_EQ(snapshot_map(two.map, 1).points.ids.size(), 30U);
   EXPECT_EQ(snapshot_observations(two.map, 0).ids.size(), 20U);
 

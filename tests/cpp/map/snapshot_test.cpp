@@ -42,7 +42,7 @@ TEST(Snapshot, EdgesAreThoseOfEnoughWeight) {
 TEST(Snapshot, PointsAndTheirObservations) {
   SmallMap small;
   small.map.erase_point(MapPointId(1));
-  const PointSnapshot points = snapshot_points(small.map);
+  const PointSnapshot points = snapshot_map(small.map).points;
   ASSERT_EQ(points.ids.size(), 17U);
   EXPECT_EQ(points.ids[1], MapPointId(2));
   EXPECT_EQ(points.positions[1], (std::array<double, 3>{0, 0, 5}));

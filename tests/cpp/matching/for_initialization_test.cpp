@@ -36,96 +36,94 @@ FeatureSpec corner(float u, float v, int bits, std::int32_t level = 0, float ang
   return spec;
 }
 
-std::vector<int> match_first_level(const std::vector<FeatureSpec>& initial,
-                                   const std::vector<FeatureSpec>& current) {
-  const auto frame_1 = make_synthetic_frame(0, initial);
+std::vector<int> match(const std::vector<FeatureSpec>& first,
+                       const std::vector<FeatureSpec>& current, float moved = 0,
+                       const ViewMatchOptions& options = {}) {
+  const auto frame_1 = make_synthetic_frame(0, first);
   const auto frame_2 = make_synthetic_frame(1, current);
-  auto previous = positions_of(*frame_1);
-  return match_for_initialization(*frame_1, *frame_2, previous, 100, 0.9F);
+  auto expected = positions_of(*frame_1);
+  for (Eigen::Vector2f& position : expected) position.x() += moved;
+  return match_views(*frame_1, *frame_2, expected, options);
 }
 
-TEST(MatchForInitialization, TheBetterOfTwoWinsWhateverTheOrder) {
+TEST(MatchViews, WhatComesNearerIsFoundOnAHigherLevel) {
+  EXPECT_THAT(match({corner(200, 200, 50, 1)}, {corner(205, 200, 50, 3)}), ElementsAre(0));
+  EXPECT_THAT(match({corner(200, 200, 50, 1)}, {corner(205, 200, 50, 4)}), ElementsAre(-1));
+}
+
+TEST(MatchViews, CoarseKeypointsAreLeftOut) {
+  EXPECT_THAT(match({corner(200, 200, 50, 4)}, {corner(200, 200, 50, 4)}), ElementsAre(-1));
+}
+
+TEST(MatchViews, TheSameCornerOnAnotherLevelDoesNotCompete) {
+  EXPECT_THAT(match({corner(200, 200, 50)}, {corner(205, 200, 50), corner(206, 200, 51, 1)}),
+              ElementsAre(0));
+  EXPECT_THAT(match({corner(200, 200, 50)}, {corner(205, 200, 55), corner(225, 200, 45)}),
+              ElementsAre(-1));
+}
+
+TEST(MatchViews, SearchesAroundTheExpectedPosition) {
+  ViewMatchOptions narrow;
+  narrow.window = 10;
+  const std::vector<FeatureSpec> current{corner(260, 200, 50)};
+  EXPECT_THAT(match({corner(200, 200, 50)}, current, 0, narrow), ElementsAre(-1));
+  EXPECT_THAT(match({corner(200, 200, 50)}, current, 55, narrow), ElementsAre(0));
+}
+
+TEST(MatchViews, TheBetterOfTwoWinsWhateverTheOrder) {
   const FeatureSpec good = corner(200, 200, 98), worse = corner(210, 200, 90);
-  const std::vector<FeatureSpec> current{corner(205, 205, 100)};
-  EXPECT_THAT(match_first_level({good, worse}, current), ElementsAre(0, -1));
-  EXPECT_THAT(match_first_level({worse, good}, current), ElementsAre(-1, 0));
+  EXPECT_THAT(match({worse, good}, {corner(205, 205, 100)}), ElementsAre(-1, 0));
+  EXPECT_THAT(match({good, worse}, {corner(205, 205, 100)}), ElementsAre(0, -1));
 }
 
-TEST(MatchForInitialization, OfEquallyGoodOnesTheFirstStays) {
+TEST(MatchViews, AsksForOnePositionPerKeypoint) {
+  const auto frame = make_synthetic_frame(0, {corner(200, 200, 50)});
+  EXPECT_THROW(match_views(*frame, *frame, {}, {}), StateError);
+}
+
+TEST(MatchViews, OfEquallyGoodOnesTheFirstStays) {
   const FeatureSpec one = corner(200, 200, 95), two = corner(210, 200, 95);
-  EXPECT_THAT(match_first_level({one, two}, {corner(205, 205, 100)}), ElementsAre(0, -1));
+  EXPECT_THAT(match({one, two}, {corner(205, 205, 100)}), ElementsAre(0, -1));
 }
 
-TEST(MatchForInitialization, OnlyLevelZeroOnBothSides) {
-  EXPECT_THAT(match_first_level({corner(200, 200, 50, 1)}, {corner(200, 200, 50)}),
-              ElementsAre(-1));
-  EXPECT_THAT(match_first_level({corner(200, 200, 50)}, {corner(200, 200, 50, 1)}),
-              ElementsAre(-1));
+TEST(MatchViews, DescriptorLimitIsFiftyInclusive) {
+  EXPECT_THAT(match({corner(200, 200, 0)}, {corner(200, 200, 50)}), ElementsAre(0));
+  EXPECT_THAT(match({corner(200, 200, 0)}, {corner(200, 200, 51)}), ElementsAre(-1));
 }
 
-TEST(MatchForInitialization, DescriptorLimitIsFiftyInclusive) {
-  EXPECT_THAT(match_first_level({corner(200, 200, 0)}, {corner(200, 200, 50)}), ElementsAre(0));
-  EXPECT_THAT(match_first_level({corner(200, 200, 0)}, {corner(200, 200, 51)}), ElementsAre(-1));
-}
-
-TEST(MatchForInitialization, RatioIsStrict) {
+TEST(MatchViews, RatioIsStrict) {
   // 9 of 10 bits: exactly the ratio 0.9, which does not pass; 8 of 10 does.
-  EXPECT_THAT(match_first_level({corner(200, 200, 0)}, {corner(205, 200, 9), corner(195, 200, 10)}),
+  EXPECT_THAT(match({corner(200, 200, 0)}, {corner(205, 200, 9), corner(195, 200, 10)}),
               ElementsAre(-1));
-  EXPECT_THAT(match_first_level({corner(200, 200, 0)}, {corner(205, 200, 8), corner(195, 200, 10)}),
+  EXPECT_THAT(match({corner(200, 200, 0)}, {corner(205, 200, 8), corner(195, 200, 10)}),
               ElementsAre(0));
 }
 
-TEST(MatchForInitialization, WindowIsASquareAroundThePreviousPosition) {
-  EXPECT_THAT(match_first_level({corner(200, 200, 0)}, {corner(299.5F, 299.5F, 3)}),
-              ElementsAre(0));
-  EXPECT_THAT(match_first_level({corner(200, 200, 0)}, {corner(300, 200, 3)}), ElementsAre(-1));
+TEST(MatchViews, WindowIsASquareAroundTheExpectedPosition) {
+  EXPECT_THAT(match({corner(200, 200, 0)}, {corner(299.5F, 299.5F, 3)}), ElementsAre(0));
+  EXPECT_THAT(match({corner(200, 200, 0)}, {corner(300, 200, 3)}), ElementsAre(-1));
 }
 
-TEST(MatchForInitialization, SearchFollowsMatchedPositions) {
-  const auto initial = make_synthetic_frame(0, {corner(100, 100, 20), corner(400, 300, 200)});
-  const auto second = make_synthetic_frame(1, {corner(180, 100, 20)});
-  const auto third = make_synthetic_frame(2, {corner(260, 100, 20)});
-  auto previous = positions_of(*initial);
-  EXPECT_THAT(match_for_initialization(*initial, *second, previous, 100, 0.9F), ElementsAre(0, -1));
-  EXPECT_EQ(previous[0], Eigen::Vector2f(180, 100));
-  EXPECT_EQ(previous[1], Eigen::Vector2f(400, 300));
-  EXPECT_THAT(match_for_initialization(*initial, *third, previous, 100, 0.9F), ElementsAre(0, -1));
-}
-
-TEST(MatchForInitialization, RotationMustAgreeWithTheMajority) {
+TEST(MatchViews, RotationMustAgreeWithTheMajority) {
   std::mt19937_64 random(3);
-  std::vector<FeatureSpec> initial, current;
+  std::vector<FeatureSpec> first, current;
   for (int i = 0; i < 40; ++i) {
     FeatureSpec spec = corner(60.0F + 12.0F * static_cast<float>(i), 240, 0);
     spec.descriptor = testing::random_descriptor(random);
     current.push_back(spec);
     spec.angle = i == 17 ? 200.0F : 100.0F;
-    initial.push_back(spec);
+    first.push_back(spec);
   }
-  const auto frame_1 = make_synthetic_frame(0, initial);
-  const auto frame_2 = make_synthetic_frame(1, current);
-  auto previous = positions_of(*frame_1);
-  const auto before = previous;
-  const auto matches = match_for_initialization(*frame_1, *frame_2, previous, 100, 0.9F);
+  const auto matches = match(first, current);
   for (std::size_t i = 0; i < matches.size(); ++i) {
     EXPECT_EQ(matches[i], i == 17 ? -1 : static_cast<int>(i));
   }
-  EXPECT_EQ(previous, before);
 }
 
-TEST(MatchForInitialization, EmptyFramesAndWrongSizes) {
-  EXPECT_THAT(match_first_level({}, {}), ::testing::IsEmpty());
-  EXPECT_THAT(match_first_level({corner(1, 1, 0)}, {}), Each(-1));
-  const auto frame = make_synthetic_frame(0, {corner(1, 1, 0)});
-  std::vector<Eigen::Vector2f> previous;
-  EXPECT_THROW(match_for_initialization(*frame, *frame, previous, 100, 0.9F), StateError);
-}
-
-TEST(MatchForInitialization, NonFinitePreviousPositionsMatchNothing) {
-  const auto frame = make_synthetic_frame(0, {corner(10, 10, 0)});
-  std::vector<Eigen::Vector2f> previous{{std::nanf(""), 10}};
-  EXPECT_THAT(match_for_initialization(*frame, *frame, previous, 100, 0.9F), ElementsAre(-1));
+TEST(MatchViews, EmptyFramesAndPositionsThatAreNoNumbers) {
+  EXPECT_THAT(match({}, {}), ::testing::IsEmpty());
+  EXPECT_THAT(match({corner(1, 1, 0)}, {}), Each(-1));
+  EXPECT_THAT(match({corner(10, 10, 0)}, {corner(10, 10, 0)}, std::nanf("")), ElementsAre(-1));
 }
 
 // ---- parity with the arrays of the original -------------------------------------------------
@@ -149,8 +147,10 @@ std::shared_ptr<Frame> golden_frame(const std::string& which, bool with_angles) 
 std::vector<int> golden_matches(bool with_angles) {
   const auto frame_1 = golden_frame("1", with_angles);
   const auto frame_2 = golden_frame("2", with_angles);
-  auto previous = positions_of(*frame_1);
-  return match_for_initialization(*frame_1, *frame_2, previous, 100, 0.9F);
+  ViewMatchOptions options;
+  options.level_difference = 0;
+  options.highest_level = 0;
+  return match_views(*frame_1, *frame_2, positions_of(*frame_1), options);
 }
 
 std::vector<int> golden_output() {
@@ -158,9 +158,10 @@ std::vector<int> golden_output() {
       .values;
 }
 
-// With all angles zero nothing is filtered, so what comes out is the search itself. The original's
-// filter (bins 0 to 12 without wrap-around) on top must give the original's matches exactly.
-TEST(MatchForInitializationGolden, SearchIsIdenticalToTheOriginal) {
+// The original compares keypoints of level 0 only. With all angles zero nothing is filtered, so
+// what comes out is the search itself. The original's filter (bins 0 to 12 without wrap-around) on
+// top must give the original's matches exactly.
+TEST(MatchViewsGolden, SearchIsIdenticalToTheOriginal) {
   std::vector<int> matches = golden_matches(false);
   const auto frame_1 = golden_frame("1", true);
   const auto frame_2 = golden_frame("2", true);
@@ -185,57 +186,8 @@ TEST(MatchForInitializationGolden, SearchIsIdenticalToTheOriginal) {
 
 // Ours has 12 bins with wrap-around, so rotations near 0 degrees count together instead of as two
 // half bins. That may change which bins survive; with this pair it changes no match. (OD-79)
-TEST(MatchForInitializationGolden, WrapAroundKeepsTheSameMatches) {
+TEST(MatchViewsGolden, WrapAroundKeepsTheSameMatches) {
   EXPECT_EQ(golden_matches(true), golden_output());
-}
-
-std::vector<int> match_all_levels(const std::vector<FeatureSpec>& first,
-                                  const std::vector<FeatureSpec>& current, float moved = 0,
-                                  const ViewMatchOptions& options = {}) {
-  const auto frame_1 = make_synthetic_frame(0, first);
-  const auto frame_2 = make_synthetic_frame(1, current);
-  auto expected = positions_of(*frame_1);
-  for (Eigen::Vector2f& position : expected) position.x() += moved;
-  return match_views(*frame_1, *frame_2, expected, options);
-}
-
-TEST(MatchViews, WhatComesNearerIsFoundOnAHigherLevel) {
-  EXPECT_THAT(match_all_levels({corner(200, 200, 50, 1)}, {corner(205, 200, 50, 3)}),
-              ElementsAre(0));
-  EXPECT_THAT(match_all_levels({corner(200, 200, 50, 1)}, {corner(205, 200, 50, 4)}),
-              ElementsAre(-1));
-}
-
-TEST(MatchViews, CoarseKeypointsAreLeftOut) {
-  EXPECT_THAT(match_all_levels({corner(200, 200, 50, 4)}, {corner(200, 200, 50, 4)}),
-              ElementsAre(-1));
-}
-
-TEST(MatchViews, TheSameCornerOnAnotherLevelDoesNotCompete) {
-  EXPECT_THAT(
-      match_all_levels({corner(200, 200, 50)}, {corner(205, 200, 50), corner(206, 200, 51, 1)}),
-      ElementsAre(0));
-  EXPECT_THAT(
-      match_all_levels({corner(200, 200, 50)}, {corner(205, 200, 55), corner(225, 200, 45)}),
-      ElementsAre(-1));
-}
-
-TEST(MatchViews, SearchesAroundTheExpectedPosition) {
-  ViewMatchOptions narrow;
-  narrow.window = 10;
-  const std::vector<FeatureSpec> current{corner(260, 200, 50)};
-  EXPECT_THAT(match_all_levels({corner(200, 200, 50)}, current, 0, narrow), ElementsAre(-1));
-  EXPECT_THAT(match_all_levels({corner(200, 200, 50)}, current, 55, narrow), ElementsAre(0));
-}
-
-TEST(MatchViews, TheBetterOfTwoWins) {
-  const FeatureSpec good = corner(200, 200, 98), worse = corner(210, 200, 90);
-  EXPECT_THAT(match_all_levels({worse, good}, {corner(205, 205, 100)}), ElementsAre(-1, 0));
-}
-
-TEST(MatchViews, AsksForOnePositionPerKeypoint) {
-  const auto frame = make_synthetic_frame(0, {corner(200, 200, 50)});
-  EXPECT_THROW(match_views(*frame, *frame, {}, {}), StateError);
 }
 
 }  // namespace

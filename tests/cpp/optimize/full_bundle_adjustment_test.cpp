@@ -9,6 +9,7 @@
 
 #include "map/content_hash.hpp"
 #include "map/invariants.hpp"
+#include "optimize/full_bundle.hpp"
 #include "support/synthetic_frames.hpp"
 
 namespace orbslam::testing {

@@ -8,6 +8,7 @@
 
 #include "map/content_hash.hpp"
 #include "map/invariants.hpp"
+#include "optimize/full_bundle.hpp"
 #include "optimize/full_bundle_adjustment.hpp"
 #include "optimize/local_bundle_adjustment.hpp"
 #include "support/loop_map.hpp"

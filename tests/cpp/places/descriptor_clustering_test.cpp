@@ -5,7 +5,6 @@
 
 #include <random>
 #include <set>
-#include <stdexcept>
 
 namespace orbslam {
 namespace {
@@ -131,14 +130,6 @@ TEST(ClusterDescriptors, IterationCapAndCancelEndIt) {
   EXPECT_EQ(n_asked, 3);
   cluster_descriptors(set, {10, 0, 1, 1}, 1, count(2));
   EXPECT_EQ(n_asked, 2);
-}
-
-TEST(RunOnThreads, HandsExceptionsOver) {
-  EXPECT_THROW(run_on_threads(3,
-                              [](int i) {
-                                if (i == 2) throw std::runtime_error("two");
-                              }),
-               std::runtime_error);
 }
 
 }  // namespace

@@ -63,7 +63,7 @@ TEST_F(PlaceRecognition, LoopsAreSoughtAmongUnconnectedKeyframes) {
   // Keyframe 1 shares as many words with 0, but is connected to it.
   EXPECT_THAT(ids(find_loop_candidates(index_, map_, ids_[0], 0)), ElementsAre(ids_[2]));
   EXPECT_THAT(find_loop_candidates(index_, map_, ids_[3], 0), IsEmpty());
-  EXPECT_THROW(find_loop_candidates(index_, map_, KeyFrameId(9), 0), StateError);
+  EXPECT_THAT(find_loop_candidates(index_, map_, KeyFrameId(9), 0), IsEmpty()) << "it has died";
 }
 
 TEST_F(PlaceRecognition, RelocalizationSeeksEverywhereAndGroupsNeighbours) {

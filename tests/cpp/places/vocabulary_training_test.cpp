@@ -10,6 +10,7 @@
 
 #include "base/errors.hpp"
 #include "places/golden_vocabulary.hpp"
+#include "support/no_new_threads.hpp"
 
 namespace orbslam {
 namespace {
@@ -145,6 +146,48 @@ TEST(TrainVocabulary, ProgressAscendsToOneAndCancels) {
                                [limit](double fraction) { return fraction < limit; }),
               nullptr);
   }
+}
+
+TEST(TrainVocabulary, NobodyIsAskedAgainAfterANo) {
+  // Two groups that are clustered one after the other, as they are large.
+  std::mt19937_64 random(7);
+  TrainingSet set;
+  for (int i = 0; i < 220000; ++i) {
+    const std::uint64_t group = i % 2 == 0 ? 0 : ~std::uint64_t{0};
+    set.descriptors.push_back({{random(), group, group, group}});
+  }
+  set.image_ends = {set.descriptors.size()};
+  TrainingOptions options;
+  options.branching = 2;
+  options.depth = 2;
+  options.max_iterations = 2;
+  for (const int n_threads : {1, 2}) {
+    options.n_threads = n_threads;
+    std::vector<double> heard;
+    const auto all = [&](double fraction) {
+      heard.push_back(fraction);
+      return true;
+    };
+    ASSERT_TRUE(train_vocabulary(set, options, all));
+    const std::vector<double> fractions = heard;
+    for (std::size_t n = 1; n <= fractions.size(); ++n) {
+      heard.clear();
+      const auto listener = [&](double fraction) {
+        heard.push_back(fraction);
+        return heard.size() < n;
+      };
+      EXPECT_EQ(train_vocabulary(set, options, listener), nullptr);
+      EXPECT_EQ(heard.size(), n);
+    }
+  }
+}
+
+TEST(TrainVocabulary, IsTheSameWhereNoThreadCanBeStarted) {
+  TrainingOptions options = small_tree();
+  const auto hash = train_vocabulary(golden_set(), options)->hash();
+  const testing::NoNewThreads none;
+  options.n_threads = 8;
+  EXPECT_EQ(train_vocabulary(golden_set(), options)->hash(), hash);
 }
 
 TEST(TrainVocabulary, AnExceptionOfTheListenerComesThrough) {

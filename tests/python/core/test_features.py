@@ -14,6 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from orbslam2py import ImageError, SettingsError, StateError, _core
+from support.slow_arrays import SlowArray
 
 
 def noise(height: int, width: int, seed: int = 0) -> NDArray[np.generic]:
@@ -136,6 +137,31 @@ def test_one_extractor_refuses_a_second_thread() -> None:
     assert len(extractor.extract(small)) > 0
 
 
+def test_a_second_thread_is_refused_while_the_arrays_are_read() -> None:
+    extractor, image = _core.OrbExtractor(), noise(240, 320)
+    mask = SlowArray(np.full(image.shape, 255, np.uint8))
+    found: list[_core.Extraction] = []
+    thread = threading.Thread(target=lambda: found.append(extractor.extract(image, mask)))
+    thread.start()
+    assert mask.is_read.wait(30)
+    try:
+        with pytest.raises(StateError, match="another thread"):
+            extractor.extract(image)
+    finally:
+        mask.go_on.set()
+        thread.join()
+    expected = _core.OrbExtractor().extract(image)
+    np.testing.assert_array_equal(found[0].keypoints, expected.keypoints)
+
+
+def test_refused_arrays_do_not_keep_the_extractor() -> None:
+    extractor, image = _core.OrbExtractor(), noise(240, 320)
+    for wrong in ((image[:0], None), (image, image[:, :1])):
+        with pytest.raises(ImageError):
+            extractor.extract(*wrong)
+    assert len(extractor.extract(image)) > 0
+
+
 def test_mask() -> None:
     image = noise(240, 320)
     mask = np.full(image.shape, 255, np.uint8)
@@ -239,6 +265,20 @@ def test_pose_moves_points(n: int) -> None:
     for point, target in zip(points, expected, strict=True):
         assert (pose @ point).shape == (3,)
         np.testing.assert_allclose(pose @ point, target, atol=1e-12)
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_poses_are_finite(wrong: float) -> None:
+    matrix = np.eye(4)
+    matrix[1, 3] = wrong
+    with pytest.raises(ValueError, match="finite"):
+        _core.Pose.from_matrix(matrix)
+    with pytest.raises(ValueError, match="translation must be finite"):
+        _core.Pose([0, 0, 0, 1], [0, wrong, 0])
+    with pytest.raises(ValueError, match="quaternion must be finite"):
+        _core.Pose([0, wrong, 0, 1], [0, 0, 0])
+    with pytest.raises(ValueError, match="tangent vector must be finite"):
+        _core.Pose.exp([0, 0, 0, 0, 0, wrong])
 
 
 def test_pose_pickles_and_prints() -> None:

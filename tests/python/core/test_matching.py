@@ -105,20 +105,18 @@ def test_by_words(scene: Scene) -> None:
     assert len(np.unique(pairs[:, 1])) == len(pairs)
 
 
-def test_for_initialization(scene: Scene) -> None:
+def test_views(scene: Scene) -> None:
     first, second = scene.frame(0).features, scene.frame(6).features
-    matches, previous = core.match_for_initialization(first, second, first.keypoints, 50.0, 0.9)
+    matches = core.match_views(first, second, first.keypoints, window=50.0)
     found = matches >= 0
-    assert matches.shape == (len(first),)
+    assert (matches.shape, matches.dtype) == ((len(first),), np.int32)
     assert np.count_nonzero(found) > 40
-    np.testing.assert_array_equal(previous[found], second.keypoints[matches[found]])
-    np.testing.assert_array_equal(previous[~found], first.keypoints[~found])
-    moved = first.keypoints[found] - previous[found]
+    moved = first.keypoints[found] - second.keypoints[matches[found]]
     assert np.median(moved[:, 0]) == pytest.approx(6.0, abs=0.5)
     with pytest.raises(ValueError, match=r"\(n, 2\)"):
-        core.match_for_initialization(first, second, first.keypoints[:, :1], 50.0, 0.9)
+        core.match_views(first, second, first.keypoints[:, :1])
     with pytest.raises(StateError, match="one position per keypoint"):
-        core.match_for_initialization(first, second, first.keypoints[:3], 50.0, 0.9)
+        core.match_views(first, second, first.keypoints[:3])
 
 
 def linked_keyframes(scene: Scene) -> tuple[int, int]:
@@ -140,8 +138,6 @@ def test_new_points(scene: Scene) -> None:
     core.match_local_map(free, points, np.zeros(0, np.int64), 3.0)
     c = int(core.insert_keyframe(scene.map, free, False))
     core.process_new_keyframe(scene.map, c, scene.recent)
-    pairs = core.match_for_triangulation(scene.map, c, b)
-    assert len(pairs) > 0
     options = core.NewPointOptions(monocular=False, n_neighbours=5)
     flag = core.StopFlag()
     created = core.create_new_points(scene.map, c, options, flag)
@@ -157,10 +153,7 @@ def test_new_points(scene: Scene) -> None:
 def test_fusion(scene: Scene) -> None:
     a, b = linked_keyframes(scene)
     before = scene.map.weight(a, b)
-    points_of_a = scene.map.keyframe_points(a)
-    assert core.fuse_points(scene.map, b, points_of_a, 3.0) > 0
-    assert core.fuse_points(scene.map, b, points_of_a) == 0
-    core.fuse_with_neighbours(scene.map, b, 10)
+    assert core.fuse_with_neighbours(scene.map, b, 10) > 0
     assert scene.map.weight(a, b) > before
     assert core.check_invariants(scene.map, True) == []
 

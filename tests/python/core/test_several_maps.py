@@ -57,7 +57,8 @@ class Store:
             slam_map.begin_map()
             self.add_keyframe()
         elif what == 3:
-            slam_map.activate_map(maps[first % len(maps)])
+            active = maps[first % len(maps)]
+            assert slam_map.activate_map_of(slam_map.root(active)) == active
         elif what == 4 and len(maps) > 1:
             slam_map.erase_map(maps[first % len(maps)])
         elif what == 5 and len(maps) > 1:

@@ -28,6 +28,12 @@ def texture(shift: int = 0, seed: int = 0) -> npt.NDArray[np.uint8]:
     return np.ascontiguousarray(wall[:, shift : shift + WIDTH])
 
 
+def some_frame() -> core.Frame:
+    """What one camera sees of the wall: fifty keypoints."""
+    extraction = core.OrbExtractor(core.OrbOptions(n_features=50)).extract(texture())
+    return core.build_monocular_frame(context(bf=0.0), 0, 0.0, extraction)
+
+
 def ten_words() -> core.Vocabulary:
     """A vocabulary of ten random words."""
     rng = np.random.default_rng(1)

@@ -70,8 +70,6 @@ class CandidatePlaces:
 
         Ids, the likeliest first, no more than are compared with a frame.
         """
-        if not self._map.has_keyframe(keyframe):
-            return []
         found = core.find_loop_candidates(self._keyframe_index, self._map, keyframe, 0.0)
         ranked = sorted(found, key=lambda place: (-place.group_score, place.keyframe))
         return [place.keyframe for place in ranked[: self._limits.word_candidates]]
