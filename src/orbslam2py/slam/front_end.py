@@ -110,6 +110,11 @@ class FrontEnd:
         assert self._pair_extractor is not None
         self._check(left, "left image")
         self._check(right, "right image")
+        if left.shape[:2] != right.shape[:2]:
+            raise ImageError(
+                f"left image has size {_size_text(left)}, the right {_size_text(right)}; both must "
+                "be of the size they were rectified to"
+            )
         if left.shape != right.shape:
             raise ImageError(f"left and right image differ: shapes {left.shape} and {right.shape}")
         if isinstance(mask, tuple) and len(mask) != 2:
@@ -150,8 +155,8 @@ class FrontEnd:
         depth = np.asarray(np.ma.filled(depth, 0))
         if depth.shape != image.shape[:2]:
             raise ImageError(
-                f"depth has size {depth.shape}, the image {image.shape[:2]}; "
-                "depth must be registered to the image"
+                f"depth has size {_size_text(depth)}, the image {_size_text(image)}; depth must be "
+                "registered to the image"
             )
         if depth.dtype.kind not in "uif" or depth.dtype.itemsize > _LARGEST_NUMBER:
             raise ImageError(f"depth must hold numbers (uint16, float32...), got {depth.dtype}")
@@ -191,14 +196,13 @@ class FrontEnd:
             )
         if min(image.shape[:2]) < SMALLEST_SIDE:
             raise ImageError(
-                f"{what} is too small: {image.shape[1]}x{image.shape[0]} pixels, and keypoints are "
+                f"{what} is too small: {_size_text(image)} pixels, and keypoints are "
                 f"found from {SMALLEST_SIDE} per side on; give whole images of the camera"
             )
         if self._size is not None and image.shape[:2] != self._size:
             raise ImageError(
-                f"{what} has size {image.shape[1]}x{image.shape[0]}, the first image had "
-                f"{self._size[1]}x{self._size[0]}; give images of one size, or call reset() before "
-                "the first one of another size"
+                f"{what} has size {_size_text(image)}, the first image had "
+                f"{self._size[1]}x{self._size[0]}; give images of one size"
             )
 
     def _context_for(self, image: npt.NDArray[np.uint8]) -> core.FrameContext:
@@ -217,6 +221,11 @@ class FrontEnd:
         misfit = find_misfit(self._settings, (width, height))
         if misfit is not None:
             _log.warning("%s", misfit)
+
+
+def _size_text(image: npt.NDArray[np.generic]) -> str:
+    """Width and height, as people write them."""
+    return f"{image.shape[1]}x{image.shape[0]}"
 
 
 def _check_mask(mask: Mask | None, image: npt.NDArray[np.uint8], what: str) -> None:

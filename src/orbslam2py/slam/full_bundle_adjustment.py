@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 
 from orbslam2py import _core as core
 from orbslam2py._arguments import number_above_zero
-from orbslam2py._cores import n_cores
+from orbslam2py._cores import n_cores, n_threads
 from orbslam2py._timing import StageStatistics, StageTimer
 from orbslam2py._worker import Worker, WorkerState
 from orbslam2py.maps.contents import MapContents, contents_of
@@ -93,7 +93,7 @@ class FullBundleAdjustment:
         )
         self._on_done = on_done
         #: One core is left for tracking; a single thread gives the same bytes in every run.
-        self._n_threads = min(4, max(1, n_cores() // 2)) if threaded else 1
+        self._n_threads = n_threads(min(4, max(1, n_cores() // 2))) if threaded else 1
         #: All that were begun, also those given up.
         self.records: list[FullAdjustmentRecord] = []
         #: Milliseconds per step.
