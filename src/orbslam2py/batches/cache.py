@@ -76,7 +76,8 @@ class Cache:
         DatasetError
             If it does not fit, or the folder cannot be written.
         """
-        key = hashlib.sha256(address.encode()).hexdigest()[:20]
+        # A path may hold bytes that are no text.
+        key = hashlib.sha256(address.encode("utf-8", "surrogateescape")).hexdigest()[:20]
         with contextlib.ExitStack() as stack:
             try:
                 self.folder.mkdir(parents=True, exist_ok=True)

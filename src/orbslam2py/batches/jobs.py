@@ -9,15 +9,24 @@ import glob
 import hashlib
 import itertools
 import json
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
-from orbslam2py._arguments import cannot_open, is_whole, path_of, seed_of, shown
+from orbslam2py._arguments import (
+    cannot_open,
+    float_of,
+    is_number,
+    is_whole,
+    path_of,
+    seed_of,
+    shown,
+)
+from orbslam2py.batches.keys import key_of, label_of, with_labels_of_their_own
 from orbslam2py.batches.remote import is_remote, name_of, require_protocols
 from orbslam2py.batches.sweep import Sweep, read_sweep
 from orbslam2py.errors import DatasetError, SettingsError
@@ -61,6 +70,9 @@ class Job:
         Keys of the settings that are swept, and their values in this run.
     seed
         Seed of the run.
+    label
+        What its folder is called, but for the seed, where the plain name is that of other runs of
+        the batch as well; else empty.
     """
 
     path: str
@@ -71,23 +83,24 @@ class Job:
     options: tuple[tuple[str, Any], ...] = ()
     parameters: tuple[tuple[str, float], ...] = ()
     seed: int = 0
+    label: str = ""
 
     @property
     def key(self) -> str:
         """Name of its folder."""
-        parts = [self.name, self.sensor or "", Path(self.settings or "").stem]
-        parts += [f"{name}={_short(value)}" for name, value in (*self.options, *self.parameters)]
-        return "-".join([_plain(part) for part in parts if part] + [f"seed{self.seed}"])
+        return key_of(self.setting, self.seed)
 
     @property
     def setting(self) -> str:
         """What the runs with other seeds have in common."""
-        return self.key.removesuffix(f"-seed{self.seed}")
+        return self.label or label_of(self)
 
     @property
     def fingerprint(self) -> str:
         """Tells this job from another one in the same folder."""
-        text = json.dumps(dataclasses.asdict(self), sort_keys=True, default=str)
+        told = dataclasses.asdict(self)
+        del told["label"]  # it says nothing new, and earlier versions had none
+        text = json.dumps(told, sort_keys=True, default=str)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
     def run_options(self, sensor: Sensor) -> RunOptions:
@@ -161,7 +174,8 @@ def make_jobs(document: Mapping[str, Any], folder: Path | None = None) -> list[J
     Raises
     ------
     SettingsError
-        For unknown keys and values that make no sense, or if two jobs have one folder.
+        For unknown keys and values that make no sense, or if two runs would have one folder and
+        it is for the caller to say what tells them apart.
     DatasetError
         If a sequence is not there.
     """
@@ -175,7 +189,7 @@ def make_jobs(document: Mapping[str, Any], folder: Path | None = None) -> list[J
     seeds = _seeds(document.get("seeds", 1))
     options = list(_options(document.get("options") or {}))
     sweep = read_sweep(document["sweep"]) if "sweep" in document else Sweep()
-    jobs: list[Job] = []
+    kinds: list[Job] = []  # each stands for as many runs as there are seeds
     for one in itertools.chain.from_iterable(_sequences(entry, folder) for entry in sequences):
         mine = [one["sensor"]] if "sensor" in one else sensors
         own = [one["settings"]] if "settings" in one else settings
@@ -191,12 +205,12 @@ def make_jobs(document: Mapping[str, Any], folder: Path | None = None) -> list[J
                 option,
                 parameters,
             )
-            _require_few(len(jobs) + len(seeds))
-            jobs += [dataclasses.replace(job, seed=seed) for seed in seeds]
-    for job in jobs:
-        job.run_options(Sensor.MONOCULAR)  # says now what would fail in every run
-    _require_own_folders(jobs)
-    return jobs
+            kinds.append(job)
+            _require_few(len(kinds) * len(seeds))
+    for kind in kinds:
+        kind.run_options(Sensor.MONOCULAR)  # says now what would fail in every run
+    kinds = with_labels_of_their_own(kinds)
+    return [dataclasses.replace(kind, seed=seed) for kind in kinds for seed in seeds]
 
 
 def _sequences(entry: Any, folder: Path) -> Iterator[dict[str, Any]]:
@@ -240,7 +254,8 @@ def _options(values: Any) -> Iterator[tuple[tuple[str, Any], ...]]:
     for name in names:
         if _listed(values[name], keep=True) == []:
             raise SettingsError(f"option {name} has no value; give one, or leave it out")
-    for combination in itertools.product(*(_listed(values[name], keep=True) for name in names)):
+    listed = ([_plain_value(one) for one in _listed(values[name], keep=True)] for name in names)
+    for combination in itertools.product(*listed):
         yield tuple(zip(names, combination, strict=True))
 
 
@@ -253,9 +268,18 @@ def options_of(values: Mapping[str, Any]) -> tuple[tuple[str, Any], ...]:
         For an unknown one, and for values that would fail in every run.
     """
     _refuse_unknown(values, (*RUN_OPTIONS, *SYSTEM_OPTIONS), "option")
-    given = tuple(sorted(values.items()))
+    given = tuple((name, _plain_value(values[name])) for name in sorted(values))
     Job("", "", options=given).run_options(Sensor.MONOCULAR)
     return given
+
+
+def _plain_value(value: Any) -> Any:
+    """Take numbers of NumPy and others as Python's own, which files can hold."""
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    if is_whole(value):
+        return int(value)
+    return float_of(value) if is_number(value) else value
 
 
 def _seeds(value: Any) -> list[int]:
@@ -308,24 +332,3 @@ def _refuse_unknown(values: Mapping[str, Any], known: Sequence[str], what: str) 
             near = difflib.get_close_matches(str(name), known, 1)
             hint = f"; did you mean {near[0]}?" if near else f"; there are {', '.join(known)}"
             raise SettingsError(f"unknown {what} '{name}'{hint}")
-
-
-def _require_own_folders(jobs: list[Job]) -> None:
-    by_key: dict[str, Job] = {}
-    for job in jobs:
-        other = by_key.setdefault(job.key, job)
-        if other is not job:
-            both = f"{other.path} and {job.path}" if other.path != job.path else f"{job.path} twice"
-            raise SettingsError(
-                f"two runs would have the folder {job.key}: {both}; give the sequences names of "
-                "their own ('path: ..., name: ...')"
-            )
-
-
-def _short(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value).lower()
-
-
-def _plain(text: str) -> str:
-    """Leave only what is harmless in names of files."""
-    return re.sub(r"[^A-Za-z0-9_.=+]+", "_", text)

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import contextlib
+import errno
+import gzip
 import importlib
 import re
 import shutil
@@ -13,6 +15,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path, PurePosixPath
 from typing import IO, Any
 
+from orbslam2py._files import reason_of
 from orbslam2py.batches.cache import Cache
 from orbslam2py.errors import DatasetError, OrbSlamError, SettingsError
 
@@ -20,6 +23,10 @@ _ADDRESS = re.compile(r"([A-Za-z][A-Za-z0-9+]*)(?:://|::)")
 _ARCHIVES = (".zip", ".tar", ".tar.gz", ".tgz", ".tar.bz2", ".tbz2", ".tar.xz", ".txz")
 #: What some archives hold beside the folder that is meant.
 _NOT_MEANT = ("__MACOSX",)
+#: Bit of the flags of a file in a zip file.
+_ENCRYPTED = 0x1
+#: What a disk says to names that are too long, or to a file where a folder is.
+_ERRORS_OF_NAMES = (errno.ENAMETOOLONG, errno.EEXIST, errno.ENOTDIR, errno.EISDIR)
 
 
 def is_remote(path: str) -> bool:
@@ -172,31 +179,71 @@ def _extract(
     name: str | None = None,
 ) -> None:
     """Unpack an archive; nothing in it is written elsewhere than in the folder."""
+    named = name or str(archive)
     try:
         if zipfile.is_zipfile(archive):
-            with zipfile.ZipFile(archive) as packed:
-                reserve(taken + sum(one.file_size for one in packed.infolist()))
-                for one in packed.infolist():
-                    if not one.is_dir():
-                        _write(packed.open(one), folder, one.filename)
+            _extract_zip(archive, folder, reserve, taken, named)
         else:
-            with tarfile.open(archive) as tar:
-                members = [one for one in tar.getmembers() if one.isfile()]
-                reserve(taken + sum(one.size for one in members))
-                for member in members:
-                    stream = tar.extractfile(member)
-                    assert stream is not None
-                    _write(stream, folder, member.name)
-    except (zipfile.BadZipFile, tarfile.TarError, EOFError) as error:
+            _extract_tar(archive, folder, reserve, taken, named)
+    except (OrbSlamError, MemoryError):
+        raise
+    except NotImplementedError as error:
         raise DatasetError(
-            f"{name or archive} is no whole archive; fetch or pack it again"
+            f"{named} is packed in a way that is not known here; unpack it, and give the folder"
         ) from error
+    except Exception as error:
+        # Each way of packing has errors of its own for bytes that are none of its; what has a
+        # number came from the disk, but for names that no disk takes.
+        if isinstance(error, OSError) and error.errno:
+            if error.errno not in _ERRORS_OF_NAMES:
+                raise
+            raise DatasetError(
+                f"{named} holds names that do not fit beside each other in a folder: "
+                f"{reason_of(error)}; pack it again"
+            ) from error
+        raise DatasetError(f"{named} is no whole archive; fetch or pack it again") from error
 
 
-def _write(stream: IO[bytes], folder: Path, name: str) -> None:
+def _extract_zip(
+    archive: Path, folder: Path, reserve: Callable[[int], None], taken: int, named: str
+) -> None:
+    with zipfile.ZipFile(archive) as packed:
+        members = [one for one in packed.infolist() if not one.is_dir()]
+        if any(one.flag_bits & _ENCRYPTED for one in members):
+            raise DatasetError(f"{named} is encrypted; unpack it, and give the folder")
+        reserve(taken + sum(one.file_size for one in members))
+        for one in members:
+            _write(packed.open(one), folder, one.filename, named)
+
+
+def _extract_tar(
+    archive: Path, folder: Path, reserve: Callable[[int], None], taken: int, named: str
+) -> None:
+    with tarfile.open(archive) as tar:
+        members = [one for one in tar.getmembers() if one.isfile()]
+        reserve(taken + sum(one.size for one in members))
+        for member in members:
+            stream = tar.extractfile(member)
+            assert stream is not None
+            _write(stream, folder, member.name, named)
+        assert tar.fileobj is not None
+        _read_to_the_end(tar.fileobj)
+
+
+def _read_to_the_end(stream: Any) -> None:
+    """Let what was unpacked be checked: the sum of all bytes stands at the end."""
+    try:
+        while stream.read(1 << 20):
+            pass
+    except gzip.BadGzipFile as error:
+        if "Not a gzipped file" not in str(error):  # what else lies behind the end is not looked at
+            raise
+
+
+def _write(stream: IO[bytes], folder: Path, name: str, archive: str) -> None:
     inner = PurePosixPath(name)
     if inner.is_absolute() or ".." in inner.parts:
-        raise DatasetError(f"the archive holds '{name}', which leads out of it; pack it again")
+        raise DatasetError(f"{archive} holds '{name}', which leads out of it; pack it again")
     path = folder / inner
     path.parent.mkdir(parents=True, exist_ok=True)
     with stream, path.open("wb") as target:

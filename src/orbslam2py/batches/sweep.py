@@ -127,21 +127,23 @@ def with_parameters(settings: Settings, parameters: tuple[tuple[str, float], ...
     SettingsError
         If a value is not allowed, or the settings have no such group.
     """
+    fields: dict[str, dict[str, Any]] = {}
     for name, value in parameters:
         key = _KEYS[name]
-        group = getattr(settings, key.group)
-        if group is None:
+        if getattr(settings, key.group) is None:
             raise SettingsError(f"{name} is not used by {settings.sensor}; leave it out of sweep")
-        changed = replace(group, **{key.field: key.kind(value)})
-        settings = replace(settings, **{key.group: changed})
-    return settings
+        fields.setdefault(key.group, {})[key.field] = key.kind(value)
+    # All of a group at once: some values are only allowed together with others.
+    groups = {name: replace(getattr(settings, name), **new) for name, new in fields.items()}
+    return replace(settings, **groups)
 
 
 def _values(name: str, listed: list[Any]) -> tuple[float, ...]:
     """Take the values of a list."""
     if not listed:
         raise SettingsError(f"sweep: {name} has no values; give a list of numbers")
-    for number, value in enumerate(listed):
+    values: list[float] = []
+    for value in listed:
         if not is_number(value):
             raise SettingsError(f"sweep: a value of {name} is {shown(value)}; give numbers")
         try:
@@ -152,9 +154,11 @@ def _values(name: str, listed: list[Any]) -> tuple[float, ...]:
             ) from error
         except ValueError as error:
             raise SettingsError(f"sweep: {error}") from error
-        if value in listed[:number]:
+        if value in values:
             raise SettingsError(f"sweep: {name} has the value {value} twice; leave one out")
-    return tuple(listed)
+        # Numbers of NumPy and others as Python's own, which files can hold.
+        values.append(int(value) if is_whole(value) else float(value))
+    return tuple(values)
 
 
 def _require_different_draws(sweep: Sweep) -> None:

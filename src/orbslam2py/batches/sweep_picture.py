@@ -7,7 +7,8 @@ import statistics
 from pathlib import Path
 from typing import Any
 
-from orbslam2py._files import atomic_write
+from orbslam2py._figures import write_figure
+from orbslam2py.batches.table import printable
 
 _PREFIX = "sweep."
 _PER_ROW = 3
@@ -24,7 +25,7 @@ def write_sweep_picture(path: Path, rows: list[dict[str, Any]]) -> bool:
     Parameters
     ----------
     path
-        The PNG file.
+        The file; the ending tells the format.
     rows
         The table of the batch.
 
@@ -52,8 +53,7 @@ def write_sweep_picture(path: Path, rows: list[dict[str, Any]]) -> bool:
         if number == 0:
             for text in axes.legend(fontsize="small").get_texts():
                 text.set_parse_math(False)  # names may have dollars
-    with atomic_write(path, binary=True) as stream:
-        figure.savefig(stream, format="png", dpi=120)
+    write_figure(path, figure, dpi=120)
     return True
 
 
@@ -62,10 +62,10 @@ def _draw(axes: Any, key: str, rows: list[dict[str, Any]]) -> None:
     for number, sequence in enumerate(sequences):
         mine = [row for row in rows if row["sequence"] == sequence and row.get(key) is not None]
         judged = [row for row in mine if row.get(_ERROR) is not None]
-        colour = f"C{number % 10}"
+        colour, name = f"C{number % 10}", printable(sequence)
         values = [float(row[key]) for row in judged]
         errors = [float(row[_ERROR]) for row in judged]
-        axes.plot(values, errors, "o", color=colour, alpha=0.6, label=sequence)
+        axes.plot(values, errors, "o", color=colour, alpha=0.6, label=name)
         medians = _medians(values, errors)
         if len(medians) < len(values):
             axes.plot(*zip(*medians, strict=True), "-", color=colour)
@@ -75,7 +75,7 @@ def _draw(axes: Any, key: str, rows: list[dict[str, Any]]) -> None:
                 *(lost, [0.02] * len(lost), "x"),
                 color=colour,
                 transform=axes.get_xaxis_transform(),
-                label=f"{sequence}: no result",
+                label=f"{name}: no result",
             )
     axes.set_xlabel(key.removeprefix(_PREFIX))
     axes.set_ylabel("ATE [m]")

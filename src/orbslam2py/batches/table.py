@@ -12,11 +12,16 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from orbslam2py._files import atomic_write
+import numpy as np
+
+from orbslam2py._arguments import is_number, is_whole
+from orbslam2py._files import atomic_write, printable_name
 from orbslam2py.batches.work import MEASURED
 
 #: Columns that come first, in this order.
 _FIRST = ("run", "sequence", "sensor", "settings", "seed", "state", "reason", "tracked", "frames")
+#: Whole numbers that a database holds; seeds may be larger.
+_LEAST, _LARGEST = -(2**63), 2**63 - 1
 
 
 def columns_of(rows: Iterable[dict[str, Any]]) -> list[str]:
@@ -37,7 +42,9 @@ def is_measured(name: str) -> bool:
 def write_table(folder: Path, rows: list[dict[str, Any]]) -> list[Path]:
     """Write ``results.sqlite``, ``results.csv`` and, with pyarrow, ``results.parquet``.
 
-    Rows are in the order of their names, whatever the order in which the runs ended.
+    Rows are in the order of their names, whatever the order in which the runs ended. What a file
+    cannot hold as it is stands there as text: whole numbers beyond 64 bits with a sign, and names
+    of files that are no text, as far as they can be read.
 
     Returns
     -------
@@ -49,7 +56,10 @@ def write_table(folder: Path, rows: list[dict[str, Any]]) -> list[Path]:
     OSError
         If a file cannot be written.
     """
-    rows = sorted(rows, key=lambda row: str(row["run"]))
+    rows = [
+        {name: _storable(value) for name, value in row.items()}
+        for row in sorted(rows, key=lambda row: str(row["run"]))
+    ]
     columns = columns_of(rows)
     files = [folder / "results.csv", folder / "results.sqlite"]
     with atomic_write(files[0]) as stream:
@@ -61,6 +71,23 @@ def write_table(folder: Path, rows: list[dict[str, Any]]) -> list[Path]:
         files.append(folder / "results.parquet")
         _write_parquet(files[-1], columns, rows)
     return files
+
+
+def printable(text: str) -> str:
+    """Spell a text that may hold names of files so that every file and font can hold it."""
+    try:
+        return printable_name(text)
+    except UnicodeEncodeError:  # half of a character, which no byte of a name stands for
+        return text.encode("utf-8", "replace").decode("utf-8")
+
+
+def _storable(value: Any) -> bool | int | float | str | None:
+    """Bring a value into a form that all files of the table can hold."""
+    if value is None or isinstance(value, bool | np.bool_):
+        return None if value is None else bool(value)
+    if is_whole(value):
+        return int(value) if _LEAST <= value <= _LARGEST else str(value)
+    return float(value) if is_number(value) else printable(str(value))
 
 
 def _text(value: Any) -> Any:

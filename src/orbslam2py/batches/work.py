@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import platform
 import threading
@@ -21,7 +22,10 @@ from orbslam2py.batches.results import Results
 from orbslam2py.batches.sweep import with_parameters
 from orbslam2py.datasets import open_input
 from orbslam2py.errors import DatasetError, OrbSlamError
+from orbslam2py.runs.report import error_entry, peak_memory_mb
 from orbslam2py.runs.run import run_sequence
+
+_log = logging.getLogger(__name__)
 
 #: A run whose worker ended while it was made is begun so often.
 _MOST_BEGINNINGS = 3
@@ -35,6 +39,7 @@ _LEFT_OUT = (
     *("sequence", "settings", "options", "command", "command_folder", "machine", "sensor", "seed"),
     *("version", "deterministic", "realtime", "loaded_map", "saved_map", "final_adjustment"),
     "error",  # it is the reason of the row
+    *("loops", "losses"),  # they are counted as loops_closed and lost
 )
 
 
@@ -93,9 +98,12 @@ def run_job(
                 _run(job, path, folder, row, page=page)
     except (OrbSlamError, OSError, MemoryError) as error:
         row |= {"state": "failed", "reason": _one_line(error)}
+    except Exception as error:  # of a library, of a user's own loader, or ours
+        _log.error("unexpected error in the run %s", job.key, exc_info=error)
+        row |= {"state": "failed", "reason": _one_line(error)}
     row["job_seconds"] = round(time.perf_counter() - begin, 3)
     row.setdefault("seconds", row["job_seconds"])
-    row["peak_memory_mb"] = _peak_memory() or row.get("peak_memory_mb")
+    row["peak_memory_mb"] = round(peak_memory_mb(), 1)
     _mark_as_ended(results, job, row)
     return row
 
@@ -169,15 +177,17 @@ def _figures(report: dict[str, Any]) -> dict[str, Any]:
             continue
         if name == "milliseconds":
             row |= {f"milliseconds.{stage}": times["median"] for stage, times in value.items()}
-        elif name == "warnings":
-            row["warnings"] = len(value)
+        elif isinstance(value, list):
+            row[name] = len(value)
         elif value is None or isinstance(value, str | int | float):
             row[name] = value
     return row
 
 
-def _one_line(error: BaseException) -> str:
-    return " ".join(describe_error(error).split())
+def _one_line(error: Exception) -> str:
+    # NumPy has an error of its own for too little memory, whose name says nothing to people.
+    text = describe_error(error) if isinstance(error, MemoryError) else error_entry(error)
+    return " ".join((text or "").split())
 
 
 def _forget_peak_memory() -> None:
@@ -186,12 +196,3 @@ def _forget_peak_memory() -> None:
         Path("/proc/self/clear_refs").write_text("5")
     except OSError:
         return
-
-
-def _peak_memory() -> float | None:
-    try:
-        text = Path("/proc/self/status").read_text()
-    except OSError:
-        return None
-    line = next((line for line in text.splitlines() if line.startswith("VmHWM:")), None)
-    return None if line is None else round(int(line.split()[1]) / 1e3, 1)

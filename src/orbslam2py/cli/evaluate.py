@@ -23,7 +23,7 @@ from orbslam2py.datasets import Layout, is_recording, open_sequence, recognise
 from orbslam2py.datasets.euroc import find_root
 from orbslam2py.datasets.euroc_calibration import read_sensor_yaml
 from orbslam2py.datasets.extrinsics import read_extrinsics
-from orbslam2py.errors import DatasetError
+from orbslam2py.errors import DatasetError, OrbSlamError
 from orbslam2py.evaluation import (
     Alignment,
     Evaluation,
@@ -248,8 +248,8 @@ def _sensor_of_run(trajectory: Path) -> Sensor | None:
     try:
         report = json_module.loads((trajectory.parent / "report.json").read_text(encoding="utf-8"))
         return Sensor(report["sensor"])
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
+    except (OSError, ValueError, KeyError, TypeError, OrbSlamError):
+        return None  # it may be of another program
 
 
 def _table(figures: dict[str, Any], trajectory: Path, ground_truth: Path) -> Table:

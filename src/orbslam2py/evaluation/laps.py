@@ -13,7 +13,7 @@ import numpy as np
 from orbslam2py._arguments import shown
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import DatasetError
-from orbslam2py.evaluation.matching import match_poses
+from orbslam2py.evaluation.matching import match_poses, time_order
 from orbslam2py.evaluation.metrics import relative_errors
 from orbslam2py.trajectory import (
     MAX_DIFFERENCE,
@@ -138,6 +138,7 @@ def _lap(
         require_poses(trajectory.T_wc, ~trajectory.lost, f"the {name}")
     estimate = estimate.select(~estimate.lost)
     truth = truth.select(~truth.lost)
+    truth = truth.select(time_order(truth))
     i, j = match_poses(estimate, truth, max_difference)
     # Along all true poses: the way also goes on where the estimate has gaps.
     along = lengths_along(truth.positions)[j]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import DatasetError
-from orbslam2py.evaluation.matching import match_poses
+from orbslam2py.evaluation.matching import match_poses, time_order
 from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory, align, lengths_along
 from orbslam2py.trajectory.rotations import inverse_poses, rotation_angles
 
@@ -124,6 +124,7 @@ def metres_per_unit_at(
     """
     estimate = estimate.select(~estimate.lost)
     truth = truth.select(~truth.lost)
+    truth = truth.select(time_order(truth))
     i, j = match_poses(estimate, truth, max_difference)
     along = lengths_along(truth.positions)
     near = np.abs(along[j] - along[_nearest(truth, timestamp)]) <= reach
@@ -143,7 +144,7 @@ def find_revisits(
     Parameters
     ----------
     truth
-        True poses, camera to world with z ahead, in the order of time [m].
+        True poses, camera to world with z ahead [m].
     near
         Distance that still is the same place [m].
     apart
@@ -151,6 +152,7 @@ def find_revisits(
     degrees
         Angle between the two views that still is the same direction [deg].
     """
+    truth = truth.select(time_order(truth))
     along = lengths_along(truth.positions)
     ahead = truth.T_wc[:, :3, 2]
     found = np.zeros(len(truth), bool)

@@ -97,6 +97,19 @@ def match_poses(
     return i, j
 
 
+def time_order(trajectory: Trajectory) -> IntArray:
+    """Order poses by their time stamps: in files they may stand in any order.
+
+    Along a path metres are only counted in this order.
+
+    Returns
+    -------
+    IntArray
+        Indices of the poses, (n,); those of one time stamp stay as they are.
+    """
+    return np.argsort(trajectory.timestamps, kind="stable")
+
+
 def describe_match(
     estimate: Trajectory, truth: Trajectory, i: IntArray, j: IntArray, *, timed: bool = True
 ) -> Matched:
@@ -112,7 +125,7 @@ def describe_match(
         False if the time stamps are only frame numbers.
     """
     differences = np.abs(estimate.timestamps[i] - truth.timestamps[j])
-    by_time = np.argsort(truth.timestamps, kind="stable")
+    by_time = time_order(truth)
     with np.errstate(all="ignore"):
         along = lengths_along(truth.positions[by_time])
         place = np.empty(len(truth), np.int64)

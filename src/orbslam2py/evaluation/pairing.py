@@ -24,6 +24,7 @@ from orbslam2py.trajectory import (
     read_times,
     read_trajectory,
 )
+from orbslam2py.trajectory.frame_times import is_frame_table
 
 _SAME_TIME = 1e-6  # [s]
 _END = 0.02  # part of a sequence that may be without a true pose at its end
@@ -44,9 +45,11 @@ class Poses:
     is_timed
         Whether the time stamps are times.
     frames
-        The frames of the run that the file belongs to; None if it is not known.
+        The frames of the run that the file belongs to; None if they are not known, or not read.
     frame_times
         Time of every frame of the sequence [s], (n,); None if it is not known.
+    frame_table
+        The run's ``frames.csv`` beside the file, which tells `frames`; None if there is none.
     """
 
     source: str
@@ -55,6 +58,7 @@ class Poses:
     is_timed: bool = True
     frames: FrameTable | None = None
     frame_times: FloatArray | None = None
+    frame_table: Path | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +94,8 @@ def read_estimate(
 
     Rows of a file in KITTI format that only stand for frames without a pose are marked as lost:
     those that ``frames.csv`` lists without one; without that file the identity at the beginning
-    and repetitions of the row before.
+    and repetitions of the row before. For a file with time stamps it is only read when it is
+    needed, and one of another program never is.
 
     Parameters
     ----------
@@ -105,13 +110,15 @@ def read_estimate(
         If a file is missing or malformed.
     """
     trajectory, file_format = read_trajectory(path, file_format)
-    frames = _frames_beside(path)
+    beside = path.parent / "frames.csv"
+    table = beside if is_frame_table(beside) else None
     if file_format is not TrajectoryFormat.KITTI:
-        return Poses(str(path), trajectory, file_format, frames=frames)
+        return Poses(str(path), trajectory, file_format, frame_table=table)
+    frames = None if table is None else read_frame_table(table)
     if frames is not None and len(frames) == len(trajectory):
         lost = ~frames.has_pose | _before_the_map(trajectory.T_wc)
         trajectory = Trajectory(frames.timestamps, trajectory.T_wc, lost, frames.indices)
-        return Poses(str(path), trajectory, file_format, frames=frames)
+        return Poses(str(path), trajectory, file_format, frames=frames, frame_table=table)
     lost = rows_without_pose(trajectory.T_wc)
     trajectory = Trajectory(trajectory.timestamps, trajectory.T_wc, lost)
     return _with_times(Poses(str(path), trajectory, file_format, is_timed=False), path, times)
@@ -201,6 +208,8 @@ def _before_the_map(T_wc: FloatArray) -> NDArray[np.bool_]:
 def _by_frame_number(estimate: Poses, truth: Poses) -> Paired:
     """Pair the frames of a run with the rows of a truth that has one for every frame."""
     frames, n = estimate.frames, len(truth.trajectory)
+    if frames is None and estimate.frame_table is not None:
+        frames = read_frame_table(estimate.frame_table)
     if frames is None or not _all_listed(estimate.trajectory, frames):
         raise DatasetError(
             f"{truth.source} has {n} poses without time stamps; give the time of each with "
@@ -269,11 +278,6 @@ def _at(poses: Poses, times: FloatArray | None) -> Trajectory:
     assert times is not None
     n = len(poses.trajectory)
     return Trajectory(times[:n], poses.trajectory.T_wc, poses.trajectory.lost)
-
-
-def _frames_beside(path: Path) -> FrameTable | None:
-    table = path.parent / "frames.csv"
-    return read_frame_table(table) if table.is_file() else None
 
 
 def _times_beside(path: Path) -> FloatArray | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import re
 import threading
 import time
 from collections.abc import Generator
@@ -22,6 +23,8 @@ from orbslam2py.slam.frame_source import check_images
 
 #: Seconds between two looks at whether the run was stopped.
 _WAIT_SLICE = 0.2
+#: A decimal number, as whoever reads the files takes it.
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 
 @dataclass(frozen=True)
@@ -162,12 +165,12 @@ def is_sequence(source: Sequence | LiveSource) -> TypeGuard[Sequence]:
 
 
 def _time_text(text: Any, giver: str) -> str:
-    """See that a time stamp is text with a number: it goes into files as it is."""
-    try:
-        if isinstance(text, str) and math.isfinite(float(text)):
-            return text
-    except ValueError:
-        pass
+    """See that a time stamp is text with a number: it goes into files as it is.
+
+    Python reads more as a number than others do, such as blanks and line ends around it.
+    """
+    if isinstance(text, str) and _NUMBER.fullmatch(text) and math.isfinite(float(text)):
+        return text
     raise DatasetError(
         f"{giver} gave {shown(text)} for a time stamp; give the time in seconds as text, such as "
         "'1305031102.175304'"

@@ -14,12 +14,11 @@ import numpy as np
 from orbslam2py._files import atomic_write
 from orbslam2py.runs.result import FrameRow
 from orbslam2py.slam.records import Evidence, TrackingRecord
+from orbslam2py.trajectory.frame_times import FRAME_COLUMNS, is_frame_table
 from orbslam2py.trajectory.rotations import quaternions_from_rotations
 
 STAGES = ("wait", "extract", "stereo", "predict", "local_map", "keyframe", "track")
 
-_ALWAYS = ["index", "timestamp", "map", "state", "reason"]
-_BEGINNING = ",".join(_ALWAYS).encode()
 _TRACKED = [
     *("inliers", "matches", "keyframe", "reference_keyframe"),
     *("tx", "ty", "tz", "qx", "qy", "qz", "qw", "std_position", "std_angle"),
@@ -39,15 +38,6 @@ def begin_frames(path: Path) -> None:
     write_frames(path, ())
 
 
-def is_frame_table(path: Path) -> bool:
-    """Whether a file is such a table, of this version or of another."""
-    try:
-        with path.open("rb") as file:
-            return file.read(len(_BEGINNING)) == _BEGINNING
-    except OSError:
-        return False
-
-
 def has_no_frames(path: Path) -> bool:
     """Whether a file is the table of a run that has not ended."""
     return is_frame_table(path) and path.read_bytes().count(b"\n") == 1
@@ -63,7 +53,7 @@ def write_frames(path: Path, rows: Iterable[FrameRow]) -> None:
     """
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(_ALWAYS + _TRACKED)
+    writer.writerow([*FRAME_COLUMNS, *_TRACKED])
     for row in rows:
         writer.writerow(_fields(row))
     with atomic_write(path) as file:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import resource
 import sys
@@ -300,9 +301,8 @@ def initialization_reasons(result: RunResult) -> dict[str, int]:
 def peak_memory_mb() -> float:
     """Largest resident memory of this process so far, in megabytes."""
     # A child inherits ru_maxrss of the program that started it; Linux' own figure is the process's.
-    status = Path("/proc/self/status")
-    if status.exists():
-        for line in status.read_text().splitlines():
+    with contextlib.suppress(OSError):
+        for line in Path("/proc/self/status").read_text().splitlines():
             if line.startswith("VmHWM:"):
                 return int(line.split()[1]) / 1e3
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -4,7 +4,10 @@
 from __future__ import annotations
 
 import csv
+import statistics
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +18,13 @@ from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._text_lines import content_lines, number_of
 from orbslam2py.errors import DatasetError
 
-_LONGEST_STEP = 86400  # whole numbers are nanoseconds if they step by more than that as seconds
+#: Whole numbers are nanoseconds if their typical step is longer than this as seconds (a day), or if
+#: one is later than this (the year 5138, counted from 1970).
+_LONGEST_STEP, _LATEST = 86400, 10**11
+
+
+#: What the table of a run's frames begins with, in this version and in others.
+FRAME_COLUMNS = ("index", "timestamp", "map", "state", "reason")
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +49,16 @@ class FrameTable:
         return len(self.indices)
 
 
+def is_frame_table(path: Path) -> bool:
+    """Whether a file is the table of a run's frames, and none of another program."""
+    beginning = ",".join(FRAME_COLUMNS).encode()
+    try:
+        with path.open("rb") as file:
+            return file.read(len(beginning)) == beginning
+    except OSError:
+        return False
+
+
 def read_frame_table(path: str | Path) -> FrameTable:
     """Read ``frames.csv`` of a run.
 
@@ -50,7 +69,10 @@ def read_frame_table(path: str | Path) -> FrameTable:
     """
     rows = []
     try:
-        with path_of(path, "the table of frames").open(encoding="utf-8", newline="") as stream:
+        # Reasons hold names of files byte by byte, and not all names are UTF-8.
+        with path_of(path, "the table of frames").open(
+            encoding="utf-8", errors="replace", newline=""
+        ) as stream:
             reader = csv.DictReader(stream)
             for row in reader:
                 world = int(row["map"]) if row["map"] else -1
@@ -68,6 +90,25 @@ def read_frame_table(path: str | Path) -> FrameTable:
     return FrameTable(
         table[:, 0].astype(np.int64), table[:, 1], (table[:, 3] > 0) & (table[:, 2] == last)
     )
+
+
+def in_seconds(texts: Sequence[str]) -> list[str]:
+    """Write whole nanoseconds as decimal seconds, with all their digits; others stay as they are.
+
+    Parameters
+    ----------
+    texts
+        The times of a list, finite numbers. They are taken for nanoseconds if all are whole and
+        make no sense as seconds: more than a day from one to the next, or thousands of years from
+        now.
+    """
+    if not all(text.isdecimal() for text in texts):
+        return list(texts)
+    times = [int(text) for text in texts]
+    steps = [later - earlier for earlier, later in pairwise(times)]
+    if max(times, default=0) < _LATEST and (not steps or statistics.median(steps) <= _LONGEST_STEP):
+        return list(texts)
+    return [f"{time // 10**9}.{time % 10**9:09d}" for time in times]
 
 
 def read_times(path: str | Path) -> FloatArray:
@@ -95,14 +136,13 @@ def read_times(path: str | Path) -> FloatArray:
                 f"{path}:{line.number}: expected one time stamp, found {len(line.fields)} fields; "
                 "a list of times has one per line"
             )
-    times = np.array([number_of(path, line, line.fields[0]) for line in lines], np.float64)
+        number_of(path, line, line.fields[0])
+    texts = in_seconds([line.fields[0] for line in lines])
+    times = np.array([float(text) for text in texts], np.float64)
     back = np.flatnonzero(np.diff(times) < 0)
     if len(back):
         raise DatasetError(
             f"{path}:{lines[int(back[0]) + 1].number}: the time stamp is before the one above it; "
             "give the times in the order of the frames"
         )
-    whole = all(line.fields[0].isdecimal() for line in lines)
-    if whole and len(times) > 1 and np.median(np.diff(times)) > _LONGEST_STEP:
-        times = np.array([int(line.fields[0]) / 1e9 for line in lines])
     return times

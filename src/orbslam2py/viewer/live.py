@@ -20,7 +20,9 @@ from types import TracebackType
 import numpy as np
 import numpy.typing as npt
 
+from orbslam2py._arguments import instance_of, shown
 from orbslam2py._waiting import wait_for_event
+from orbslam2py.errors import StateError
 from orbslam2py.maps.changes import MapChanges
 from orbslam2py.slam.events import Event, LoopClosed, MapsMerged
 from orbslam2py.slam.records import TrackingRecord
@@ -124,7 +126,16 @@ class LiveView:
             What ends the run.
         folder : path
             Where maps are saved.
+
+        Raises
+        ------
+        StateError
+            If `system` is none, or `truth` no trajectory.
         """
+        _require_system(system)
+        if truth is not None:
+            remedy = "an orbslam2py.Trajectory, or None"
+            instance_of(truth, Trajectory, "truth", remedy, StateError)
         self._system, self._control = system, control
         actions = ActionsOnSystem(system, Path(folder))
         self._answers.update(
@@ -267,7 +278,7 @@ class Viewer:
     Raises
     ------
     StateError
-        If viser is not installed, or the page cannot be served there.
+        If `system` is none, viser is not installed, or the page cannot be served there.
 
     Examples
     --------
@@ -284,12 +295,18 @@ class Viewer:
         truth: Trajectory | None = None,
         open_browser: bool = True,
     ) -> None:
+        _require_system(system)
         self.stopped = threading.Event()
+        self._publisher: Publisher | None = None
         self._view = LiveView(host=host, port=port)
-        self.address = self._view.address
-        self._view.attach(system, truth=truth, stop=self.stopped.set)
-        self._publisher = Publisher(system, [self._view], frame_rate=FRAME_RATE)
-        announce(self.address, open_browser=open_browser)
+        try:
+            self.address = self._view.address
+            self._view.attach(system, truth=truth, stop=self.stopped.set)
+            self._publisher = Publisher(system, [self._view], frame_rate=FRAME_RATE)
+            announce(self.address, open_browser=open_browser)
+        except BaseException:  # a Ctrl-C as well: nobody else could end the page
+            self.close()
+            raise
 
     def look_from(self, eye: npt.ArrayLike, target: npt.ArrayLike) -> None:
         """Let all browsers look from a place (3,) to another, in the world of the map."""
@@ -301,7 +318,8 @@ class Viewer:
 
     def close(self) -> None:
         """End the page."""
-        self._publisher.close()
+        if self._publisher is not None:
+            self._publisher.close()
         self._view.stop()
 
     def __enter__(self) -> Viewer:
@@ -314,6 +332,11 @@ class Viewer:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+
+
+def _require_system(system: object) -> None:
+    if not isinstance(system, System):
+        raise StateError(f"a viewer shows a System, not {shown(system)}")
 
 
 def announce(address: str, *, open_browser: bool) -> None:

@@ -127,12 +127,6 @@ class Publisher:
         """An image was dropped before it came to the system."""
         self._n_dropped += 1
 
-    def show_next(self) -> None:
-        """The next image is wanted however soon it comes, as when single ones are stepped."""
-        with self._condition:
-            self._next_view_at = 0.0
-            self._condition.notify_all()
-
     def close(self) -> None:
         """Give the watchers what is left, and end; may be called again."""
         events = self._pipeline.back_end.events

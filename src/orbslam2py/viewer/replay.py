@@ -49,7 +49,7 @@ class Replay:
     StateError
         If viser is not installed, or the page cannot be served there.
     DatasetError
-        If the run saw no images.
+        If the run saw no images, or the ground truth of its sequence cannot be read.
     MapFileError
         If the file of its map is not whole.
     """
@@ -78,14 +78,18 @@ class Replay:
         self._condition = threading.Condition()
         self._wanted, self._shown = len(run.frames) - 1, -1
         self._playing = self._stopping = False
+        self._thread = threading.Thread(target=self._follow, name="viewer page", daemon=True)
         self.page = Page(
             host=host, port=port, title=f"{run.name} ({run.sensor})", on_client=self._show_now
         )
-        self.page.neighbours = self._neighbours
-        self._add_controls()
-        self._draw_paths()
-        self._thread = threading.Thread(target=self._follow, name="viewer page", daemon=True)
-        self._thread.start()
+        try:
+            self.page.neighbours = self._neighbours
+            self._add_controls()
+            self._draw_paths()
+            self._thread.start()
+        except BaseException:  # a Ctrl-C as well: nobody else could end the page
+            self.stop()
+            raise
 
     @property
     def address(self) -> str:
@@ -102,7 +106,8 @@ class Replay:
         with self._condition:
             self._stopping = True
             self._condition.notify_all()
-        self._thread.join()
+        if self._thread.ident is not None:  # it was begun
+            self._thread.join()
         self.page.stop()
 
     # ---- the slider ------------------------------------------------------------------------------

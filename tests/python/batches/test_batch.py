@@ -80,6 +80,17 @@ def test_table(whole: Whole) -> None:
     assert group.ate_rmse_m.least <= group.ate_rmse_m.median <= group.ate_rmse_m.most
 
 
+def test_lists_of_a_report_are_counted(whole: Whole) -> None:
+    """Each once: loops and losses have figures of their own."""
+    for row in whole.done.rows:
+        report = json.loads((whole.folder / "runs" / row["run"] / "report.json").read_text())
+        counted = ("warnings", "maps", "merges", "full_adjustments")
+        assert [row[name] for name in counted] == [len(report[name]) for name in counted]
+        assert row["maps"] == 1
+        assert (row["loops_closed"], row["lost"]) == (len(report["loops"]), len(report["losses"]))
+        assert not {"loops", "losses"} & row.keys()
+
+
 def test_resume(sequences: Path, whole: Whole, tmp_path: Path) -> None:
     """Stopped after two runs, with a half one: the same table as without a stop."""
     folder, stop = tmp_path / "stopped", threading.Event()

@@ -207,6 +207,27 @@ def test_parameters_go_into_the_settings() -> None:
 
 
 @pytest.mark.parametrize(
+    ("given", "thresholds"),
+    [
+        ((("ORBextractor.iniThFAST", 5), ("ORBextractor.minThFAST", 3)), (5, 3)),
+        ((("ORBextractor.minThFAST", 30), ("ORBextractor.iniThFAST", 40.0)), (40, 30)),
+    ],
+)
+def test_keys_that_are_only_allowed_together(
+    given: tuple[tuple[str, float], ...], thresholds: tuple[int, int]
+) -> None:
+    """Each of them alone is on the wrong side of what the other has been."""
+    settings = builtin_settings("tum1", orb.Sensor.RGBD)
+    changed = with_parameters(settings, (*given, ("ThDepth", 25.0), ("Camera.fx", 500.0)))
+    assert (changed.orb.ini_th_fast, changed.orb.min_th_fast) == thresholds
+    assert changed.depth is not None
+    assert (changed.depth.close_factor, changed.camera.fx) == (25, 500)
+    assert changed.orb.n_features == settings.orb.n_features
+    with pytest.raises(orb.SettingsError, match="iniThFAST"):
+        with_parameters(settings, (("ORBextractor.iniThFAST", 5), ("ORBextractor.minThFAST", 6)))
+
+
+@pytest.mark.parametrize(
     ("more", "said"),
     [
         ({"seeds": 1_000_000_000}, "1000000000 runs or more; make batches of at most 100000"),

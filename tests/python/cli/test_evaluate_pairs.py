@@ -231,6 +231,43 @@ def test_rows_for_every_frame_of_a_sequence(command: CommandLine, tmp_path: Path
     expect_refused(command("evaluate", "part.txt", "09"), "part.txt has 50 rows", "120 frames")
 
 
+# ---- files of other programs beside the estimate -------------------------------------------------
+@pytest.mark.parametrize("sensor", ["lidar", None, ["mono"], {"name": "rgbd"}])
+def test_a_report_of_another_program(command: CommandLine, tmp_path: Path, sensor: Any) -> None:
+    truth = wander(N)
+    write_tum(tmp_path / "a.txt", noisy(truth))
+    write_tum(tmp_path / "b.txt", truth)
+    (tmp_path / "report.json").write_text(json.dumps({"sensor": sensor}))
+    figures, done = compared(command, "a.txt", "b.txt")
+    expect_right(figures, N)
+    assert "sim3 (told by the lengths)" in done.out
+
+
+@pytest.mark.parametrize("table", ["frame;x;y\n1;2;3\n", "", "index,timestamp\n0,0.5\n"])
+def test_a_table_of_another_program(command: CommandLine, tmp_path: Path, table: str) -> None:
+    truth = wander(N)
+    (tmp_path / "frames.csv").write_text(table)
+    write_tum(tmp_path / "a.txt", noisy(truth))
+    write_kitti(tmp_path / "rows.txt", noisy(truth))
+    write_tum(tmp_path / "b.txt", truth)
+    write_kitti(tmp_path / "poses.txt", truth)
+    expect_right(compared(command, "a.txt", "b.txt")[0], N)
+    expect_right(compared(command, "rows.txt", "poses.txt")[0], N)
+    expect_refused(command("evaluate", "a.txt", "poses.txt"), "poses.txt", "--times", "times.txt")
+
+
+def test_a_damaged_table_is_told_where_it_is_needed(command: CommandLine, tmp_path: Path) -> None:
+    truth = wander(N)
+    leave_run(tmp_path / "run", truth)
+    write_tum(tmp_path / "truth.txt", truth)
+    write_kitti(tmp_path / "poses.txt", truth)
+    table = tmp_path / "run" / "frames.csv"
+    table.write_text(table.read_text().replace("\n5,", "\nfive,"))
+    expect_right(compared(command, "run/trajectory.txt", "truth.txt")[0], N - 12)
+    for name in ("trajectory.txt", "trajectory_kitti.txt"):
+        expect_refused(command("evaluate", f"run/{name}", "poses.txt"), "frames.csv:7: no row")
+
+
 # ---- told ----------------------------------------------------------------------------------------
 def test_part_of_the_path_is_told(command: CommandLine, tmp_path: Path) -> None:
     truth = wander(N)

@@ -80,6 +80,18 @@ def test_scale_that_grows_by_three_percent_over_a_lap(unit: float) -> None:
     assert scale_drift(truth, truth) == pytest.approx(0, abs=1e-12)
 
 
+def test_files_in_another_order_than_that_of_time() -> None:
+    """As those that several tools have written one after the other."""
+    truth = circle(400)
+    T_wc = truth.T_wc.copy()
+    T_wc[:, :3, 3] *= 1 + 1e-4 * np.arange(len(truth))[:, None]
+    estimate = Trajectory(truth.timestamps, T_wc)
+    order = np.random.default_rng(0).permutation(len(truth))
+    for mixed in ((estimate.select(order), truth), (estimate, truth.select(order))):
+        assert lap_error(*mixed, 40.0) == lap_error(estimate, truth, 40.0)
+        assert scale_drift(*mixed) == pytest.approx(scale_drift(estimate, truth))
+
+
 def test_laps_that_cannot_be_judged() -> None:
     truth = circle(400)
     with pytest.raises(DatasetError, match=r"ends after 31\.\d+ m of a lap of 60\.00 m"):

@@ -97,6 +97,16 @@ def test_scale_is_that_of_the_place() -> None:
     assert 2 < both < 4
 
 
+def test_the_scale_goes_by_time_and_not_by_rows() -> None:
+    truth = along_z(0.1 * np.arange(200))
+    steps = np.where(np.arange(199) < 100, 0.05, 0.025)
+    estimate = along_z(np.concatenate([[0.0], np.cumsum(steps)]))
+    order = np.random.default_rng(0).permutation(200)
+    for mixed in ((estimate.select(order), truth), (estimate, truth.select(order))):
+        assert metres_per_unit_at(2.0, *mixed, 2.0) == pytest.approx(2)
+        assert metres_per_unit_at(17.0, *mixed, 2.0) == pytest.approx(4)
+
+
 def test_lost_poses_are_left_out() -> None:
     truth = along_z(0.1 * np.arange(50))
     lost = np.arange(50) % 2 == 1
@@ -122,6 +132,13 @@ def test_a_second_lap_is_one_revisit() -> None:
     assert revisit.begin == pytest.approx(40.0, abs=0.7)
     assert revisit.begin < 40.0
     assert revisit.end == pytest.approx(59.9)
+
+
+def test_revisits_go_by_time_and_not_by_rows() -> None:
+    truth = circle(400, 1.5)
+    order = np.random.default_rng(0).permutation(len(truth))
+    found = find_revisits(truth.select(order), near=1.0, apart=10.0)
+    assert found == find_revisits(truth, near=1.0, apart=10.0)
 
 
 def test_the_way_back_looks_the_other_way() -> None:

@@ -219,7 +219,7 @@ def test_hint_for_a_single_camera() -> None:
 
 def test_noise_is_no_unit() -> None:
     generator = np.random.default_rng(0)
-    T_wc = wander(50).T_wc
+    T_wc = wander(50).T_wc.copy()
     T_wc[:, :3, 3] = generator.normal(size=(50, 3))
     result = evaluate_trajectory(Trajectory(wander(50).timestamps, T_wc), wander(50))
     assert result.alignment is Alignment.SE3

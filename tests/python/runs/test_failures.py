@@ -101,7 +101,23 @@ def test_a_system_names_what_is_no_images() -> None:
             slam.run(source)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("text", [7, None, "noon", "nan"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        *(7, None, "noon", "nan", "inf", "-inf", "", "1e999", "0x10", "1.5.2", "1,5", "1e", "."),
+        *(
+            "1.0\n",
+            "\n1.0",
+            " 1.5 ",
+            "1.5\t",
+            "1_000.5",
+            "\uff11.5",
+            "\u0663",
+            "1.5\x00",
+            "1.5\u2028",
+        ),
+    ],
+)
 def test_time_stamps_that_are_no_text_are_told_before_anything_is_written(
     text: Any, tmp_path: Path
 ) -> None:
@@ -109,6 +125,15 @@ def test_time_stamps_that_are_no_text_are_told_before_anything_is_written(
     with pytest.raises(orb.DatasetError, match=told):
         orb.run_sequence(Own(text=lambda index: text), output=tmp_path / "o")
     assert not (tmp_path / "o").exists()
+
+
+@pytest.mark.parametrize("form", ["{}", "{}.", "+{}.25", "-0.{}", ".{}", "{}e-3", "{}.50E+2"])
+def test_time_stamps_go_into_files_as_they_are(form: str, tmp_path: Path) -> None:
+    own = Own(text=lambda index: form.format(index + 10))
+    done = orb.run_sequence(own, RunOptions(orb.Sensor.RGBD, max_frames=3), output=tmp_path / "o")
+    lines = (tmp_path / "o/trajectory.txt").read_text().splitlines()
+    assert done.result.error is None
+    assert [line.split()[0] for line in lines] == [form.format(index + 10) for index in range(3)]
 
 
 def test_a_later_time_stamp_that_is_no_text_ends_the_run(tmp_path: Path) -> None:

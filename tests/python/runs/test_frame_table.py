@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from orbslam2py import DatasetError
 from orbslam2py.runs.frame_table import pose_deviation, write_frames
 from orbslam2py.runs.report_page.run_folder import read_frames
+from orbslam2py.trajectory import read_frame_table
 from support.made_up_rows import rows_of
 
 pytestmark = pytest.mark.watchdog(20)
@@ -82,3 +84,22 @@ def test_a_table_of_an_earlier_version_says_nothing_of_it(tmp_path: Path) -> Non
     frames = read_frames(tmp_path / "f.csv")
     assert not frames.is_weak.any()
     assert np.isnan(frames.found).all()
+
+
+def test_a_reason_with_a_name_that_is_no_utf_8(tmp_path: Path) -> None:
+    """The table keeps the bytes of the name; who reads it is not stopped by them."""
+    tracked, skipped = rows_of("ks")
+    skipped = replace(skipped, reason="im/caf\udce9.png is no readable image")
+    write_frames(tmp_path / "f.csv", [tracked, skipped])
+    assert b"im/caf\xe9.png is no" in (tmp_path / "f.csv").read_bytes()
+    assert len(read_frame_table(tmp_path / "f.csv")) == 2
+    # A page may hold no half of a letter.
+    assert read_frames(tmp_path / "f.csv").reason[1] == "im/caf\ufffd.png is no readable image"
+
+
+def test_a_field_that_no_table_has(tmp_path: Path) -> None:
+    write_frames(tmp_path / "f.csv", rows_of("k"))
+    with (tmp_path / "f.csv").open("a") as stream:
+        stream.write("1,2,0,OK," + "x" * 200_000 + "\n")
+    with pytest.raises(DatasetError, match=r"f\.csv is no whole table of frames"):
+        read_frames(tmp_path / "f.csv")

@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from orbslam2py import DatasetError, OrbSlamError, Sensor
+from orbslam2py import DatasetError, OrbSlamError, Sensor, SettingsError, System
 from orbslam2py.runs import RunOptions, SystemOptions
 
 pytestmark = pytest.mark.watchdog(20)
@@ -65,3 +66,25 @@ def test_a_wrong_value_is_told_when_the_options_are_made(
 
 def test_numbers_of_numpy_become_those_that_a_report_can_hold() -> None:
     assert type(RunOptions(Sensor.RGBD, max_frames=np.int64(3)).max_frames) is int  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"full_adjustment": False, "full_adjustment_time_limit": 3}, "or --no-full-adjustment"),
+        ({"loop_closing": False, "full_adjustment_time_limit": 3}, "or --no-loop-closing"),
+        ({"several_maps": False, "new_map_after": 3}, "or --one-map"),
+    ],
+)
+def test_an_option_that_would_do_nothing_is_refused(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(SettingsError, match=message):
+        SystemOptions(**options)
+    with pytest.raises(SettingsError, match=message):
+        System("tum1", "rgbd", **options)
+
+
+@pytest.mark.parametrize("switch", ["full_adjustment", "loop_closing", "several_maps"])
+def test_what_is_left_as_it_is_does_no_harm(switch: str) -> None:
+    options = SystemOptions(**{switch: False})  # type: ignore[arg-type]
+    assert options.new_map_after == 2.0
+    assert replace(options, seed=3).seed == 3

@@ -99,7 +99,11 @@ def test_every_stage_beside_tracking_is_explained() -> None:
     measured = set(
         re.findall(r'timer\("(mapping[.a-z_]*)"\)', (slam / "local_mapping.py").read_text())
     )
-    for name, file in (("loop", "loop_closing.py"), ("adjustment", "full_bundle_adjustment.py")):
+    for name, file in (
+        ("loop", "loop_closing.py"),
+        ("loop", "merging/map_merging.py"),
+        ("adjustment", "full_bundle_adjustment.py"),
+    ):
         found = re.findall(r'timer\("([a-z_]+)"\)', (slam / file).read_text())
         measured |= {f"{name}.{stage}" for stage in found}
     assert len(measured) > 10

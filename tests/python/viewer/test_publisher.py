@@ -13,6 +13,7 @@ import pytest
 from orbslam2py import MapChanged, Sensor, StateError, System, TrackingLost, TrackingState
 from orbslam2py.datasets import Images
 from orbslam2py.viewer import FrameView, Publisher
+from orbslam2py.viewer.live import FRAME_RATE
 from support.small_sequences import SIZE, black, images, new_system, play, track
 from support.watchers import Notebook
 
@@ -73,19 +74,30 @@ def test_the_changes_add_up_to_the_map() -> None:
 def test_frames_come_at_the_rate_and_none_of_their_records_is_lost() -> None:
     notebook = Notebook()
     with new_system(Sensor.RGBD, deterministic=True) as system:
-        with Publisher(system, [notebook], frame_rate=0.001) as publisher:
+        with Publisher(system, [notebook], frame_rate=0.001):
             track(system, 0)
             notebook.wait_for(lambda book: len(book.views) == 1)
-            play(system, 3, first=1)
-            publisher.show_next()
-            notebook.wait_for(lambda book: len(book.views) == 2)
-            play(system, 2, first=4)  # shown at the end
+            play(system, 5, first=1)  # shown at the end
         seen = [
             [record.frame_id for record in (*view.earlier, view.record)] for view in notebook.views
         ]
-    assert seen == [[0], [1, 2, 3], [4, 5]]
+    assert seen == [[0], [1, 2, 3, 4, 5]]
     assert notebook.views[-1].queue.n_frames == 6
-    assert notebook.views[-1].queue.n_not_shown == 3
+    assert notebook.views[-1].queue.n_not_shown == 4
+
+
+def test_an_image_is_shown_though_none_comes_after_it() -> None:
+    """As when a run is stepped: all of them are, at the rate of the page."""
+    notebook = Notebook()
+    with (
+        new_system(Sensor.RGBD, deterministic=True) as system,
+        Publisher(system, [notebook], frame_rate=FRAME_RATE),
+    ):
+        for n in range(4):
+            track(system, n)
+            notebook.wait_for(lambda book, n=n: len(book.views) == n + 1)
+    assert [view.record.frame_id for view in notebook.views] == [0, 1, 2, 3]
+    assert not any(view.earlier for view in notebook.views)
 
 
 def test_a_slow_watcher_delays_nobody() -> None:

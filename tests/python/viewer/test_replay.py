@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+import json
 import shutil
+import socket
+import threading
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,11 +14,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orbslam2py import DatasetError, MapFileError, Sensor, run_sequence
+from orbslam2py import DatasetError, MapFileError, Sensor, Trajectory, run_sequence
 from orbslam2py._palette import KEYFRAME
 from orbslam2py.maps import MapArrays
 from orbslam2py.runs import RunOptions, SystemOptions
 from orbslam2py.runs.report_page import read_run
+from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.viewer.replay import Replay
 from support.browser import Browser
 from support.small_sequences import sequence
@@ -121,8 +125,26 @@ def test_a_run_that_saw_nothing_is_named(folder: Path, tmp_path: Path) -> None:
     shutil.copytree(folder, copy)
     header = (copy / "frames.csv").read_text().splitlines()[0]
     (copy / "frames.csv").write_text(header + "\n")
+    report = json.loads((copy / "report.json").read_text())
+    (copy / "report.json").write_text(json.dumps(report | {"seen_frames": 0}))
     with pytest.raises(DatasetError, match="lists no frames; give the folder of a run that saw"):
         Replay(read_run(copy), port=0)
+
+
+def test_a_page_that_could_not_be_filled_is_no_more(folder: Path) -> None:
+    class Untrue(SyntheticSequence):
+        def ground_truth(self) -> Trajectory:
+            raise DatasetError("groundtruth.txt:3: 'x' is not a number")
+
+    run = read_run(folder)
+    images = Untrue(SyntheticOptions(world="corridor", sensor="rgbd", frames=N_FRAMES))
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+    with pytest.raises(DatasetError, match=r"groundtruth\.txt:3"):
+        Replay(run, images, port=port)
+    assert not any(thread.name == "viewer page" for thread in threading.enumerate())
+    replay = Replay(run, port=port)  # which is free again
+    replay.stop()
 
 
 def test_without_a_map_the_path_is_shown_and_that_is_said(
