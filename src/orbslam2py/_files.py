@@ -8,11 +8,13 @@ import errno
 import os
 import secrets
 import shutil
+import stat
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO, Any, NoReturn
 
 from orbslam2py._arguments import path_of
+from orbslam2py.errors import OrbSlamError
 
 #: Endings of names, in lower case, that OpenCV reads as single images.
 IMAGE_SUFFIXES = (
@@ -34,6 +36,8 @@ _REMEDIES = {
     errno.ENOTDIR: "a part of the path is a file; give another one",
     errno.EISDIR: "give the name of a file",
 }
+#: Letters of a file's name in that of the hidden one beside it, which must not become too long.
+_LETTERS = 24
 
 
 def reason_of(error: OSError) -> str:
@@ -53,6 +57,79 @@ def printable_name(name: str) -> str:
     return name.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
 
 
+def utf8_name(name: str) -> str:
+    """Make a name of a file whose bytes are UTF-8, as Python spells it in this locale."""
+    return os.fsdecode(printable_name(name).encode())
+
+
+def utf8_path(
+    path: Path,
+    error: type[OrbSlamError],
+    remedy: str = "rename the file, or the folder it is in",
+) -> str:
+    """Spell a path for what takes text in UTF-8, such as the core and OpenCV.
+
+    The core takes nothing else, and OpenCV ends the whole program over it: over surrogates, which
+    stand for the bytes that are no letters in the locale (they may be UTF-8 all the same).
+
+    Parameters
+    ----------
+    path
+        Where the file is.
+    error
+        Raised if the path has bytes that are no UTF-8.
+    remedy
+        What to do then.
+    """
+    try:
+        return os.fsencode(path).decode()
+    except UnicodeError:
+        raise error(f"the path {path} is not UTF-8, and so it cannot be used; {remedy}") from None
+
+
+def kind_of_special(path: Path) -> str | None:
+    """Name what a path is if it is no file, nor a folder: to open a pipe is to wait for a writer.
+
+    Raises
+    ------
+    OSError
+        If there is nothing.
+    """
+    mode = path.stat().st_mode
+    if stat.S_ISREG(mode) or stat.S_ISDIR(mode):
+        return None
+    kinds = ((stat.S_ISFIFO, "pipe"), (stat.S_ISSOCK, "socket"))
+    return next((name for is_kind, name in kinds if is_kind(mode)), "device")
+
+
+def temporary_beside(target: Path, ending: str = ".tmp") -> Path:
+    """Choose a hidden name in the folder of a file or folder, in UTF-8 whatever its own is.
+
+    It begins like the target's, but is short: one that is as long as the system allows has no
+    room for more.
+    """
+    beginning = printable_name(target.name)[:_LETTERS]
+    name = f".{beginning}.{os.getpid()}-{secrets.token_hex(4)}{ending}"
+    return target.with_name(utf8_name(name))
+
+
+def take_mode(place: Path, target: Path, more: int = 0) -> None:
+    """Give what will replace a file or folder its permissions: what is private stays so.
+
+    Parameters
+    ----------
+    place
+        What will replace it.
+    target
+        If there is none, nothing is done.
+    more
+        Permissions that it gets as well.
+    """
+    # Some file systems have no permissions, and refuse to change them.
+    with contextlib.suppress(OSError):
+        place.chmod(stat.S_IMODE(target.stat().st_mode) | more)
+
+
 def describe_error(error: BaseException) -> str:
     """Say what failed in words for people; of a file which, and why, without numbers."""
     if not isinstance(error, OSError):
@@ -69,7 +146,8 @@ def atomic_write(path: str | os.PathLike[str], *, binary: bool = False) -> Itera
 
     The content goes to a temporary file in the same folder, which replaces `path` at the end of
     the ``with`` block. If the block raises or the disk is full, the temporary file is removed and
-    an existing file stays as it was. Devices and pipes are written directly.
+    an existing file stays as it was; else its permissions stay. Devices and pipes are written
+    directly.
 
     Parameters
     ----------
@@ -93,10 +171,11 @@ def atomic_write(path: str | os.PathLike[str], *, binary: bool = False) -> Itera
         with _open(path, path, os.O_WRONLY, binary) as stream:
             yield stream
         return
-    temporary = target.with_name(f".{target.name}.{os.getpid()}-{secrets.token_hex(4)}.tmp")
+    temporary = temporary_beside(target)
     try:  # a Ctrl-C may come as soon as it is there
         stream = _open(path, temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, binary)
         try:
+            take_mode(temporary, target)
             yield stream
         except BaseException:
             with contextlib.suppress(OSError):
@@ -120,8 +199,8 @@ def atomic_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Make a folder that appears under its name only when everything in it was written.
 
     Yields a temporary folder beside it, which takes the place of `path` at the end of the ``with``
-    block. If the block raises, the temporary folder is removed and an existing folder stays as it
-    was; else the existing one is removed with all it holds.
+    block. If anything fails, the temporary folder is removed and an existing folder stays as it
+    was; else the existing one is removed with all it holds, but for its permissions.
 
     Parameters
     ----------
@@ -134,8 +213,7 @@ def atomic_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
         If it cannot be written or replaced.
     """
     target = Path(os.path.realpath(path_of(path, "the folder to write")))
-    token = secrets.token_hex(4)
-    temporary = target.with_name(f".{target.name}.{token}.tmp")
+    temporary, old = temporary_beside(target), temporary_beside(target, ".old")
     try:  # a Ctrl-C may come as soon as it is there
         try:
             temporary.mkdir(parents=True)
@@ -145,15 +223,18 @@ def atomic_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
                 f"cannot write to {path}: {reason_of(error)}; give another folder",
                 str(path),
             ) from error
+        take_mode(temporary, target, stat.S_IRWXU)
         yield temporary
         if target.exists() and any(target.iterdir()):
-            old = target.with_name(f".{target.name}.{token}.old")
             target.replace(old)
-            temporary.replace(target)
+        temporary.replace(target)
+        if old.exists():
             shutil.rmtree(old)
-        else:
-            temporary.replace(target)
     except BaseException:
+        if os.path.lexists(old) and not os.path.lexists(target):  # between the two renames
+            old.replace(target)
+        elif not os.path.lexists(temporary):  # the new one is in its place
+            shutil.rmtree(old, ignore_errors=True)
         shutil.rmtree(temporary, ignore_errors=True)
         raise
 

@@ -206,7 +206,8 @@ class Sequence(Source, Protocol):
     Attributes
     ----------
     timestamps
-        Time of every frame in seconds, float64 (n,).
+        Time of every frame in seconds, float64 (n,). Those of this package's sequences are
+        read-only: ``sequence.timestamps - sequence.timestamps[0]`` makes an array of one's own.
     """
 
     @property
@@ -273,7 +274,7 @@ class Stamps:
     Attributes
     ----------
     seconds
-        float64 (n,).
+        float64 (n,); a copy of what was given, and read-only.
     texts
         The same as text in seconds, all digits of the source kept.
     lines
@@ -283,6 +284,11 @@ class Stamps:
     seconds: FloatArray
     texts: tuple[str, ...]
     lines: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        seconds = np.array(self.seconds, dtype=np.float64)
+        seconds.setflags(write=False)  # sequences hand it out
+        object.__setattr__(self, "seconds", seconds)
 
     def warn_unless_increasing(self, path: Path) -> None:
         """Log the lines whose time stamp is not after the one before."""
@@ -294,6 +300,14 @@ class Stamps:
                 self.texts[i + 1],
                 self.texts[i],
             )
+
+
+def rate_of(seconds: FloatArray, usual: float) -> float:
+    """Return images per second by the usual step, or `usual` if no time grows."""
+    steps = np.diff(seconds)
+    steps = steps[steps > 0]
+    # Rounded, since times are written with few digits: 9.99999 would count as 9 frames.
+    return round(1.0 / float(np.median(steps)), 3) if len(steps) else usual
 
 
 def choose_sensor(

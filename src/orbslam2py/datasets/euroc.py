@@ -237,6 +237,6 @@ def _list_folder(folder: Path) -> _CameraList:
     found = sorted(
         (int(path.stem), path)
         for path in folder.iterdir()
-        if path.suffix.lower() in IMAGE_SUFFIXES and path.stem.isdigit()
+        if path.suffix.lower() in IMAGE_SUFFIXES and path.stem.isdigit() and not path.is_dir()
     )
     return _CameraList(folder, dict(found), {stamp: k for k, (stamp, _) in enumerate(found, 1)})

@@ -19,6 +19,7 @@ from orbslam2py.settings import (
     Settings,
     builtin_settings,
 )
+from orbslam2py.settings.keys import focal_problems
 from orbslam2py.settings.opencv_yaml import Entry, parse_number, read_matrix, scan
 from orbslam2py.trajectory.rotations import inverse_poses, nearest_rotations, poses_from
 
@@ -107,12 +108,15 @@ def read_sensor_yaml(path: Path) -> SensorCalibration:
         if key in entries and entries[key].value != allowed:
             entry = entries[key]
             raise DatasetError(f"{path}:{entry.line}: {key} is {entry.value}; allowed: {allowed}")
+    intrinsics = _numbers(path, entries["intrinsics"], 4)
+    for problem in focal_problems("intrinsics", np.diag(intrinsics[:2])):
+        raise DatasetError(f"{path}:{entries['intrinsics'].line}: {problem}")
     width, height = _numbers(path, entries["resolution"], 2)
     rate = _numbers(path, entries["rate_hz"], 1)[0] if "rate_hz" in entries else 20.0
     return SensorCalibration(
         path=path,
         T_body_camera=_rigid(path, entries["T_BS"]) if "T_BS" in entries else None,
-        intrinsics=_numbers(path, entries["intrinsics"], 4),
+        intrinsics=intrinsics,
         distortion=_numbers(path, entries["distortion_coefficients"], 4),
         size=(int(width), int(height)),
         rate=float(rate),

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 
@@ -36,16 +37,19 @@ def image_files(folder: Path) -> list[Path]:
         If the folder cannot be listed.
     """
     try:
-        found = [
-            path
-            for path in folder.iterdir()
-            if path.suffix.lower() in IMAGE_SUFFIXES and not path.name.startswith(".")
-        ]
+        with os.scandir(folder) as entries:  # tells folders without a look at every file
+            names = [
+                entry.name
+                for entry in entries
+                if Path(entry.name).suffix.lower() in IMAGE_SUFFIXES
+                and not entry.name.startswith(".")
+                and not entry.is_dir()
+            ]
     except OSError as error:
         raise DatasetError(
             f"cannot list {folder}: {error.strerror or error}; give a folder of images"
         ) from error
-    return sorted(found, key=lambda path: (natural_key(path.name), path.name))
+    return [folder / name for name in sorted(names, key=lambda name: (natural_key(name), name))]
 
 
 class ImageFolder(FramesInOrder, UnposedSource):
@@ -106,7 +110,7 @@ class ImageFolder(FramesInOrder, UnposedSource):
 
     @property
     def timestamps(self) -> FloatArray:
-        """Time of every frame in seconds, float64 (n,)."""
+        """Time of every frame in seconds, float64 (n,); read-only."""
         return self._stamps.seconds
 
     def timestamp_text(self, index: int, /) -> str:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import contextlib
-import stat
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from orbslam2py import _core as core
 from orbslam2py._arrays import ByteArray
-from orbslam2py.errors import DatasetError, ImageError
+from orbslam2py._files import kind_of_special, utf8_path
+from orbslam2py.errors import DatasetError, ImageError, OrbSlamError
 
 _PNG, _PNG_END = b"\x89PNG", b"IEND"
 _JPEG, _JPEG_END = b"\xff\xd8", b"\xff\xd9"
@@ -25,16 +26,54 @@ _TAIL = 4096  # where the end mark must be; some cameras append a few bytes afte
 _PIXELS = 1 << 15
 
 
+class _Silence:
+    """Who wants OpenCV's log silent, and the level it had before the first of them."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.n = self.level = 0
+
+
+_silence = _Silence()
+
+
 @contextlib.contextmanager
 def quiet_opencv() -> Iterator[None]:
-    """Keep OpenCV from printing warnings: what goes wrong is said by an exception."""
+    """Keep OpenCV from printing warnings: what goes wrong is said by an exception.
+
+    The log is that of the whole process: of threads that overlap, the last one gives it its level
+    back.
+    """
     logging: Any = getattr(cv2.utils, "logging", cv2)  # cv2 4 has its functions itself
-    level = logging.getLogLevel()
-    logging.setLogLevel(_SILENT)
+    with _silence.lock:
+        if _silence.n == 0:
+            _silence.level = logging.getLogLevel()
+            logging.setLogLevel(_SILENT)
+        _silence.n += 1
     try:
         yield
     finally:
-        logging.setLogLevel(level)
+        with _silence.lock:
+            _silence.n -= 1
+            if _silence.n == 0:
+                logging.setLogLevel(_silence.level)
+
+
+def open_video(path: Path, error: type[OrbSlamError] = DatasetError) -> cv2.VideoCapture:
+    """Open a video, quietly; whether that has worked is asked of what is returned.
+
+    Parameters
+    ----------
+    path
+        The file.
+    error
+        Raised if its path is not UTF-8.
+    """
+    # In the present folder the name alone would do, but FFmpeg takes what stands before a colon
+    # for the name of a protocol. An absolute path would need a folder whose own is UTF-8.
+    named = utf8_path(path, error)
+    with quiet_opencv():
+        return cv2.VideoCapture(named if path.is_absolute() else f"./{named}")
 
 
 def read_image(path: Path, *, rgb: bool) -> ByteArray:
@@ -125,12 +164,9 @@ def read_any(path: Path) -> NDArray[np.generic]:
 
 def _check_regular(path: Path) -> None:
     """Raise `ImageError` if a path is no file or folder: to open a pipe is to wait for a writer."""
-    mode = path.stat().st_mode
-    if stat.S_ISREG(mode) or stat.S_ISDIR(mode):
-        return
-    kinds = ((stat.S_ISFIFO, "pipe"), (stat.S_ISSOCK, "socket"))
-    kind = next((name for is_kind, name in kinds if is_kind(mode)), "device")
-    raise ImageError(f"image {path} is a {kind}, not a file; replace it, or leave it out")
+    kind = kind_of_special(path)
+    if kind is not None:
+        raise ImageError(f"image {path} is a {kind}, not a file; replace it, or leave it out")
 
 
 def decode_any(content: bytes, what: object) -> NDArray[np.generic]:

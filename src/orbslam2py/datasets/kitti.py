@@ -13,7 +13,7 @@ from orbslam2py._arguments import index_of
 from orbslam2py._arguments import number_of as counted
 from orbslam2py._arrays import FloatArray
 from orbslam2py._text_lines import content_lines, number_of
-from orbslam2py.datasets.base import Images, Layout, Stamps, require_frames
+from orbslam2py.datasets.base import Images, Layout, Stamps, rate_of, require_frames
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.images import read_image
 from orbslam2py.datasets.recorded import RecordedSequence
@@ -181,7 +181,7 @@ class KittiSequence(RecordedSequence):
                 fy=P[1, 1],
                 cx=P[0, 2],
                 cy=P[1, 2],
-                fps=self._rate(),
+                fps=rate_of(self.timestamps, _USUAL_RATE),
                 # Minus the left one's: colour cameras are not at the origin, as P0's is.
                 bf=P[0, 3] - projections[f"P{self._right}"][0, 3] if stereo else 0.0,
                 rgb=True,
@@ -210,12 +210,6 @@ class KittiSequence(RecordedSequence):
             name = "kitti00-02" if number < 3 else "kitti03" if number == 3 else "kitti04-12"
             return f"{name} (sequence {self.name})"
         return _ALL_BUILT_IN
-
-    def _rate(self) -> float:
-        steps = np.diff(self.timestamps)
-        steps = steps[steps > 0]
-        # Rounded, since times are written with few digits: 9.99999 would count as 9 frames.
-        return round(1.0 / float(np.median(steps)), 3) if len(steps) else _USUAL_RATE
 
 
 def find_cameras(folder: Path) -> tuple[int, ...]:

@@ -231,7 +231,7 @@ class MaskedSequence(FramesInOrder, _Masked):
 
     @property
     def timestamps(self) -> FloatArray:
-        """Time of every frame in seconds, float64 (n,)."""
+        """Time of every frame in seconds, float64 (n,); as of the sequence."""
         return self._sequence.timestamps
 
     def timestamp_text(self, index: int, /) -> str:

@@ -7,8 +7,6 @@ import mimetypes
 from collections.abc import Mapping
 from pathlib import Path
 
-import cv2
-
 from orbslam2py._arguments import is_whole, path_of
 from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.datasets.bags import BagSequence
@@ -16,7 +14,7 @@ from orbslam2py.datasets.base import IterableSequence, LiveSource
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.depth_folders import DepthFolders, find_depth_pair
 from orbslam2py.datasets.image_folder import ImageFolder, image_files
-from orbslam2py.datasets.images import quiet_opencv
+from orbslam2py.datasets.images import open_video
 from orbslam2py.datasets.live import LiveCamera
 from orbslam2py.datasets.masks import MaskedCamera, MaskedSequence
 from orbslam2py.datasets.recognise import (
@@ -157,9 +155,8 @@ def _require_video(path: Path) -> None:
     kind = mimetypes.guess_type(path.name)[0] or ""
     if ending in IMAGE_SUFFIXES or kind.startswith("video/"):
         return
-    with quiet_opencv():
-        # Text is not tried: to OpenCV some of it is a film of characters.
-        readable = not kind.startswith("text/") and cv2.VideoCapture(str(path)).isOpened()
+    # Text is not tried: to OpenCV some of it is a film of characters.
+    readable = not kind.startswith("text/") and open_video(path).isOpened()
     if not readable:
         raise DatasetError(
             f"{path} is neither a video, nor a bag, nor a folder, nor a camera; give the folder of "

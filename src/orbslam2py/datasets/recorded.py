@@ -92,7 +92,7 @@ class RecordedSequence(FramesInOrder, ABC):
 
     @property
     def timestamps(self) -> FloatArray:
-        """Time of every frame in seconds, float64 (n,)."""
+        """Time of every frame in seconds, float64 (n,); read-only."""
         return self._stamps.seconds
 
     def timestamp_text(self, index: int, /) -> str:

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from orbslam2py._arrays import ByteArray, FloatArray
-from orbslam2py.errors import ImageError
+from orbslam2py.errors import ImageError, SettingsError
 from orbslam2py.settings import CameraRectification, StereoRectification
 
 
@@ -30,7 +30,17 @@ def rectification_of_pair(
         Transform (4, 4) from left to right camera coordinates [m].
     size
         Width and height of the images [pixels].
+
+    Raises
+    ------
+    SettingsError
+        If the cameras stand in one place, or there is no rectification.
     """
+    if not np.any(T_right_left[:3, 3]):
+        raise SettingsError(
+            "the two cameras of the pair stand in one place, so they see no depth; look at where "
+            "their calibration puts them, or use one of them (--sensor mono)"
+        )
     R_left, R_right, P_left, P_right, *_ = cv2.stereoRectify(
         cameraMatrix1=K[0],
         distCoeffs1=D[0],

@@ -13,9 +13,7 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py._text_lines import TextLine, content_lines, number_of
 from orbslam2py.datasets.base import Stamps
 from orbslam2py.errors import DatasetError
-
-#: Whole numbers are nanoseconds if their typical step is longer than this as seconds (a day).
-_LONGEST_STEP = 86400
+from orbslam2py.trajectory.frame_times import in_seconds
 
 #: Whole numbers with so many digits are a time since 1970, in so many parts of a second.
 _PARTS_OF_SECOND = {19: 9, 16: 6, 13: 3}
@@ -79,8 +77,8 @@ def seconds_of_name(stem: str) -> str | None:
 def read_time_file(path: Path, n: int, names: Sequence[str] | None = None) -> Stamps:
     """Read one time stamp per image: decimal seconds, or whole nanoseconds.
 
-    A file of whole numbers holds nanoseconds if its typical step would be more than a day in
-    seconds. Empty lines and lines starting with ``#`` are left out.
+    A file of whole numbers holds nanoseconds if they make no sense as seconds (see `in_seconds`).
+    Empty lines and lines starting with ``#`` are left out.
 
     Lists with the images' files in the second field are read as well, such as ``rgb.txt`` and
     associations of TUM RGB-D, or EuRoC's ``data.csv``. The names of the files count then, without
@@ -103,16 +101,14 @@ def read_time_file(path: Path, n: int, names: Sequence[str] | None = None) -> St
     lines = _uniform_lines(path)
     if names is not None and lines and len(lines[0].fields) > 1:
         lines = _lines_of(path, lines, names)
-    texts = [line.fields[0] for line in lines]
-    seconds = np.array([number_of(path, line, line.fields[0]) for line in lines])
+    for line in lines:
+        number_of(path, line, line.fields[0])
     if len(lines) != n:
         raise DatasetError(
             f"{path} holds {len(lines)} time stamps, but there are {n} images; give one for each"
         )
-    whole = [int(text) for text in texts if text.isdecimal()]
-    if len(whole) == n > 1 and np.median(np.diff(whole)) > _LONGEST_STEP:
-        texts = [f"{time // 10**9}.{time % 10**9:09d}" for time in whole]
-        seconds = np.array([time / 1e9 for time in whole])
+    texts = in_seconds([line.fields[0] for line in lines])
+    seconds = np.array([float(text) for text in texts], dtype=np.float64)
     for i in np.flatnonzero(np.diff(seconds) <= 0).tolist():
         raise DatasetError(
             f"{path}:{lines[i + 1].number}: time stamp {texts[i + 1]} is not after the one before "

@@ -26,7 +26,17 @@ ASSOCIATION_NAMES = ("associations.txt", "association.txt", "associate.txt", "as
 
 
 @dataclass(frozen=True)
-class _ImageList:
+class ImageList:
+    """Images that a file lists, with their time stamps.
+
+    Attributes
+    ----------
+    stamps
+        When each was taken.
+    paths
+        Their files, as the list names them: from the folder that it lies in.
+    """
+
     stamps: Stamps
     paths: tuple[str, ...]
 
@@ -82,7 +92,7 @@ class TumSequence(RecordedSequence):
             )
         elif (self.folder / "rgb.txt").is_file() or found is None:
             source = self.folder / "rgb.txt"
-            colour = _read_list(source)
+            colour = read_image_list(source)
         else:
             source = found
             colour, _ = _read_association(found)
@@ -127,14 +137,21 @@ def _record(path: Path, line: TextLine, count: int, meaning: str) -> None:
         )
 
 
-def _read_list(path: Path) -> _ImageList:
+def read_image_list(path: Path) -> ImageList:
+    """Read ``time path`` lines.
+
+    Raises
+    ------
+    DatasetError
+        Naming file and line.
+    """
     lines = content_lines(path)
     for line in lines:
         _record(path, line, 2, "'timestamp path'")
     return _image_list(path, lines, 0)
 
 
-def _read_association(path: Path) -> tuple[_ImageList, tuple[str, ...]]:
+def _read_association(path: Path) -> tuple[ImageList, tuple[str, ...]]:
     lines = content_lines(path)
     for line in lines:
         _record(path, line, 4, "'t_rgb path_rgb t_depth path_depth'")
@@ -142,18 +159,18 @@ def _read_association(path: Path) -> tuple[_ImageList, tuple[str, ...]]:
     return _image_list(path, lines, 0), tuple(line.fields[3] for line in lines)
 
 
-def _image_list(path: Path, lines: list[TextLine], first: int) -> _ImageList:
+def _image_list(path: Path, lines: list[TextLine], first: int) -> ImageList:
     seconds = [number_of(path, line, line.fields[first]) for line in lines]
     stamps = Stamps(
         np.array(seconds, dtype=np.float64),
         tuple(line.fields[first] for line in lines),
         tuple(line.number for line in lines),
     )
-    return _ImageList(stamps, tuple(line.fields[first + 1] for line in lines))
+    return ImageList(stamps, tuple(line.fields[first + 1] for line in lines))
 
 
-def _associate_lists(folder: Path) -> tuple[_ImageList, tuple[str, ...]]:
-    colour, depth = _read_list(folder / "rgb.txt"), _read_list(folder / "depth.txt")
+def _associate_lists(folder: Path) -> tuple[ImageList, tuple[str, ...]]:
+    colour, depth = read_image_list(folder / "rgb.txt"), read_image_list(folder / "depth.txt")
     require_frames(folder / "rgb.txt", len(colour.paths))
     require_frames(folder / "depth.txt", len(depth.paths))
     i, j = associate(colour.stamps.seconds, depth.stamps.seconds)
@@ -169,5 +186,5 @@ def _associate_lists(folder: Path) -> tuple[_ImageList, tuple[str, ...]]:
         tuple(colour.stamps.texts[k] for k in i),
         tuple(colour.stamps.lines[k] for k in i),
     )
-    paired = _ImageList(stamps, tuple(colour.paths[k] for k in i))
+    paired = ImageList(stamps, tuple(colour.paths[k] for k in i))
     return paired, tuple(depth.paths[k] for k in j)

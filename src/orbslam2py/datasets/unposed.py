@@ -99,11 +99,22 @@ class UnposedSource:
 
 
 def with_rate(camera: CameraSettings, fps: float) -> CameraSettings:
-    """Return the camera with the rate that was given by hand."""
+    """Return the camera with the rate that was given by hand.
+
+    Raises
+    ------
+    SettingsError
+        If no camera has such a rate.
+    """
     try:
         return replace(camera, fps=fps)
     except SettingsError as error:
         raise SettingsError(f"--fps: {error}") from None
+
+
+def checked_rate(fps: float) -> float:
+    """Take a rate that was given by hand where there may be no settings yet; as `with_rate`."""
+    return with_rate(CameraSettings(fx=1.0, fy=1.0, cx=0.0, cy=0.0), fps).fps
 
 
 def chosen_stamps(
@@ -132,6 +143,8 @@ def chosen_stamps(
     ------
     DatasetError
         If both are given, or the file does not fit.
+    SettingsError
+        If the rate is none.
     """
     if fps is not None and times is not None:
         raise DatasetError(
@@ -140,5 +153,5 @@ def chosen_stamps(
     if times is not None:
         return read_time_file(Path(times), n, names)
     if fps is not None:
-        return stamps_of_rate(n, fps)
+        return stamps_of_rate(n, checked_rate(fps))
     return otherwise if isinstance(otherwise, Stamps) else stamps_of_rate(n, otherwise)

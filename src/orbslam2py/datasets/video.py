@@ -17,7 +17,7 @@ from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.datasets.base import Images, Stamps
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.frames import FramesInOrder
-from orbslam2py.datasets.images import quiet_opencv
+from orbslam2py.datasets.images import open_video
 from orbslam2py.datasets.time_files import stamps_of_rate, stamps_of_seconds
 from orbslam2py.datasets.unposed import UnposedSource, chosen_stamps
 from orbslam2py.errors import DatasetError, ImageError
@@ -40,7 +40,7 @@ class VideoReader:
     Raises
     ------
     DatasetError
-        If there is no such file, or it is no video.
+        If there is no such file, it is no video, or its path is not UTF-8.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -143,8 +143,7 @@ class VideoReader:
     def _open(self) -> cv2.VideoCapture:
         if self.path.suffix.lower() in IMAGE_SUFFIXES:
             raise DatasetError(f"{self.path} is an image, no video; give the folder it is in")
-        with quiet_opencv():
-            capture = cv2.VideoCapture(str(self.path))
+        capture = open_video(self.path)
         if not capture.isOpened():
             raise DatasetError(
                 f"{self.path} is no video that can be read; convert it, for example to MP4 (H.264)"
@@ -212,7 +211,7 @@ class VideoSequence(FramesInOrder, UnposedSource):
 
     @property
     def timestamps(self) -> FloatArray:
-        """Time of every frame in seconds, float64 (n,)."""
+        """Time of every frame in seconds, float64 (n,); read-only."""
         return self._stamps.seconds
 
     def timestamp_text(self, index: int, /) -> str:

@@ -5,13 +5,12 @@ from __future__ import annotations
 
 import contextlib
 import os
-import secrets
 import shutil
 from collections.abc import Iterable
 from pathlib import Path
 
 from orbslam2py._arguments import path_of
-from orbslam2py._files import reason_of
+from orbslam2py._files import reason_of, take_mode, temporary_beside, utf8_path
 from orbslam2py.errors import OutputFileError
 
 #: So much is left free on a disk, for what else a run has to write [bytes].
@@ -52,9 +51,8 @@ class OutputFile:
         target = Path(os.path.realpath(self.path))
         _check_folder(self.path, target)
         self._target = target
-        token = f"{os.getpid()}-{secrets.token_hex(4)}"
         # Who writes it looks at the ending, so that one stays the last.
-        self.temporary = target.with_name(f".{target.stem}.{token}.tmp{target.suffix.lower()}")
+        self.temporary = temporary_beside(target, f".tmp{target.suffix.lower()}")
         self.require_room()
 
     def require_room(self) -> None:
@@ -80,13 +78,14 @@ class OutputFile:
         return OutputFileError(f"cannot write the {self._what} {self.path}: {why}")
 
     def publish(self) -> None:
-        """Give it its name; a file that was there is replaced.
+        """Give it its name; a file that was there is replaced, and leaves its permissions.
 
         Raises
         ------
         OutputFileError
             If that cannot be done.
         """
+        take_mode(self.temporary, self._target)
         try:
             self.temporary.replace(self._target)
         except OSError as error:
@@ -113,3 +112,5 @@ def _check_folder(path: Path, target: Path) -> None:
         raise OutputFileError(f"there is no folder {path.parent} for {path.name}; make it first")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise OutputFileError(f"{path} cannot be written: no right to write into {path.parent}")
+    # Its own name may be any: it is written under another one.
+    utf8_path(folder, OutputFileError, "rename the folder, or take another one")

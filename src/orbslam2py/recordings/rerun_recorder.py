@@ -35,6 +35,7 @@ from orbslam2py.slam.events import (
     KeyframeAdded,
     LoopClosed,
     MapChanged,
+    MapsMerged,
     Relocalized,
     TrackingLost,
 )
@@ -308,17 +309,28 @@ def _camera_shapes(T_wc: npt.NDArray[np.floating], size: float) -> list[FloatArr
 
 def _in_words(event: Event) -> tuple[str, str]:
     """What has happened, and how much that matters."""
+    level = "WARN"
     if isinstance(event, LoopClosed):
         moved = f"{event.translation:.3g} and {event.rotation_deg:.2g} degrees"
-        pair = f"keyframe {event.current_keyframe} to {event.matched_keyframe}"
-        return f"loop closed, {pair}, {event.n_inliers} inliers, moved by {moved}", "WARN"
-    if isinstance(event, TrackingLost):
-        return f"lost: {event.reason}", "ERROR"
-    if isinstance(event, Relocalized):
-        return "found again", "WARN"
-    if isinstance(event, MapChanged):
-        return f"the map is another one: {event.cause}", "WARN"
-    if isinstance(event, KeyframeAdded):
+        text = f"loop closed, {_evidence_of(event)}, moved by {moved}"
+    elif isinstance(event, MapsMerged):
+        maps = f"map {event.merged_map} is part of map {event.map_index} now"
+        moved = f"{event.n_moved_keyframes} keyframes and {event.n_moved_points} points moved"
+        text = f"{maps}, {_evidence_of(event)}: {moved}, scale {event.scale:.3g}"
+    elif isinstance(event, TrackingLost):
+        text, level = f"lost: {event.reason}", "ERROR"
+    elif isinstance(event, Relocalized):
+        text = "found again"
+    elif isinstance(event, MapChanged):
+        text = f"the map is another one: {event.cause}"
+    elif isinstance(event, KeyframeAdded):
         size = f"{event.n_keyframes} keyframes, {event.n_map_points} points"
-        return f"keyframe {event.keyframe} mapped: {size}", "DEBUG"
-    return type(event).__name__, "INFO"
+        text, level = f"keyframe {event.keyframe} mapped: {size}", "DEBUG"
+    else:
+        text, level = f"map {event.map_index} has begun", "INFO"
+    return text, level
+
+
+def _evidence_of(event: LoopClosed | MapsMerged) -> str:
+    pair = f"keyframe {event.current_keyframe} to {event.matched_keyframe}"
+    return f"{pair}, {event.n_inliers} inliers"

@@ -6,12 +6,14 @@ from __future__ import annotations
 import os
 import threading
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from orbslam2py._arguments import instance_of, number_above_zero
+from orbslam2py._arguments import instance_of, is_whole, number_above_zero, shown
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
 from orbslam2py.errors import OutputFileError
 from orbslam2py.maps import MapChanges
@@ -28,6 +30,8 @@ from orbslam2py.trajectory import Trajectory
 from orbslam2py.viewer.paths import TruthBeside
 from orbslam2py.viewer.watching import FrameView
 
+#: More than the codecs take.
+_LARGEST_SIDE = 16384
 #: A pause of a stream of images is shown by at most so many pictures.
 _LONGEST_PAUSE = 300
 #: Images over which the rate of a recording is measured.
@@ -66,8 +70,8 @@ class VideoWriter:
     Raises
     ------
     OutputFileError
-        If it can be told already that there will be no video, or if a rate, a duration or a true
-        path is none.
+        If it can be told already that there will be no video, or if a size, a rate, a duration or
+        a true path is none.
     """
 
     name = "the video"
@@ -83,11 +87,7 @@ class VideoWriter:
         ground_truth: Trajectory | None = None,
         size: tuple[int, int] = (1280, 720),
     ) -> None:
-        if size[0] < 320 or size[1] < 240 or size[0] % 2 or size[1] % 2:
-            raise OutputFileError(
-                f"a video cannot be {size[0]} x {size[1]} pixels large; take even numbers from "
-                "320 x 240 on"
-            )
+        size = _checked_size(size)
         rate = number_above_zero(
             frames_per_second, "frames_per_second", "images a second, above 0", OutputFileError
         )
@@ -294,6 +294,21 @@ class _Unused:
     position: int
     timestamp: float
     reason: str
+
+
+def _checked_size(size: Any) -> tuple[int, int]:
+    sides = tuple(size) if isinstance(size, Sequence | np.ndarray) else ()
+    if len(sides) != 2 or not all(is_whole(side) and side <= _LARGEST_SIDE for side in sides):
+        raise OutputFileError(
+            f"size is {shown(size)}; give width and height in pixels, up to {_LARGEST_SIDE}"
+        )
+    width, height = map(int, sides)
+    if width < 320 or height < 240 or width % 2 or height % 2:
+        raise OutputFileError(
+            f"a video cannot be {width} x {height} pixels large; take even numbers from "
+            "320 x 240 on"
+        )
+    return width, height
 
 
 def _marks(view: FrameView) -> Marks:

@@ -9,7 +9,9 @@ from pathlib import Path
 import cv2
 
 from orbslam2py._arrays import ByteArray
-from orbslam2py.datasets.images import quiet_opencv
+from orbslam2py._files import utf8_path
+from orbslam2py.datasets.images import open_video, quiet_opencv
+from orbslam2py.errors import OutputFileError
 from orbslam2py.recordings.output_file import OutputFile
 
 #: Codecs by the ending of the name, as FFmpeg calls them. All wheels of OpenCV have them.
@@ -44,7 +46,7 @@ class VideoFile:
         self.n_frames = 0
         suffix = self._file.path.suffix.lower()
         codec = cv2.VideoWriter.fourcc(*CODECS[suffix])
-        place = str(self._file.temporary)
+        place = utf8_path(self._file.temporary, OutputFileError)
         with quiet_opencv():
             self._writer = cv2.VideoWriter(place, cv2.CAP_FFMPEG, codec, frames_per_second, size)
         self._open = self._writer.isOpened()
@@ -96,7 +98,7 @@ class VideoFile:
 
 def _is_video(path: Path) -> bool:
     with quiet_opencv():
-        video = cv2.VideoCapture(str(path))
+        video = open_video(path, OutputFileError)
         try:
             return bool(video.isOpened() and video.read()[0])
         finally:

@@ -105,8 +105,10 @@ class SyntheticSequence(FramesInOrder):
 
     @cached_property
     def timestamps(self) -> FloatArray:
-        """Time of every frame in seconds from the start, float64 (n,)."""
-        return np.asarray(self.nanoseconds / 1e9)
+        """Time of every frame in seconds from the start, float64 (n,); read-only."""
+        seconds = np.asarray(self.nanoseconds / 1e9)
+        seconds.setflags(write=False)
+        return seconds
 
     def timestamp_text(self, index: int, /) -> str:
         """Return the time of a frame in seconds, with nine decimals."""

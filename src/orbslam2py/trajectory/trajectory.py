@@ -16,10 +16,16 @@ from orbslam2py.errors import DatasetError
 from orbslam2py.trajectory.rotations import inverse_poses, quaternions_from_rotations
 from orbslam2py.trajectory.writers import TrajectoryFormat, write_kitti, write_tum
 
+#: From here on, floats are no int64 any more.
+_LARGEST_INDEX = 2.0**63
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(EqualByValue):
     """Poses of a camera over time; two are equal if all their arrays are, number by number.
+
+    The arrays are copies of those that were given, and read-only; ``trajectory.T_wc.copy()`` may be
+    changed.
 
     Attributes
     ----------
@@ -36,7 +42,7 @@ class Trajectory(EqualByValue):
     Raises
     ------
     DatasetError
-        If one of them is no array of numbers, or they differ in length.
+        If one of them is no array of numbers, indices are no whole ones, or they differ in length.
     """
 
     timestamps: FloatArray
@@ -51,13 +57,12 @@ class Trajectory(EqualByValue):
             "timestamps": timestamps,
             "T_wc": array_of(self.T_wc, "T_wc", (-1, 4, 4), finite=False),
             "lost": _mask(self.lost, n),
-            "indices": np.arange(n, dtype=np.int64)
-            if self.indices is None
-            else array_of(self.indices, "indices", (-1,)).astype(np.int64),
+            "indices": _indices(self.indices, n),
         }
         for name, value in fields.items():
             if len(value) != n:
                 raise DatasetError(f"{n} timestamps, but {len(value)} {name}; give one per pose")
+            value.setflags(write=False)
             object.__setattr__(self, name, value)
 
     def __len__(self) -> int:
@@ -76,7 +81,7 @@ class Trajectory(EqualByValue):
 
     @property
     def positions(self) -> FloatArray:
-        """Camera centres in the world, float64 (n, 3), in the unit of `T_wc`."""
+        """Camera centres in the world, float64 (n, 3), in the unit of `T_wc`; read-only."""
         return self.T_wc[:, :3, 3]
 
     @property
@@ -161,6 +166,20 @@ def _mask(lost: Any, n: int) -> NDArray[np.bool_]:
     if mask.ndim != 1 or (mask.dtype != np.bool_ and mask.size):
         raise DatasetError(f"lost is {shown(lost)}; give True or False per pose, or None")
     return mask.astype(bool)
+
+
+def _indices(indices: Any, n: int) -> IntArray:
+    if indices is None:
+        return np.arange(n, dtype=np.int64)
+    given = np.asarray(indices)
+    if given.dtype.kind == "i" and given.ndim == 1:  # not through floats, which round large ones
+        return given.astype(np.int64)
+    numbers = array_of(indices, "indices", (-1,))
+    if (numbers != np.rint(numbers)).any() or (np.abs(numbers) >= _LARGEST_INDEX).any():
+        raise DatasetError(
+            "indices are no whole numbers; give the place of each pose's frame, from 0"
+        )
+    return numbers.astype(np.int64)
 
 
 def _selection(which: Any, n: int) -> NDArray[Any]:

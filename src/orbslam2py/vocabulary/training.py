@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import threading
 from collections.abc import Callable, Iterable
@@ -13,10 +14,10 @@ import cv2
 import numpy as np
 
 from orbslam2py import _core as core
-from orbslam2py._arguments import path_of, shown
+from orbslam2py._arguments import cannot_open, path_of, shown
 from orbslam2py._arrays import ByteArray
-from orbslam2py._cores import n_cores
-from orbslam2py._files import IMAGE_SUFFIXES
+from orbslam2py._cores import n_threads
+from orbslam2py._files import IMAGE_SUFFIXES, kind_of_special
 from orbslam2py.errors import ImageError, VocabularyError
 
 
@@ -34,7 +35,11 @@ def read_training_images(folder: str | os.PathLike[str]) -> list[Path]:
         If there are none.
     """
     root = path_of(folder, "the folder of images", VocabularyError).expanduser()
-    images = sorted(p for p in root.rglob("*") if p.suffix.lower() in IMAGE_SUFFIXES)
+    images = sorted(
+        path
+        for path in root.rglob("*")
+        if path.suffix.lower() in IMAGE_SUFFIXES and not path.is_dir()
+    )
     if not images:
         if not root.is_dir():
             what = "is a file" if root.exists() else "does not exist"
@@ -112,14 +117,11 @@ def _describe_images(
     def describe(path: Path) -> ByteArray:
         if not hasattr(of_thread, "extractor"):
             of_thread.extractor = core.OrbExtractor(features)
-        image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
-        if image is None:
-            raise ImageError(f"{path}: cannot be read as an image; remove it, or replace it")
-        descriptors: ByteArray = of_thread.extractor.extract(image).descriptors
+        descriptors: ByteArray = of_thread.extractor.extract(_read_grey(path)).descriptors
         return descriptors
 
     results: list[ByteArray] = []
-    pool = ThreadPoolExecutor(options.n_threads or n_cores())
+    pool = ThreadPoolExecutor(options.n_threads or n_threads(len(paths)))
     try:
         for descriptors in pool.map(describe, paths):
             results.append(descriptors)
@@ -128,3 +130,24 @@ def _describe_images(
     finally:
         pool.shutdown(cancel_futures=True)
     return results
+
+
+def _read_grey(path: Path) -> ByteArray:
+    # Not cv2.imread: it ends the program over a name that is not UTF-8.
+    try:
+        special = kind_of_special(path)
+        if special is not None:
+            raise ImageError(
+                f"image {path} is a {special}, not a file; replace it, or leave it out"
+            )
+        content = np.frombuffer(path.read_bytes(), np.uint8)
+    except OSError as error:
+        raise ImageError(cannot_open(path, error, "image")) from error
+    image = None
+    if content.size:
+        # Of a size that OpenCV refuses, or one that does not fit into memory.
+        with contextlib.suppress(cv2.error):
+            image = cv2.imdecode(content, cv2.IMREAD_GRAYSCALE)
+    if image is None:
+        raise ImageError(f"{path}: cannot be read as an image; remove it, or replace it")
+    return np.asarray(image, dtype=np.uint8)

@@ -23,8 +23,8 @@ from typing import IO
 import numpy as np
 
 from orbslam2py import _core as core
-from orbslam2py._arguments import cannot_open, path_of, shown
-from orbslam2py._files import atomic_write
+from orbslam2py._arguments import cannot_open, instance_of, path_of, shown
+from orbslam2py._files import atomic_write, printable_name, utf8_name, utf8_path
 from orbslam2py.errors import VocabularyError
 from orbslam2py.vocabulary import _textio
 from orbslam2py.vocabulary.files import Progress, VocabularyFormat, detect_format, read_nodes
@@ -74,7 +74,7 @@ def load_vocabulary(
     chosen = path_of(path, "the vocabulary", VocabularyError).expanduser()
     file_format = detect_format(chosen)
     if file_format is VocabularyFormat.BINARY:
-        return core.Vocabulary.open(str(chosen))
+        return _open_binary(chosen)
     if not cache:
         return read_nodes(chosen, file_format, progress)
 
@@ -87,6 +87,10 @@ def load_vocabulary(
     return _keep(vocabulary, chosen, source) or vocabulary
 
 
+def _open_binary(path: Path) -> core.Vocabulary:
+    return core.Vocabulary.open(utf8_path(path, VocabularyError))
+
+
 def vocabulary_name(choice: core.Vocabulary | str | os.PathLike[str] | None) -> str:
     """Name the file of a vocabulary, as `load_vocabulary` chooses it.
 
@@ -94,7 +98,7 @@ def vocabulary_name(choice: core.Vocabulary | str | os.PathLike[str] | None) -> 
     """
     if isinstance(choice, core.Vocabulary):
         own = default_vocabulary_path()
-        return own.name if core.Vocabulary.open(str(own)).hash == choice.hash else ""
+        return own.name if _open_binary(own).hash == choice.hash else ""
     return Path(choice or os.environ.get(ENVIRONMENT_VARIABLE) or default_vocabulary_path()).name
 
 
@@ -119,12 +123,13 @@ def _cache_places(path: Path) -> tuple[Path, Path]:
     home = os.environ.get("XDG_CACHE_HOME") or "~/.cache"
     folder = Path(home).expanduser() / "orbslam2py"
     key = hashlib.blake2b(os.fsencode(path.resolve()), digest_size=8).hexdigest()
-    return path.with_name(name), folder / f"{key}-{name}"
+    # The core opens names in UTF-8 alone; the key tells apart what the second spells alike.
+    return path.with_name(name), folder / f"{key}-{utf8_name(name)}"
 
 
 def _open_cache(path: Path) -> core.Vocabulary | None:
     with contextlib.suppress(VocabularyError):
-        return core.Vocabulary.open(str(path))
+        return _open_binary(path)
     return None
 
 
@@ -139,9 +144,10 @@ def _keep(
                 continue  # not a copy that we made: somebody's own file
         with contextlib.suppress(OSError, VocabularyError):
             copy.parent.mkdir(parents=True, exist_ok=True)
-            vocabulary.save(str(copy), f"Converted from {path.name}.", source)
+            named = utf8_path(copy, VocabularyError)
+            vocabulary.save(named, f"Converted from {printable_name(path.name)}.", source)
             _log.info("kept a binary copy of %s in %s", path, copy)
-            return core.Vocabulary.open(str(copy))
+            return _open_binary(copy)
     return None
 
 
@@ -176,7 +182,11 @@ def save_vocabulary(
         )
     target = path_of(path, "the file of the vocabulary", VocabularyError).expanduser()
     if target.suffix == ".bvoc":
-        vocabulary.save(str(target), comment, core.VocabularySource())
+        named = utf8_path(target, VocabularyError)
+        if comment is not None:
+            remedy = "text, or None for that of the vocabulary"
+            comment = printable_name(instance_of(comment, str, "comment", remedy, VocabularyError))
+        vocabulary.save(named, comment, core.VocabularySource())
     elif target.suffix == ".txt":
         _write_text(vocabulary, target, contextlib.nullcontext, progress)
     elif target.name.endswith(".txt.gz"):

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orbslam2py import DatasetError, ImageError, open_sequence
+from orbslam2py import DatasetError, ImageError, SettingsError, open_sequence
 from orbslam2py.datasets import open_input
+from orbslam2py.datasets.depth_folders import DepthFolders
 from orbslam2py.settings import Sensor, builtin_settings
 from support.small_folders import image, save
 
@@ -138,3 +139,11 @@ def test_settings_are_asked_for(tmp_path: Path) -> None:
     folder = phone(tmp_path / "p", names("color/%d.png", 2), names("depth/%d.png", 2))
     with pytest.raises(DatasetError, match="nothing tells what camera it is from; give --settings"):
         open_sequence(folder)
+
+
+@pytest.mark.parametrize("fps", [0, -5, np.nan, np.inf, "x", "10", True, 10**400])
+@pytest.mark.parametrize("settings", [SETTINGS, None])
+def test_a_rate_that_is_none(tmp_path: Path, fps: object, settings: object) -> None:
+    folder = phone(tmp_path / "p", names("color/%d.png", 2), names("depth/%d.png", 2))
+    with pytest.raises(SettingsError, match=r"^--fps: .*fps"):
+        DepthFolders(folder, settings=settings, fps=fps)  # type: ignore[arg-type]

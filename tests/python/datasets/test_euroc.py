@@ -127,7 +127,7 @@ def test_euroc_stamp_twice_or_backwards(euroc: Path, caplog: pytest.LogCaptureFi
         ("radial-tangential", "equidistant", "allowed: radial-tangential"),
         ("intrinsics: [40.0,", "intrinsics: [", "intrinsics must hold 4 numbers"),
         ("intrinsics: [40.0,", "intrinsics: [x,", "intrinsics: 'x' is not a number"),
-        ("intrinsics: [40.0,", "intrinsics: [-40.0,", "Camera.fx"),
+        ("intrinsics: [40.0,", "intrinsics: [-40.0,", "intrinsics has the focal lengths -40, 41"),
         ("resolution: [64, 48]\n", "", "has no resolution"),
         ("cols: 4", "cols: 3", "T_BS should hold 4 x 3 = 12 numbers, found 16"),
         ("0.0, 0.0, 1.0, 0.03", "0.0, 0.0, 2.0, 0.03", "T_BS is no 4 x 4 rigid transform"),

@@ -81,3 +81,16 @@ def test_time_stamps_of_a_tum_list(tum: Path) -> None:
     (tum / "rgb/100.200000.png").unlink()
     images = ImageFolder(tum / "rgb", settings="tum1", times=tum / "rgb.txt")
     assert [images.timestamp_text(i) for i in range(3)] == [f"100.{k}00000" for k in (0, 1, 3)]
+
+
+def test_folders_that_are_called_like_images_are_none(folder: Path, tmp_path: Path) -> None:
+    (folder / "sub.png").mkdir()
+    (folder / "link.png").symlink_to(tmp_path)
+    (folder / "13.png").symlink_to(folder / "12.png")
+    (folder / "99.png").symlink_to(folder / "nowhere.png")
+    names = [path.name for path in ImageFolder(folder, settings="tum1").paths]
+    assert names == [*(f"{k}.png" for k in range(1, 14)), "99.png"]
+    (tmp_path / "only").mkdir()
+    (tmp_path / "only" / "sub.png").mkdir()
+    with pytest.raises(DatasetError, match="no images in"):
+        ImageFolder(tmp_path / "only", settings="tum1")

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import socket
+import threading
 from pathlib import Path
 
 import cv2
@@ -130,3 +131,32 @@ def test_colours_come_in_the_order_that_is_wanted(tmp_path: Path, n_channels: in
     rgb = read_image(path, rgb=True)
     np.testing.assert_array_equal(rgb[..., :3], pixels[..., 2::-1])
     np.testing.assert_array_equal(rgb[..., 3:], pixels[..., 3:])
+
+
+def test_threads_that_overlap_give_the_log_its_level_back() -> None:
+    """The second took the silence of the first for the level to return to."""
+    logging = getattr(cv2.utils, "logging", cv2)
+    before = logging.getLogLevel()
+    assert before != 0
+    first_is_in, second_is_in = threading.Event(), threading.Event()
+    levels = []
+
+    def first() -> None:
+        with quiet_opencv():
+            first_is_in.set()
+            second_is_in.wait(10)
+
+    def second() -> None:
+        first_is_in.wait(10)
+        with quiet_opencv():
+            second_is_in.set()
+            threads[0].join()
+            levels.append(logging.getLogLevel())
+
+    threads = [threading.Thread(target=first), threading.Thread(target=second)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert levels == [0], "silent until the last one is out"
+    assert logging.getLogLevel() == before

@@ -88,3 +88,25 @@ def test_list_of_other_images(tmp_path: Path) -> None:
 def test_missing_times(tmp_path: Path) -> None:
     with pytest.raises(DatasetError, match=r"cannot open .*times\.txt"):
         read_time_file(tmp_path / "times.txt", 3)
+
+
+@pytest.mark.parametrize(
+    ("line", "text"),
+    [
+        ("1403636579763555584", "1403636579.763555584"),
+        ("1403636579763555584 a.png", "1403636579.763555584"),
+        ("1403636579", "1403636579"),
+        ("33000000", "33000000"),
+        ("1403636579.5", "1403636579.5"),
+    ],
+)
+def test_a_single_time(tmp_path: Path, line: str, text: str) -> None:
+    """A step that is too long for seconds needs two; a year that is too late does not."""
+    stamps = read_time_file(times_file(tmp_path, line), 1, NAMES[:1])
+    assert stamps.texts == (text,)
+    assert stamps.seconds.tolist() == pytest.approx([float(text)], abs=3e-7)
+
+
+def test_nanoseconds_that_lie_close_together(tmp_path: Path) -> None:
+    path = times_file(tmp_path, "1403636579763555584", "1403636579763605584", "1403636579763655584")
+    assert read_time_file(path, 3).texts[1] == "1403636579.763605584"

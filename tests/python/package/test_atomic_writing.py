@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import errno
 import os
+import stat
 from pathlib import Path
 from typing import Any
 
@@ -141,3 +142,91 @@ def test_a_ctrl_c_right_after_the_temporary_one_is_made_leaves_nothing(
         pass
     monkeypatch.undo()
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o444, 0o666])
+def test_an_existing_file_keeps_its_permissions(tmp_path: Path, mode: int) -> None:
+    """A private file could be read by everybody once it was written anew."""
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+    path.chmod(mode)
+    with atomic_write(path) as stream:
+        (growing,) = [one for one in tmp_path.iterdir() if one != path]
+        assert stat.S_IMODE(growing.stat().st_mode) == mode, "also while it is written"
+        stream.write("new")
+    assert stat.S_IMODE(path.stat().st_mode) == mode
+    assert path.read_text() == "new"
+
+
+def test_a_file_that_has_no_permissions_of_its_own_is_written_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise PermissionError(errno.EPERM, "Operation not permitted")
+
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+    path.chmod(0o600)
+    monkeypatch.setattr(Path, "chmod", refuse)  # as on a stick with FAT
+    with atomic_write(path) as stream:
+        stream.write("new")
+    assert path.read_text() == "new"
+
+
+@pytest.mark.parametrize("name", ["x" * 240 + ".txt", "\u00fc" * 127, "caf\udce9" * 40])
+def test_a_name_may_be_as_long_as_the_system_allows(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("plain works")
+    with atomic_write(tmp_path / name) as stream:
+        (growing,) = [one for one in tmp_path.iterdir() if one.name != name]
+        assert growing.name.startswith(".")
+        assert growing.name.endswith(".tmp")
+        stream.write("new")
+    assert (tmp_path / name).read_text() == "new"
+    (tmp_path / name).unlink()
+    with atomic_folder(tmp_path / name) as folder:
+        (folder / "a").write_text("first")
+    with atomic_folder(tmp_path / name) as folder:
+        (folder / "a").write_text("second")
+    assert (tmp_path / name / "a").read_text() == "second"
+    assert names_in(tmp_path) == [name]
+
+
+def test_a_folder_keeps_its_permissions(tmp_path: Path) -> None:
+    path = tmp_path / "f"
+    path.mkdir(mode=0o700)
+    (path / "old").write_text("")
+    with atomic_folder(path) as growing:
+        assert stat.S_IMODE(growing.stat().st_mode) == 0o700
+        (growing / "new").write_text("")
+    assert stat.S_IMODE(path.stat().st_mode) == 0o700
+    assert names_in(path) == ["new"]
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), OSError(errno.EIO, "broken")])
+@pytest.mark.parametrize("after", [True, False])
+@pytest.mark.parametrize("step", [1, 2])
+def test_a_folder_is_the_old_one_or_the_new_whatever_happens(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException, after: bool, step: int
+) -> None:
+    """Between the two renames nothing was there under the name, and the old content hidden."""
+    path = tmp_path / "f"
+    path.mkdir()
+    (path / "old").write_text("precious")
+    rename, count = Path.replace, 0
+
+    def fails(self: Path, target: Path) -> Path:
+        nonlocal count
+        count += 1
+        if count == step and not after:
+            raise error
+        rename(self, target)
+        if count == step:
+            raise error
+        return target
+
+    with pytest.raises(type(error)), atomic_folder(path) as growing:
+        (growing / "new").write_text("")
+        monkeypatch.setattr(Path, "replace", fails)
+    monkeypatch.undo()
+    assert names_in(tmp_path) == ["f"]
+    assert names_in(path) == (["new"] if (step, after) == (2, True) else ["old"])

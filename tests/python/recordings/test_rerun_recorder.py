@@ -14,6 +14,8 @@ import pytest
 
 from orbslam2py import OrbSlamError, OutputFileError, RerunRecorder, Sensor, System
 from orbslam2py.recordings import output_file
+from orbslam2py.recordings.rerun_recorder import _in_words
+from orbslam2py.slam.events import MapsMerged, MapStarted
 from orbslam2py.viewer import Publisher
 from support.files import names_in
 from support.small_sequences import new_system, play, sequence
@@ -193,3 +195,13 @@ def test_without_an_image_there_is_no_file(tmp_path: Path) -> None:
     recorder.close()
     recorder.close()
     assert names_in(tmp_path) == []
+
+
+def test_maps_that_begin_and_merge_are_said_in_words() -> None:
+    merged = MapsMerged(0, 1, 40, 7, 2.0, 1.0, 55, 80, 30, 12, 340, np.eye(4), 1.25)
+    assert _in_words(merged) == (
+        "map 1 is part of map 0 now, keyframe 40 to 7, 55 inliers: 12 keyframes and 340 points "
+        "moved, scale 1.25",
+        "WARN",
+    )
+    assert _in_words(MapStarted(2, 90, 3.0)) == ("map 2 has begun", "INFO")

@@ -117,3 +117,47 @@ def test_what_could_not_be_read_again_is_not_written(
     with pytest.raises(DatasetError, match=r"^pose 2 of the trajectory"):
         write_euroc(tmp_path / "t.txt", Trajectory(good.timestamps, T_wc))
     assert not list(tmp_path.iterdir())
+
+
+def test_arrays_are_read_only() -> None:
+    """A change through `positions` moved the poses, behind an equal hash."""
+    given = made_up(4)
+    stamps, T_wc = np.arange(4.0), given.T_wc.copy()
+    lost, indices = np.zeros(4, bool), np.arange(4)
+    trajectory = Trajectory(stamps, T_wc, lost, indices)
+    for array in (
+        *(trajectory.timestamps, trajectory.T_wc, trajectory.lost, trajectory.indices),
+        trajectory.positions,
+        trajectory.select(slice(1, 3)).T_wc,
+        trajectory.shifted(1.0).T_wc,
+        Trajectory(stamps, T_wc).lost,
+        Trajectory(stamps, T_wc).indices,
+    ):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1
+    for array in (stamps, T_wc, lost, indices):
+        array[0] = 1  # what was given is the caller's own
+    assert trajectory.timestamps[0] == 0
+    np.testing.assert_array_equal(trajectory.T_wc, given.T_wc)
+    trajectory.T_cw[0] = 0  # made for whoever asks
+    np.testing.assert_array_equal(trajectory.T_wc, given.T_wc)
+
+
+@pytest.mark.parametrize(
+    "indices",
+    [[0.7, 1.7], [0.0, np.nan], [0.0, np.inf], [0.0, 1e300], ["a", "b"], [True, False], [[0, 1]]],
+)
+def test_indices_are_whole_numbers(indices: object) -> None:
+    two = made_up(2)
+    with pytest.raises(DatasetError, match=r"^indices .*; (give|leave)"):
+        Trajectory(two.timestamps, two.T_wc, indices=indices)  # type: ignore[arg-type]
+
+
+def test_indices_as_columns_of_tables_have_them() -> None:
+    two = made_up(2)
+    for indices in ([0.0, 7.0], np.array([0, 7], np.uint8), (0, 7)):
+        taken = Trajectory(two.timestamps, two.T_wc, indices=indices)  # type: ignore[arg-type]
+        assert taken.indices.tolist() == [0, 7]
+    large = [2**53 + 1, 2**62]
+    taken = Trajectory(two.timestamps, two.T_wc, indices=np.array(large))
+    assert taken.indices.tolist() == large

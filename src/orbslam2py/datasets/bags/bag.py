@@ -14,9 +14,9 @@ from typing import Any
 import yaml
 
 from orbslam2py._arguments import cannot_open
-from orbslam2py.datasets.bags.libraries import open_zstd
+from orbslam2py.datasets.bags.libraries import unpack_zstd
 from orbslam2py.datasets.bags.mcap_file import McapFile
-from orbslam2py.datasets.bags.parts import BagFile, Channel, Place
+from orbslam2py.datasets.bags.parts import BagFile, Channel, Place, naming_damage
 from orbslam2py.datasets.bags.ros1_file import Ros1File
 from orbslam2py.datasets.bags.sqlite_file import SqliteFile
 from orbslam2py.errors import DatasetError
@@ -97,7 +97,8 @@ class Bag:
         self.layout = _kind_of(paths[0])[0]
         self._files: list[BagFile] = []
         for one in paths:
-            opened = _kind_of(one)[1](self._unpacked(one))  # type: ignore[call-arg]
+            with naming_damage(one):
+                opened = _kind_of(one)[1](self._unpacked(one))  # type: ignore[call-arg]
             self.doubts += [f"{one} {doubt}" for doubt in opened.doubts]
             self._files.append(opened)
         counts: dict[Channel, int] = {}
@@ -111,13 +112,20 @@ class Bag:
         ]
 
     def messages(self, topic: Topic) -> list[Message]:
-        """Tell where the messages of a topic are, in the order of recording."""
+        """Tell where the messages of a topic are, in the order of recording.
+
+        Raises
+        ------
+        DatasetError
+            If the bag is damaged there.
+        """
         channel = Channel(topic.name, topic.kind, topic.encoding)
-        return sorted(
-            Message(place.recorded, number, place)
-            for number, file in enumerate(self._files)
-            for place in file.places(channel)
-        )
+        with naming_damage(self.path):
+            return sorted(
+                Message(place.recorded, number, place)
+                for number, file in enumerate(self._files)
+                for place in file.places(channel)
+            )
 
     def read(self, message: Message, most: int | None = None) -> bytes:
         """Read a message, or its first bytes."""
@@ -131,15 +139,15 @@ class Bag:
         weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
         copy = folder / path.stem
         try:
-            with path.open("rb") as stream, open_zstd(stream) as source, copy.open("wb") as target:
-                shutil.copyfileobj(source, target, 1 << 20)
+            with path.open("rb") as stream, copy.open("wb") as target:
+                problem = unpack_zstd(stream, target)
         except OSError as error:
             raise DatasetError(
                 f"{path} cannot be unpacked into {folder}: {error.strerror or error}; make room "
                 "there, or name another folder with the variable TMPDIR"
             ) from error
-        except EOFError:
-            self.doubts.append(f"{path} is cut off; read as far as it goes")
+        if problem is not None:
+            self.doubts.append(f"{path} {problem}; read as far as it goes")
         return copy
 
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import importlib
-import io
+import shutil
 import sys
 from functools import lru_cache
 from typing import Any, BinaryIO
@@ -55,10 +55,28 @@ def zstd_decompress(content: bytes, most: int | None = None) -> bytes:
         raise OSError(f"damaged Zstandard data: {error}") from error
 
 
-def open_zstd(stream: BinaryIO) -> io.BufferedIOBase:
-    """Open a stream of Zstandard data for reading."""
-    opened: io.BufferedIOBase = require(_ZSTD).open(stream, "rb")
-    return opened
+def unpack_zstd(packed: BinaryIO, target: BinaryIO) -> str | None:
+    """Decompress a file of Zstandard data, as far as that goes.
+
+    Returns
+    -------
+    str or None
+        What is wrong with the data, such as ``is cut off``; None if they were whole.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be read or written.
+    """
+    zstd = require(_ZSTD)
+    try:
+        with zstd.open(packed, "rb") as source:
+            shutil.copyfileobj(source, target, 1 << 20)
+    except EOFError:
+        return "is cut off"
+    except zstd.ZstdError:
+        return "is damaged"
+    return None
 
 
 @lru_cache(maxsize=2)

@@ -4,10 +4,13 @@
 from __future__ import annotations
 
 import bz2
+import contextlib
+import struct
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple, Protocol, TypeVar
 
 from orbslam2py.datasets.bags.libraries import lz4_decompress, zstd_decompress
@@ -15,6 +18,8 @@ from orbslam2py.errors import DatasetError
 
 EntryT = TypeVar("EntryT")
 
+#: What comes of numbers, texts and fields that are not what the format says.
+_DAMAGE = (struct.error, LookupError, ValueError, OverflowError, MemoryError)
 #: Chunks that are kept decompressed: the cameras' messages of one moment lie close together.
 _KEPT_CHUNKS = 4
 
@@ -73,6 +78,32 @@ class BagFile(Protocol):
     def read(self, place: Place, most: int | None = None) -> bytes:
         """Read a message, or its first bytes."""
         ...
+
+
+@contextlib.contextmanager
+def naming_damage(path: Path) -> Iterator[None]:
+    """Turn whatever damaged bytes lead to into an error that names the file.
+
+    Parameters
+    ----------
+    path
+        The file, or the bag.
+
+    Raises
+    ------
+    DatasetError
+        In the place of what comes of wrong bytes; one that names the file already comes through.
+    """
+    try:
+        yield
+    except DatasetError as error:
+        if str(path) in str(error):
+            raise
+        raise DatasetError(f"{path}: {error}") from error
+    except _DAMAGE as error:
+        raise DatasetError(
+            f"{path} is damaged: a part of it is not what its format says; copy it anew"
+        ) from error
 
 
 def normal_kind(kind: str) -> str:

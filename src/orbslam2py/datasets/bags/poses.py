@@ -9,6 +9,7 @@ import numpy as np
 
 from orbslam2py.datasets.bags.bag import Bag, Topic
 from orbslam2py.datasets.bags.messages import read_message, stamp_of
+from orbslam2py.datasets.bags.parts import naming_damage
 from orbslam2py.datasets.bags.timing import stamps_of
 from orbslam2py.errors import DatasetError
 from orbslam2py.trajectory import Trajectory
@@ -35,7 +36,8 @@ def read_poses(bag: Bag, topic: Topic) -> Trajectory:
     """
     found: dict[int, list[float]] = {}
     for message in bag.messages(topic):
-        read = read_message(bag.read(message), topic.kind, topic.encoding)
+        with naming_damage(bag.path):
+            read = read_message(bag.read(message), topic.kind, topic.encoding)
         numbers = _numbers(read)
         if np.isfinite(numbers).all() and any(numbers[3:]):
             found.setdefault(stamp_of(read.header), numbers)

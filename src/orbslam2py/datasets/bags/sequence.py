@@ -18,19 +18,19 @@ from orbslam2py.datasets.bags.bag import Bag, Message, Topic
 from orbslam2py.datasets.bags.calibration import CameraInfo, settings_of_camera, settings_of_pair
 from orbslam2py.datasets.bags.image_topics import ImageTopic
 from orbslam2py.datasets.bags.messages import CAMERA_INFO, read_message
+from orbslam2py.datasets.bags.parts import naming_damage
 from orbslam2py.datasets.bags.pixels import decode_depth, decode_image, units_per_metre
 from orbslam2py.datasets.bags.poses import read_poses
 from orbslam2py.datasets.bags.timing import (
     TimedMessages,
     pair_messages,
-    rate_of,
     require_one_size,
     stamps_of,
     time_messages,
     warn_of_gaps,
 )
 from orbslam2py.datasets.bags.topics import TopicChoice, parse_topics
-from orbslam2py.datasets.base import Images, choose_sensor
+from orbslam2py.datasets.base import Images, choose_sensor, rate_of
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.frames import FramesInOrder
 from orbslam2py.datasets.rectification import Rectifier
@@ -42,6 +42,8 @@ _log = logging.getLogger(__name__)
 
 #: So many CameraInfo are looked at to find one of a calibrated camera.
 _MOST_INFOS = 10
+#: Images per second of a bag with a single one.
+_USUAL_RATE = 30.0
 
 
 class BagSequence(FramesInOrder):
@@ -117,7 +119,7 @@ class BagSequence(FramesInOrder):
     @cached_property
     def _default_settings(self) -> Settings:
         left = self._camera_info(self.topics.left, self.topics.left_info)
-        fps = rate_of(self.timestamps)
+        fps = rate_of(self.timestamps, _USUAL_RATE)
         if self.topics.right is not None:
             right = self._camera_info(self.topics.right, self.topics.right_info)
             rectified = self.topics.left.is_rectified and self.topics.right.is_rectified
@@ -136,7 +138,7 @@ class BagSequence(FramesInOrder):
 
     @property
     def timestamps(self) -> FloatArray:
-        """Time of every frame in seconds, float64 (n,): the stamps of the (left) images."""
+        """Times in seconds, float64 (n,): the stamps of the (left) images; read-only."""
         return self._stamps.seconds
 
     def timestamp_text(self, index: int, /) -> str:
@@ -271,7 +273,8 @@ class BagSequence(FramesInOrder):
             )
         what = f"{topic.name} in {self.path}"
         for message in self._bag.messages(topic)[:_MOST_INFOS]:
-            read = read_message(self._bag.read(message), topic.kind, topic.encoding)
+            with naming_damage(self.path):
+                read = read_message(self._bag.read(message), topic.kind, topic.encoding)
             info = CameraInfo.of(read, what)
             if info is not None:
                 break

@@ -10,7 +10,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
-from orbslam2py._arguments import cannot_open
+from orbslam2py._arguments import cannot_open, number_of
 from orbslam2py.datasets.bags.libraries import ZSTD_MAGIC, zstd_decompress
 from orbslam2py.datasets.bags.parts import (
     Channel,
@@ -52,12 +52,8 @@ class SqliteFile:
                 f"{path} is a database, but no bag of ROS 2: it has no tables 'topics' and "
                 "'messages'; give the file that 'ros2 bag record' wrote"
             )
-        self._channels = {
-            number: Channel(normal_topic(topic), normal_kind(kind), encoding)
-            for number, topic, kind, encoding in self._rows(
-                "SELECT id, name, type, serialization_format FROM topics ORDER BY id"
-            )
-        }
+        self._channels: dict[int, Channel] = {}
+        self._list_topics()
         self._entries: dict[int, list[tuple[int, int]]] = {}
         self._list_messages()
 
@@ -93,7 +89,9 @@ class SqliteFile:
             with self._database.blobopen("messages", "data", row, readonly=True) as blob:
                 return blob.read(most)
         query = "SELECT data FROM messages WHERE id = ?"
-        content = bytes(self._database.execute(query, (row,)).fetchone()[0])
+        content, *_ = self._database.execute(query, (row,)).fetchone() or (None,)
+        if not isinstance(content, bytes):
+            raise DatasetError(f"a message of {self.path} cannot be read: it holds no bytes")
         return content if most is None else content[:most]
 
     def _open(self) -> sqlite3.Connection:
@@ -111,33 +109,62 @@ class SqliteFile:
         for mode in ("mode=ro", "immutable=1"):
             with contextlib.suppress(sqlite3.OperationalError):
                 database = sqlite3.connect(f"{address}?{mode}", uri=True, check_same_thread=False)
+                database.text_factory = lambda text: text.decode("utf-8", "replace")
                 try:
                     database.execute("SELECT count(*) FROM sqlite_master").fetchone()
                 except sqlite3.OperationalError:
                     database.close()
                     raise
-                except sqlite3.DatabaseError as error:
+                except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
                     # Without it, a file that is shorter than its head says is not even looked at.
                     database.execute("PRAGMA writable_schema = ON")
-                    self.doubts.append(f"is damaged or cut off ({error}); read as far as it goes")
+                    self._doubt(error)
                 return database
         raise DatasetError(f"{self.path} is a database that cannot be opened; copy it anew")
 
     def _rows(self, query: str) -> list[tuple[Any, ...]]:
         try:
             return self._database.execute(query).fetchall()
-        except sqlite3.DatabaseError as error:
-            raise self._damaged(error) from error
+        except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
+            raise DatasetError(
+                f"{self.path} is damaged or cut off ({_reason(error)}); copy it anew"
+            ) from error
+
+    def _list_topics(self) -> None:
+        query = "SELECT id, name, type, serialization_format FROM topics ORDER BY id"
+        nameless = 0
+        for number, *texts in self._rows(query):
+            if all(isinstance(text, str) for text in texts):
+                topic, kind, encoding = texts
+                channel = Channel(normal_topic(topic), normal_kind(kind), encoding)
+                self._channels[number] = channel
+            else:  # a damaged table may hold anything, or nothing
+                nameless += 1
+        if nameless:
+            named = number_of(nameless, "topic")
+            self.doubts.append(f"is damaged: {named} without a name or a type, left out")
 
     def _list_messages(self) -> None:
         """Note when and in which row each message is, as far as the database can be read."""
         query = "SELECT id, topic_id, timestamp FROM messages ORDER BY id"
+        untimed = 0
         try:
             for row, topic, recorded in self._database.execute(query):
-                self._entries.setdefault(topic, []).append((recorded, row))
-        except sqlite3.DatabaseError as error:
+                if isinstance(recorded, int):
+                    self._entries.setdefault(topic, []).append((recorded, row))
+                else:
+                    untimed += 1
+        except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
             if not self.doubts:
-                self.doubts.append(f"is damaged or cut off ({error}); read as far as it goes")
+                self._doubt(error)
+        if untimed:
+            named = number_of(untimed, "message")
+            self.doubts.append(f"is damaged: {named} without a time, left out")
 
-    def _damaged(self, error: sqlite3.Error) -> DatasetError:
-        return DatasetError(f"{self.path} is damaged or cut off ({error}); copy it anew")
+    def _doubt(self, error: Exception) -> None:
+        self.doubts.append(f"is damaged or cut off ({_reason(error)}); read as far as it goes")
+
+
+def _reason(error: Exception) -> str:
+    """What SQLite says, unless it says it with bytes that are no text."""
+    return str(error) if isinstance(error, sqlite3.Error) else "malformed database"

@@ -176,10 +176,3 @@ def warn_of_gaps(path: Path, seconds: FloatArray) -> None:
             "%s: images are missing in %d places; the longest gap is %.1f s after frame %d",
             *(path, len(gaps), steps[longest], longest),
         )
-
-
-def rate_of(seconds: FloatArray, usual: float = 30.0) -> float:
-    """Return images per second by the usual step, or `usual` if there is a single image."""
-    steps = np.diff(seconds)
-    steps = steps[steps > 0]
-    return round(1.0 / float(np.median(steps)), 3) if len(steps) else usual

@@ -7,13 +7,12 @@ import logging
 import re
 from pathlib import Path
 
-import numpy as np
 import yaml
 
 from orbslam2py._arguments import cannot_open
-from orbslam2py._text_lines import content_lines, number_of
 from orbslam2py.datasets.base import Layout, Stamps
 from orbslam2py.datasets.layouts.frames_on_disk import DepthSequence
+from orbslam2py.datasets.tum import read_image_list
 from orbslam2py.errors import DatasetError
 from orbslam2py.settings import Settings
 from orbslam2py.trajectory import Trajectory, associate, read_tum
@@ -79,17 +78,9 @@ class OpenLorisSequence(DepthSequence):
 
 
 def _read_list(path: Path) -> tuple[Stamps, list[Path]]:
-    lines = content_lines(path)
-    for line in lines:
-        if len(line.fields) != 2:
-            raise DatasetError(
-                f"{path}:{line.number}: expected 'timestamp path', found {len(line.fields)} fields"
-            )
-    seconds = np.array([number_of(path, line, line.fields[0]) for line in lines])
-    texts = tuple(line.fields[0] for line in lines)
-    stamps = Stamps(seconds, texts, tuple(line.number for line in lines))
-    stamps.warn_unless_increasing(path)
-    return stamps, [path.parent / line.fields[1] for line in lines]
+    listed = read_image_list(path)
+    listed.stamps.warn_unless_increasing(path)
+    return listed.stamps, [path.parent / name for name in listed.paths]
 
 
 def _values_of(path: Path) -> dict[str, list[float]]:
