@@ -6,7 +6,6 @@ from __future__ import annotations
 import csv
 import importlib
 import importlib.util
-import secrets
 import sqlite3
 from collections.abc import Iterable
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from orbslam2py._arguments import is_number, is_whole
-from orbslam2py._files import atomic_write, printable_name
+from orbslam2py._files import atomic_write, printable_name, temporary_beside
 from orbslam2py.batches.work import MEASURED
 
 #: Columns that come first, in this order.
@@ -95,7 +94,7 @@ def _text(value: Any) -> Any:
 
 
 def _write_database(path: Path, columns: list[str], rows: list[dict[str, Any]]) -> None:
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
+    temporary = temporary_beside(path)
     try:
         database = sqlite3.connect(temporary)
         try:

@@ -25,6 +25,11 @@ from orbslam2py.settings import Sensor, Settings
 
 _log = logging.getLogger(__name__)
 
+#: So much of a video may be missing untold [s; share of its length]: sound may last a little longer.
+_MISSING, _MISSING_SHARE = 0.25, 0.03
+#: A file that says it has more frames does not know.
+_MOST_FRAMES = 1e9
+
 
 class VideoReader:
     """Frames of a video file by their number, exact whatever the distance of its key frames.
@@ -55,7 +60,8 @@ class VideoReader:
     def scan(self) -> FloatArray:
         """Decode the file once and return the time of every frame in seconds, float64 (n,).
 
-        What files say about their number of frames is often wrong.
+        What files say about their number of frames is often wrong; a warning tells where much of
+        what they promise is missing.
 
         Raises
         ------
@@ -66,10 +72,25 @@ class VideoReader:
         seconds = []
         while self._capture.grab():
             seconds.append(self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3)
+        promised = self._promised_seconds()
         self._rewind()
         if not seconds:
             raise self._no_frames()
+        if self.fps:
+            found = max(seconds[-1] - seconds[0], len(seconds) / self.fps)
+            if promised - found > max(_MISSING, _MISSING_SHARE * promised):
+                _log.warning(
+                    "%s promises %.1f s, but ends after %.1f s (%d frames): it was cut off, or is "
+                    "damaged there; copy or record it again if the rest matters",
+                    *(self.path, promised, found, len(seconds)),
+                )
         return np.array(seconds, dtype=np.float64)
+
+    def _promised_seconds(self) -> float:
+        """What the file says of its length; 0 if it does not."""
+        n_frames = self._capture.get(cv2.CAP_PROP_FRAME_COUNT)
+        known = math.isfinite(n_frames) and 0 < n_frames < _MOST_FRAMES and self.fps
+        return n_frames / self.fps if known else 0.0
 
     def read(self, index: int) -> ByteArray:
         """Decode a frame.

@@ -6,14 +6,13 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
-import secrets
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Set
 from pathlib import Path
 from types import MappingProxyType
 
 from orbslam2py._arguments import path_of
-from orbslam2py._files import reason_of
+from orbslam2py._files import reason_of, take_mode, temporary_beside
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.map_rows import Row, checksum
 from orbslam2py.maps.schema import (
@@ -163,9 +162,10 @@ class MapWriter:
 
     def _commit_first(self, rows: Iterable[tuple[str, Row]]) -> int:
         _check_target(self.path, self._named)
-        temporary = self.path.with_name(f".{self.path.name}.{secrets.token_hex(4)}.tmp")
+        temporary = temporary_beside(self.path)
         try:
             with contextlib.closing(connect(temporary, "rwc")) as connection:
+                take_mode(temporary, self.path)  # before anything private is in it
                 # Nobody sees the temporary file, so it needs no journal.
                 connection.execute("PRAGMA journal_mode = OFF")
                 connection.execute("PRAGMA synchronous = OFF")
@@ -332,7 +332,7 @@ def check_map_target(path: str | os.PathLike[str]) -> None:
     target = Path(os.path.realpath(path))
     with _naming(named):
         _check_target(target, named)
-        probe = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
+        probe = temporary_beside(target)
         probe.touch()
         probe.unlink()
 

@@ -37,15 +37,15 @@ def associate(
     Raises
     ------
     DatasetError
-        If they are no lists of numbers, or the limit is below 0.
+        If they are no lists of finite numbers, or the limit is below 0.
 
     Returns
     -------
     first_indices, second_indices
         int64 (k,) each, in the order of the stamps of `first`.
     """
-    first = array_of(first, "the first time stamps", (-1,), finite=False)
-    second = array_of(second, "the second time stamps", (-1,), finite=False)
+    first = array_of(first, "the first time stamps", (-1,))
+    second = array_of(second, "the second time stamps", (-1,))
     max_difference = finite_number(max_difference, "max_difference", _REMEDY, DatasetError)
     if max_difference < 0:
         raise DatasetError(f"max_difference is {max_difference:g}; give {_REMEDY}")

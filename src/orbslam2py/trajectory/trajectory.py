@@ -42,7 +42,8 @@ class Trajectory(EqualByValue):
     Raises
     ------
     DatasetError
-        If one of them is no array of numbers, indices are no whole ones, or they differ in length.
+        If one of them is no array of numbers, a time stamp is not finite, indices are no whole
+        numbers, or they differ in length.
     """
 
     timestamps: FloatArray
@@ -51,7 +52,7 @@ class Trajectory(EqualByValue):
     indices: IntArray = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
-        timestamps = array_of(self.timestamps, "timestamps", (-1,), finite=False)
+        timestamps = array_of(self.timestamps, "timestamps", (-1,))
         n = len(timestamps)
         fields: dict[str, NDArray[Any]] = {
             "timestamps": timestamps,

@@ -11,7 +11,7 @@ import pytest
 
 from orbslam2py import DatasetError, ImageError, Sensor, SettingsError
 from orbslam2py.datasets import Sequence, VideoReader, VideoSequence, open_input
-from support.numbered_images import MONO, SIZE, number_of, with_size
+from support.numbered_images import MONO, SIZE, number_of, with_size, write_video
 
 
 def test_video_delivers_every_frame_in_order(video: Path) -> None:
@@ -42,6 +42,21 @@ def test_video_rate_and_times(video: Path, tmp_path: Path) -> None:
 def test_video_reader_takes_every_nth_frame(video: Path) -> None:
     frames = [frame for frame in VideoReader(video).frames(6) if isinstance(frame, np.ndarray)]
     assert [number_of(frame) for frame in frames] == [0, 6, 12, 18]
+
+
+@pytest.mark.parametrize(("share", "told"), [(1.0, False), (0.6, True)])
+def test_a_video_that_was_cut_off_is_told(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, share: float, told: bool
+) -> None:
+    """Its beginning says how much there should be."""
+    whole = write_video(tmp_path / "whole.avi", code="MJPG", n=30)
+    cut = tmp_path / "cut.avi"
+    data = whole.read_bytes()
+    cut.write_bytes(data[: int(share * len(data))])
+    n = len(VideoSequence(cut, settings="tum1"))
+    assert (n < 30) is told
+    warned = f"cut.avi promises 1.2 s, but ends after {n / 25:.1f} s ({n} frames)"
+    assert (warned in caplog.text) is told
 
 
 def test_bad_videos(tmp_path: Path, video: Path, folder: Path) -> None:

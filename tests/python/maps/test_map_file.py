@@ -295,3 +295,11 @@ def test_an_empty_file_and_a_map_are_replaced(tmp_path: Path) -> None:
     for _ in range(2):
         save_map(small_map(), path)
     load_map(path)
+
+
+def test_a_private_map_stays_private(tmp_path: Path) -> None:
+    path = tmp_path / f"{'m' * 240}.orbmap"  # as long as names may be, nearly
+    save_map(small_map(), path)
+    path.chmod(0o600)
+    save_map(small_map(), path)
+    assert path.stat().st_mode & 0o777 == 0o600

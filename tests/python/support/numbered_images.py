@@ -39,12 +39,12 @@ def mask_image(value: int = 0, size: tuple[int, int] = SIZE) -> np.ndarray:
     return mask
 
 
-def write_video(path: Path) -> Path:
-    """Twenty frames at 25 per second; skips the test where videos cannot be written."""
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), 25, SIZE[::-1])
+def write_video(path: Path, *, code: str = "mp4v", n: int = 20) -> Path:
+    """Frames at 25 per second; skips the test where videos cannot be written."""
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*code), 25, SIZE[::-1])
     if not writer.isOpened():
         pytest.skip("this OpenCV cannot write videos")
-    for k in range(20):
+    for k in range(n):
         writer.write(coloured(k))
     writer.release()
     return path

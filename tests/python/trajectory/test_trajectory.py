@@ -12,6 +12,7 @@ import pytest
 from orbslam2py.errors import DatasetError
 from orbslam2py.trajectory import (
     Trajectory,
+    associate,
     lengths_along,
     read_kitti,
     read_tum,
@@ -161,3 +162,12 @@ def test_indices_as_columns_of_tables_have_them() -> None:
     large = [2**53 + 1, 2**62]
     taken = Trajectory(two.timestamps, two.T_wc, indices=np.array(large))
     assert taken.indices.tolist() == large
+
+
+@pytest.mark.parametrize("time", [np.nan, np.inf])
+def test_a_time_that_is_not_finite_is_refused(time: float) -> None:
+    T_wc = np.repeat(np.eye(4)[None], 3, axis=0)
+    with pytest.raises(DatasetError, match="timestamps holds a number that is not finite"):
+        Trajectory(np.array([0.0, time, 2.0]), T_wc)
+    with pytest.raises(DatasetError, match="the second time stamps holds a number that is not"):
+        associate(np.arange(3.0), np.array([0.0, time]))

@@ -12,6 +12,7 @@ from support.command_line import CommandLine
 from support.made_up_paths import wander
 
 N = 20
+COLUMNS = "index,timestamp,map,state,reason"
 MATRIX = "1 0 0 0.1\n0 1 0 0.2\n0 0 1 0.3\n"
 
 
@@ -78,7 +79,7 @@ def test_matrix_of_a_sensor_file_that_is_none(command: CommandLine, data: str) -
 
 @pytest.mark.parametrize(
     ("text", "line"),
-    [("nothing\n1\n", 2), ("index,timestamp,map,state\n0,x,0,OK\n", 2), ("index\n0\n", 2)],
+    [(f"{COLUMNS}\n0,x,0,OK,\n", 2), (f"{COLUMNS}\n0,1.0,0,OK,\n0\n", 3)],
 )
 def test_frames_of_a_run_that_are_none(command: CommandLine, text: str, line: int) -> None:
     Path("frames.csv").write_text(text)
@@ -86,6 +87,12 @@ def test_frames_of_a_run_that_are_none(command: CommandLine, text: str, line: in
     assert done.code == 2
     assert f"frames.csv:{line}" in done.err
     assert "move the file away" in done.err
+
+
+@pytest.mark.parametrize("text", ["nothing\n1\n", "index\n0\n", ""])
+def test_frames_of_another_program_are_left_alone(command: CommandLine, text: str) -> None:
+    Path("frames.csv").write_text(text)
+    assert command("evaluate", "rows.txt", "poses.txt").code == 0
 
 
 @pytest.mark.parametrize(("times", "line"), [("1\n0\n2\n", 2), ("0\n2\n1\n", 3)])
