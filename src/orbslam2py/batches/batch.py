@@ -134,11 +134,12 @@ def batch(
         default_folder() if cache is None else path_of(cache, "the cache").absolute(),
         cache_size_of(DEFAULT_SIZE if cache_size is None else cache_size),
     )
+    elsewhere = where.scheduler is not None
     if isinstance(jobs, Mapping):
-        wanted = make_jobs(jobs)
+        wanted = make_jobs(jobs, elsewhere=elsewhere)
         named = jobs.get("output")
     else:
-        wanted, named = read_jobs(path_of(jobs, "the job file"))
+        wanted, named = read_jobs(path_of(jobs, "the job file"), elsewhere=elsewhere)
     place = named if output is None else output
     if place is None:
         raise DatasetError("there is no folder for the results; give --output")

@@ -15,25 +15,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from orbslam2py._arguments import (
-    cannot_open,
     float_of,
     is_number,
     is_whole,
-    path_of,
     seed_of,
     shown,
 )
+from orbslam2py.batches.chosen_settings import require_usable, settings_name
+from orbslam2py.batches.job_file import read_document
 from orbslam2py.batches.keys import key_of, label_of, with_labels_of_their_own
 from orbslam2py.batches.remote import is_remote, name_of, require_protocols
 from orbslam2py.batches.sweep import Sweep, read_sweep
 from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.runs.options import RunOptions
-from orbslam2py.settings import BUILTIN_NAMES, Sensor, Settings
-from orbslam2py.settings.builtin import is_builtin_name
-from orbslam2py.settings.settings import looks_like_path
+from orbslam2py.settings import Sensor
 from orbslam2py.slam.options import SystemOptions
 
 _KEYS = ("sequences", "sensors", "settings", "options", "seeds", "sweep", "output")
@@ -120,13 +117,15 @@ class Job:
         )
 
 
-def read_jobs(path: Path) -> tuple[list[Job], Path | str | None]:
+def read_jobs(path: Path, *, elsewhere: bool = False) -> tuple[list[Job], Path | str | None]:
     """Read a job file.
 
     Parameters
     ----------
     path
         A YAML file; paths in it are relative to its folder.
+    elsewhere
+        Whether workers may see settings files that this computer does not.
 
     Returns
     -------
@@ -140,19 +139,9 @@ def read_jobs(path: Path) -> tuple[list[Job], Path | str | None]:
     DatasetError
         If a sequence is not there.
     """
+    document = read_document(path)
     try:
-        document = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SettingsError(cannot_open(path, error, "job file")) from error
-    except yaml.MarkedYAMLError as error:
-        line = error.problem_mark.line + 1 if error.problem_mark else 1
-        raise SettingsError(f"{path}:{line} is no YAML: {error.problem}; correct it") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise SettingsError(f"{path} is no text in YAML; give a job file") from error
-    if not isinstance(document, Mapping):
-        raise SettingsError(f"{path} holds no named values; it needs at least 'sequences:'")
-    try:
-        jobs = make_jobs(document, path.parent)
+        jobs = make_jobs(document, path.parent, elsewhere=elsewhere)
     except (SettingsError, DatasetError) as error:
         raise type(error)(f"{path}: {error}") from error
     output = document.get("output")
@@ -161,7 +150,9 @@ def read_jobs(path: Path) -> tuple[list[Job], Path | str | None]:
     return jobs, path.parent / str(output)
 
 
-def make_jobs(document: Mapping[str, Any], folder: Path | None = None) -> list[Job]:
+def make_jobs(
+    document: Mapping[str, Any], folder: Path | None = None, *, elsewhere: bool = False
+) -> list[Job]:
     """Make the runs that a job file, or a dictionary like one, asks for.
 
     Parameters
@@ -170,12 +161,14 @@ def make_jobs(document: Mapping[str, Any], folder: Path | None = None) -> list[J
         ``sequences`` and, if wanted, ``sensors``, ``settings``, ``options``, ``seeds``, ``sweep``.
     folder
         What paths are relative to; the present one if None.
+    elsewhere
+        Whether workers may see settings files that this computer does not.
 
     Raises
     ------
     SettingsError
-        For unknown keys and values that make no sense, or if two runs would have one folder and
-        it is for the caller to say what tells them apart.
+        For unknown keys and values that make no sense, for settings that are missing or wrong, or
+        if two runs would have one folder and it is for the caller to say what tells them apart.
     DatasetError
         If a sequence is not there.
     """
@@ -200,7 +193,7 @@ def make_jobs(document: Mapping[str, Any], folder: Path | None = None) -> list[J
                 one["path"],
                 one["name"],
                 None if sensor is None else str(Sensor(sensor)),
-                None if setting is None else _settings_name(setting, folder),
+                None if setting is None else settings_name(setting, folder, elsewhere=elsewhere),
                 one.get("topics"),
                 option,
                 parameters,
@@ -209,6 +202,7 @@ def make_jobs(document: Mapping[str, Any], folder: Path | None = None) -> list[J
             _require_few(len(kinds) * len(seeds))
     for kind in kinds:
         kind.run_options(Sensor.MONOCULAR)  # says now what would fail in every run
+    require_usable(kinds)
     kinds = with_labels_of_their_own(kinds)
     return [dataclasses.replace(kind, seed=seed) for kind in kinds for seed in seeds]
 
@@ -299,25 +293,6 @@ def _require_few(n_runs: int) -> None:
         raise SettingsError(
             f"that would be {n_runs} runs or more; make batches of at most {_MOST_RUNS}"
         )
-
-
-def _settings_name(choice: Any, folder: Path) -> str:
-    """A file beside the job file, or a built-in name."""
-    if isinstance(choice, Settings):
-        raise SettingsError(
-            "settings are a Settings object, which the table cannot name; save it "
-            "(settings.save('camera.yaml')) and give the path"
-        )
-    name = path_of(choice, "settings", SettingsError)
-    path = folder / name
-    if path.exists():
-        return str(path.absolute())
-    if not looks_like_path(name) and not is_builtin_name(str(name)):
-        raise SettingsError(
-            f"settings '{name}' are no file in {folder} and none of the built-in ones "
-            f"({', '.join(BUILTIN_NAMES)}); correct the name"
-        )
-    return str(choice)  # a file that may be where the workers are
 
 
 def _listed(value: Any, *, keep: bool = False) -> list[Any]:

@@ -7,7 +7,10 @@ A batch is gone on with by these names, so whatever could be called in the plain
 from __future__ import annotations
 
 import hashlib
+import os
 import re
+import sys
+import unicodedata
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -19,12 +22,14 @@ from orbslam2py.errors import SettingsError
 if TYPE_CHECKING:
     from orbslam2py.batches.jobs import Job
 
-#: Bytes of a name on the usual file systems; names are ASCII.
+#: Bytes of a name on the usual file systems, where letters beyond ASCII have several.
 _LONGEST = 255
-#: What is kept of longer ones: with a fingerprint and the largest seed they have less than 120.
+#: Bytes that are kept of longer ones: with fingerprint and the largest seed they are less than 120.
 _KEPT = 80
 #: Digits of the fingerprints in names.
 _DIGITS = 12
+#: What is harmless in names of files beside letters and digits.
+_SIGNS = "_.=+"
 _OWN_NAMES = "give the sequences names of their own ('path: ..., name: ...')"
 
 
@@ -49,10 +54,11 @@ def label_of(job: Job, settings: str | None = None, *, exact: bool = False) -> s
 def key_of(label: str, seed: int) -> str:
     """Name the folder of a run; of a name that no disk takes the end is a fingerprint of it."""
     key = f"{label}-seed{seed}"
-    if len(key) <= _LONGEST:
+    if len(key.encode()) <= _LONGEST:
         return key
     fingerprint = hashlib.sha256(label.encode()).hexdigest()[:_DIGITS]
-    return f"{label[:_KEPT]}-{fingerprint}-seed{seed}"
+    kept = label.encode()[:_KEPT].decode(errors="ignore")  # no half of a letter
+    return f"{kept}-{fingerprint}-seed{seed}"
 
 
 def with_labels_of_their_own(jobs: Sequence[Job]) -> list[Job]:
@@ -66,7 +72,8 @@ def with_labels_of_their_own(jobs: Sequence[Job]) -> list[Job]:
     Raises
     ------
     SettingsError
-        If it is for the user to tell them apart: two sequences of one name, or one run twice.
+        If it is for the user to tell them apart: two sequences of one name, or one run twice; or
+        if the file system cannot spell a name.
     """
     places: dict[str, list[int]] = {}
     for place, job in enumerate(jobs):
@@ -88,7 +95,21 @@ def with_labels_of_their_own(jobs: Sequence[Job]) -> list[Job]:
             own = one if is_its_own else f"{one}-{job.fingerprint[:_DIGITS]}"
             taken.add(own)
             told[place] = replace(job, label=own)
+    for job in told:
+        _require_spelling(job.key)
     return told
+
+
+def _require_spelling(key: str) -> None:
+    """See that this system can write a name, as in an ASCII locale it could not all letters."""
+    try:
+        os.fsencode(key)
+    except UnicodeEncodeError as error:
+        raise SettingsError(
+            f"{key} cannot be the name of a folder where names are in "
+            f"{sys.getfilesystemencoding()}; give names in letters from a to z, or set LC_ALL to "
+            "a locale with UTF-8, such as C.UTF-8"
+        ) from error
 
 
 def _require_differences(label: str, group: list[Job]) -> None:
@@ -99,7 +120,7 @@ def _require_differences(label: str, group: list[Job]) -> None:
         if job.name != first.name:
             raise SettingsError(
                 f"{clash}the names '{first.name}' and '{job.name}' are one in names of folders; "
-                "give names that differ in letters from a to z, digits, or one of _ . = +"
+                f"give names that differ in letters, digits, or one of {' '.join(_SIGNS)}"
             )
         if job.path != first.path:
             raise SettingsError(f"{clash}{first.path} and {job.path}; {_OWN_NAMES}")
@@ -143,5 +164,25 @@ def _short(value: Any, *, exact: bool) -> str:
 
 
 def _plain(text: str) -> str:
-    """Leave only what is harmless in names of files."""
+    """Leave only what is harmless in names of files: letters and digits of any script, few signs.
+
+    Letters with accents are one character each, whichever way they were typed: some file systems
+    take both ways for one name.
+    """
+    if not text.isascii():
+        text = unicodedata.normalize("NFC", text)
+        pairs = zip(f" {text}", text, strict=False)
+        text = "".join(letter if _is_harmless(letter, before) else "/" for before, letter in pairs)
+        return re.sub("/+", "_", text)
     return re.sub(r"[^A-Za-z0-9_.=+]+", "_", text)
+
+
+def _is_harmless(letter: str, before: str) -> bool:
+    """Whether a character may stay, behind another one: marks belong to letters in many scripts."""
+    if _is_mark(letter):
+        return before.isalnum() or _is_mark(before)
+    return letter.isalnum() or letter in _SIGNS
+
+
+def _is_mark(letter: str) -> bool:
+    return unicodedata.category(letter).startswith("M")

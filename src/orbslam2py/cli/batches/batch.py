@@ -9,10 +9,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
 
-from orbslam2py._arguments import number_of
-from orbslam2py.batches import BatchResult, Spread
 from orbslam2py.batches import batch as run_batch
 from orbslam2py.cli.batches.arguments import (
     MemoryLimitOption,
@@ -21,6 +18,7 @@ from orbslam2py.cli.batches.arguments import (
     SchedulerOption,
     WorkersOption,
 )
+from orbslam2py.cli.batches.printed_table import printed_table
 from orbslam2py.cli.batches.watched_runs import exit_as_it_ended, watched_runs
 from orbslam2py.cli.run_options import QuietFlag
 
@@ -77,36 +75,9 @@ def batch(
             watch=watch,
             stop=stop,
         )
-    console.print(_table(done))
+    console.print(printed_table(done, console.width))
     console.print(f"Results are in {escape(str(done.files[0]))}", highlight=False, soft_wrap=True)
     exit_as_it_ended(done, errors)
 
 
 batch.__doc__ = f"{batch.__doc__}\n{EXAMPLE}"
-
-
-def _table(done: BatchResult) -> Table:
-    table = Table(title=f"{number_of(len(done.rows), 'run')}, {done.n_failed} failed")
-    table.add_column("run")
-    for name in ("runs", "failed", "ATE [m]", "tracked [%]", "frames/s", "memory [MB]"):
-        table.add_column(name, justify="right")
-    for group in done.groups:
-        table.add_row(
-            escape(group.setting),
-            str(group.n_runs),
-            str(group.n_failed) if group.n_failed else "",
-            _spread(group.ate_rmse_m, 4),
-            _spread(group.tracked_fraction, 1, 100),
-            _spread(group.frames_per_second, 1),
-            _spread(group.peak_memory_mb, 0),
-        )
-    return table
-
-
-def _spread(spread: Spread | None, digits: int, factor: float = 1.0) -> str:
-    """Median, and the range behind it if there is one."""
-    if spread is None:
-        return ""
-    median, least, most = (factor * x for x in (spread.median, spread.least, spread.most))
-    text = f"{median:.{digits}f}"
-    return text if least == most else f"{text} ({least:.{digits}f}-{most:.{digits}f})"

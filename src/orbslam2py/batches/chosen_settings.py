@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Settings that the runs of a batch are to have: looked at before the first run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from orbslam2py._arguments import path_of
+from orbslam2py.errors import SettingsError
+from orbslam2py.settings import BUILTIN_NAMES, Sensor, Settings, builtin_settings
+from orbslam2py.settings.builtin import is_builtin_name
+from orbslam2py.settings.reader import read_groups
+from orbslam2py.settings.settings import looks_like_path
+
+if TYPE_CHECKING:
+    from orbslam2py.batches.jobs import Job
+
+
+def settings_name(choice: Any, folder: Path, *, elsewhere: bool) -> str:
+    """Return what a choice of settings names: a file beside the job file, or built-in settings.
+
+    Parameters
+    ----------
+    choice
+        A path or a name.
+    folder
+        What paths are relative to.
+    elsewhere
+        Let paths through that are not there: workers on other computers may see them.
+
+    Raises
+    ------
+    SettingsError
+        If it is neither.
+    """
+    if isinstance(choice, Settings):
+        raise SettingsError(
+            "settings are a Settings object, which the table cannot name; save it "
+            "(settings.save('camera.yaml')) and give the path"
+        )
+    name = path_of(choice, "settings", SettingsError)
+    path = folder / name
+    if path.exists():
+        return str(path.absolute())
+    if is_builtin_name(str(name)):
+        return str(choice)
+    if not looks_like_path(name):
+        raise SettingsError(
+            f"settings '{name}' are no file in {folder} and none of the built-in ones "
+            f"({', '.join(BUILTIN_NAMES)}); correct the name"
+        )
+    if not elsewhere:
+        raise SettingsError(
+            f"settings file {path.absolute()} does not exist; correct the path, or give the name "
+            f"of built-in settings ({', '.join(BUILTIN_NAMES)})"
+        )
+    return str(choice)
+
+
+def require_usable(jobs: Iterable[Job]) -> None:
+    """See that all settings serve at least one of the sensors that they are to be used with.
+
+    Everything is combined with everything in a job file, so that settings that serve another
+    sensor are no mistake: those runs fail, and the table says why.
+
+    Raises
+    ------
+    SettingsError
+        If no run with some settings could begin: what is wrong with them.
+    """
+    sensors: dict[str, dict[Sensor, None]] = {}
+    for job in jobs:
+        if job.settings is not None:
+            # The richest that a sequence has images for is known when it is opened.
+            wanted = list(Sensor) if job.sensor is None else [Sensor(job.sensor)]
+            sensors.setdefault(job.settings, {}).update(dict.fromkeys(wanted))
+    for name, wanted_for in sensors.items():
+        if not is_builtin_name(name) and not Path(name).exists():
+            continue  # it may be where the workers are
+        problems = [_problem_of(name, sensor) for sensor in wanted_for]
+        # The first sensor is the one that needs least, if none is named.
+        if problems[0] is not None and all(problems):
+            raise problems[0]
+
+
+def _problem_of(name: str, sensor: Sensor) -> SettingsError | None:
+    """Return why settings do not serve a sensor; what is only doubtful, the runs say."""
+    try:
+        if is_builtin_name(name):
+            builtin_settings(name, sensor)
+        else:
+            groups = read_groups(Path(name), sensor, allow_unknown=False, warn=lambda _: None)
+            Settings(sensor=sensor, **groups)
+    except SettingsError as error:
+        return error
+    return None
