@@ -10,6 +10,9 @@ import sys
 
 import orbslam2py as orb
 
+if len(sys.argv) != 2:
+    sys.exit("usage: python examples/mono_euroc.py V1_01_easy")
+
 sequence = orb.open_sequence(sys.argv[1], "mono")
 
 with orb.System(sequence.settings, "mono", wait_for_mapping=True) as slam:

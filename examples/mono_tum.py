@@ -9,6 +9,9 @@ import sys
 import orbslam2py as orb
 from orbslam2py.trajectory import write_tum
 
+if len(sys.argv) != 2:
+    sys.exit("usage: python examples/mono_tum.py rgbd_dataset_freiburg1_desk")
+
 sequence = orb.open_sequence(sys.argv[1], orb.Sensor.MONOCULAR)
 
 with orb.System(sequence.settings, "mono", wait_for_mapping=True) as slam:

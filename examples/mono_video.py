@@ -13,6 +13,9 @@ import numpy as np
 import orbslam2py as orb
 from orbslam2py.datasets import VideoSequence
 
+if len(sys.argv) != 3:
+    sys.exit("usage: python examples/mono_video.py video.mp4 my_camera.yaml")
+
 video = VideoSequence(sys.argv[1], settings=sys.argv[2])
 
 with orb.System(video.settings, "mono", wait_for_mapping=True) as slam:

@@ -12,6 +12,9 @@ import numpy as np
 
 import orbslam2py as orb
 
+if len(sys.argv) != 2:
+    sys.exit("usage: python examples/stereo_euroc.py V1_01_easy")
+
 sequence = orb.open_sequence(sys.argv[1], "stereo")
 
 with orb.System(sequence.settings, "stereo", wait_for_mapping=True) as slam:

@@ -10,6 +10,9 @@ import orbslam2py as orb
 from orbslam2py.evaluation import evaluate_trajectory
 from orbslam2py.trajectory import write_kitti
 
+if len(sys.argv) != 2:
+    sys.exit("usage: python examples/stereo_kitti.py dataset/sequences/06")
+
 sequence = orb.open_sequence(sys.argv[1], orb.Sensor.STEREO)
 
 with orb.System(sequence.settings, "stereo", wait_for_mapping=True) as slam:

@@ -300,7 +300,7 @@ def _colmap(path: Path, text: str, number: int | None) -> CameraModel:
     # COLMAP's pixels begin at their corner: the centre of the first one is (0.5, 0.5).
     K = np.array([[fx, 0.0, cx - 0.5], [0.0, fy, cy - 0.5], [0.0, 0.0, 1.0]])
     return CameraModel(
-        K=K,
+        K=checked_camera_matrix(where, K, model),
         distortion=np.array([k1, k2, p1, p2, 0.0]),
         size=checked_size(where, [width, height]),
     )

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import CameraSettings, Sensor, Settings, settings_for_camera
+from orbslam2py.settings.keys import focal_problems
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,17 +105,26 @@ def require_supported(path: Path, what: str, name: object, supported: tuple[str,
         )
 
 
-def checked_camera_matrix(path: Path, K: NDArray[Any]) -> FloatArray:
+def checked_camera_matrix(
+    path: Path, K: NDArray[Any], where: str = "the camera matrix"
+) -> FloatArray:
     """Check a camera matrix (3, 3) [pixels].
+
+    Parameters
+    ----------
+    path, where
+        The file and the place in it, for the message.
+    K
+        The matrix.
 
     Raises
     ------
     SettingsError
         If there is skew, or a focal length is not above 0.
     """
-    K = checked_numbers(path, "the camera matrix", K, (9,)).reshape(3, 3)
-    if K[0, 0] <= 0 or K[1, 1] <= 0:
-        raise SettingsError(f"{path}: focal lengths {K[0, 0]:g}, {K[1, 1]:g} must be above 0")
+    K = checked_numbers(path, where, K, (9,)).reshape(3, 3)
+    for problem in focal_problems(where, K):
+        raise SettingsError(f"{path}: {problem}")
     if abs(K[0, 1]) > 1e-6 * K[0, 0]:
         raise SettingsError(f"{path}: a camera with skew ({K[0, 1]:g}) is not supported")
     return K

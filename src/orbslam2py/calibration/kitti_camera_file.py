@@ -13,6 +13,7 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py.calibration.camera_model import checked_numbers, checked_size
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import CameraSettings, OrbSettings, Sensor, Settings, settings_for_camera
+from orbslam2py.settings.keys import focal_problems
 
 _PROJECTION = re.compile(r"^P(?:_rect_0)?(\d):(.*)$", re.MULTILINE)
 _SIZE = re.compile(r"^S_rect_0(\d):(.*)$", re.MULTILINE)
@@ -71,5 +72,7 @@ def _camera(path: Path, text: str, number: int, P: FloatArray, fps: float) -> Ca
     if number in sizes:
         found = checked_numbers(path, f"S_rect_0{number}", sizes[number], (2,))
         width, height = checked_size(path, found.tolist())
+    for problem in focal_problems(f"P{number}", P):
+        raise SettingsError(f"{path}: {problem}")
     fx, fy, cx, cy = (float(value) for value in np.array([P[0, 0], P[1, 1], P[0, 2], P[1, 2]]))
     return CameraSettings(fx, fy, cx, cy, width=width, height=height, fps=fps, rgb=True)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from orbslam2py import _palette as palette
-from orbslam2py._files import atomic_write
+from orbslam2py._figures import write_figure
 from orbslam2py._palette import hexadecimal
 from orbslam2py.calibration.calibration import Calibration
 
@@ -26,12 +26,12 @@ _SCALES = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
 
 
 def draw_residuals(path: str | PathLike[str], calibration: Calibration, *, title: str) -> None:
-    """Draw the residuals over the image, as a cloud, and the error of every view, into a PNG file.
+    """Draw the residuals over the image, as a cloud, and the error of every view, into a picture.
 
     Parameters
     ----------
     path
-        Where to write.
+        Where to write; the ending tells the format, and without one it is PNG.
     calibration
         What to show.
     title
@@ -39,6 +39,8 @@ def draw_residuals(path: str | PathLike[str], calibration: Calibration, *, title
 
     Raises
     ------
+    OutputFileError
+        If the ending is that of no format of pictures that is known here.
     OSError
         If the file cannot be written.
     """
@@ -59,8 +61,7 @@ def draw_residuals(path: str | PathLike[str], calibration: Calibration, *, title
     _draw_image(figure.add_subplot(grid[0, 0]), calibration)
     _draw_cloud(figure.add_subplot(grid[0, 1]), calibration)
     _draw_views(figure.add_subplot(grid[1, :]), calibration)
-    with atomic_write(path, binary=True) as stream:
-        figure.savefig(stream, format="png")
+    write_figure(path, figure)
 
 
 def _draw_image(axes: Axes, calibration: Calibration) -> None:

@@ -106,10 +106,30 @@ def kalibr_settings(
         raise SettingsError(f"{path}: {where}T_cn_cnm1 is no 4 x 4 rigid transform")
     if left.size is None or left.size != right.size:
         raise SettingsError(f"{path}: the cameras of a pair must have the same resolution")
-    rectification = rectification_of_pair(
-        (left.K, right.K), (left.distortion, right.distortion), T, left.size
-    )
+    for name, one in zip(names, (left, right), strict=False):
+        _require_centre_inside(path, name, one)
+    try:
+        rectification = rectification_of_pair(
+            (left.K, right.K), (left.distortion, right.distortion), T, left.size
+        )
+    except SettingsError as error:
+        raise SettingsError(
+            f"{path}: the pair cannot be rectified ({error}); look at intrinsics, "
+            "distortion_coeffs and T_cn_cnm1"
+        ) from error
     return _pair_settings(path, rectification, fps)
+
+
+def _require_centre_inside(path: Path, name: str, one: CameraModel) -> None:
+    """Refuse a camera of a pair whose images would be zoomed in on a place outside of them."""
+    assert one.size is not None
+    width, height = one.size
+    cx, cy = float(one.K[0, 2]), float(one.K[1, 2])
+    if not (0 <= cx < width and 0 <= cy < height):
+        raise SettingsError(
+            f"{path}: {name}.intrinsics has its centre at {cx:g}, {cy:g}, outside of the {width} x "
+            f"{height} pixels of {name}.resolution; give both of the same images"
+        )
 
 
 def _kalibr_camera(path: Path, name: str, values: object) -> CameraModel:
@@ -127,8 +147,9 @@ def _kalibr_camera(path: Path, name: str, values: object) -> CameraModel:
         given = _value(path, where, values, "distortion_coeffs")
         coefficients = checked_numbers(path, f"{where}distortion_coeffs", given, (4,))
     resolution = _value(path, where, values, "resolution")
+    K = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
     return CameraModel(
-        np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]),
+        checked_camera_matrix(path, K, f"{where}intrinsics"),
         five_coefficients(path, coefficients),
         checked_size(path, checked_numbers(path, f"{where}resolution", resolution, (2,)).tolist()),
     )

@@ -12,6 +12,7 @@ from rich.markup import escape
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from orbslam2py._figures import check_picture_name
 from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.calibration import (
     Board,
@@ -23,9 +24,11 @@ from orbslam2py.calibration import (
 )
 from orbslam2py.calibration import calibrate as calibrate_views
 from orbslam2py.calibration.plot import draw_residuals
+from orbslam2py.cli.messages import log_to
 from orbslam2py.cli.targets import check_apart, check_target
-from orbslam2py.errors import SettingsError
+from orbslam2py.errors import OutputFileError, SettingsError
 from orbslam2py.settings import CameraSettings, OrbSettings, Sensor, settings_for_camera
+from orbslam2py.settings.check import warn_of_doubts
 
 Output = Annotated[Path, typer.Option("--output", "-o", help="Settings file to write.")]
 Fps = Annotated[
@@ -73,7 +76,7 @@ def calibrate(
     ] = 40,
     k3: Annotated[bool, typer.Option("--k3", help="Estimate k3 as well: for wide lenses.")] = False,
     plot: Annotated[
-        Path | None, typer.Option(help="PNG file for a picture of the residuals.")
+        Path | None, typer.Option(help="Picture of the residuals (.png, .jpg, .svg, .pdf ...).")
     ] = None,
     sensor: Annotated[
         Sensor, typer.Option(help="What the settings are for: mono, or rgbd.")
@@ -94,8 +97,10 @@ def calibrate(
     orb = None if features is None else OrbSettings(n_features=features)
     settings_for_camera(a_camera, sensor, baseline=baseline, depth_factor=depth_factor, orb=orb)
     model = Board.parse(board, square)
-    images = [path for path in source.glob("*") if path.suffix.lower() in IMAGE_SUFFIXES]
+    images = [path for path in source.glob("*") if _is_image(path)]
     check_apart({"--output": output, "--plot": plot}, [source, *images])
+    if plot is not None:
+        _check_plot(plot, source)
     for path in (output, plot):
         check_target(path, force=force)
     console = Console(quiet=quiet)
@@ -168,10 +173,25 @@ def import_camera(
         n_features=features,
     )
     settings.save(output)
-    console = Console(quiet=quiet)
+    log_to(Console(stderr=True), quiet=quiet)
+    warn_of_doubts(settings, output, of_file=True)
+    console = Console(quiet=quiet, highlight=False, soft_wrap=True)
     for line in settings.describe():
-        console.print(line, highlight=False, markup=False)
-    console.print(f"Settings are in [bold]{escape(str(output))}[/]", highlight=False)
+        console.print(line, markup=False)
+    console.print(f"Settings are in [bold]{escape(str(output))}[/]")
+
+
+def _check_plot(plot: Path, source: Path) -> None:
+    check_picture_name(plot, "--plot")
+    if _is_image(plot) and plot.resolve().parent == source.resolve():
+        raise OutputFileError(
+            f"--plot {plot} would lie among the images that are read, and be one of the next "
+            f"calibration's; give it another place than {source}"
+        )
+
+
+def _is_image(path: Path) -> bool:
+    return path.suffix.lower() in IMAGE_SUFFIXES
 
 
 def _search(source: Path, board: Board, every: int | None, console: Console) -> BoardViews:

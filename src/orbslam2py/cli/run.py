@@ -45,17 +45,18 @@ from orbslam2py.cli.run_options import (
     TopicsOption,
     VocabularyOption,
 )
-from orbslam2py.cli.targets import check_kept
+from orbslam2py.cli.targets import check_apart, check_kept
 from orbslam2py.cli.viewing import ViewerExit, ViewerFlag, ViewerHost, ViewerOptions, ViewerPort
 from orbslam2py.cli.watching import RecordOption, VideoOption
 from orbslam2py.datasets import open_input
-from orbslam2py.errors import DatasetError
+from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.maps import MapFile
 from orbslam2py.maps.setup_check import check_sensor
+from orbslam2py.runs.input_folders import check_not_among_images
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.settings import Settings
 from orbslam2py.slam.effort import Effort
-from orbslam2py.slam.options import SystemOptions
+from orbslam2py.slam.options import NOTHING_TO_WAIT_FOR, SystemOptions
 
 EXAMPLE = """
 **Example**
@@ -105,7 +106,7 @@ def run(
     full_adjustment_time_limit: FullAdjustmentTimeLimitOption = None,
     final_adjustment: FinalAdjustmentFlag = False,
     several_maps: SeveralMapsFlag = True,
-    new_map_after: NewMapAfterOption = 2.0,
+    new_map_after: NewMapAfterOption = None,
     effort: EffortOption = Effort.NORMAL,
     seed: SeedOption = 0,
     video: VideoOption = None,
@@ -122,6 +123,8 @@ def run(
     check_kept(video, record, force=force)
     if save_images and save is None:
         raise DatasetError("--save-images keeps images in the map that is saved: --save FILE")
+    if new_map_after is not None and not several_maps:  # also if it is the usual number
+        raise SettingsError(NOTHING_TO_WAIT_FOR)
     look = ViewerOptions(viewer, viewer_port, viewer_host, viewer_exit)
     log_to(Console(stderr=True), quiet=quiet)  # opening warns already
     loaded = None if load is None else MapFile(load)
@@ -133,6 +136,9 @@ def run(
     images = open_input(
         sequence, sensor, settings=chosen, fps=fps, times=times, mask=mask, topics=topics
     )
+    if output is not None:
+        check_apart({"--output": output}, [] if mask is None else [mask])
+        check_not_among_images(output, images, Path(sequence))
     options = RunOptions(
         images.sensor,
         SystemOptions(
@@ -141,7 +147,7 @@ def run(
             full_adjustment=full_adjustment,
             full_adjustment_time_limit=full_adjustment_time_limit,
             several_maps=several_maps,
-            new_map_after=new_map_after,
+            new_map_after=SystemOptions.new_map_after if new_map_after is None else new_map_after,
             effort=effort,
             keyframe_images=save_images,
             seed=seed,

@@ -109,8 +109,8 @@ SeveralMapsFlag = Annotated[
     ),
 ]
 NewMapAfterOption = Annotated[
-    float,
-    typer.Option(help="Seconds that it is lost before another map begins.", metavar="SECONDS"),
+    float | None,
+    typer.Option(help="Seconds that it is lost before another map begins [2].", metavar="SECONDS"),
 ]
 EffortOption = Annotated[
     Effort,

@@ -28,7 +28,7 @@ from orbslam2py.settings import (
     settings_for_camera,
 )
 from orbslam2py.settings.builtin import BUILTIN_DATA, builtin_sensors
-from orbslam2py.settings.check import read_choice
+from orbslam2py.settings.check import read_choice, warn_of_doubts
 
 app = typer.Typer(
     help="Make, show, check and list settings files.",
@@ -86,7 +86,7 @@ def new(
     with atomic_write(output) as stream:
         stream.write(settings.to_yaml())
     log_to(Console(stderr=True), quiet=quiet)
-    Settings.load(output, sensor)  # warns of what is doubtful
+    warn_of_doubts(settings, output, of_file=True)
     console = Console(quiet=quiet, highlight=False, soft_wrap=True)
     _describe(console, settings)
     if sensor is Sensor.RGBD and depth_factor is None:
@@ -106,6 +106,7 @@ def check(choice: Choice, sensor: OfSensor = None) -> None:
     log_to(Console(stderr=True), quiet=False)
     chosen = read_choice(choice)
     settings = chosen.load(sensor or chosen.likely_sensor)
+    warn_of_doubts(settings, choice, of_file=False)  # of others it has warned
     console = Console(highlight=False, soft_wrap=True)
     _describe(console, settings)
     # What is asked for is loaded, as a run does it: it is complete for that, too.

@@ -6,8 +6,12 @@ from __future__ import annotations
 import json
 from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from orbslam2py.errors import OutputFileError
+
+if TYPE_CHECKING:
+    from orbslam2py.runs.report_page import PageKind
 
 #: So much of a file is read to see whether figures could be in it [bytes]: they take a hundredth.
 _MOST_FIGURES = 1 << 20
@@ -57,8 +61,8 @@ def check_apart(outputs: Mapping[str, Path | None], inputs: Iterable[Path] = ())
         options[place] = option
 
 
-def check_page(path: Path) -> Path:
-    """See that a page may be written there: only one of this program is replaced.
+def check_page(path: Path, kind: PageKind) -> Path:
+    """See that a page may be written there: only one of the same kind is replaced.
 
     Raises
     ------
@@ -67,14 +71,20 @@ def check_page(path: Path) -> Path:
     """
     if path.is_dir():
         raise OutputFileError(f"{path} is a folder; give the page a name with --output")
-    from orbslam2py.runs.report_page import is_page  # noqa: PLC0415  (large)
+    from orbslam2py.runs.report_page import kind_of_page  # noqa: PLC0415  (large)
 
-    if _holds_something(path) and not is_page(path):
-        raise OutputFileError(
-            f"{path} exists and is no page of this program, so it is kept; give the page another "
-            "name with --output"
-        )
+    if _holds_something(path):
+        there = kind_of_page(path)
+        if there is not kind:
+            what = "no page of this program" if there is None else f"the page of {_OF[there.value]}"
+            raise OutputFileError(
+                f"{path} exists and is {what}, so it is kept; give the page another name with "
+                "--output"
+            )
     return path
+
+
+_OF = {"run": "one run", "comparison": "several runs", "benchmark": "a benchmark"}
 
 
 def check_figures(path: Path | None, names: Collection[str], *, force: bool) -> None:

@@ -25,7 +25,7 @@ from orbslam2py.settings import Sensor, Settings
 
 _log = logging.getLogger(__name__)
 
-#: So much of a video may be missing untold [s; share of its length]: sound may last a little longer.
+#: So much may be missing untold [s; share of the length]: sound may last a little longer.
 _MISSING, _MISSING_SHARE = 0.25, 0.03
 #: A file that says it has more frames does not know.
 _MOST_FRAMES = 1e9

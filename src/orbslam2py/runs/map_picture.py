@@ -17,18 +17,25 @@ from orbslam2py.trajectory import Trajectory
 
 
 def draw_map(path: Path, saved: SavedMap, *, title: str) -> None:
-    """Draw a saved map into a PNG file, as seen in the first keyframe's camera.
+    """Draw a saved map into a picture, as seen in the first keyframe's camera.
 
     Of several maps each has a part of the picture, a colour and a world of its own.
 
     Parameters
     ----------
     path
-        Where to write.
+        Where to write; the ending tells the format, and without one it is PNG.
     saved
         The map or maps.
     title
         First line above the picture.
+
+    Raises
+    ------
+    OutputFileError
+        If the ending is that of no format of pictures that is known here.
+    OSError
+        If the file cannot be written.
     """
     contents = saved.contents
     keyframes = contents.keyframes

@@ -23,7 +23,7 @@ from orbslam2py._files import atomic_write, reason_of
 from orbslam2py.errors import DatasetError
 from orbslam2py.maps.ply import write_ply
 from orbslam2py.runs.frame_errors import truth_of_frames, worst_frames
-from orbslam2py.runs.frame_table import begin_frames, has_no_frames, is_frame_table, write_frames
+from orbslam2py.runs.frame_table import begin_frames, has_no_frames, write_frames
 from orbslam2py.runs.report import RunEvaluation
 from orbslam2py.runs.report_page import write_report_page
 from orbslam2py.runs.report_page.frame_images import (
@@ -35,6 +35,7 @@ from orbslam2py.runs.result import RunResult
 from orbslam2py.runs.run_picture import anchored_points, draw_maps_of_run, draw_run
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.trajectory import Trajectory, write_kitti, write_tum
+from orbslam2py.trajectory.frame_times import is_frame_table
 
 _log = logging.getLogger(__name__)
 
@@ -148,7 +149,7 @@ def remove_earlier_results(folder: Path) -> None:
     Only from a folder in which a run has written, and only what runs write; the settings stay, and
     so does the table of frames.
     """
-    if not _holds_run(folder):
+    if not holds_run(folder):
         return
     for path in _results_in(folder):
         if path.is_file() and path.name != _MARK:
@@ -172,7 +173,8 @@ def mark_as_begun(folder: Path) -> None:
         ) from error
 
 
-def _holds_run(folder: Path) -> bool:
+def holds_run(folder: Path) -> bool:
+    """Whether a run has written into a folder."""
     return is_frame_table(folder / _MARK)
 
 
@@ -187,7 +189,7 @@ def _results_in(folder: Path) -> Iterator[Path]:
 
 def _other_work(folder: Path, settings: str) -> str | None:
     """Name of a file that is called as a result is, and is none."""
-    if _holds_run(folder):
+    if holds_run(folder):
         return None
     own = folder / _SETTINGS
     if own.is_file() and own.read_bytes() != settings.encode():

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _palette as palette
-from orbslam2py._files import atomic_write
+from orbslam2py._figures import write_figure
 from orbslam2py._palette import hexadecimal
 from orbslam2py.runs.gravity import Height
 from orbslam2py.runs.report_page.plane_view import FROM_ABOVE, View, choose_view
@@ -57,14 +57,14 @@ def draw_trajectory(
     unit: str = "m",
     height: Height | None = None,
 ) -> None:
-    """Draw the path from above, and how high it goes over time, into a PNG file.
+    """Draw the path from above, and how high it goes over time, into a picture.
 
     If the camera went up or down more than forward, the path is drawn as seen from behind.
 
     Parameters
     ----------
     path : Path
-        Where to write.
+        Where to write; the ending tells the format, and without one it is PNG.
     title, subtitle : str
         Two lines of text above the picture.
     positions : array of float64, (n, 3)
@@ -129,8 +129,7 @@ def draw_trajectory(
         axes.set_axisbelow(True)
         for side in ("top", "right"):
             axes.spines[side].set_visible(False)
-    with atomic_write(path, binary=True) as stream:
-        figure.savefig(stream, format="png")
+    write_figure(path, figure)
 
 
 def draw_map_from_above(

@@ -19,6 +19,7 @@ from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.maps.map_file import MapFile
 from orbslam2py.maps.map_writer import check_map_target
 from orbslam2py.runs.control import RunControl
+from orbslam2py.runs.input_folders import check_not_among_images
 from orbslam2py.runs.losses import find_losses, last_loss_warning
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.outputs import (
@@ -90,7 +91,8 @@ def run_sequence(
         Folder for the results; nothing is written if None.
     force : bool
         Accept an output folder that holds files; the results of an earlier run are removed when
-        this one begins. Files called as results are that no run has written are not replaced.
+        this one begins. Files called as results are that no run has written are not replaced, and
+        nothing is written among the sequence's own images.
     progress : callable, optional
         ``progress(row, system)``, called after every frame.
     stop : threading.Event, optional
@@ -141,6 +143,8 @@ def run_sequence(
     elif not isinstance(options, RunOptions):
         raise SettingsError(f"options are {shown(options)}; give orbslam2py.runs.RunOptions(...)")
     folder = None if output is None else path_of(output, "output")
+    if folder is not None:
+        check_not_among_images(folder, sequence)
     if not isinstance(vocabulary, core.Vocabulary):
         vocabulary = load_vocabulary(vocabulary)
     if options.load_map is not None:  # before anything is made

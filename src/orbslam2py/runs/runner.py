@@ -224,7 +224,7 @@ class SequenceRunner:
         try:
             record = self._call(system, frame.item, frame.timestamp)
         except ImageError as error:
-            return self._skip(frame, error)
+            return self._skip(frame, error, self._file_of(frame))
         finally:
             self.result.slam_seconds += time.perf_counter() - begin
         if self._watch is not None:
@@ -241,10 +241,15 @@ class SequenceRunner:
             raise DatasetError("the sequence delivers no second image for this sensor")
         return track_images(system, images, timestamp)
 
-    def _skip(self, frame: FedFrame, error: Exception) -> FrameRow:
+    def _skip(self, frame: FedFrame, error: Exception, file: str = "") -> FrameRow:
         reason = describe_error(error)
-        _log.warning("frame %d skipped: %s", frame.index, reason)
+        _log.warning("frame %d skipped: %s", frame.index, f"{file}: {reason}" if file else reason)
         return _row(frame, None, reason)
+
+    def _file_of(self, frame: FedFrame) -> str:
+        """Name the file of a frame's image; empty if the source does not tell it."""
+        path_of = getattr(self.result.sequence, "image_path", None)
+        return "" if path_of is None else str(path_of(frame.index))
 
     # ---- the end ---------------------------------------------------------------------------------
     def _wait_for_mapping(self, system: System, stop: threading.Event) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -10,10 +11,19 @@ from pathlib import Path
 from orbslam2py._arguments import path_of
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings.builtin import builtin_sensors, is_builtin_name
+from orbslam2py.settings.fit import find_misfit, known_camera
+from orbslam2py.settings.groups import CameraRectification, CameraSettings
 from orbslam2py.settings.opencv_yaml import scan
 from orbslam2py.settings.reader import groups_of_text, read_text
 from orbslam2py.settings.sensor import Sensor
-from orbslam2py.settings.settings import Settings, looks_like_path, resolve_settings
+from orbslam2py.settings.settings import (
+    Settings,
+    builtin_settings,
+    looks_like_path,
+    resolve_settings,
+)
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -75,6 +85,60 @@ def read_choice(choice: str | PathLike[str]) -> ChosenSettings:
         resolve_settings(choice, Sensor.MONOCULAR)  # says which names there are
     path = path_of(choice, "the settings file", SettingsError)
     return ChosenSettings(str(path), read_text(path))
+
+
+def doubts_of_size(settings: Settings) -> list[str]:
+    """Say which of their cameras cannot belong to images of the size that the settings name."""
+    found = []
+    if settings.rectification is not None:
+        for side in ("left", "right"):
+            raw = Settings(Sensor.MONOCULAR, _raw_camera(getattr(settings.rectification, side)))
+            found += _misfits(f"{side.upper()}.K: ", raw)
+    # Of wrong cameras nothing else can come than a wrong rectified one.
+    return found or ([] if _is_published(settings) else _misfits("", settings))
+
+
+def warn_of_doubts(settings: Settings, source: str | PathLike[str], *, of_file: bool) -> None:
+    """Log what is allowed, but probably a mistake.
+
+    Parameters
+    ----------
+    settings
+        The settings.
+    source
+        Where they are from, or where they were written, for the messages.
+    of_file
+        Also what is told whenever a file of these settings is read.
+    """
+    if of_file:
+        Settings.from_yaml(settings.to_yaml(), settings.sensor, source=str(source))
+    for doubt in doubts_of_size(settings):
+        _log.warning("%s: %s", source, doubt)
+
+
+def _misfits(name: str, settings: Settings) -> list[str]:
+    camera = settings.camera
+    if camera.width is None or camera.height is None:
+        return []
+    misfit = find_misfit(settings, (camera.width, camera.height))
+    return [] if misfit is None else [f"{name}{misfit}"]
+
+
+def _is_published(settings: Settings) -> bool:
+    """Whether numbers and size are those of a data set: KITTI's name one size for three."""
+    name = known_camera(settings.camera)
+    if name is None:
+        return False
+    known = builtin_settings(name, builtin_sensors(name)[0]).camera
+    size = (settings.camera.width, settings.camera.height)
+    return size == (known.width, known.height)
+
+
+def _raw_camera(one: CameraRectification) -> CameraSettings:
+    fx, fy, cx, cy = (float(one.K[i]) for i in ((0, 0), (1, 1), (0, 2), (1, 2)))
+    # No camera has its centre farther away than settings allow, nor is one needed to tell so.
+    cx, cy = (max(-1e5, min(1e5, centre)) for centre in (cx, cy))
+    return CameraSettings(fx, fy, cx, cy, width=one.width, height=one.height)
 
 
 def _is_complete(text: str, source: str, sensor: Sensor) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 from orbslam2py._arguments import array_of, choice_of, is_whole, numbers_of, pose_of, shown
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings.keys import check_group
+from orbslam2py.settings.keys import check_group, focal_problems
 from orbslam2py.settings.projection import on_image_plane
 
 
@@ -243,6 +243,8 @@ class CameraRectification:
                 problems.append(f"{name} must have 4, 5 or 8 coefficients, not {value.size}")
             elif not np.isfinite(value).all():
                 problems.append(f"{name} holds a number that is not finite")
+            elif name in "KP":
+                problems += focal_problems(name, value)
         if not problems and np.abs(self.R @ self.R.T - np.eye(3)).max() > 1e-3:
             problems.append("R is not a rotation (rows not orthonormal to 1e-3)")
         for name in ("width", "height"):

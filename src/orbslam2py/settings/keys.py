@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from orbslam2py._arguments import float_of, is_number, shown
+from orbslam2py._arrays import FloatArray
 from orbslam2py.settings.sensor import Sensor
 
 _ALL = frozenset(Sensor)
@@ -82,7 +83,8 @@ def _key(
     return Key(name, group, field, kind, rule, required=True, usual=usual)
 
 
-_FOCAL = _above_zero(1e5, "pixels")
+#: Of a focal length, also of those in matrices.
+FOCAL = _above_zero(1e5, "pixels")
 _CENTRE = _between(-1e5, 1e5, "pixels")
 _COEFFICIENT = _between(-1e4, 1e4)
 _SIZE = _between(1, 65535, "pixels")
@@ -94,8 +96,8 @@ _ORIGINAL = Rule("0 (true places) or 1 (as the original)", lambda value: value i
 ORIGINAL_COORDINATES = "ORBextractor.originalCoordinates"
 
 KEYS: tuple[Key, ...] = (
-    _key("Camera.fx", "camera", "fx", float, _FOCAL, "0.5 to 1.5 times the image's width"),
-    _key("Camera.fy", "camera", "fy", float, _FOCAL, "nearly Camera.fx"),
+    _key("Camera.fx", "camera", "fx", float, FOCAL, "0.5 to 1.5 times the image's width"),
+    _key("Camera.fy", "camera", "fy", float, FOCAL, "nearly Camera.fx"),
     _key("Camera.cx", "camera", "cx", float, _CENTRE, "near half the image's width"),
     _key("Camera.cy", "camera", "cy", float, _CENTRE, "near half the image's height"),
     Key("Camera.k1", "camera", "k1", float, _COEFFICIENT),
@@ -111,7 +113,8 @@ KEYS: tuple[Key, ...] = (
         "camera",
         "bf",
         float,
-        _above_zero(1e6, "pixel metres (baseline times fx)"),
+        # What lies below is no distance of anything, and the depth of close points becomes 0.
+        _between(1e-6, 1e6, "pixel metres (baseline times fx)"),
         _DEPTH_SENSORS,
         True,
         "40 for rgbd",
@@ -250,6 +253,17 @@ def convert(key: Key, value: float) -> float | int | bool:
 
 #: Fields that may be None: image size and unit of depth are not known of every camera.
 _MAY_BE_UNKNOWN = ("width", "height", "raw_per_metre")
+
+
+def focal_problems(what: str, K: FloatArray) -> list[str]:
+    """Say what is wrong with the focal lengths of a camera matrix."""
+    lengths = float(K[0, 0]), float(K[1, 1])
+    if all(map(FOCAL.allows, lengths)):
+        return []
+    return [
+        f"{what} has the focal lengths {lengths[0]:g}, {lengths[1]:g} (fx, fy); give numbers "
+        f"{FOCAL.text}"
+    ]
 
 
 def check_group(group: str, values: object) -> list[str]:

@@ -45,6 +45,8 @@ from orbslam2py.settings.sensor import Sensor
 
 _log = logging.getLogger(__name__)
 _MOST_PROBLEMS = 30
+#: Baselines of pairs, also of those that a depth camera counts as, beyond which one is doubted [m].
+_LEAST_BASELINE, _MOST_BASELINE = 1e-3, 10.0
 
 
 #: What text files do not hold: control characters.
@@ -298,6 +300,8 @@ def _doubts(sensor: Sensor, groups: SettingsGroups) -> list[str]:
         found.append(f"ORBextractor.nFeatures {orb.n_features} is very few")
     if sensor is Sensor.STEREO and camera.is_distorted:
         found.append("stereo input must be rectified; distortion must be zero")
+    if sensor.has_depth:
+        found += _doubts_of_depth(camera, groups["depth"])
     if rectification is not None:
         P = rectification.left.P
         expected = np.array([P[0, 0], P[1, 1], P[0, 2], P[1, 2]])
@@ -306,4 +310,17 @@ def _doubts(sensor: Sensor, groups: SettingsGroups) -> list[str]:
             found.append("Camera.fx, fy, cx, cy differ from LEFT.P")
         if abs(camera.bf + rectification.right.P[0, 3]) > 1e-3:
             found.append("Camera.bf differs from -RIGHT.P[0,3]")
+    return found
+
+
+def _doubts_of_depth(camera: CameraSettings, depth: DepthSettings | None) -> list[str]:
+    found = []
+    baseline = camera.bf / camera.fx
+    if not _LEAST_BASELINE <= baseline <= _MOST_BASELINE:
+        found.append(
+            f"Camera.bf {camera.bf:g} by Camera.fx is a baseline of {baseline:.3g} m; bf is in "
+            "pixel metres"
+        )
+    if depth is not None and depth.close_factor < 1:
+        found.append(f"ThDepth {depth.close_factor:g} is very little; it counts baselines")
     return found

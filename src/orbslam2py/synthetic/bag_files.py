@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+import errno
+import os
+import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -121,8 +124,13 @@ def _opened(folder: Path, layout: str) -> Iterator[Any]:
     rosbag2 = require("rosbags.rosbag2")
     plugin = rosbag2.StoragePlugin.MCAP if layout == "mcap" else rosbag2.StoragePlugin.SQLITE3
     inner = folder / "images"  # it makes its folder itself
-    with rosbag2.Writer(inner, version=8, storage_plugin=plugin) as writer:
-        yield writer
+    try:
+        with rosbag2.Writer(inner, version=8, storage_plugin=plugin) as writer:
+            yield writer
+    except sqlite3.Error as error:  # which is no OSError, also where the disk is the reason
+        if "full" in str(error):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)) from error
+        raise OSError(f"SQLite fails: {error}") from error
     for path in inner.iterdir():
         path.replace(folder / path.name)
     inner.rmdir()

@@ -168,6 +168,16 @@ class SyntheticOptions:
                     raise SettingsError(f"{name} applies to a way in pieces; give pieces as well")
         elif self.order is not None:
             object.__setattr__(self, "order", _order_of(self.order, self.pieces))
+        if self.gap and len(self.order or range(self.pieces or 0)) == 1:
+            raise SettingsError(
+                "gap is the time between pieces, and only one comes; give more pieces, or leave it "
+                "out"
+            )
+        if self.overlap and self.pieces == 1:
+            raise SettingsError(
+                "overlap is what pieces share, and there is only one; give more pieces, or leave "
+                "it out"
+            )
 
     def _check_pace(self) -> None:
         _check_range("pace", self.pace, 0.01, 100)

@@ -11,6 +11,7 @@ import pytest
 
 import orbslam2py as orb
 from orbslam2py.batches import Job, make_jobs
+from orbslam2py.settings import builtin_settings
 from support.batches import make_sequences, table
 
 #: What names of files may have at most, in bytes.
@@ -21,10 +22,11 @@ LONGEST = 255
 def places(tmp_path: Path) -> Path:
     for name in ("seq", "other", "x/seq"):
         (tmp_path / name).mkdir(parents=True)
-    for name in ("a/camera.yaml", "b/camera.yaml", "b/camera.yml", "c/lens.yaml", "a b.yaml"):
+    settings = builtin_settings("tum1", orb.Sensor.RGBD)
+    cameras = ("a/camera.yaml", "b/camera.yaml", "b/camera.yml", "c/lens.yaml")
+    for name in (*cameras, "a b.yaml", "a_b.yaml", "a_camera.yaml", "mono.yaml"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).touch()
-    (tmp_path / "a_b.yaml").touch()
+        settings.save(tmp_path / name)
     return tmp_path
 
 
@@ -81,13 +83,11 @@ def test_settings_of_one_name_for_sequences_of_their_own(places: Path) -> None:
 
 
 def test_a_name_made_longer_is_no_other_ones(places: Path) -> None:
-    (places / "a_camera.yaml").touch()
     files = ["a/camera.yaml", "b/camera.yaml", "a_camera.yaml"]
     assert keys(places, settings=files)[2] == "seq-a_camera-seed0"
 
 
 def test_a_sensor_and_settings_that_are_called_as_it_is(places: Path) -> None:
-    (places / "mono.yaml").touch()
     entries = [{"path": "seq", "sensor": "mono"}, {"path": "seq", "settings": "mono.yaml"}]
     assert all(key.startswith("seq-mono-") for key in keys(places, sequences=entries))
 
@@ -101,8 +101,13 @@ def test_a_sensor_and_settings_that_are_called_as_it_is(places: Path) -> None:
             "/seq with the topics /left and /right; give the sequences names of their own",
         ),
         (
-            {"sequences": [{"path": "seq", "name": name} for name in ("раз", "два")]},
-            "the names 'раз' and 'два' are one in names of folders; give names that differ in",
+            {"sequences": [{"path": "seq", "name": name} for name in ("one!", "one?")]},
+            "the names 'one!' and 'one[?]' are one in names of folders; give names that differ in "
+            "letters, digits, or one of _ . = [+]",
+        ),
+        (  # disks that make one spelling of both would have one folder for them
+            {"sequences": [{"path": "seq", "name": name} for name in ("\u00e9", "e\u0301")]},
+            "the names '\u00e9' and 'e\u0301' are one in names of folders",
         ),
         (
             {"sequences": ["seq", "seq"]},
@@ -114,6 +119,41 @@ def test_a_sensor_and_settings_that_are_called_as_it_is(places: Path) -> None:
 def test_what_clashes_is_named(places: Path, document: dict[str, Any], message: str) -> None:
     with pytest.raises(orb.SettingsError, match=f"two runs would have the folder .*{message}"):
         make_jobs(document, places)
+
+
+# ---- of any script -------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("日本", "日本"),
+        ("Zürich Süd", "Zürich_Süd"),
+        ("Zu\u0308rich", "Zürich"),
+        ("हिन्दी", "हिन्दी"),  # signs of vowels are no letters to Unicode, but of the word
+        ("прогон №٣", "прогон_٣"),
+        ("a/b\\c:d*e?f\x00\n\u202eg\u2215\uff0fh", "a_b_c_d_e_f_g_h"),
+        ("\u2600\ufe0fcaf\udce9", "_caf_"),
+        ("plain a-b__c=+.", "plain_a_b__c=+."),
+    ],
+)
+def test_letters_of_any_script(places: Path, name: str, told: str) -> None:
+    assert keys(places, sequences=[{"path": "seq", "name": name}]) == [f"{told}-seed0"]
+
+
+def test_names_of_any_script_tell_runs_apart(places: Path) -> None:
+    entries = [{"path": "seq", "name": name} for name in ("раз", "два", "日本")]
+    assert keys(places, sequences=entries) == ["раз-seed0", "два-seed0", "日本-seed0"]
+
+
+def test_names_that_the_file_system_cannot_spell(
+    places: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in an ASCII locale, where every run would fail with it."""
+    monkeypatch.setattr("os.fsencode", lambda text: text.encode("ascii", "surrogateescape"))
+    monkeypatch.setattr("sys.getfilesystemencoding", lambda: "ascii")
+    assert keys(places, sequences=[{"path": "seq", "name": "plain"}]) == ["plain-seed0"]
+    said = "日本-seed0 cannot be the name of a folder where names are in ascii; .* or set LC_ALL"
+    with pytest.raises(orb.SettingsError, match=said):
+        keys(places, sequences=["seq", {"path": "seq", "name": "日本"}])
 
 
 # ---- too long ------------------------------------------------------------------------------------
@@ -148,6 +188,17 @@ def test_names_that_fit_are_kept(places: Path) -> None:
     assert [job.key for job in make_jobs(document, places)] == [f"{name}-seed0"]
     (longer,) = make_jobs({"sequences": [{"path": "seq", "name": f"{name}n"}]}, places)
     assert len(longer.key) <= 120
+
+
+@pytest.mark.parametrize(("letter", "size"), [("é", 2), ("日", 3), ("𐍈", 4)])
+def test_bytes_count(places: Path, letter: str, size: int) -> None:
+    """A letter has several bytes, and none is cut in two."""
+    fits = letter * ((LONGEST - len("-seed0")) // size)
+    (key,) = keys(places, sequences=[{"path": "seq", "name": fits}])
+    assert key == f"{fits}-seed0"
+    (key,) = keys(places, sequences=[{"path": "seq", "name": fits + letter}])
+    assert re.fullmatch(rf"{letter}{{{80 // size}}}-[0-9a-f]{{12}}-seed0", key)
+    assert len(key.encode()) <= 120
 
 
 def test_fingerprints_are_those_of_always() -> None:

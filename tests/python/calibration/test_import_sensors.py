@@ -49,6 +49,23 @@ def test_rectified_camera_becomes_a_pair_by_its_baseline(tmp_path: Path) -> None
         (KITTI, {"camera": 1, "sensor": "stereo"}, "P2 does not stand to the right of P1"),
         (KITTI.replace("P0: 700", "P0: x"), {}, "P0 must hold 12 finite numbers"),
         (KITTI.replace("P0: 700 ", "P0: "), {}, "P0 must hold 12 finite numbers"),
+        (KITTI.replace("P0: 700", "P0: -7"), {}, "yaml: P0 has the focal lengths -7, 700"),
+        (OPENCV.replace("[ 520.5", "[ 0"), {}, "yaml: the camera matrix has the focal lengths 0,"),
+        (ROS.replace("[520.5", "[-5"), {}, "yaml: the camera matrix has the focal lengths -5,"),
+        ("1 PINHOLE 640 480 0 510 320 240\n", {}, ":1: PINHOLE has the focal lengths 0, 510"),
+        (KALIBR.replace("[520.5", "[-5"), {}, "yaml: cam0.intrinsics has the focal lengths -5,"),
+        (
+            KALIBR_PAIR.replace("[640, 480]", "[320, 240]"),
+            {},
+            r"yaml: cam0.intrinsics has its centre at 325.75, 236.125, outside of the 320 x 240 "
+            "pixels of cam0.resolution",
+        ),
+        (
+            KALIBR_PAIR.replace("0.0, -0.11", "0.0, 0.0"),
+            {},
+            r"yaml: the pair cannot be rectified \(the two cameras of the pair stand in one place.*"
+            r"look at intrinsics, distortion_coeffs and T_cn_cnm1",
+        ),
     ],
 )
 def test_what_does_not_fit(

@@ -216,7 +216,11 @@ def test_an_older_run_has_a_page(tmp_path: Path) -> None:
         ("report.json", '{"sequence":', "report.json cannot be read"),
         ("report.json", "[1]", "is no report of a run"),
         ("frames.csv", None, "holds no whole run: frames.csv is missing"),
-        ("frames.csv", "index,timestamp\n1,", "frames.csv:2: '' in the column timestamp is no number"),
+        (
+            "frames.csv",
+            "index,timestamp\n1,",
+            "frames.csv:2: '' in the column timestamp is no number",
+        ),
         ("frames.csv", "", "frames.csv is empty"),
         ("trajectory.txt", "1 2 3", "trajectory.txt:1"),
         ("points.ply", "ply\n", "points.ply is no binary PLY"),

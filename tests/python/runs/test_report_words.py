@@ -38,8 +38,8 @@ def test_warnings_stand_before_everything_else(tmp_path: Path) -> None:
 
 def test_what_ended_the_run_stands_first(tmp_path: Path) -> None:
     run = made_up_run(tmp_path / "r")
-    page = changed(run, error="no <image>", seen_frames=15, frames=30, warnings=["it is dark"])
-    assert page.index("The run failed after 15 of 30 frames: no &lt;image&gt;") < page.index("dark")
+    page = changed(run, error="no <image>", seen_frames=40, frames=60, warnings=["it is dark"])
+    assert page.index("The run failed after 40 of 60 frames: no &lt;image&gt;") < page.index("dark")
 
 
 def test_a_warning_is_the_likely_cause_of_an_empty_run(tmp_path: Path) -> None:

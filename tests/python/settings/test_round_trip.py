@@ -55,14 +55,21 @@ ORBS = st.integers(1, 254).flatmap(
 MATRICES = st.lists(number(-1e4, 1e4), min_size=12, max_size=12)
 
 
+def _with_focal_lengths(matrix: np.ndarray) -> np.ndarray:
+    """Any matrix, but of a camera that looks forward."""
+    for i in range(2):
+        matrix[i, i] = abs(matrix[i, i]) + 1.0
+    return matrix
+
+
 @st.composite
 def rectified_cameras(draw: st.DrawFn) -> CameraRectification:
     R, _ = cv2.Rodrigues(np.array(draw(st.lists(number(-3, 3), min_size=3, max_size=3))))
     return CameraRectification(
-        K=np.array(draw(MATRICES)[:9]).reshape(3, 3),
+        K=_with_focal_lengths(np.array(draw(MATRICES)[:9]).reshape(3, 3)),
         D=np.array(draw(MATRICES)[: draw(st.sampled_from([4, 5, 8]))]),
         R=np.asarray(R, dtype=np.float64),
-        P=np.array(draw(MATRICES)).reshape(3, 4),
+        P=_with_focal_lengths(np.array(draw(MATRICES)).reshape(3, 4)),
         width=draw(st.integers(1, 65535)),
         height=draw(st.integers(1, 65535)),
     )

@@ -81,7 +81,7 @@ def test_stereo_images_of_different_size() -> None:
     shown = images(Sensor.STEREO, 0)
     assert shown.right is not None
     with new_system(Sensor.STEREO) as system:
-        with pytest.raises(ImageError, match=r"differ: shapes \(240, 320\) and \(240, 300\)"):
+        with pytest.raises(ImageError, match="left image has size 320x240, the right 300x240"):
             system.track_stereo(shown.image, shown.right[:, :300], 0.0)
         with pytest.raises(ImageError, match="differ"):
             system.track_stereo(np.dstack([shown.image] * 3), shown.right, 0.0)
@@ -118,7 +118,9 @@ def test_reset_frees_the_size(sensor: Sensor) -> None:
     larger = padded(images(sensor, 3))
     with new_system(sensor, deterministic=True) as system:
         play(system, 3)
-        with pytest.raises(ImageError, match=r"size 352x260, the first image had 320x240.*reset"):
+        with pytest.raises(
+            ImageError, match="size 352x260, the first image had 320x240; give images of one"
+        ):
             track(system, 3, shown=larger)
         system.reset()
         record = track(system, 3, shown=larger)

@@ -101,6 +101,9 @@ def test_the_truth_of_a_written_sequence_keeps_with_its_images(tmp_path: Path) -
     [
         ({"order": (0,)}, "order applies to a way in pieces; give pieces"),
         ({"gap": 1.0}, "gap applies to a way in pieces"),
+        ({"pieces": 1, "gap": 3.0}, "gap is the time between pieces, and only one comes"),
+        ({"pieces": 3, "order": (1,), "gap": 0.5}, "gap is the time between pieces"),
+        ({"pieces": 1, "overlap": 1.0}, "overlap is what pieces share, and there is only one"),
         ({"pieces": 2, "order": (0, 2)}, "order is 2; allowed: whole numbers 0 to 1"),
         ({"pieces": 2, "order": (1, 1)}, "twice"),
         ({"pieces": 2, "order": ()}, "give numbers of pieces"),

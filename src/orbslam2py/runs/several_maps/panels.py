@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from orbslam2py import _palette as palette
-from orbslam2py._files import atomic_write
+from orbslam2py._figures import write_figure
 from orbslam2py._palette import hexadecimal
 from orbslam2py.runs.plots import draw_map_from_above
 from orbslam2py.runs.several_maps.drawn_map import DrawnMap
@@ -23,12 +23,12 @@ _HEAD = 0.85
 def draw_maps(
     path: Path, maps: Sequence[DrawnMap], *, title: str, unit: str = "m", main: int | None = None
 ) -> None:
-    """Draw maps from above, each in its colour and in a world of its own, into a PNG file.
+    """Draw maps from above, each in its colour and in a world of its own, into a picture.
 
     Parameters
     ----------
     path : Path
-        Where to write.
+        Where to write; the ending tells the format, and without one it is PNG.
     maps : sequence of DrawnMap
         At least one.
     title : str
@@ -40,6 +40,8 @@ def draw_maps(
 
     Raises
     ------
+    OutputFileError
+        If the ending is that of no format of pictures that is known here.
     OSError
         If the file cannot be written.
     """
@@ -76,5 +78,4 @@ def draw_maps(
         text = f"{one.title}{' (main)' if one.number == main else ''}"
         ink = hexadecimal(colour)
         panel.set_title(text, fontsize=10, loc="left", color=ink, parse_math=False)
-    with atomic_write(path, binary=True) as stream:
-        figure.savefig(stream, format="png")
+    write_figure(path, figure)

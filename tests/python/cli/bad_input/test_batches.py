@@ -101,6 +101,11 @@ def test_what_the_screen_shows() -> None:
             ("sweep.yaml", "--output", "out"),
             "sweep.yaml: sweep: ThDepth is -5; allowed: greater than 0",
         ),
+        (("again.yaml", "--output", "out"), "again.yaml:2: 'sequences' is given twice (first on"),
+        (
+            ("camera.yaml", "--output", "out", "--workers", "0"),
+            "camera.yaml: settings file /no/where.yaml does not exist; correct the path",
+        ),
     ],
 )
 def test_bad_input(
@@ -119,8 +124,10 @@ def test_bad_input(
         ("twice", {"sequences": [one, one]}),
         ("far", {"sequences": ["nfs9://host/one"]}),
         ("sweep", {"sequences": [one], "sweep": {"ThDepth": [40, -5]}}),
+        ("camera", {"sequences": [one], "settings": ["/no/where.yaml"]}),
     ):
         Path(f"{name}.yaml").write_text(json.dumps(document))
+    Path("again.yaml").write_text(f"sequences: [{one}]\nsequences: [{one}]\n")
     Path("full").mkdir()
     Path("full/notes.txt").write_text("mine\n")
     done = command("batch", *arguments)

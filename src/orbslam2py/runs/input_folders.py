@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Folders that a sequence is read from: what a run writes there would be part of the next one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from orbslam2py.datasets import DepthFolders, is_recording
+from orbslam2py.datasets.image_folder import image_files
+from orbslam2py.errors import DatasetError
+from orbslam2py.runs.outputs import holds_run
+
+
+def check_not_among_images(output: Path, sequence: object, source: Path | None = None) -> None:
+    """See that results do not come to lie among what the sequence is read from.
+
+    The pictures of a run would be taken for frames, and its settings go before any calibration
+    that comes with the images.
+
+    Parameters
+    ----------
+    output : Path
+        Folder of the results.
+    sequence : Sequence or LiveSource
+        What is run.
+    source : Path, optional
+        Where it is read from; by default what the sequence itself tells (`folder` or `path`).
+
+    Raises
+    ------
+    DatasetError
+        If it is the sequence's own folder, or one of the folders in it that are read.
+    """
+    source = _place_of(sequence) if source is None else source
+    if source is None or not (source.is_dir() or is_recording(source)):
+        return
+    folder = source if source.is_dir() else source.absolute().parent
+    if folder != source and not is_recording(folder):  # else the folder of a bag stands for it
+        return
+    place, own = output.resolve(), folder.resolve()
+    remedy = "give another --output (output)"
+    if place == own:
+        what = "images" if getattr(sequence, "layout", "") == "images" else "sequence"
+        raise DatasetError(
+            f"{output} is the folder of the {what}: the next run would take what this one writes "
+            f"for a part of it, pictures and settings.yaml; {remedy}"
+        )
+    if own not in place.parents or folder != source:
+        return
+    if _is_read(place):
+        raise DatasetError(
+            f"{output} is one of the sequence's own folders: results would lie among the images; "
+            f"{remedy}"
+        )
+    if getattr(sequence, "layout", "") == DepthFolders.layout and place.parent == own:
+        raise DatasetError(
+            f"{output} would lie beside the folders of images and depth, and its pictures be taken "
+            f"for a third one; give another --output (output), such as {source / 'runs' / 'first'}"
+        )
+
+
+def _place_of(sequence: object) -> Path | None:
+    """Where a sequence is on disk; None if it does not tell."""
+    places = (getattr(sequence, name, None) for name in ("folder", "path"))
+    return next((place for place in places if isinstance(place, Path)), None)
+
+
+def _is_read(folder: Path) -> bool:
+    """Whether a folder in that of a sequence is likely read: no run made it, and it holds some."""
+    if not folder.is_dir() or holds_run(folder):
+        return False
+    return bool(image_files(folder)) or any(inner.is_dir() for inner in folder.iterdir())
