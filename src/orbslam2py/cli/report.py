@@ -16,6 +16,7 @@ from orbslam2py.cli.messages import log_to
 from orbslam2py.cli.targets import check_page
 from orbslam2py.runs.report_page import (
     Comparison,
+    PageKind,
     compare_runs,
     write_comparison,
     write_report_page,
@@ -39,7 +40,7 @@ def report(
     """
     log_to(Console(stderr=True), quiet=False)
     page = output or run / "report.html"
-    write_report_page(check_page(page), run)
+    write_report_page(check_page(page, PageKind.RUN), run)
     _tell(page)
 
 
@@ -60,7 +61,7 @@ def compare(
     for warning in comparison.warnings:
         _log.warning("%s", warning.rstrip("."))
     Console().print(_table(comparison))
-    write_comparison(check_page(output), comparison)
+    write_comparison(check_page(output, PageKind.COMPARISON), comparison)
     _tell(output)
 
 

@@ -21,11 +21,13 @@ from orbslam2py.cli.targets import check_apart
 from orbslam2py.cli.viewing import ViewerOptions, Viewing
 from orbslam2py.cli.watching import file_watchers, watch_all
 from orbslam2py.datasets.base import LiveSource, Sequence
+from orbslam2py.errors import MapFileError, OrbSlamError
+from orbslam2py.maps import MapFile
 from orbslam2py.runs.feeds import is_sequence
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.runs.outputs import new_output_folder, prepare_output_folder
 from orbslam2py.runs.remedies import why_nothing_was_tracked
-from orbslam2py.runs.result import FrameRow
+from orbslam2py.runs.result import FrameRow, RunResult
 from orbslam2py.runs.run import FinishedRun, run_sequence
 from orbslam2py.slam.system import System
 from orbslam2py.vocabulary.vocabulary import load_vocabulary
@@ -67,6 +69,7 @@ def run_and_show(
             if is_new:
                 page.callback(_remove_if_empty, output)  # if there is no run after all
             force = True
+        there_before = _identity_of(options.save_map)
         with StopOnInterrupt() as interrupt:
             files = page.enter_context(file_watchers(sequence, options, video, record))
             in_real_time = options.realtime or not is_sequence(sequence)
@@ -103,8 +106,8 @@ def run_and_show(
             text = f"To look at them: [bold]{escape(str(html))}[/]"
             console.print(text, highlight=False, soft_wrap=True)
         if done.result.saved_map is not None:
-            saved = escape(str(done.result.saved_map))
-            console.print(f"Map saved in [bold]{saved}[/]", highlight=False, soft_wrap=True)
+            about_map = _about_map(done.result, done.result.saved_map, there_before)
+            console.print(about_map, highlight=False, soft_wrap=True)
         files.tell(console)
         code = _conclude(done, errors)
         viewing.stay(console, done.folder)
@@ -119,13 +122,45 @@ def _remove_if_empty(folder: Path) -> None:
         folder.rmdir()
 
 
+def _identity_of(path: Path | None) -> tuple[int, int] | None:
+    """Tell a file from one that takes its place; None if there is none."""
+    if path is None or not path.exists():
+        return None
+    status = path.stat()
+    return status.st_dev, status.st_ino
+
+
+def _about_map(result: RunResult, path: Path, before: tuple[int, int] | None) -> str:
+    """Say what the map file holds; a last save that failed has left what there was."""
+    named = f"[bold]{escape(str(path))}[/]"
+    if not _last_save_failed(result):
+        return f"Map saved in {named}"
+    now = _identity_of(path)
+    if now is None:
+        return "The map was not saved"
+    if now == before:
+        return f"The map was not saved; {named} is as it was before the run"
+    try:
+        n = len(MapFile(path).runs[-1].frames)
+    except OrbSlamError:
+        return f"{named} holds an older state of the map, if any"
+    return f"{named} holds an older state of the map, with {n} of {result.n_frames} frames"
+
+
+def _last_save_failed(result: RunResult) -> bool:
+    return result.options.autosave is not None and isinstance(result.error, MapFileError)
+
+
 def _conclude(done: FinishedRun, errors: Console) -> ExitCode:
     result = done.result
     for problem in done.problems:
         print_error(errors, "Error", problem)
     if result.error is not None:
         what = describe_error(result.error)
-        print_error(errors, "Error", f"{what} (what was done until then is saved)")
+        saved = (
+            "the other results are" if _last_save_failed(result) else "what was done until then is"
+        )
+        print_error(errors, "Error", f"{what} ({saved} saved)")
     if result.error is not None or done.problems:
         return ExitCode.FAILED
     if result.n_tracked == 0 and not result.interrupted:

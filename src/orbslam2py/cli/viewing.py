@@ -110,7 +110,11 @@ class Viewing:
             self._view = LiveView(
                 host=host, port=self._options.port, title=name, stand_back=self._in_real_time
             )
-            announce(self._view.address, open_browser=not self._options.exit)
+            try:
+                announce(self._view.address, open_browser=not self._options.exit)
+            except BaseException:  # a Ctrl-C as well: what is not entered is not left
+                self._view.stop()
+                raise
         return self
 
     def __exit__(self, *_: object) -> None:

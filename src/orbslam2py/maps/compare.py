@@ -53,6 +53,10 @@ def _contents(first: MapContents, second: MapContents) -> Iterator[str]:
     for name in ("next_keyframe", "next_point"):
         if getattr(first, name) != getattr(second, name):
             yield f"{name}: {getattr(first, name)} and {getattr(second, name)}"
+    for which, one, other in (("first", first, second), ("second", second, first)):
+        for root in sorted({*one.metric_roots} - {*other.metric_roots}):
+            roots = one.keyframes.ids[one.keyframes.parent < 0]
+            yield f"metres: map {np.searchsorted(roots, root)} only in the {which}"
     unlike: set[str] = set()  # groups whose rows do not belong together
     for (name, mine), (_, theirs) in zip(first.arrays(), second.arrays(), strict=True):
         group, _, field = name.rpartition(".")

@@ -57,6 +57,9 @@ class MapContents:
     covisibility: Covisibility
     loop_edges: IntArray
     """(l, 2) ids of keyframes that a closed loop connects, ascending, the lower one first."""
+    metric_roots: tuple[int, ...] = ()
+    """First keyframes of those maps of a single camera that were given metres, ascending
+    (`transform_map`, ``map align``); a camera that sees metres needs no telling."""
 
     def observations_of_point(self, point_id: int) -> tuple[IntArray, Int32Array]:
         """Return who sees a point.
@@ -140,7 +143,7 @@ class MapContents:
         `map_index` says which map of a run it was, not what is in it, and is not compared. Words
         are, if both know them.
         """
-        for name in ("next_keyframe", "next_point"):
+        for name in ("next_keyframe", "next_point", "metric_roots"):
             if getattr(self, name) != getattr(other, name):
                 return name
         for (name, mine), (_, theirs) in zip(self.arrays(), other.arrays(), strict=True):
@@ -160,6 +163,8 @@ class MapContents:
                 continue
             digest.update(f"\n{name} {array.dtype.str} {array.shape}\n".encode())
             digest.update(np.ascontiguousarray(array).data)
+        if self.metric_roots:
+            digest.update(f"\nmetric_roots {self.metric_roots}".encode())
         return digest.hexdigest()
 
 

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import weakref
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,11 @@ from orbslam2py.maps.content_groups import (
     RemovedKeyframes,
 )
 from orbslam2py.maps.contents import MapContents, contents_of
+
+#: What the core has no need to know: which of its maps were given metres, and since which epoch.
+_metric_roots: weakref.WeakKeyDictionary[core.Map, tuple[int, tuple[int, ...]]] = (
+    weakref.WeakKeyDictionary()
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +94,9 @@ def take_changes(
         observations=Observations(**groups["observations"]),
         covisibility=Covisibility(**groups["covisibility"]),
     )
+    epoch, roots = _metric_roots.get(slam_map, (-1, ()))
+    if epoch == contents.map_index:  # else it was emptied since, and ids began anew
+        contents = replace(contents, metric_roots=living_roots(roots, contents.keyframes))
     return ChangedContents(contents, **groups["known"])
 
 
@@ -127,4 +136,25 @@ def restore_contents(
     restorer = core.MapRestorer(arrays, len(keyframes.keypoints), vocabulary, words_fit)
     restorer.add(arrays, len(keyframes))
     restorer.finish(slam_map, index)
+    remember_metric_roots(slam_map, contents.metric_roots)
     return slam_map
+
+
+def remember_metric_roots(slam_map: core.Map, roots: tuple[int, ...]) -> None:
+    """Keep beside a map of the core which of its maps were given metres, for copies of it.
+
+    Parameters
+    ----------
+    slam_map
+        The map, as it was just made.
+    roots
+        As in `MapContents.metric_roots`.
+    """
+    if roots:
+        _metric_roots[slam_map] = slam_map.epoch, roots
+
+
+def living_roots(roots: tuple[int, ...], keyframes: Keyframes) -> tuple[int, ...]:
+    """Take those that are roots: a map that became part of another one has the other's unit."""
+    there = keyframes.ids[keyframes.parent < 0]
+    return tuple(there[np.isin(there, np.array(roots, np.int64))].tolist())

@@ -11,6 +11,7 @@ from orbslam2py import _core as core
 from orbslam2py._arguments import path_of
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.contents import contents_of
+from orbslam2py.maps.map_copies import remember_metric_roots
 from orbslam2py.maps.map_reader import check_contents, check_frames, opened, read_head
 from orbslam2py.maps.map_rows import all_rows
 from orbslam2py.maps.map_tables import MapTables
@@ -33,6 +34,8 @@ class MapFile:
     ----------
     settings, vocabulary, runs, images, source
         As in `SavedMap`.
+    metric_roots : tuple of int
+        As in `MapContents`.
     n_keyframes, n_points : int
         Of the map.
 
@@ -45,12 +48,13 @@ class MapFile:
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.source = str(path)
         with opened(path) as (connection, tables):
-            self.settings, self.vocabulary, self.runs, self.images = read_head(
-                connection, tables, images=True
-            )
+            head = read_head(connection, tables, images=True)
             totals = connection.execute("SELECT name, rows, checksum FROM totals").fetchall()
             (n_points,) = connection.execute("SELECT sum(count) FROM map_points").fetchone()
             (n_keyframes,) = connection.execute("SELECT count(*) FROM keyframes").fetchone()
+        self.settings, self.vocabulary = head.settings, head.vocabulary
+        self.runs, self.images = head.runs, head.images
+        self.metric_roots = head.metric_roots
         self._totals = totals
         self.n_keyframes = int(n_keyframes)
         self.n_points = int(n_points or 0)
@@ -107,6 +111,7 @@ class MapFile:
             for part, n_keyframes in stored.keypoint_parts():
                 restorer.add(part, n_keyframes)
             restorer.finish(slam_map, index)
+        remember_metric_roots(slam_map, self.metric_roots)
 
     @contextlib.contextmanager
     def _opened(self) -> Iterator[MapTables]:

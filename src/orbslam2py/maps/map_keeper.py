@@ -221,7 +221,7 @@ class MapKeeper:
         self, changes: ChangedContents, writer: MapWriter, *, partly: bool
     ) -> Iterator[tuple[str, Row]]:
         contents = changes.contents
-        yield from self._head
+        yield from settings_rows(self._settings, self._identity, contents.metric_roots)
         runs = (*self._runs_before(contents), self._present_run(contents))
         for number, run in enumerate(runs):
             # Parts that are full change at the end alone; the last one is looked at again.
@@ -236,8 +236,8 @@ class MapKeeper:
                 yield "images", (keyframe, jpeg)
 
     @cached_property
-    def _head(self) -> list[tuple[str, Row]]:
-        return list(settings_rows(self._settings, self._vocabulary()))
+    def _identity(self) -> VocabularyIdentity:
+        return self._vocabulary()
 
 
 class _Autosave:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import sqlite3
 from collections.abc import Iterator
 from dataclasses import replace
@@ -20,6 +21,7 @@ from orbslam2py._arrays import IntArray
 from orbslam2py._files import reason_of
 from orbslam2py.errors import MapFileError, SettingsError
 from orbslam2py.maps.contents import MapContents
+from orbslam2py.maps.map_copies import living_roots
 from orbslam2py.maps.map_tables import BlobTable, MapTables, read_one, read_rows
 from orbslam2py.maps.map_writer import connect
 from orbslam2py.maps.saved_map import RecordedFrames, Run, SavedMap, VocabularyIdentity
@@ -27,6 +29,7 @@ from orbslam2py.maps.schema import (
     APPLICATION_ID,
     FORMAT_VERSION,
     HEADER_SIZE,
+    IN_METRES,
     Table,
     application_of,
     create_script,
@@ -41,6 +44,9 @@ _COPY = "use a copy of the file"
 
 #: Characters of what is quoted in a message.
 _LONGEST = 200
+
+#: A keyframe's number, as far as 64 bits hold one.
+_ID = re.compile(r"[0-9]{1,18}")
 
 
 def load_map(path: str | os.PathLike[str], *, images: bool = False) -> SavedMap:
@@ -66,7 +72,8 @@ def load_map(path: str | os.PathLike[str], *, images: bool = False) -> SavedMap:
         head = read_head(connection, tables, images=images)
         contents = MapTables(connection, tables).contents()
         check_contents(contents, head.runs)
-    return SavedMap(contents, *head, source=named)
+    contents = replace(contents, metric_roots=living_roots(head.metric_roots, contents.keyframes))
+    return SavedMap(contents, head.settings, head.vocabulary, head.runs, head.images, source=named)
 
 
 @contextlib.contextmanager
@@ -172,6 +179,8 @@ class Head(NamedTuple):
     vocabulary: VocabularyIdentity
     runs: tuple[Run, ...]
     images: dict[int, bytes]
+    metric_roots: tuple[int, ...]
+    """As in `MapContents`; it is for who has the keyframes to see that they are roots."""
 
 
 def read_head(connection: sqlite3.Connection, tables: dict[str, Table], *, images: bool) -> Head:
@@ -182,7 +191,14 @@ def read_head(connection: sqlite3.Connection, tables: dict[str, Table], *, image
     identity = VocabularyIdentity(*read_one(connection, tables["vocabulary"])[1:])
     runs = tuple(_read_runs(connection, tables))
     pictures = read_rows(connection, tables["images"]) if images else []
-    return Head(_settings_of(yaml, Sensor(sensor)), identity, runs, dict(pictures))
+    settings = _settings_of(yaml, Sensor(sensor))
+    return Head(settings, identity, runs, dict(pictures), _metric_roots_of(yaml))
+
+
+def _metric_roots_of(yaml: str) -> tuple[int, ...]:
+    lines = [line for line in yaml.splitlines() if line.startswith(IN_METRES)]
+    words = lines[-1].removeprefix(IN_METRES).split() if lines else []
+    return tuple(sorted({int(word) for word in words if _ID.fullmatch(word)}))
 
 
 def _settings_of(yaml: str, sensor: Sensor) -> Settings:

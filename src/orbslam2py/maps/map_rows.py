@@ -16,7 +16,14 @@ from orbslam2py._arrays import IntArray
 from orbslam2py.maps.content_groups import Covisibility, Keyframes
 from orbslam2py.maps.contents import MapContents
 from orbslam2py.maps.saved_map import Run, SavedMap, VocabularyIdentity
-from orbslam2py.maps.schema import FRAMES_PER_ROW, IDS_PER_PAGE, TABLES, Blob, Table
+from orbslam2py.maps.schema import (
+    FRAMES_PER_ROW,
+    IDS_PER_PAGE,
+    IN_METRES,
+    TABLES,
+    Blob,
+    Table,
+)
 from orbslam2py.settings.settings import Settings
 
 #: The values of one row in the order of `Table.columns`, without the checksum.
@@ -42,9 +49,14 @@ def checksum(row: Row) -> int:
 
 
 # ---- the tables that say what the map is of ---------------------------------------------------
-def settings_rows(settings: Settings, vocabulary: VocabularyIdentity) -> Iterator[tuple[str, Row]]:
-    """Camera and visual words, as (table, row)."""
-    yield "settings", (1, str(settings.sensor), settings.to_yaml())
+def settings_rows(
+    settings: Settings, vocabulary: VocabularyIdentity, metric_roots: tuple[int, ...] = ()
+) -> Iterator[tuple[str, Row]]:
+    """Camera and visual words, as (table, row), and which maps were given metres."""
+    yaml = settings.to_yaml()
+    if metric_roots:
+        yaml += f"{IN_METRES} {' '.join(map(str, metric_roots))}\n"
+    yield "settings", (1, str(settings.sensor), yaml)
     yield "vocabulary", (1, vocabulary.name, vocabulary.hash, vocabulary.comment)
 
 
@@ -116,7 +128,8 @@ def _keypoint_blobs(keyframes: Keyframes, row: int) -> Iterator[Any]:
 
 def all_rows(saved: SavedMap) -> Iterator[tuple[str, Row]]:
     """A whole map file, as (table, row)."""
-    yield from settings_rows(saved.settings, saved.vocabulary)
+    roots = saved.contents.metric_roots
+    yield from settings_rows(saved.settings, saved.vocabulary, roots)
     for number, run in enumerate(saved.runs):
         yield from run_rows(number, run)
     yield from map_rows(saved.contents)

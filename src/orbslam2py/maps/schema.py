@@ -9,6 +9,9 @@ from typing import NamedTuple
 APPLICATION_ID = 0x4F52426D
 #: Version of the format that is written; later ones are refused. Version 1 had no words.
 FORMAT_VERSION = 2
+#: Begins a line of the settings' text, after which come the roots of maps that were given metres.
+#: Programs that know nothing of it take it for a comment, and drop it when they write a file.
+IN_METRES = "# Maps in metres, by their roots:"
 #: A row of `map_points` and of `observations` holds the points of so many ids.
 IDS_PER_PAGE = 256
 #: Frames in a row of `frames`.

@@ -12,17 +12,24 @@ import socket
 import sys
 import threading
 import warnings
+import weakref
 import webbrowser
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from orbslam2py._files import reason_of
 from orbslam2py.errors import StateError
+from orbslam2py.viewer.unwanted_requests import UnwantedRequests
 
 if TYPE_CHECKING:
     import viser
 
 _log = logging.getLogger(__name__)
+
+#: What is kept off the log, by the server that it was sent to.
+_unwanted: weakref.WeakKeyDictionary[viser.ViserServer, UnwantedRequests] = (
+    weakref.WeakKeyDictionary()
+)
 
 #: Where it listens if nobody says anything else.
 LOOPBACK = "127.0.0.1"
@@ -62,6 +69,7 @@ def start_server(host: str = LOOPBACK, port: int | None = None) -> viser.ViserSe
 
     with _quiet():
         server = viser.ViserServer(host=host, port=chosen, verbose=False)
+    _unwanted[server] = UnwantedRequests(server.get_port())
     # A browser may close at any moment, also between two lines that move its view.
     warnings.filterwarnings("ignore", r"Queued a \w+ on a closed connection", UserWarning)
     # It offers to share the page through somebody's server.
@@ -71,6 +79,7 @@ def start_server(host: str = LOOPBACK, port: int | None = None) -> viser.ViserSe
 
 def stop_server(server: viser.ViserServer) -> None:
     """End it; the pages in browsers stay as they are."""
+    unwanted = _unwanted.pop(server, None)
 
     def stop() -> None:
         with _quiet():
@@ -80,6 +89,8 @@ def stop_server(server: viser.ViserServer) -> None:
     stopping = threading.Thread(target=stop, name="viewer stop", daemon=True)
     stopping.start()
     stopping.join(_GOODBYE)
+    if unwanted is not None:
+        unwanted.stop()
 
 
 def address_of(server: viser.ViserServer) -> str:

@@ -243,8 +243,9 @@ def test_bad_input_ends_with_status_2(
 def test_positions_that_overflow(tmp_path: Path) -> None:
     truth = wander(20)
     write_tum(tmp_path / "b.txt", truth)
-    truth.T_wc[3, :3, 3] = 1e200
-    write_tum(tmp_path / "a.txt", truth)
+    T_wc = truth.T_wc.copy()
+    T_wc[3, :3, 3] = 1e200
+    write_tum(tmp_path / "a.txt", Trajectory(truth.timestamps, T_wc))
     result = CliRunner().invoke(app, [str(tmp_path / "a.txt"), str(tmp_path / "b.txt")])
     assert result.exit_code == 0, result.output
     assert "positions are too large" in result.stderr

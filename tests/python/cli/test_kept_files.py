@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -225,10 +226,37 @@ def test_pages_replace_pages_only(command: CommandLine, finished: Path) -> None:
         "r/frames.csv exists and is no page of this program",
     )
     assert (finished / "frames.csv").read_bytes() == table
-    Path("a.html").touch()
+    for name in ("a.html", "b.html"):
+        Path(name).touch()
     for _ in range(2):
         assert command("report", finished, "-o", "a.html").code == 0
-        assert command("compare", finished, finished, "-o", "a.html").code == 0
+        assert command("compare", finished, finished, "-o", "b.html").code == 0
+
+
+@pytest.mark.parametrize("version", ["this", "earlier"])
+def test_pages_of_another_kind_are_other_files(
+    command: CommandLine, finished: Path, version: str
+) -> None:
+    page = finished / "report.html"
+    assert command("compare", finished, finished, "-o", "both.html").code == 0
+    if version == "earlier":  # when a page did not say of what it is
+        for path in (page, Path("both.html")):
+            text = path.read_text()
+            assert text.count('<meta name="orbslam2py-page"') == 1
+            path.write_text(re.sub('<meta name="orbslam2py-page" content="[a-z]*">', "", text))
+    before = page.read_bytes(), Path("both.html").read_bytes()
+    refused(
+        command("compare", finished, finished, "-o", page),
+        "r/report.html exists and is the page of one run, so it is kept; give the page another "
+        "name with --output",
+    )
+    refused(
+        command("report", finished, "-o", "both.html"),
+        "both.html exists and is the page of several runs, so it is kept",
+    )
+    assert (page.read_bytes(), Path("both.html").read_bytes()) == before
+    assert command("report", finished).code == 0
+    assert command("compare", finished, finished, "-o", "both.html").code == 0
 
 
 def test_figures_replace_figures_only(command: CommandLine, finished: Path, rgbd: Path) -> None:

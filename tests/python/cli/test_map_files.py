@@ -40,7 +40,7 @@ def test_info(command: CommandLine, tmp_path: Path) -> None:
     assert told["observations"].startswith(f"{len(contents.observations)}, 6.")
     # The median of a two-dimensional error with a deviation of 1 pixel in each direction is 1.18.
     assert 0.9 < float(told["reprojection error"].split()[1]) < 1.4
-    assert told["loops"] == "1"
+    assert told["loops"] == "1 (closed, or where two maps became one)"
     assert told["times"].startswith(f"{FIRST_TIME:.3f} to ")
     assert told["times"].endswith("(3.5 s), from 2011-05-10 12:38:22 UTC")
     length = np.linalg.norm(np.diff(contents.keyframes.T_wc[:, :3, 3], axis=0), axis=1).sum()

@@ -145,6 +145,42 @@ def test_import_for_a_sensor(command: CommandLine, tmp_path: Path, sensor: str) 
     assert Settings.load("a.yaml", Sensor(sensor)).camera.is_distorted
 
 
+def test_doubts_about_an_imported_camera_are_told(command: CommandLine, tmp_path: Path) -> None:
+    """The same of the import, of new settings and of a check."""
+    half = KALIBR_PAIR.replace("[640, 480]", "[320, 240]")
+    written(tmp_path, half, "camchain.yaml")
+    done = command("import-camera", "camchain.yaml", "--camera", "0", "-o", "a.yaml")
+    assert done.code == 0
+    assert "Warning: a.yaml: Camera.cx 325.75 lies outside the image (320 wide)" in done.err
+    assert "Warning: a.yaml: the calibration does not fit the images" in done.err
+    assert "calibration of larger or smaller images, of about 64" in done.err
+    checked = command("settings", "check", "a.yaml")
+    assert (checked.code, checked.err) == (0, done.err)
+    again = ("import-camera", "camchain.yaml", "--camera", "0", "-o", "a.yaml", "--force")
+    assert command(*again, "--quiet").err == ""
+    numbers = ("--fx", "520.5", "--fy", "515.25", "--cx", "325.75", "--cy", "236.125")
+    line = ("settings", "new", "--sensor", "mono", *numbers, "--size", "320x240", "-o", "b.yaml")
+    assert command(*line).err.replace("b.yaml", "a.yaml") == done.err
+
+
+def test_doubts_about_an_imported_pair_are_told(command: CommandLine, tmp_path: Path) -> None:
+    """The raw cameras are named, of which the rectified one is made."""
+    half = KALIBR_PAIR.replace("[640, 480]", "[320, 240]").replace("325.75, 236.125", "310, 230")
+    written(tmp_path, half, "camchain.yaml")
+    done = command("import-camera", "camchain.yaml", "-o", "a.yaml")
+    assert done.code == 0
+    assert done.err.count("the calibration does not fit the images") == 2
+    for name in ("LEFT", "RIGHT"):
+        assert f"Warning: a.yaml: {name}.K: the calibration does not fit the images" in done.err
+    assert command("settings", "check", "a.yaml").err == done.err
+
+
+def test_settings_go_to_the_terminal_by_its_name(command: CommandLine) -> None:
+    """What was written is not read again: here it cannot be."""
+    done = command("settings", "new", "--sensor", "mono", *NUMBERS, "-o", "/dev/null", "--force")
+    assert (done.code, done.err) == (0, "")
+
+
 def test_import_of_kitti(command: CommandLine, tmp_path: Path) -> None:
     written(tmp_path, KITTI, "calib.txt")
     line = ("import-camera", "calib.txt", "--sensor", "stereo", "--camera", "2", "-o", "a.yaml")

@@ -155,7 +155,10 @@ def test_the_command_merges_and_tells(
     part = str(tmp_path / "part.orbmap")
     assert call("map", "optimize", target, "--output", part).code == 2
     assert call("map", "optimize", target, "--map", "1", "--output", part).code == 0
-    assert load_map(part).n_keyframes == elsewhere.n_keyframes
+    assert load_map(part).n_keyframes == load_map(target).n_keyframes
+    alone = str(tmp_path / "alone.orbmap")
+    assert call("map", "crop", part, "--map", "1", "--only", "--output", alone).code == 0
+    assert load_map(alone).n_keyframes == elsewhere.n_keyframes
 
 
 def test_paths_of_two_maps_are_never_mixed(beginning: SavedMap, elsewhere: SavedMap) -> None:

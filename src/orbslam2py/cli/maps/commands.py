@@ -11,6 +11,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
+from orbslam2py._figures import check_picture_name
 from orbslam2py.cli.calibrate import Force, Quiet
 from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.maps.description import describe_map
@@ -35,7 +36,8 @@ def info(
     picture: Annotated[
         Path | None,
         typer.Option(
-            help="PNG file for a picture of the path; of several maps, unless --map names one.",
+            help="Picture of the path (.png, .jpg, .svg, .pdf ...); of several maps, unless --map "
+            "names one.",
             metavar="FILE",
         ),
     ] = None,
@@ -45,6 +47,8 @@ def info(
     """Show what is in a map file: camera, keyframes, points, runs, extent."""
     check_target(picture, force=force)
     check_apart({"--picture": picture}, [file])
+    if picture is not None:
+        check_picture_name(picture, "--picture")
     if number is not None and picture is None:
         raise MapFileError("--map says of which map the picture is to be: --picture FILE.png")
     saved = load_map(file, images=True)

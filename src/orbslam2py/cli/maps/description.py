@@ -14,6 +14,7 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py.maps import MapContents, SavedMap, reprojection_errors
 from orbslam2py.maps.content_groups import BoolArray
 from orbslam2py.maps.edits.parts import map_numbers
+from orbslam2py.maps.keyframe_runs import runs_of_keyframes, way_along
 from orbslam2py.maps.units import unit_of
 
 #: Time stamps above are seconds since 1970, as a date is easier to read (1990).
@@ -33,19 +34,19 @@ def describe_map(saved: SavedMap, file: Path) -> Iterator[tuple[str, str]]:
     if numbers.max() > 0:
         yield "maps", f"{numbers.max() + 1}, each in a world of its own"
         for number in range(int(numbers.max()) + 1):
-            yield f"map {number}", _one_map(contents, numbers == number)
+            yield f"map {number}", _one_map(saved, numbers == number)
     yield "keyframes", f"{len(keyframes)} ({len(contents.removed_keyframes)} were culled)"
     yield "points", str(len(contents.points))
     yield "observations", f"{len(contents.observations)}{_per_point(contents)}"
     errors = reprojection_errors(contents)
     if len(errors):
         yield "reprojection error", f"median {np.median(errors):.2f} px"
-    yield "loops", str(len(contents.loop_edges))
+    n_loops = len(contents.loop_edges)
+    yield "loops", f"{n_loops}{' (closed, or where two maps became one)' if n_loops else ''}"
     yield "times", _times(keyframes.timestamps)
-    path = keyframes.T_wc[:, :3, 3]
     if numbers.max() == 0:
-        yield "path", f"{_length(path):.2f} {unit} from keyframe to keyframe"
-        yield "cameras stood in", _box(path, unit)
+        yield "path", f"{_way(saved, numbers == 0, unit)} from keyframe to keyframe"
+        yield "cameras stood in", _box(keyframes.T_wc[:, :3, 3], unit)
     yield "colours", f"of {int(keyframes.has_colours.sum())} keyframes"
     yield "images", f"of {len(saved.images)} keyframes"
     for number, run in enumerate(saved.runs):
@@ -53,19 +54,20 @@ def describe_map(saved: SavedMap, file: Path) -> Iterator[tuple[str, str]]:
         yield f"run {number}", f"{run.started}, {run.program}, {frames}"
 
 
-def _one_map(contents: MapContents, chosen: BoolArray) -> str:
-    keyframes, unit = contents.keyframes, unit_of(contents)
+def _one_map(saved: SavedMap, chosen: BoolArray) -> str:
+    contents, keyframes = saved.contents, saved.contents.keyframes
     reference = np.searchsorted(keyframes.ids, contents.points.reference_keyframe)
-    path = keyframes.T_wc[chosen, :3, 3]
-    points = number_of(int(chosen[reference].sum()), "point")
+    unit = unit_of(contents, int(keyframes.ids[chosen][0]))
     return (
-        f"{number_of(len(path), 'keyframe')}, {points}, path {_length(path):.2f} {unit}, "
-        f"{_times(keyframes.timestamps[chosen])}"
+        f"{number_of(int(chosen.sum()), 'keyframe')}, "
+        f"{number_of(int(chosen[reference].sum()), 'point')}, "
+        f"path {_way(saved, chosen, unit)}, {_times(keyframes.timestamps[chosen])}"
     )
 
 
-def _length(path: FloatArray) -> float:
-    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+def _way(saved: SavedMap, chosen: BoolArray, unit: str) -> str:
+    n = len(np.unique(runs_of_keyframes(saved)[chosen]))
+    return f"{way_along(saved, chosen):.2f} {unit}{f' in {n} runs' if n > 1 else ''}"
 
 
 def _per_point(contents: MapContents) -> str:

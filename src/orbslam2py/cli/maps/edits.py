@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -12,9 +11,13 @@ import numpy as np
 import typer
 from rich.console import Console
 
-from orbslam2py._arrays import FloatArray
-from orbslam2py._text_lines import content_lines, numbers_of
 from orbslam2py.cli.calibrate import Force, Quiet
+from orbslam2py.cli.maps.places import (
+    keyframes_between,
+    read_known_points,
+    read_place,
+    read_position,
+)
 from orbslam2py.cli.maps.true_path import read_true_path
 from orbslam2py.cli.messages import log_to
 from orbslam2py.cli.targets import check_target
@@ -30,10 +33,10 @@ from orbslam2py.maps import (
     save_map,
     transform_map,
 )
-from orbslam2py.maps.edits.crop import inside_box, keyframes_in_box, keyframes_of_times
-from orbslam2py.maps.edits.parts import take_map
+from orbslam2py.maps.edits.crop import inside_box, keyframes_in_box
+from orbslam2py.maps.edits.parts import crop_among_others, map_numbers, put_back, take_map
 from orbslam2py.maps.edits.saved import crop_saved_map
-from orbslam2py.maps.units import unit_of
+from orbslam2py.maps.units import sees_metres, unit_of
 from orbslam2py.slam.full_bundle_adjustment import optimize_map
 
 MapFile = Annotated[Path, typer.Argument(help="Map file.")]
@@ -44,8 +47,6 @@ MapNumber = Annotated[
     ),
 ]
 Output = Annotated[Path, typer.Option("--output", "-o", help="Map file to write.")]
-
-_LINE_OF_TIME, _LINE_OF_POSITION = 4, 6
 
 
 def save_edited(saved: SavedMap, output: Path, *, force: bool) -> None:
@@ -74,41 +75,51 @@ def crop(
         typer.Option("--points", help="Drop points outside of the box, too, not only cameras."),
     ] = False,
     number: MapNumber = None,
+    only: Annotated[
+        bool, typer.Option("--only", help="Leave the other maps of the file out.")
+    ] = False,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
     """Keep a part of a map: the keyframes of a time, or whose cameras stood in a box.
 
     What these see is kept, too; a point that loses observations goes if what is left does not hold
-    it. If the first keyframe goes, the next becomes the one that paths are relative to.
+    it. If the first keyframe goes, the next becomes the one that paths are relative to. Other maps
+    of the file stay as they are; --only leaves them out, and alone takes one map out of several.
     """
     by_time, by_box = not (begin is None and end is None), not (low is None and high is None)
-    if by_time == by_box:
+    if by_time == by_box and not (only and not by_time):
         raise MapFileError("say what to keep: either --from and --to, or --low and --high")
     if by_box and (low is None or high is None):
         raise MapFileError("a box has two corners; give both --low and --high")
     if points and not by_box:
         raise MapFileError("--points needs a box; give --low and --high")
     check_target(output, force=force)
-    saved = take_map(load_map(file, images=True), number)
-    contents = saved.contents
+    file_of_maps = load_map(file, images=True)
+    taken = take_map(file_of_maps, number)
+    contents = taken.contents
     inside = None
-    if by_time:
-        first = float(contents.keyframes.timestamps.min())
-        since = first + (-math.inf if begin is None else begin)
-        kept = keyframes_of_times(contents, since, first + (math.inf if end is None else end))
-    else:
+    if by_box:
         corners = [read_position("--low", low or ""), read_position("--high", high or "")]
         least, most = np.minimum(*corners), np.maximum(*corners)
         kept = keyframes_in_box(contents, least, most)
         inside = inside_box(contents.points.positions, least, most) if points else None
-    cropped = crop_saved_map(saved, kept, inside)
+    else:
+        kept = keyframes_between(contents, begin, end)
+    if only or taken is file_of_maps:
+        cropped = left = crop_saved_map(taken, kept, inside)
+        told = f"are in {output}"
+    else:
+        assert number is not None
+        cropped, new_number = crop_among_others(file_of_maps, number, kept, inside)
+        left = take_map(cropped, new_number)
+        told = f"of map {number} are in {output}{_others(file_of_maps)}"
+        told += f"; the file has it as map {new_number}" if new_number != number else ""
     save_edited(cropped, output, force=force)
-    left = cropped.contents
     _say(
         quiet,
-        f"{len(left.keyframes)} of {len(contents.keyframes)} keyframes and {len(left.points)} of "
-        f"{len(contents.points)} points are in {output}",
+        f"{left.n_keyframes} of {taken.n_keyframes} keyframes and {left.n_points} of "
+        f"{taken.n_points} points {told}",
     )
 
 
@@ -149,7 +160,7 @@ def align(
     """Lay a map onto the world: by a true path, by known points, or by a known length.
 
     The map of a single camera gets metres by that; maps that see metres are only turned and
-    shifted.
+    shifted. Other maps of the file stay as they are.
     """
     ways = [way is not None for way in (truth, points, length)]
     if sum(ways) != 1:
@@ -158,8 +169,8 @@ def align(
         raise MapFileError("a length is that between two places: give --length and --between")
     check_target(output, force=force)
     log_to(Console(stderr=True), quiet=quiet)
-    saved = take_map(load_map(file, images=True), number)
-    contents = saved.contents
+    saved = load_map(file, images=True)
+    contents = take_map(saved, number).contents
     if truth is not None:
         placement = place_by_trajectory(contents, read_true_path(truth, saved.sensor))
     elif points is not None:
@@ -167,13 +178,13 @@ def align(
     else:
         assert length is not None
         assert between is not None
-        first, second = (_place(contents, text) for text in between)
+        first, second = (read_place(contents, text) for text in between)
         placement = place_by_length(contents, first, second, length)
-    moved = transform_map(contents, placement.similarity)
-    save_edited(replace(saved, contents=moved), output, force=force)
-    for line in _described(placement, metric=unit_of(contents) == "m"):
+    moved = transform_map(contents, placement.similarity, metric=True)
+    save_edited(put_back(saved, number or 0, moved), output, force=force)
+    for line in _described(placement, contents):
         _say(quiet, line)
-    _say(quiet, f"The map is in {output}")
+    _say(quiet, _where(saved, number, output))
 
 
 def optimize(
@@ -187,89 +198,42 @@ def optimize(
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Refine all keyframes and points of a map together (full bundle adjustment)."""
+    """Refine all keyframes and points of a map together (full bundle adjustment).
+
+    Other maps of the file stay as they are.
+    """
     if time_limit is not None and not (math.isfinite(time_limit) and time_limit > 0):
         raise MapFileError(f"--time-limit must be more than 0 seconds, got {time_limit:g}")
     check_target(output, force=force)
-    saved = take_map(load_map(file, images=True), number)
-    refined, record = optimize_map(saved.contents, time_limit=time_limit)
-    save_edited(replace(saved, contents=refined), output, force=force)
+    saved = load_map(file, images=True)
+    refined, record = optimize_map(take_map(saved, number).contents, time_limit=time_limit)
+    save_edited(put_back(saved, number or 0, refined), output, force=force)
     seconds = sum(record.milliseconds.values()) / 1000
     _say(
         quiet,
         f"{record.n_keyframes} keyframes, {record.n_points} points: cost {record.initial_cost:.0f} "
         f"to {record.final_cost:.0f} in {record.iterations} steps, {seconds:.1f} s",
     )
-    _say(quiet, f"The map is in {output}")
+    _say(quiet, _where(saved, number, output))
 
 
-# ---- what is typed -------------------------------------------------------------------------------
-def read_position(option: str, text: str) -> FloatArray:
-    """Read ``1.5,0,-2``.
-
-    Raises
-    ------
-    MapFileError
-        If it is anything else.
-    """
-    try:
-        numbers = np.array([float(word) for word in text.split(",")])
-    except ValueError:
-        numbers = np.zeros(0)
-    if len(numbers) != 3 or not np.isfinite(numbers).all():
-        raise MapFileError(f"{option} is '{text}'; give a position like 1.5,0,-2")
-    return numbers
+# ---- what is told --------------------------------------------------------------------------------
+def _where(saved: SavedMap, number: int | None, output: Path) -> str:
+    others = _others(saved)
+    return f"{f'Map {number}' if others else 'The map'} is in {output}{others}"
 
 
-def _place(contents: MapContents, text: str) -> FloatArray:
-    """A position in the map, or where the camera was at a time."""
-    if "," in text:
-        return read_position("--between", text)
-    try:
-        seconds = float(text)
-    except ValueError:
-        raise MapFileError(
-            f"--between has '{text}'; give places like 1.5,0,-2 or seconds like 12.4"
-        ) from None
-    return _camera_at(contents, seconds)
+def _others(saved: SavedMap) -> str:
+    """Say that the other maps of a file stay, if there are any."""
+    n = int(map_numbers(saved.contents.keyframes).max())
+    return ", the other map as it was" if n == 1 else f", the {n} other maps as they were" * (n > 1)
 
 
-def _camera_at(contents: MapContents, seconds: float) -> FloatArray:
-    """Where the camera was, from the keyframes before and after."""
-    times = contents.keyframes.timestamps
-    order = np.argsort(times, kind="stable")
-    since = times[order] - times[order[0]]
-    if not 0 <= seconds <= since[-1]:
-        raise MapFileError(
-            f"{seconds:g} s is not within the map, whose keyframes are of 0 to {since[-1]:g} s"
-        )
-    centres = contents.keyframes.T_wc[order, :3, 3]
-    return np.array([np.interp(seconds, since, centres[:, axis]) for axis in range(3)])
-
-
-def read_known_points(path: Path, contents: MapContents) -> tuple[FloatArray, FloatArray]:
-    """Read points known in the map and in the world, (m, 3) each.
-
-    Raises
-    ------
-    DatasetError, MapFileError
-        Naming file and line.
-    """
-    in_map, in_world = [], []
-    for line in content_lines(path):
-        numbers = numbers_of(path, line, (_LINE_OF_TIME, _LINE_OF_POSITION))
-        if len(numbers) == _LINE_OF_TIME:
-            in_map.append(_camera_at(contents, numbers[0]))
-        else:
-            in_map.append(np.array(numbers[:3]))
-        in_world.append(np.array(numbers[-3:]))
-    return np.array(in_map).reshape(-1, 3), np.array(in_world).reshape(-1, 3)
-
-
-def _described(placement: Placement, *, metric: bool) -> list[str]:
+def _described(placement: Placement, contents: MapContents) -> list[str]:
     lines = []
-    if not metric:
-        lines.append(f"A unit of the map is {placement.similarity.scale:.6g} m")
+    if not sees_metres(contents):
+        unit = "metre" if unit_of(contents) == "m" else "unit"
+        lines.append(f"A {unit} of the map is {placement.similarity.scale:.6g} m")
     if placement.rmse or placement.n_pairs > 2:
         lines.append(
             f"{placement.n_pairs} positions are {placement.rmse:.4f} m from where they should be "

@@ -15,9 +15,10 @@ from orbslam2py.cli.calibrate import Force, Quiet
 from orbslam2py.cli.messages import log_to
 from orbslam2py.cli.run_options import VocabularyOption
 from orbslam2py.cli.targets import check_target
+from orbslam2py.errors import MapFileError
 from orbslam2py.maps import SavedMap, load_map, save_map
 from orbslam2py.maps.edits.parts import map_numbers
-from orbslam2py.maps.units import unit_of
+from orbslam2py.maps.units import sees_metres
 from orbslam2py.slam.events import MapsMerged
 from orbslam2py.slam.saved_map_merging import merge_maps
 
@@ -40,6 +41,8 @@ def merge(
     The world and the scale of the first stay. What shows no common place stays a map of its own in
     the same file.
     """
+    if len(files) < 2:
+        raise MapFileError(f"{files[0]} alone cannot be merged; name two map files or more")
     check_target(output, force=force)
     log_to(Console(stderr=True), quiet=quiet)
     saved = [load_map(file, images=True) for file in files]
@@ -57,7 +60,7 @@ def merge(
 
 def described(one: MapsMerged, merged: SavedMap) -> str:
     """What two maps that became one had in common."""
-    scale = "" if unit_of(merged.contents) == "m" else f", its lengths times {one.scale:.4g}"
+    scale = "" if sees_metres(merged.contents) else f", its lengths times {one.scale:.4g}"
     return (
         f"map {one.merged_map} is part of map {one.map_index} now{scale}: keyframe "
         f"{one.current_keyframe} shows the place of {one.matched_keyframe}, {one.n_matches} "

@@ -152,7 +152,8 @@ def keep_keyframes(
     )
     keyframes = _select(contents.keyframes, kept)
     covisibility = count_covisibility(observations, keyframes.ids)
-    maps = map_numbers(contents.keyframes)[kept]
+    numbers = map_numbers(contents.keyframes)
+    maps = numbers[kept]
     parents, provisional = spanning_parents(keyframes, covisibility, maps)
     cropped = replace(
         contents,
@@ -161,6 +162,13 @@ def keep_keyframes(
         observations=observations,
         covisibility=covisibility,
         loop_edges=contents.loop_edges[np.isin(contents.loop_edges, keyframes.ids).all(axis=1)],
+        metric_roots=tuple(
+            sorted(
+                int(keyframes.ids[maps == number][0])
+                for number in numbers[np.isin(contents.keyframes.ids, contents.metric_roots)]
+                if (maps == number).any()
+            )
+        ),
     )
     cropped = _select_points(cropped, np.isin(contents.points.ids, observations.point))
     root = int(keyframes.ids[0])
@@ -297,6 +305,7 @@ def _renumbered(contents: MapContents, root: int) -> MapContents:
         observations=replace(contents.observations, keyframe=new(contents.observations.keyframe)),
         covisibility=Covisibility(new(edges.a), new(edges.b), edges.weight),
         loop_edges=new(contents.loop_edges),
+        metric_roots=tuple(new(np.array(contents.metric_roots, np.int64)).tolist()),
     )
 
 

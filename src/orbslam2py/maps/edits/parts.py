@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Several maps in one file: which keyframe belongs to which, one taken out, several put together.
+"""Several maps in one file: one taken out, changed and put back, maps of files put together.
 
 Each keyframe without a parent is the root of a map; ``docs/method/several_maps.md``.
 """
@@ -8,15 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from orbslam2py._arrays import IntArray
+from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.content_groups import (
     ArrayGroup,
+    BoolArray,
     Cameras,
     Covisibility,
     Keyframes,
@@ -29,7 +30,9 @@ from orbslam2py.maps.edits.saved import crop_saved_map
 from orbslam2py.maps.edits.spanning_tree import map_numbers
 from orbslam2py.maps.saved_map import Run, SavedMap
 
-__all__ = ["map_numbers", "put_together", "take_map"]
+_Group = TypeVar("_Group", Keyframes, Points)
+
+__all__ = ["crop_among_others", "map_numbers", "put_back", "put_together", "take_map"]
 
 
 def take_map(saved: SavedMap, number: int | None = None) -> SavedMap:
@@ -63,6 +66,110 @@ def take_map(saved: SavedMap, number: int | None = None) -> SavedMap:
     if number is not None and not 0 <= number < len(counts):
         raise MapFileError(f"{name} has no map {number}; it holds {told}")
     return saved if len(counts) == 1 else crop_saved_map(saved, numbers == number)
+
+
+def crop_among_others(
+    saved: SavedMap, number: int, kept: BoolArray, kept_points: BoolArray | None = None
+) -> tuple[SavedMap, int]:
+    """Keep some keyframes of one map of a file, and the other maps as they are.
+
+    Parameters
+    ----------
+    saved
+        What the file holds.
+    number
+        Which map.
+    kept
+        Which of its keyframes, bool (k,), at least one.
+    kept_points
+        Which of its points may stay, bool (p,); all of them by default.
+
+    Returns
+    -------
+    cropped
+        All maps.
+    number
+        That of the map then: maps are numbered by their first keyframes.
+    """
+    contents = saved.contents
+    numbers = map_numbers(contents.keyframes)
+    stay = numbers != number
+    stay[~stay] = kept
+    points = None
+    if kept_points is not None:
+        mine = np.isin(contents.points.ids, take_map(saved, number).contents.points.ids)
+        points = ~mine
+        points[mine] = kept_points
+    cropped = crop_saved_map(saved, stay, points)
+    left = map_numbers(cropped.contents.keyframes)
+    return cropped, int(left[numbers[stay] == number][0])
+
+
+def put_back(saved: SavedMap, number: int, edited: MapContents) -> SavedMap:
+    """Put a map that was moved or refined back among the others of its file, which stay.
+
+    Parameters
+    ----------
+    saved
+        What the file holds.
+    number
+        Which map was taken from it (`take_map`).
+    edited
+        The map, with the same keyframes and points in other places.
+
+    Raises
+    ------
+    MapFileError
+        If it has other keyframes or points, or other cameras.
+    """
+    contents = saved.contents
+    rows = np.flatnonzero(map_numbers(contents.keyframes) == number)
+    if len(rows) == len(contents.keyframes):  # there is no other
+        return replace(saved, contents=edited)
+    taken = take_map(saved, number).contents
+    alike = (
+        np.array_equal(taken.keyframes.ids, edited.keyframes.ids)
+        and np.array_equal(taken.points.ids, edited.points.ids)
+        and np.array_equal(_baselines(taken), _baselines(edited))
+    )
+    if not alike:
+        raise MapFileError(
+            f"these are not the keyframes and points of map {number}; give the map that take_map "
+            "gave, moved or refined"
+        )
+    # Taken alone the map had another root number, but the same order.
+    root = int(contents.keyframes.ids[rows[0]])
+    metric = {*contents.metric_roots} - {root} | ({root} if edited.metric_roots else set())
+    points = np.searchsorted(contents.points.ids, edited.points.ids)
+    return replace(
+        saved,
+        contents=replace(
+            contents,
+            keyframes=_placed(contents.keyframes, rows, edited.keyframes, _PLACES_OF_KEYFRAMES),
+            points=_placed(contents.points, points, edited.points, _PLACES_OF_POINTS),
+            metric_roots=tuple(sorted(metric)),
+        ),
+    )
+
+
+def _baselines(contents: MapContents) -> FloatArray:
+    """`Cameras.bf` of each keyframe (k,): cameras themselves may be counted in another way."""
+    return np.asarray(contents.cameras.bf[contents.keyframes.camera])
+
+
+#: What says where things are, and how large. Depths are those of cameras that see metres, whose
+#: maps keep their size.
+_PLACES_OF_KEYFRAMES = ("rotations", "translations", "scale")
+_PLACES_OF_POINTS = ("positions", "mean_directions", "min_distance", "max_distance")
+
+
+def _placed(group: _Group, rows: IntArray, edited: _Group, names: tuple[str, ...]) -> _Group:
+    changed = {}
+    for name in names:
+        array = getattr(group, name).copy()
+        array[rows] = getattr(edited, name)
+        changed[name] = array
+    return replace(group, **changed)
 
 
 def put_together(files: Sequence[SavedMap]) -> SavedMap:
@@ -138,6 +245,11 @@ def _joined(parts: Sequence[MapContents]) -> MapContents:
         covisibility=together(Covisibility, lambda part: part.covisibility, a=keyframe, b=keyframe),
         loop_edges=np.concatenate(
             [part.loop_edges + by for part, by in zip(parts, keyframe[:-1], strict=True)]
+        ),
+        metric_roots=tuple(
+            root + by
+            for part, by in zip(parts, keyframe[:-1].tolist(), strict=True)
+            for root in part.metric_roots
         ),
     )
 

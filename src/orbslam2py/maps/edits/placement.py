@@ -11,7 +11,7 @@ from orbslam2py._arguments import array_of, instance_of, number_above_zero
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.contents import MapContents, contents_of
-from orbslam2py.maps.units import unit_of
+from orbslam2py.maps.units import sees_metres
 from orbslam2py.trajectory import MAX_DIFFERENCE, Similarity, Trajectory, align, associate
 
 #: Fewest positions that tell how a map lies.
@@ -30,7 +30,7 @@ FARTHEST = 1e9
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """How a map comes into another world; `transform_map` takes it there.
+    """How a map comes into another world; ``transform_map(..., metric=True)`` takes it there.
 
     Attributes
     ----------
@@ -133,8 +133,8 @@ def _place(contents: MapContents, positions: FloatArray, known: FloatArray) -> P
     if min(spread[0] for spread in spreads) < _SAME_PLACE:
         raise MapFileError("the known points are all at one place; give some that are apart")
     on_a_line = any(map(_is_thin, spreads))
-    scaled = unit_of(contents) != "m"
-    similarity = align(positions, known, with_scale=scaled, on_a_line=on_a_line)
+    with_scale = not sees_metres(contents)
+    similarity = align(positions, known, with_scale=with_scale, on_a_line=on_a_line)
     left = np.linalg.norm(similarity.apply(positions) - known, axis=1)
     return Placement(
         similarity=similarity,
@@ -164,7 +164,7 @@ def place_by_length(
         If the map has metres already, the places are one, or the length or a place is none that
         can be meant.
     """
-    if unit_of(contents_of(contents)) == "m":
+    if sees_metres(contents_of(contents)):
         raise MapFileError(
             "the map has metres already, from the baseline or the depth images; correct these in "
             "the settings if its lengths are wrong"

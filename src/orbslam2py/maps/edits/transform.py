@@ -10,11 +10,14 @@ import numpy as np
 from orbslam2py._arguments import instance_of
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.contents import MapContents, contents_of
+from orbslam2py.maps.units import sees_metres
 from orbslam2py.trajectory import Similarity
 from orbslam2py.trajectory.rotations import inverse_poses
 
 
-def transform_map(contents: MapContents, similarity: Similarity) -> MapContents:
+def transform_map(
+    contents: MapContents, similarity: Similarity, *, metric: bool = False
+) -> MapContents:
     """Move a map as a whole; everything in it that has a length or a direction follows.
 
     With a scale other than 1, so do depths, the distances from which points are searched, the
@@ -28,6 +31,9 @@ def transform_map(contents: MapContents, similarity: Similarity) -> MapContents:
     similarity
         From the map's world to the new one. A map that sees metres (stereo, RGB-D) fits its camera
         only with a scale of 1.
+    metric
+        Lengths in the new world are metres: the map of a single camera, which cannot see them,
+        remembers that (`MapContents.metric_roots`). Without it another scale is another unit.
 
     Returns
     -------
@@ -48,6 +54,7 @@ def transform_map(contents: MapContents, similarity: Similarity) -> MapContents:
     depth = np.where(known, scale * keyframes.depth, keyframes.depth).astype(np.float32)
     return replace(
         contents,
+        metric_roots=_metric_roots(contents, scale, metric=metric),
         cameras=replace(cameras, bf=scale * cameras.bf),
         keyframes=replace(moved, depth=depth, scale=scale * keyframes.scale),
         points=replace(
@@ -58,3 +65,10 @@ def transform_map(contents: MapContents, similarity: Similarity) -> MapContents:
             max_distance=scale * points.max_distance,
         ),
     )
+
+
+def _metric_roots(contents: MapContents, scale: float, *, metric: bool) -> tuple[int, ...]:
+    if metric and not sees_metres(contents):
+        keyframes = contents.keyframes
+        return tuple(keyframes.ids[keyframes.parent < 0].tolist())
+    return contents.metric_roots if scale == 1 else ()

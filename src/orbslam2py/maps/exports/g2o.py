@@ -12,7 +12,7 @@ from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._files import atomic_write
 from orbslam2py.errors import MapFileError
 from orbslam2py.maps.contents import MapContents, contents_of
-from orbslam2py.maps.units import unit_of
+from orbslam2py.maps.units import sees_metres, unit_of
 from orbslam2py.trajectory.rotations import inverse_poses, quaternions_from_rotations
 
 #: Shared points from which on two keyframes are linked: those of the essential graph (ORB-SLAM,
@@ -22,9 +22,10 @@ ESSENTIAL_WEIGHT = 100
 #: Upper triangle of the identity (6, 6), row by row.
 _INFORMATION = " ".join("1" if i == j else "0" for i in range(6) for j in range(i, 6))
 
-_MONOCULAR = (
-    "# a single camera: lengths are in the map's own unit, and their drift along the way\n"
-    "# is not in this graph, which has rotations and translations only (scales: VERTEX_SIM3:QUAT)\n"
+_OWN_UNIT = "# a single camera: lengths are in the map's own unit\n"
+_DRIFT = (
+    "# a single camera: the drift of lengths along the way is not in this graph, which has\n"
+    "# rotations and translations only (scales: VERTEX_SIM3:QUAT)\n"
 )
 
 
@@ -66,7 +67,9 @@ def export_g2o(
         stream.write("# keyframes of a map and what links them; lengths in ")
         stream.write(f"{'metres' if unit_of(contents) == 'm' else 'units'}\n")
         if unit_of(contents) != "m":
-            stream.write(_MONOCULAR)
+            stream.write(_OWN_UNIT)
+        if not sees_metres(contents):
+            stream.write(_DRIFT)
         for number, pose in zip(keyframes.ids.tolist(), _numbers(T_wc), strict=True):
             stream.write(f"VERTEX_SE3:QUAT {number} {pose}\n")
         if len(keyframes):

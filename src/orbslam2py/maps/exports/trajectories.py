@@ -3,9 +3,13 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 
-from orbslam2py._arguments import instance_of, path_of
+import numpy as np
+
+from orbslam2py._arguments import instance_of, number_of, path_of
+from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import DatasetError
 from orbslam2py.maps.contents import MapContents, contents_of
 from orbslam2py.trajectory import (
@@ -15,6 +19,8 @@ from orbslam2py.trajectory import (
     write_kitti,
     write_tum,
 )
+
+_log = logging.getLogger(__name__)
 
 
 def keyframe_path(contents: MapContents) -> Trajectory:
@@ -31,8 +37,10 @@ def export_trajectory(
     Parameters
     ----------
     trajectory
-        Poses camera to world, such as `keyframe_path` gives. Lost ones are left out; KITTI's format
-        has no time stamps, so there one line belongs to each pose that is left.
+        Poses camera to world, such as `keyframe_path` gives. They are written in the order of their
+        time stamps, which those of merged maps are not in; of equal ones, which a warning tells, in
+        their own. Lost ones are left out; KITTI's format has no time stamps, so there one line
+        belongs to each pose that is left.
     path
         The file; replaced only when everything was written.
     file_format
@@ -49,7 +57,8 @@ def export_trajectory(
     instance_of(trajectory, Trajectory, "the trajectory", remedy, DatasetError)
     path = path_of(path, "the file of the trajectory")
     kept = trajectory.select(~trajectory.lost)
-    kept = Trajectory(kept.timestamps, kept.T_wc)
+    order = np.argsort(kept.timestamps, kind="stable")
+    kept = Trajectory(kept.timestamps[order], kept.T_wc[order])
     file_format = TrajectoryFormat.of(file_format)
     if file_format is TrajectoryFormat.TUM:
         write_tum(path, kept)
@@ -59,3 +68,15 @@ def export_trajectory(
         write_euroc(path, kept)
     else:
         raise DatasetError("a file to be written needs a format: tum, kitti or euroc")
+    _warn_of_equal_times(path, kept.timestamps)
+
+
+def _warn_of_equal_times(path: Path, timestamps: FloatArray) -> None:
+    counts = np.unique(timestamps, return_counts=True)[1]
+    if (counts > 1).any():
+        _log.warning(
+            "%s has several poses at %s: the map is of runs whose times overlap, and programs that "
+            "pair poses by time take one of each",
+            path,
+            number_of(int((counts > 1).sum()), "time stamp"),
+        )

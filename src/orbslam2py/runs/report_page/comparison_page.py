@@ -10,7 +10,7 @@ from orbslam2py.runs.report_page import above
 from orbslam2py.runs.report_page.comparison import Comparison, Row
 from orbslam2py.runs.report_page.explained import STAGES
 from orbslam2py.runs.report_page.markup import Markup, element, join, section, table
-from orbslam2py.runs.report_page.page import whole_page
+from orbslam2py.runs.report_page.page import PageKind, whole_page
 from orbslam2py.runs.report_page.plane_view import FROM_ABOVE, choose_view
 from orbslam2py.runs.report_page.plot import Line, TimePlot, figures, strip
 from orbslam2py.runs.report_page.round_numbers import NONE
@@ -45,7 +45,8 @@ def comparison_page(comparison: Comparison) -> str:
     body = join(warning, *(part for _, part in parts.values()))
     title = f"{len(names)} runs: {', '.join(names)}"
     sequences = ", ".join(dict.fromkeys(run.name for run in comparison.runs))
-    return whole_page(title, sequences, links, body, as_script(_data(comparison)))
+    data = as_script(_data(comparison))
+    return whole_page(title, sequences, links, body, data, kind=PageKind.COMPARISON)
 
 
 def look(number: int) -> str:

@@ -90,6 +90,7 @@ _IN_WORDS: dict[str, Callable[[dict[str, Any]], str]] = {
     "relocalisations": relocalisations_words,
     "loaded_map": loaded_map_words,
     "depth": depth_words,
+    "merges": lambda report: str(len(report["merges"])),
     "ate_alignment": lambda report: ALIGNMENTS.get(report["ate_alignment"], NONE),
 }
 
@@ -155,6 +156,8 @@ FIGURES: dict[str, tuple[Figure, ...]] = {
         Figure("keyframes", "keyframes", "", "of the main map"),
         Figure("map_points", "map points", "", "of the main map"),
         Figure("loops_closed", "loops closed", "", "over all maps"),
+        Figure("merges", "maps joined", "",
+               "how often a place showed that two maps are one"),
     ),
     "Speed": (
         Figure("seconds", "time", "s",
@@ -212,6 +215,7 @@ STAGES_BESIDE = {
     "loop.verify": "whether the geometry agrees that it is this place",
     "loop.wait": "waiting until mapping pauses",
     "loop.plan": "where the keyframes and points around the loop belong",
+    "loop.weld": "refining what is around the place at which two maps became one",
     "loop.graph": "spreading the correction over all keyframes",
     "loop.apply": "moving the map",
     "adjustment.gather": "collecting the whole map",

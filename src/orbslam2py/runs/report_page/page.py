@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import re
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +24,27 @@ from orbslam2py.runs.report_page.story import Story
 _FOLDER = Path(__file__).parents[2] / "data" / "report_page"
 #: What the head of a page begins to say about its maker; the version follows.
 _MADE_BY = '<meta name="generator" content="orbslam2py '
-#: Bytes in which that comes.
+#: What it says about what the page is of; those of earlier versions are told by their titles.
+_IS_OF = '<meta name="orbslam2py-page" content="'
+#: Bytes in which these come.
 _HEAD = 4096
+
+
+class PageKind(str, Enum):
+    """What a page is of."""
+
+    RUN = "run"
+    COMPARISON = "comparison"
+    BENCHMARK = "benchmark"
+
+    def __str__(self) -> str:
+        return self.value
+
+
+_OLD_TITLES = (
+    (re.compile(r"<title>\d+ runs: "), PageKind.COMPARISON),
+    (re.compile(r": benchmark - orbslam2py</title>"), PageKind.BENCHMARK),
+)
 
 
 def run_page(run: RunFolder) -> str:
@@ -50,16 +71,27 @@ def run_page(run: RunFolder) -> str:
     body = join(
         _error(report), _warnings(report), _notes(report), sections.tiles(story), *parts.values()
     )
-    return whole_page(run.name, subtitle, links, body, script_data(story))
+    return whole_page(run.name, subtitle, links, body, script_data(story), kind=PageKind.RUN)
+
+
+def kind_of_page(path: Path) -> PageKind | None:
+    """Tell what a page is of that was made here, by whatever version; None for other files."""
+    try:
+        with path.open("rb") as stream:
+            head = stream.read(_HEAD).decode(errors="replace")
+    except OSError:
+        return None
+    if _MADE_BY not in head:
+        return None
+    told = head.partition(_IS_OF)[2].partition('"')[0]
+    if told in {kind.value for kind in PageKind}:
+        return PageKind(told)
+    return next((kind for title, kind in _OLD_TITLES if title.search(head)), PageKind.RUN)
 
 
 def is_page(path: Path) -> bool:
-    """Whether a file is a page that was made here, of whatever version."""
-    try:
-        with path.open("rb") as stream:
-            return _MADE_BY.encode() in stream.read(_HEAD)
-    except OSError:
-        return False
+    """Whether a file is a page that was made here, of whatever kind and version."""
+    return kind_of_page(path) is not None
 
 
 def whole_page(
@@ -68,6 +100,8 @@ def whole_page(
     links: list[tuple[str, str]],
     body: Markup,
     data: Markup,
+    *,
+    kind: PageKind = PageKind.BENCHMARK,
 ) -> str:
     """Put head, style, script and data around the parts of a page.
 
@@ -86,6 +120,7 @@ def whole_page(
         Markup('<meta name="viewport" content="width=device-width, initial-scale=1">'),
         Markup('<meta name="color-scheme" content="light dark">'),
         Markup(f'{_MADE_BY}{__version__}">'),
+        Markup(f'{_IS_OF}{kind}">'),
         Markup('<link rel="icon" href="data:,">'),
         element("title", f"{title} - orbslam2py"),
         Markup(f"<style>{style}</style>"),

@@ -15,15 +15,21 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from orbslam2py._arguments import number_of
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._files import describe_error
 from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.maps.map_arrays import MapArrays
 from orbslam2py.maps.ply import read_points
 from orbslam2py.runs.frame_table import STAGES
+from orbslam2py.runs.report_page.columns import Columns
 from orbslam2py.runs.result import empty_trajectory
 from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.records import TrackingState
 from orbslam2py.trajectory import Trajectory, read_tum
+
+#: What a frame of a run may be, as `FrameRow.state` tells it.
+_STATES = frozenset([*TrackingState.__members__, "SKIPPED", "DROPPED"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,13 +166,19 @@ def read_run(folders: Path | Sequence[Path]) -> RunFolder:
         for number in sorted(numbers)
         if (file := _find(places, f"trajectory_map{number}.txt")) is not None
     }
+    frames = read_frames(frames_file)
+    _check_number(frames_file, len(frames), "frame", report.get("seen_frames"))
+    path = _read_path(places, "trajectory.txt")
+    path_file = _find(places, "trajectory.txt")
+    if path_file is not None:
+        _check_number(path_file, len(path), "pose", _poses_of_main_map(report))
     points = _find(places, "points.ply")
     truth = _find(places, "groundtruth_aligned.txt")
     return RunFolder(
         folder=places[0],
         report=report,
-        frames=read_frames(frames_file),
-        path=_read_path(places, "trajectory.txt"),
+        frames=frames,
+        path=path,
         others=others,
         keyframes=_read_path(places, "keyframes.txt"),
         truth=None if truth is None else read_tum(truth),
@@ -174,6 +186,23 @@ def read_run(folders: Path | Sequence[Path]) -> RunFolder:
         images=_read_images(_find(places, "frame_images.zip")),
         places=places,
     )
+
+
+def _check_number(file: Path, found: int, noun: str, told: Any) -> None:
+    """See that a file holds as much as the report tells of; an older one may tell nothing."""
+    if isinstance(told, int) and told != found:
+        raise DatasetError(
+            f"{file} holds {number_of(found, noun)}, but report.json tells of {told}: it is cut, "
+            "or of another run; run the sequence again"
+        )
+
+
+def _poses_of_main_map(report: dict[str, Any]) -> int | None:
+    for entry in report.get("maps", []):
+        if entry["map"] == report.get("main_map"):
+            tracked: int | None = entry.get("tracked")  # an older report does not tell
+            return tracked
+    return None
 
 
 def _find(places: list[Path], name: str) -> Path | None:
@@ -228,29 +257,38 @@ def read_frames(path: Path) -> Frames:
         Naming the file, and the line if one is wrong.
     """
     try:
-        with path.open(newline="", encoding="utf-8") as stream:
-            header, *rows = csv.reader(stream)
-        columns = {name: [row[k] for row in rows] for k, name in enumerate(header)}
-        return _frames_of(columns)
-    except (OSError, UnicodeDecodeError) as error:
+        # Reasons hold names of files byte by byte; a page holds only what is UTF-8.
+        with path.open(newline="", encoding="utf-8", errors="replace") as stream:
+            reader = csv.reader(stream)
+            header = next(reader, [])
+            rows = [(reader.line_num, row) for row in reader if row]
+    except OSError as error:
         raise DatasetError(
             f"{path} cannot be read: {describe_error(error)}; run the sequence again"
         ) from error
-    except (ValueError, KeyError, IndexError) as error:
+    except csv.Error as error:
         raise DatasetError(
             f"{path} is no whole table of frames ({error}); run the sequence again"
         ) from error
+    if not header:
+        raise DatasetError(f"{path} is empty; run the sequence again")
+    for line, row in rows:
+        if len(row) != len(header):
+            raise DatasetError(
+                f"{path}:{line} has {len(row)} of {len(header)} columns, so the file is cut or was "
+                "changed; run the sequence again"
+            )
+    columns = {name: [row[k] for _, row in rows] for k, name in enumerate(header)}
+    return _frames_of(Columns(path, [line for line, _ in rows], columns))
 
 
-def _frames_of(columns: dict[str, list[str]]) -> Frames:
-    def numbers(name: str) -> FloatArray:
-        return np.array([text or "nan" for text in columns[name]], dtype=np.float64)
-
-    nothing = [""] * len(columns["index"])
+def _frames_of(columns: Columns) -> Frames:
+    nothing = [""] * len(columns)
+    numbers = columns.numbers
     return Frames(
-        index=np.array(columns["index"], dtype=np.int64),
-        timestamps=np.array(columns["timestamp"], dtype=np.float64),
-        state=np.array(columns["state"], dtype=np.str_),
+        index=columns.whole_numbers("index"),
+        timestamps=numbers("timestamp", may_be_empty=False),
+        state=np.array(columns.words("state", "state", _STATES), dtype=np.str_),
         reason=columns["reason"],
         map_index=numbers("map"),
         inliers=numbers("inliers"),
@@ -258,7 +296,7 @@ def _frames_of(columns: dict[str, list[str]]) -> Frames:
         visual_odometry=np.array([text == "1" for text in columns["visual_odometry"]], bool),
         # Folders of earlier versions do not have the next two.
         is_weak=np.array([text == "weak" for text in columns.get("evidence", nothing)], bool),
-        found=np.array([text or "nan" for text in columns.get("found", nothing)], np.float64),
+        found=numbers("found") if "found" in columns else np.full(len(columns), np.nan),
         has_pose=np.array([text != "" for text in columns["tx"]], bool),
         milliseconds={
             stage: numbers(f"ms_{stage}") for stage in STAGES if f"ms_{stage}" in columns

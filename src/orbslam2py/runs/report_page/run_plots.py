@@ -25,7 +25,12 @@ STATES = {
     "DROPPED": ("dropped", "dropped"),
     "SKIPPED": ("skipped", "skipped"),
 }
-_EVENTS = {"loop": "loop closed", "relocalised": "found again", "map": "new map"}
+_EVENTS = {
+    "loop": "loop closed",
+    "relocalised": "found again",
+    "map": "another map",
+    "merge": "maps became one",
+}
 
 #: A few frames that took longest do not squeeze the others.
 _SHOWN_PART = 0.995
@@ -173,12 +178,12 @@ def untracked(story: Story) -> list[Span]:
 
 
 def loop_marks(story: Story) -> list[Mark]:
-    """Moments of closed loops."""
+    """Moments at which the map was moved: closed loops, and maps that became one."""
     seconds = story.run.frames.seconds
     return [
-        Mark(float(seconds[event.position]), "m-loop", event.text)
+        Mark(float(seconds[event.position]), f"m-{event.kind}", event.text)
         for event in story.events
-        if event.kind == "loop"
+        if event.kind in ("loop", "merge")
     ]
 
 

@@ -28,7 +28,7 @@ class Event:
     position: int
     """Of the frame in frames.csv."""
     kind: str
-    """``loop``, ``relocalised``, ``lost``, ``map``."""
+    """``loop``, ``relocalised``, ``lost``, ``map``, ``merge``."""
     text: str
 
 
@@ -102,12 +102,23 @@ def _events(run: RunFolder) -> list[Event]:
             frames_text = number_of(entry["frames"], "frame")
             text = f"tracking lost for {frames_text} ({entry['seconds']:.1f} s{end}): "
             events.append(Event(int(where[0]), "lost", text + entry["reason"]))
+    merges = _merges(run)
+    events += [event for _, _, event in merges]
+
+    def part_of(number: float, position: int) -> float:
+        """What a map was part of when a frame came."""
+        for younger, older, event in merges:
+            if number == younger and event.position <= position:
+                number = older
+        return number
+
     previous_map, previous_state = np.nan, ""
     seen: set[float] = set()
     for position, (number, state) in enumerate(zip(frames.map_index, frames.state, strict=True)):
         if np.isnan(number):
             continue
-        if number != previous_map and not np.isnan(previous_map):
+        before, now = (part_of(one, position) for one in (previous_map, number))
+        if now != before and not np.isnan(before):
             what = "again" if number in seen else "begun"
             events.append(Event(position, "map", f"map {number:.0f} {what}"))
         elif state == "OK" and previous_state == "LOST":
@@ -117,11 +128,29 @@ def _events(run: RunFolder) -> list[Event]:
     unit = "units" if run.is_monocular else "m"
     for entry in run.report.get("loops", []):
         if len(frames):
-            at = int(np.argmin(np.abs(frames.timestamps - entry["timestamps"][1])))
+            at = _frame_at(run, entry["timestamps"][1])
             text = f"loop closed: keyframe {entry['keyframes'][1]} at {entry['keyframes'][0]}, "
             text += f"moved by {short(entry['correction_m'])} {unit}"
             events.append(Event(at, "loop", text))
     return sorted(events, key=lambda event: event.position)
+
+
+def _merges(run: RunFolder) -> list[tuple[int, int, Event]]:
+    """Maps that became part of another one, that one, and when, in the order of the report."""
+    found = []
+    for entry in run.report.get("merges", []) if len(run.frames) else []:
+        text = f"map {entry['merged']} became part of map {entry['map']}: keyframe "
+        text += f"{entry['keyframes'][1]} shows the place of keyframe {entry['keyframes'][0]}"
+        if run.is_monocular:
+            text += f"; its lengths times {short(entry['scale'], 4)}"
+        event = Event(_frame_at(run, entry["timestamps"][1]), "merge", text)
+        found.append((entry["merged"], entry["map"], event))
+    return found
+
+
+def _frame_at(run: RunFolder, seconds: float) -> int:
+    """Position of the frame whose time stamp is nearest."""
+    return int(np.argmin(np.abs(run.frames.timestamps - seconds)))
 
 
 def _found(run: RunFolder, events: list[Event]) -> str:

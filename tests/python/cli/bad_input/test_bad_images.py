@@ -82,6 +82,22 @@ def test_one_bad_image_of_a_pair(
     expect_skipped(run(command, stereo, "stereo"), "r", message)
 
 
+def test_sizes_are_told_as_everywhere_and_with_the_file(command: CommandLine, rgbd: Path) -> None:
+    """Width before height, and no word about the calls of Python."""
+    spoil_size(nth(rgbd / "rgb", 3))
+    spoil_size(nth(rgbd / "depth", 5))
+    done = run(command, rgbd)
+    colour, beside = nth(rgbd / "rgb", 3), nth(rgbd / "rgb", 5)
+    assert done.err.splitlines() == [
+        f"Warning: frame 3 skipped: {colour}: image has size 300x200, the first image had "
+        "320x240; give images of one size",
+        f"Warning: frame 5 skipped: {beside}: depth has size 300x200, the image 320x240; depth "
+        "must be registered to the image",
+    ]
+    frames = Results(Path("r")).frames
+    assert frames[5]["reason"].startswith("depth has size"), "equal ones are counted together"
+
+
 def test_first_image_bad(command: CommandLine, rgbd: Path) -> None:
     spoil_truncated(nth(rgbd / "rgb", 0))
     expect_skipped(run(command, rgbd), "r", "truncated", index=0)
