@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -160,6 +161,10 @@ def _fitting(path: Path, mask: ByteArray, image: ByteArray) -> ByteArray:
     return mask
 
 
+#: Attributes that not every sequence has: where its files are.
+_OF_SOME = frozenset({"path", "folder", "image_path"})
+
+
 class _Masked:
     """What masked sources share: everything but the images comes from the source."""
 
@@ -228,6 +233,12 @@ class MaskedSequence(FramesInOrder, _Masked):
 
     def __len__(self) -> int:
         return len(self._sequence)
+
+    def __getattr__(self, name: str) -> Any:
+        # What only some sequences tell: `path` or `folder`, and `image_path`.
+        if name in _OF_SOME:
+            return getattr(self._sequence, name)
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
     @property
     def timestamps(self) -> FloatArray:

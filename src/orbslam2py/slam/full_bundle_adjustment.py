@@ -21,7 +21,7 @@ from orbslam2py._timing import StageStatistics, StageTimer
 from orbslam2py._worker import Worker, WorkerState
 from orbslam2py.maps.contents import MapContents, contents_of
 from orbslam2py.maps.map_copies import restore_contents, take_contents
-from orbslam2py.maps.units import unit_of
+from orbslam2py.maps.units import sees_metres
 
 _log = logging.getLogger(__name__)
 
@@ -266,7 +266,7 @@ def optimize_map(
         slam_map,
         nobody,
         time_limit=time_limit,
-        monocular=unit_of(contents) != "m",
+        monocular=not sees_metres(contents),
         threaded=False,
         on_done=lambda _: None,
     )

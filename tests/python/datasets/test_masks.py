@@ -24,6 +24,7 @@ def test_one_mask_for_all(folder: Path, tmp_path: Path) -> None:
     assert (sequence.name, sequence.layout, len(sequence)) == ("walk", "images", 12)
     assert sequence.settings == builtin_settings("tum1", MONO) == sequence.default_settings()
     assert sequence.ground_truth() is None
+    assert (sequence.folder, sequence.image_path(3).name) == (folder, "4.png")
     images = sequence.load(3)
     np.testing.assert_array_equal(images.mask, mask_image())
     assert images.image.shape == (*SIZE, 3)
