@@ -15,13 +15,16 @@ class CallGuard:
 
     def __init__(self, what: str) -> None:
         self._what = what
-        self._lock = threading.Lock()
+        # One that knows its owner: should a Ctrl-C come right after it was taken, its thread can
+        # take it again, and need not wait for itself.
+        self._lock = threading.RLock()
         self._owner: int | None = None  # the thread that is in the call
 
     @contextlib.contextmanager
     def __call__(self) -> Iterator[None]:
         """Enter the guarded call."""
-        if not self._lock.acquire(blocking=False):
+        inside = self._owner == threading.get_ident()
+        if inside or not self._lock.acquire(blocking=False):
             raise StateError(f"{self._what} is already running in another thread")
         self._owner = threading.get_ident()
         try:

@@ -31,6 +31,58 @@ _log = logging.getLogger(__name__)
 Job = TypeVar("Job")
 
 
+class Turn:
+    """Whose turn it is, among threads whose calls run steps inline; taken again within itself.
+
+    Who asks first comes first.
+    """
+
+    def __init__(self) -> None:
+        self._condition = threading.Condition()
+        self._waiting: deque[int] = deque()
+        self._depth = 0
+        #: The thread whose turn it is, None if it is nobody's.
+        self.owner: int | None = None
+
+    def __enter__(self) -> None:
+        self._take(1)
+
+    def __exit__(self, *_: object) -> None:
+        with self._condition:
+            self._depth -= 1
+            if self._depth == 0:
+                self.owner = None
+                self._condition.notify_all()
+
+    @contextlib.contextmanager
+    def lent(self) -> Iterator[None]:
+        """Entered by a step around code that is not ours, which may wait for other callers."""
+        me = threading.get_ident()
+        with self._condition:
+            depth = self._depth if self.owner == me else 0
+            if depth:
+                self._depth, self.owner = 0, None
+                self._condition.notify_all()
+        try:
+            yield
+        finally:
+            if depth:
+                self._take(depth)
+
+    def _take(self, depth: int) -> None:
+        me = threading.get_ident()
+        with self._condition:
+            if self.owner != me:
+                self._waiting.append(me)
+                try:
+                    while self.owner is not None or self._waiting[0] != me:
+                        self._condition.wait(WAIT_SLICE)
+                    self.owner = me
+                finally:
+                    self._waiting.remove(me)
+            self._depth += depth
+
+
 class WorkerState(enum.Enum):
     """What a worker is doing."""
 
@@ -97,7 +149,7 @@ class Worker(Generic[Job]):
         self._error: BaseException | None = None
         self._thread: threading.Thread | None = None
         self._inline_in: int | None = None  # the thread that a step runs in for its caller
-        self._turn = threading.RLock()  # held while inline steps run
+        self._turn = Turn()  # of inline steps
         #: Raised when the running step should end early; lowered when a step begins.
         self.interrupt_flag = core.StopFlag()
         #: Raised when nobody wants the running step's result any more (reset, finish).
@@ -277,6 +329,10 @@ class Worker(Generic[Job]):
                     self.cancel_flag.set()
                 self._off_duty = False
 
+    def lend_turn(self) -> contextlib.AbstractContextManager[None]:
+        """Let other threads' inline steps run meanwhile: entered around code that is not ours."""
+        return self._turn.lent()
+
     # ---- pauses ----------------------------------------------------------------------------------
     def pause(self, *, brief: bool = False) -> PauseTicket:
         """Ask the worker to stand still after the running step; see `PauseTicket`.
@@ -325,6 +381,11 @@ class Worker(Generic[Job]):
             if self._busy:
                 return WorkerState.BUSY
             return WorkerState.PAUSED if self._pauses else WorkerState.IDLE
+
+    @property
+    def threaded(self) -> bool:
+        """Whether it has a thread of its own."""
+        return self._threaded
 
     @property
     def ended(self) -> bool:
@@ -411,8 +472,9 @@ class Worker(Generic[Job]):
         return self._off_duty or self._is_idle_elsewhere()
 
     def _is_idle_elsewhere(self) -> bool:
-        """No step runs, but for one that this call is part of."""
-        return not self._busy or self._inline_in == threading.get_ident()
+        """No step runs, but for one that this call is part of, or that has lent its turn."""
+        mine = self._inline_in == threading.get_ident()
+        return not self._busy or mine or not (self._threaded or self._turn.owner == self._inline_in)
 
     def _run(self) -> None:
         while True:
@@ -441,6 +503,6 @@ class Worker(Generic[Job]):
 
 def take_turns(workers: Iterable[Worker[Any]]) -> None:
     """Let no two of these workers run inline at once, for callers in different threads."""
-    turn = threading.RLock()
+    turn = Turn()
     for worker in workers:
         worker._turn = turn

@@ -56,7 +56,7 @@ from orbslam2py.runs.input_folders import check_not_among_images
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.settings import Settings
 from orbslam2py.slam.effort import Effort
-from orbslam2py.slam.options import NOTHING_TO_WAIT_FOR, SystemOptions
+from orbslam2py.slam.options import SystemOptions
 
 EXAMPLE = """
 **Example**
@@ -123,8 +123,17 @@ def run(
     check_kept(video, record, force=force)
     if save_images and save is None:
         raise DatasetError("--save-images keeps images in the map that is saved: --save FILE")
-    if new_map_after is not None and not several_maps:  # also if it is the usual number
-        raise SettingsError(NOTHING_TO_WAIT_FOR)
+    if new_map_after is not None and not several_maps:
+        raise SettingsError(
+            "--new-map-after says when another map begins, and with --one-map none does; leave out "
+            "one of them"
+        )
+    adjusts = final_adjustment or (loop_closing and full_adjustment)
+    if full_adjustment_time_limit is not None and not adjusts:
+        raise SettingsError(
+            "--full-adjustment-time-limit is of full adjustments, and there will be none; leave it "
+            "out, or take --final-adjustment"
+        )
     look = ViewerOptions(viewer, viewer_port, viewer_host, viewer_exit)
     log_to(Console(stderr=True), quiet=quiet)  # opening warns already
     loaded = None if load is None else MapFile(load)

@@ -88,6 +88,12 @@ def find_depth_pair(folder: Path) -> DepthPair | None:
     return None if colour is None or depth is None else DepthPair(colour, depth)
 
 
+def told_by_names(folder: Path) -> bool:
+    """Whether the images' folder is known by its name, also beside others with images."""
+    pair = find_depth_pair(folder)
+    return pair is not None and _COLOUR_NAME.match(pair.colour.path.name) is not None
+
+
 def no_depth_pair(folder: Path, kinds: list[FolderKind]) -> DatasetError:
     """Say what is in a folder that should have had images and depth, and what to do."""
     return DatasetError(

@@ -80,8 +80,8 @@ class VideoReader:
             found = max(seconds[-1] - seconds[0], len(seconds) / self.fps)
             if promised - found > max(_MISSING, _MISSING_SHARE * promised):
                 _log.warning(
-                    "%s promises %.1f s, but ends after %.1f s (%d frames): it was cut off, or is "
-                    "damaged there; copy or record it again if the rest matters",
+                    "%s says it lasts %.1f s, but its pictures end after %.1f s (%d frames): it "
+                    "was cut off or damaged, unless its sound lasts longer or it was trimmed",
                     *(self.path, promised, found, len(seconds)),
                 )
         return np.array(seconds, dtype=np.float64)

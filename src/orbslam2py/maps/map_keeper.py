@@ -320,7 +320,11 @@ class _Autosave:
         # Only now: as long as the number is the old map's, nothing of the new one is written.
         self._held, self._map_index = None, map_index
         if old is not self._writer:
-            old.close()
+            try:
+                old.close()
+            except MapFileError as error:
+                # What was committed is committed; the new map must not wait for that.
+                _log.warning("the old map: %s", error)
 
 
 def _leaving_time(rows: Iterable[tuple[str, Row]]) -> Iterator[tuple[str, Row]]:

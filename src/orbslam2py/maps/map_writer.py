@@ -26,7 +26,7 @@ from orbslam2py.maps.schema import (
 
 _log = logging.getLogger(__name__)
 
-#: Tables whose rows never change and are written once.
+#: Tables whose rows stay once they are written, although they are not given again.
 WRITTEN_ONCE = frozenset({"keypoints", "images", "frames", "runs", "settings", "vocabulary"})
 
 #: Seconds that a writer or reader waits for another program that has the file locked.

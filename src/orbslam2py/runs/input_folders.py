@@ -6,6 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from orbslam2py.datasets import DepthFolders, is_recording
+from orbslam2py.datasets.depth_folders import told_by_names
 from orbslam2py.datasets.image_folder import image_files
 from orbslam2py.errors import DatasetError
 from orbslam2py.runs.outputs import holds_run
@@ -47,12 +48,13 @@ def check_not_among_images(output: Path, sequence: object, source: Path | None =
         )
     if own not in place.parents or folder != source:
         return
-    if _is_read(place):
+    if _is_read(place) or place in _folders_of_images(sequence):
         raise DatasetError(
             f"{output} is one of the sequence's own folders: results would lie among the images; "
             f"{remedy}"
         )
-    if getattr(sequence, "layout", "") == DepthFolders.layout and place.parent == own:
+    beside_a_pair = getattr(sequence, "layout", "") == DepthFolders.layout and place.parent == own
+    if beside_a_pair and not told_by_names(own):
         raise DatasetError(
             f"{output} would lie beside the folders of images and depth, and its pictures be taken "
             f"for a third one; give another --output (output), such as {source / 'runs' / 'first'}"
@@ -65,8 +67,13 @@ def _place_of(sequence: object) -> Path | None:
     return next((place for place in places if isinstance(place, Path)), None)
 
 
+def _folders_of_images(sequence: object) -> set[Path]:
+    """The folders that the first image lies in, where a sequence tells it."""
+    path_of = getattr(sequence, "image_path", None)
+    first = path_of(0) if callable(path_of) else None
+    return set(first.resolve().parents) if isinstance(first, Path) else set()
+
+
 def _is_read(folder: Path) -> bool:
-    """Whether a folder in that of a sequence is likely read: no run made it, and it holds some."""
-    if not folder.is_dir() or holds_run(folder):
-        return False
-    return bool(image_files(folder)) or any(inner.is_dir() for inner in folder.iterdir())
+    """Whether a folder in that of a sequence is likely read: it holds images, and no run."""
+    return folder.is_dir() and not holds_run(folder) and bool(image_files(folder))

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import asdict, replace
 from datetime import datetime
+from pathlib import Path
 from typing import cast
 
 import numpy as np
@@ -243,13 +244,16 @@ class SequenceRunner:
 
     def _skip(self, frame: FedFrame, error: Exception, file: str = "") -> FrameRow:
         reason = describe_error(error)
-        _log.warning("frame %d skipped: %s", frame.index, f"{file}: {reason}" if file else reason)
+        told = f"{reason} (it is {file})" if file else reason
+        _log.warning("frame %d skipped: %s", frame.index, told)
         return _row(frame, None, reason)
 
     def _file_of(self, frame: FedFrame) -> str:
         """Name the file of a frame's image; empty if the source does not tell it."""
         path_of = getattr(self.result.sequence, "image_path", None)
-        return "" if path_of is None else str(path_of(frame.index))
+        # A sequence of the user's own may have something else of that name.
+        place = path_of(frame.index) if callable(path_of) else None
+        return str(place) if isinstance(place, Path) else ""
 
     # ---- the end ---------------------------------------------------------------------------------
     def _wait_for_mapping(self, system: System, stop: threading.Event) -> None:

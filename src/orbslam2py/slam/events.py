@@ -229,11 +229,16 @@ class EventDispatcher:
             MapsMerged: callbacks.on_maps_merged,
         }
         self.worker: Worker[Callable[[], None]] = Worker(
-            "callbacks", lambda deliver: deliver(), threaded=threaded
+            "callbacks", self._deliver, threaded=threaded
         )
 
         #: Told of every event, like the callbacks; assign another tuple to add one.
         self.watchers: tuple[Callable[[Event], None], ...] = ()
+
+    def _deliver(self, deliver: Callable[[], None]) -> None:
+        # A function may wait for another thread that calls the system.
+        with self.worker.lend_turn():
+            deliver()
 
     def wanted(self, kind: type[Event]) -> bool:
         """Whether anybody listens to events of a type: others need not be made."""

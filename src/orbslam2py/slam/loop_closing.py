@@ -129,7 +129,8 @@ class LoopClosing:
 
     def end(self) -> None:
         """Close the loop that waits for a better one, if one does: no keyframe follows."""
-        self.worker.offer(_NO_KEYFRAME)
+        if self.worker.threaded or self.has_loop_waiting:
+            self.worker.offer(_NO_KEYFRAME)
 
     def reset(self) -> None:
         """Drop waiting keyframes and what the last ones proposed."""

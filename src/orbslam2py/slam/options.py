@@ -24,12 +24,6 @@ _SWITCHES = (
     *("check_calibration", "keyframe_images"),
 )
 
-#: Said of a time until the next map where there is only one.
-NOTHING_TO_WAIT_FOR = (
-    "new_map_after (--new-map-after) says when another map begins, but none does with several_maps "
-    "off; leave it out, or --one-map (several_maps=False)"
-)
-
 
 @dataclass(frozen=True)
 class SystemOptions:
@@ -67,8 +61,6 @@ class SystemOptions:
                 f"{shown(self.new_map_after)}; to wait for the old map for ever, switch "
                 "several_maps off"
             )
-        if not self.several_maps and self.new_map_after != SystemOptions.new_map_after:
-            raise SettingsError(NOTHING_TO_WAIT_FOR)
         self._check_time_limit()
 
     def _check_time_limit(self) -> None:
@@ -84,19 +76,6 @@ class SystemOptions:
             raise SettingsError(
                 "deterministic mode takes no time limit for the full adjustment: what is reached "
                 "in a given time differs from run to run; leave the limit out"
-            )
-        limit = (
-            "full_adjustment_time_limit (--full-adjustment-time-limit) is of the full adjustment"
-        )
-        if not self.full_adjustment:
-            raise SettingsError(
-                f"{limit}, which is off; leave out the limit, or --no-full-adjustment "
-                "(full_adjustment=False)"
-            )
-        if not self.loop_closing:
-            raise SettingsError(
-                f"{limit} after a loop, and none is closed; leave out the limit, or "
-                "--no-loop-closing (loop_closing=False)"
             )
 
 

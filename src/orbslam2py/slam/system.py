@@ -509,7 +509,8 @@ class System:
         ----------
         path : str or path
             The file, by custom with the suffix ``.orbmap``. It appears under its name when all of
-            it has been written.
+            it has been written. That of `autosave` is brought up to date, which after a `reset` is
+            ``<name>-1.orbmap``: the map before stays.
 
         Raises
         ------

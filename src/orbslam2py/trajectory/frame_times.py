@@ -20,7 +20,7 @@ from orbslam2py.errors import DatasetError
 
 #: Whole numbers are nanoseconds if their typical step is longer than this as seconds (a day), or if
 #: one is later than this (the year 5138, counted from 1970).
-_LONGEST_STEP, _LATEST = 86400, 10**11
+_LONGEST_STEP, _LATEST = 86400, 10**17
 
 
 #: What the table of a run's frames begins with, in this version and in others.
@@ -99,8 +99,8 @@ def in_seconds(texts: Sequence[str]) -> list[str]:
     ----------
     texts
         The times of a list, finite numbers. They are taken for nanoseconds if all are whole and
-        make no sense as seconds: more than a day from one to the next, or thousands of years from
-        now.
+        make no sense as seconds: more than a day from one to the next, or as large as nanoseconds
+        since 1970 are.
     """
     if not all(text.isdecimal() for text in texts):
         return list(texts)

@@ -17,7 +17,7 @@ class NoNewThreads {
     if (pthread_getattr_default_np(&attributes) != 0) throw std::runtime_error("no attributes");
     pthread_attr_getstacksize(&attributes, &usual_);
     pthread_attr_destroy(&attributes);
-    set(std::size_t{1} << 46);
+    set(std::size_t{1} << 47);
   }
   ~NoNewThreads() { set(usual_); }
   NoNewThreads(const NoNewThreads&) = delete;

@@ -19,7 +19,13 @@ from orbslam2py.maps import (
     restore_contents,
     transform_map,
 )
-from orbslam2py.maps.edits.parts import map_numbers, put_back, put_together, take_map
+from orbslam2py.maps.edits.parts import (
+    crop_among_others,
+    map_numbers,
+    put_back,
+    put_together,
+    take_map,
+)
 from orbslam2py.trajectory import Similarity, Trajectory, write_tum
 from support.command_line import CommandLine
 from support.made_up_map import STEP, made_up_map
@@ -56,10 +62,21 @@ def sizes(saved: SavedMap) -> list[int]:
     return np.bincount(map_numbers(saved.contents.keyframes)).tolist()
 
 
+def edges_of(saved: SavedMap, number: int) -> np.ndarray:
+    """Both keyframes' places in their map, and the weight, of every edge of a map; (e, 3)."""
+    keyframes, edges = saved.contents.keyframes, saved.contents.covisibility
+    ids = keyframes.ids[map_numbers(keyframes) == number]
+    mine = np.isin(edges.a, ids)
+    rows = [np.searchsorted(ids, end[mine]) for end in (edges.a, edges.b)]
+    return np.stack([*rows, edges.weight[mine]], axis=1)
+
+
 def check_untouched(before: SavedMap, after: SavedMap, numbers: dict[int, int]) -> None:
     """Maps are in the file as they were, under new numbers."""
     for old, new in numbers.items():
         mine, theirs = take_map(before, old), take_map(after, new)
+        # Taking a map out counts its edges anew.
+        np.testing.assert_array_equal(edges_of(before, old), edges_of(after, new))
         # The numbers that the next ones will have are those of the whole file.
         assert map_differences(mine, theirs) == []
 
@@ -181,3 +198,17 @@ def test_the_number_must_be_told(command: CommandLine, tmp_path: Path) -> None:
         assert done.code == 2
         assert "holds 2 maps" in " ".join(done.err.split())
         assert not Path("b.orbmap").exists()
+
+
+def test_cropping_one_map_leaves_the_edges_of_others_as_they_were_counted() -> None:
+    """Weights are those of the last count, which may lie behind."""
+    saved = several(2)
+    edges = saved.contents.covisibility
+    older = replace(edges, weight=np.maximum(edges.weight - 1, 1))
+    saved = replace(saved, contents=replace(saved.contents, covisibility=older))
+    n = sizes(saved)[0]
+    cropped, number = crop_among_others(saved, 0, np.arange(n) < n - 1)
+    assert (number, sizes(cropped)) == (0, [n - 1, 7])
+    np.testing.assert_array_equal(edges_of(cropped, 1), edges_of(saved, 1))
+    assert not np.array_equal(edges_of(cropped, 0)[:, 2], edges_of(saved, 0)[:, 2])
+    check_invariants(cropped.contents)

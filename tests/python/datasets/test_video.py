@@ -55,7 +55,7 @@ def test_a_video_that_was_cut_off_is_told(
     cut.write_bytes(data[: int(share * len(data))])
     n = len(VideoSequence(cut, settings="tum1"))
     assert (n < 30) is told
-    warned = f"cut.avi promises 1.2 s, but ends after {n / 25:.1f} s ({n} frames)"
+    warned = f"cut.avi says it lasts 1.2 s, but its pictures end after {n / 25:.1f} s ({n} frames)"
     assert (warned in caplog.text) is told
 
 

@@ -17,6 +17,7 @@ from orbslam2py.evaluation import pose_error
 from orbslam2py.slam.local_mapping import LocalMapping
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.small_sequences import black, images, new_system, play, track
+from support.worker_steps import eventually
 
 pytestmark = pytest.mark.watchdog(60)
 
@@ -261,7 +262,9 @@ def test_reset_in_localization_mode(sensor: Sensor, deterministic: bool) -> None
         system.localization_mode = True
         play(system, 2, first=20)
         system.reset()
-        records = play(system, 5, first=22)
+        records = play(system, 1, first=22)
+        eventually(lambda: system.n_keyframes > 0)  # before, the mode is not in force
+        records += play(system, 4, first=23)
         assert system.localization_mode, "it is the user's choice"
         assert [r.map_index for r in records] == [1] * 5
         assert [r.state for r in records] == [TrackingState.OK] * 5

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 from orbslam2py import (
+    Callbacks,
+    KeyframeAdded,
     Reason,
     Sensor,
     StateError,
@@ -289,6 +291,45 @@ def test_optimize_refuses_what_it_cannot_do_and_goes_on(
             system.optimize(**arguments)
         assert system.optimize(map_index=0).map_index == 0
         assert track(system, 5).state is TrackingState.OK
+
+
+def test_a_callback_may_wait_for_another_thread_that_calls_the_system() -> None:
+    """Also in the deterministic mode, where it is called within a step."""
+    used: list[bool] = []
+
+    def refine(_: KeyframeAdded) -> None:
+        if system.n_keyframes == 3 and not used:
+            thread = threading.Thread(target=lambda: used.append(system.optimize().used))
+            thread.start()
+            thread.join()
+
+    heard: list[object] = []
+    callbacks = Callbacks(on_keyframe=refine, on_map_change=heard.append)
+    with new_system(Sensor.STEREO, deterministic=True, callbacks=callbacks) as system:
+        records = play(system, 30)
+        assert {record.state for record in records} == {TrackingState.OK}
+        assert system.check_map() == []
+    assert len(used) == 1
+    assert len(heard) == sum(used)
+
+
+def test_shutdown_in_another_thread_while_a_callback_lasts() -> None:
+    entered, leave = threading.Event(), threading.Event()
+
+    def last(_: KeyframeAdded) -> None:
+        entered.set()
+        assert leave.wait(20)
+
+    callbacks = Callbacks(on_keyframe=last)
+    system = new_system(Sensor.STEREO, deterministic=True, callbacks=callbacks)
+    thread = threading.Thread(target=play, args=(system, 1))
+    thread.start()
+    assert entered.wait(20)
+    with pytest.raises(WorkerError, match=r"did not end within 0\.1 s"):
+        system.shutdown(timeout=0.1)
+    leave.set()
+    thread.join(20)
+    system.shutdown(timeout=20)
 
 
 def test_optimize_in_another_thread_beside_a_deterministic_run() -> None:

@@ -102,7 +102,25 @@ def crop_among_others(
         points[mine] = kept_points
     cropped = crop_saved_map(saved, stay, points)
     left = map_numbers(cropped.contents.keyframes)
-    return cropped, int(left[numbers[stay] == number][0])
+    left_here = numbers[stay] == number
+    # The other maps' edges have been counted anew as well, and are to be as they were.
+    counted = _edges_among(cropped.contents.covisibility, cropped.contents.keyframes.ids[left_here])
+    before = _edges_among(contents.covisibility, contents.keyframes.ids[numbers != number])
+    old, new = contents.keyframes.ids[stay], cropped.contents.keyframes.ids
+    ends = [new[np.searchsorted(old, end)] for end in (before.a, before.b)]
+    a = np.concatenate([ends[0], counted.a])
+    b = np.concatenate([ends[1], counted.b])
+    order = np.lexsort((b, a))
+    weight = np.concatenate([before.weight, counted.weight])[order]
+    covisibility = Covisibility(a[order], b[order], weight)
+    whole = replace(cropped, contents=replace(cropped.contents, covisibility=covisibility))
+    return whole, int(left[left_here][0])
+
+
+def _edges_among(edges: Covisibility, keyframe_ids: IntArray) -> Covisibility:
+    """Those between some keyframes of one map, with the weights of their last count."""
+    chosen = np.isin(edges.a, keyframe_ids)
+    return Covisibility(edges.a[chosen], edges.b[chosen], edges.weight[chosen])
 
 
 def put_back(saved: SavedMap, number: int, edited: MapContents) -> SavedMap:

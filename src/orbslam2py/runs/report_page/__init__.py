@@ -12,7 +12,7 @@ from pathlib import Path
 from orbslam2py._files import atomic_write
 from orbslam2py.runs.report_page.comparison import Comparison, Row
 from orbslam2py.runs.report_page.comparison_page import comparison_page
-from orbslam2py.runs.report_page.page import PageKind, is_page, kind_of_page, run_page
+from orbslam2py.runs.report_page.page import PageKind, kind_of_page, run_page
 from orbslam2py.runs.report_page.run_folder import RunFolder, read_run
 
 __all__ = [
@@ -21,7 +21,6 @@ __all__ = [
     "Row",
     "RunFolder",
     "compare_runs",
-    "is_page",
     "kind_of_page",
     "read_run",
     "write_comparison",

@@ -89,11 +89,6 @@ def kind_of_page(path: Path) -> PageKind | None:
     return next((kind for title, kind in _OLD_TITLES if title.search(head)), PageKind.RUN)
 
 
-def is_page(path: Path) -> bool:
-    """Whether a file is a page that was made here, of whatever kind and version."""
-    return kind_of_page(path) is not None
-
-
 def whole_page(
     title: str,
     subtitle: str,

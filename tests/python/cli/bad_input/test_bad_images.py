@@ -89,10 +89,10 @@ def test_sizes_are_told_as_everywhere_and_with_the_file(command: CommandLine, rg
     done = run(command, rgbd)
     colour, beside = nth(rgbd / "rgb", 3), nth(rgbd / "rgb", 5)
     assert done.err.splitlines() == [
-        f"Warning: frame 3 skipped: {colour}: image has size 300x200, the first image had "
-        "320x240; give images of one size",
-        f"Warning: frame 5 skipped: {beside}: depth has size 300x200, the image 320x240; depth "
-        "must be registered to the image",
+        "Warning: frame 3 skipped: image has size 300x200, the first image had 320x240; give "
+        f"images of one size (it is {colour})",
+        "Warning: frame 5 skipped: depth has size 300x200, the image 320x240; depth must be "
+        f"registered to the image (it is {beside})",
     ]
     frames = Results(Path("r")).frames
     assert frames[5]["reason"].startswith("depth has size"), "equal ones are counted together"
