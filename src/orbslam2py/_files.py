@@ -130,6 +130,21 @@ def take_mode(place: Path, target: Path, more: int = 0) -> None:
         place.chmod(stat.S_IMODE(target.stat().st_mode) | more)
 
 
+@contextlib.contextmanager
+def failing_as(folder: Path, made: Path) -> Iterator[None]:
+    """Let what cannot be written be the folder that was asked for, not a file in the hidden one."""
+    try:
+        yield
+    except OSError as error:
+        place = None if error.filename is None else Path(str(error.filename))
+        if place is not None and place != made and made not in place.parents:
+            raise  # it is something that was to be read
+        is_full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+        remedy = f"{'make room, or ' if is_full else ''}give another folder"
+        message = f"cannot write to {folder}: {reason_of(error)}; {remedy}"
+        raise OSError(error.errno, message, str(folder)) from error
+
+
 def describe_error(error: BaseException) -> str:
     """Say what failed in words for people; of a file which, and why, without numbers."""
     if not isinstance(error, OSError):

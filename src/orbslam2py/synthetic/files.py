@@ -3,11 +3,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
-import errno
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
@@ -17,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbslam2py._arrays import FloatArray, IntArray
-from orbslam2py._files import atomic_folder, reason_of
+from orbslam2py._files import atomic_folder, failing_as
 from orbslam2py.datasets import Layout, Sequence
 from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.settings import CameraSettings, Sensor
@@ -111,7 +109,7 @@ def write_sequence(
         **{Layout(name): partial(_write_bag, name) for name in BAG_LAYOUTS},
     }
     _check_replaceable(folder, force=force)
-    with atomic_folder(folder) as temporary, _failing_as(folder):
+    with atomic_folder(folder) as temporary, failing_as(folder, temporary):
         writers[chosen](sequence, temporary, progress or (lambda done, total: None))
         about: dict[str, Any] = dataclasses.asdict(sequence.options) | {"layout": str(chosen)}
         about[_ENTRIES] = {entry.name: _n_files(entry) for entry in sorted(temporary.iterdir())}
@@ -250,18 +248,6 @@ def _sensor_yaml(sequence: WritableSequence, number: int) -> list[str]:
 
 
 # ---- files ---------------------------------------------------------------------------------------
-
-
-@contextlib.contextmanager
-def _failing_as(folder: Path) -> Iterator[None]:
-    """Let what cannot be written be the folder that was asked for, not files in a hidden one."""
-    try:
-        yield
-    except OSError as error:
-        is_full = error.errno in (errno.ENOSPC, errno.EDQUOT)
-        remedy = f"{'make room, or ' if is_full else ''}give another folder"
-        message = f"cannot write to {folder}: {reason_of(error)}; {remedy}"
-        raise OSError(error.errno, message, str(folder)) from error
 
 
 def _check_replaceable(folder: Path, *, force: bool) -> None:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import contextlib
-import errno
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,7 +12,7 @@ import numpy as np
 
 from orbslam2py._arguments import path_of
 from orbslam2py._arrays import ByteArray
-from orbslam2py._files import atomic_folder, atomic_write, reason_of
+from orbslam2py._files import atomic_folder, atomic_write, failing_as
 from orbslam2py.errors import DatasetError
 from orbslam2py.maps.contents import MapContents
 from orbslam2py.maps.exports.colours import ColourSampler
@@ -60,23 +59,8 @@ def export_folder(folder: str | Path, made_of: set[str], *, replace: bool) -> It
             f"{folder} holds other files ({min(held - made_of)}), which would be lost; give "
             "another folder"
         )
-    with atomic_folder(folder) as made, _failing_as(folder, made):
+    with atomic_folder(folder) as made, failing_as(folder, made):
         yield made
-
-
-@contextlib.contextmanager
-def _failing_as(folder: Path, made: Path) -> Iterator[None]:
-    """Let what cannot be written be the folder that was asked for, not a file in the hidden one."""
-    try:
-        yield
-    except OSError as error:
-        place = None if error.filename is None else Path(str(error.filename))
-        if place is not None and place != made and made not in place.parents:
-            raise  # it is something that was to be read
-        is_full = error.errno in (errno.ENOSPC, errno.EDQUOT)
-        remedy = f"{'make room, or ' if is_full else ''}give another folder"
-        message = f"cannot write to {folder}: {reason_of(error)}; {remedy}"
-        raise OSError(error.errno, message, str(folder)) from error
 
 
 def write_images(
