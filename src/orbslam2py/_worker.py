@@ -49,6 +49,8 @@ class Turn:
 
     def __exit__(self, *_: object) -> None:
         with self._condition:
+            if self.owner != threading.get_ident():
+                return  # lent, and a Ctrl-C came before it was back
             self._depth -= 1
             if self._depth == 0:
                 self.owner = None

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 from orbslam2py import StateError, WorkerError
-from orbslam2py._worker import Worker, WorkerState, take_turns
+from orbslam2py._worker import Turn, Worker, WorkerState, take_turns
 from support.worker_steps import NAME, failing
 
 pytestmark = pytest.mark.watchdog(10)
@@ -169,6 +169,31 @@ def test_callers_in_two_threads_take_turns() -> None:
     assert sorted(done) == list(range(900))
     assert first.idle
     assert second.idle
+
+
+def test_a_turn_that_is_interrupted_on_its_way_back_is_free(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    turn = Turn()
+
+    def interrupted(_: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt), turn, turn, turn.lent():
+        monkeypatch.setattr(turn, "_take", interrupted)
+    monkeypatch.undo()
+    assert turn.owner is None
+    owners: list[int | None] = []
+
+    def take() -> None:
+        with turn:
+            owners.append(turn.owner)
+
+    other = threading.Thread(target=take)
+    other.start()
+    other.join(5)
+    assert owners == [other.ident]
+    assert turn.owner is None
 
 
 class Elsewhere:
