@@ -23,66 +23,13 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Generic, TypeVar
 
 from orbslam2py import _core as core
+from orbslam2py._turn import Turn
 from orbslam2py._waiting import WAIT_SLICE
 from orbslam2py.errors import StateError, WorkerError
 
 _log = logging.getLogger(__name__)
 
 Job = TypeVar("Job")
-
-
-class Turn:
-    """Whose turn it is, among threads whose calls run steps inline; taken again within itself.
-
-    Who asks first comes first.
-    """
-
-    def __init__(self) -> None:
-        self._condition = threading.Condition()
-        self._waiting: deque[int] = deque()
-        self._depth = 0
-        #: The thread whose turn it is, None if it is nobody's.
-        self.owner: int | None = None
-
-    def __enter__(self) -> None:
-        self._take(1)
-
-    def __exit__(self, *_: object) -> None:
-        with self._condition:
-            if self.owner != threading.get_ident():
-                return  # lent, and a Ctrl-C came before it was back
-            self._depth -= 1
-            if self._depth == 0:
-                self.owner = None
-                self._condition.notify_all()
-
-    @contextlib.contextmanager
-    def lent(self) -> Iterator[None]:
-        """Entered by a step around code that is not ours, which may wait for other callers."""
-        me = threading.get_ident()
-        with self._condition:
-            depth = self._depth if self.owner == me else 0
-            if depth:
-                self._depth, self.owner = 0, None
-                self._condition.notify_all()
-        try:
-            yield
-        finally:
-            if depth:
-                self._take(depth)
-
-    def _take(self, depth: int) -> None:
-        me = threading.get_ident()
-        with self._condition:
-            if self.owner != me:
-                self._waiting.append(me)
-                try:
-                    while self.owner is not None or self._waiting[0] != me:
-                        self._condition.wait(WAIT_SLICE)
-                    self.owner = me
-                finally:
-                    self._waiting.remove(me)
-            self._depth += depth
 
 
 class WorkerState(enum.Enum):

@@ -10,7 +10,8 @@ from collections.abc import Iterator
 import pytest
 
 from orbslam2py import StateError, WorkerError
-from orbslam2py._worker import Turn, Worker, WorkerState, take_turns
+from orbslam2py._turn import Turn
+from orbslam2py._worker import Worker, WorkerState, take_turns
 from support.worker_steps import NAME, failing
 
 pytestmark = pytest.mark.watchdog(10)
