@@ -34,6 +34,8 @@ _WHAT_HELPS = {
     "wider lens; more time at one place before moving on",
     Reason.WEAK_EVIDENCE: "slower turns, higher frame rate, less blur; more features "
     "(ORBextractor.nFeatures), a wider lens",
+    Reason.MAP_CONTRADICTED: "begin a map with slow motion sideways, not with turns; the right "
+    "calibration",
     Reason.NOT_FOUND_IN_MAP: "come back to a place seen before, from a similar direction",
     Reason.SEVERAL_PLACES: "turn to something that is there only once, or stay until several "
     "images have been searched",

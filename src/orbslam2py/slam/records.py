@@ -46,6 +46,7 @@ class Reason(str, enum.Enum):
     FEW_MATCHES_REFERENCE = "too few matches with the reference keyframe"
     FEW_INLIERS_REFERENCE = "too few inliers from the reference keyframe"
     FEW_INLIERS_LOCAL_MAP = "too few inliers in the local map"
+    MAP_CONTRADICTED = "the images since the map began contradict it"
     WEAK_EVIDENCE = "the pose found explains too little of what should be seen"
 
     def __str__(self) -> str:

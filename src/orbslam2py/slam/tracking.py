@@ -213,7 +213,8 @@ class Tracking:
         if self.initializing:
             return self._begin_map(frame, timer)
         self._blurred = self._blur_watch.is_blurred(frame.features)
-        if self._is_small and not self._seeks_map:
+        young = self._is_small or self._initializer.watches_map
+        if young and not self._seeks_map:
             self._initializer.remember(frame)
         estimate = self._find_pose(frame, timer, localize)
         if estimate.found:
@@ -221,6 +222,14 @@ class Tracking:
         if not estimate.found:
             begun = self._begin_map_beside(frame, timer, localize=localize)
             return begun or self._lose(frame, estimate)
+        if localize:
+            self._initializer.believe_map()
+        elif not estimate.unconfirmed:
+            with timer("keyframe"):
+                wrong = self._initializer.contradicts(frame)
+            if wrong:
+                contradicted = estimate.failed(Reason.MAP_CONTRADICTED)
+                return self._lose(frame, contradicted, map_is_wrong=True)
 
         self.state = TrackingState.OK
         if not estimate.unconfirmed:
@@ -346,7 +355,9 @@ class Tracking:
         earlier = self._initializer.take_earlier()
         return TrackingOutcome(self.state, estimate, is_keyframe=True, earlier=earlier)
 
-    def _lose(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> TrackingOutcome:
+    def _lose(
+        self, frame: core.TrackedFrame, estimate: PoseEstimate, *, map_is_wrong: bool = False
+    ) -> TrackingOutcome:
         was_ok = self.state is TrackingState.OK
         self._loss.lost(frame.timestamp)
         if was_ok:
@@ -365,7 +376,7 @@ class Tracking:
         # Others are given up for one that begins. Under a hand none does, and the camera may be
         # found behind it; a blurred frame was not even searched.
         another = self._initializer.shows_enough(frame) and estimate.reason is not Reason.BLURRED
-        given_up = small and another
+        given_up = map_is_wrong or (small and another)
         return TrackingOutcome(self.state, estimate, reset_needed=given_up)
 
     def _stay(self, frame: core.TrackedFrame) -> None:

@@ -74,6 +74,18 @@ class DepthInitializer:
         """Nothing."""
         return []
 
+    @property
+    def watches_map(self) -> bool:
+        """False: depths tell where everything is."""
+        return False
+
+    def believe_map(self) -> None:
+        """It is believed from the beginning."""
+
+    def contradicts(self, frame: core.TrackedFrame) -> bool:
+        """False: depths tell where everything is."""
+        return False
+
     def restart(self, frames: list[core.Frame]) -> None:
         """Nothing is kept."""
 

@@ -14,7 +14,6 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py.slam.evidence.smear import Smear
-from orbslam2py.slam.front_end import intrinsics
 from orbslam2py.slam.initialization.earlier_frames import EarlierFrames
 from orbslam2py.slam.initialization.kept_views import KeptViews, View
 from orbslam2py.slam.initialization.several_views import SeveralViews
@@ -23,7 +22,9 @@ from orbslam2py.slam.initialization.third_view import (
     Motion,
     confirmed_motion,
     placed_matches,
+    reconstruct,
 )
+from orbslam2py.slam.initialization.young_map_watch import YoungMapWatch
 from orbslam2py.slam.local_mapping import LocalMapping
 from orbslam2py.slam.records import Reason
 from orbslam2py.slam.thresholds import InitializationThresholds
@@ -84,6 +85,7 @@ class MonocularInitializer:
         self._smear = smear
         self._limits = thresholds or InitializationThresholds()
         self._kept = KeptViews(self._limits)
+        self._watch = YoungMapWatch(self._limits, seed)
         self._earlier = earlier or EarlierFrames(None, None)
         self.reset()
 
@@ -93,6 +95,7 @@ class MonocularInitializer:
         self._drop_views()
 
     def _drop_views(self) -> None:
+        self._watch.end()
         self._kept.clear()
         self._history: deque[core.TrackedFrame] = deque(maxlen=self._limits.remembered_frames)
         self._n_waiting = 0
@@ -121,6 +124,22 @@ class MonocularInitializer:
             self._kept.follow(frame)
             if not self._smear.is_long(self._smear.length(frame)):
                 self._kept.keep_last()
+
+    @property
+    def watches_map(self) -> bool:
+        """Whether the map is so young that the next frame may contradict it."""
+        return self._watch.watching
+
+    def believe_map(self) -> None:
+        """No later frame contradicts the map."""
+        self._watch.end()
+
+    def contradicts(self, frame: core.TrackedFrame) -> bool:
+        """Whether this frame and those before it, tracked in a young map, prove it wrong."""
+        if not self._watch.watching:
+            return False
+        blurred = self._smear.is_long(self._smear.length(frame.features))
+        return self._watch.contradicted(frame, blurred=blurred)
 
     @property
     def feature_factor(self) -> int:
@@ -175,19 +194,10 @@ class MonocularInitializer:
         reason = Reason.LOW_PARALLAX
         candidates: list[Candidate] = []
         for view in self._tried_views():
-            result = core.reconstruct_two_views(
-                view.keypoints,
-                frame.features.keypoints,
-                view.matches,
-                intrinsics(frame.features.camera),
-                seed=self._seed,
-                # Each model takes about a millisecond: a busy machine starts a thread no sooner.
-                two_threads=False,
-            )
-            if result.success:
-                candidates.append(Candidate(view, (result,)))
-            elif result.alternatives:
-                candidates.append(Candidate(view, tuple(result.alternatives)))
+            result = reconstruct(view, frame.features, self._seed)
+            candidate = Candidate.of(view, result)
+            if candidate is not None:
+                candidates.append(candidate)
             if not result.success and reason is Reason.LOW_PARALLAX:
                 reason = _REASONS[result.outcome.name]
         for candidate in sorted(candidates, key=lambda candidate: -candidate.worth):
@@ -226,6 +236,7 @@ class MonocularInitializer:
         self._mapping.insert_keyframe(begun.first)
         self._mapping.insert_keyframe(begun.second)
         self._earlier.track(list(self._history), first)
+        self._watch.begin(second)
         self._kept.clear()
         self._n_waiting = 0
         self._last = self._shown = None

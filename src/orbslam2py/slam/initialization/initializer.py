@@ -17,10 +17,14 @@ class Initializer(Protocol):
     ----------
     feature_factor
         How many features the next frame needs, in multiples of the settings' number.
+    watches_map
+        Whether the map that has begun is so young that later frames may contradict it.
     """
 
     @property
     def feature_factor(self) -> int: ...  # noqa: D102
+    @property
+    def watches_map(self) -> bool: ...  # noqa: D102
 
     def reset(self) -> None:
         """Forget the frames before."""
@@ -51,6 +55,14 @@ class Initializer(Protocol):
 
     def remember(self, frame: core.TrackedFrame) -> None:
         """A frame that was tracked in a young map, which may yet come to nothing."""
+        ...
+
+    def contradicts(self, frame: core.TrackedFrame) -> bool:
+        """Whether this frame and those before it, tracked in a young map, prove it wrong."""
+        ...
+
+    def believe_map(self) -> None:
+        """No later frame contradicts the map that has begun."""
         ...
 
     def remembered(self) -> list[core.Frame]:

@@ -28,6 +28,7 @@ from orbslam2py.slam.initialization.third_view import (
     is_another_direction,
     other_views,
     pose_of_view,
+    reconstruct,
     squared_errors,
 )
 from orbslam2py.slam.thresholds import InitializationThresholds
@@ -145,15 +146,7 @@ class SeveralViews:
     def _drawn(self, motion: Motion, seed: int, draw: int) -> Sequence[Motion]:
         if draw == 0:
             return [motion]
-        view = self._view
-        result = core.reconstruct_two_views(
-            view.keypoints,
-            self._last.keypoints,
-            view.matches,
-            self._camera,
-            seed=seed + draw,
-            two_threads=False,  # the draws are what is done side by side
-        )
+        result = reconstruct(self._view, self._last, seed + draw)
         return [result] if result.success else result.alternatives
 
     # ---- adjustment ------------------------------------------------------------------------------

@@ -42,6 +42,13 @@ class Candidate:
     view: View
     motions: tuple[Motion, ...]
 
+    @staticmethod
+    def of(view: View, result: core.TwoViewResult) -> Candidate | None:
+        """What two views gave; None if they gave no motion."""
+        if result.success:
+            return Candidate(view, (result,))
+        return Candidate(view, tuple(result.alternatives)) if result.alternatives else None
+
     @property
     def is_clear(self) -> bool:
         """Whether two views are enough to tell the motion."""
@@ -55,6 +62,19 @@ class Candidate:
             * min(motion.parallax, _MOST_PARALLAX)
             for motion in self.motions
         )
+
+
+def reconstruct(view: View, last: core.Frame, seed: int) -> core.TwoViewResult:
+    """The motion from a view to the last frame, by the matches between the two alone."""
+    return core.reconstruct_two_views(
+        view.keypoints,
+        last.keypoints,
+        view.matches,
+        intrinsics(last.camera),
+        seed=seed,
+        # Each model takes about a millisecond: a busy machine starts a thread no sooner.
+        two_threads=False,
+    )
 
 
 def placed_matches(view: View, motion: Motion) -> Indices:

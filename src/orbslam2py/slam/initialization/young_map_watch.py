@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Whether the views since a single camera's map began contradict it.
+
+``docs/method/start.md#the-first-frames-of-a-map``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from orbslam2py import _core as core
+from orbslam2py.slam.initialization.kept_views import KeptViews, View
+from orbslam2py.slam.initialization.several_views import SeveralViews
+from orbslam2py.slam.initialization.third_view import Candidate, confirmed_motion, reconstruct
+from orbslam2py.slam.thresholds import InitializationThresholds
+
+
+class YoungMapWatch:
+    """Finds the motion between views of a young map once more, without the map, and compares.
+
+    What a map begins with may be wrong, or be bent by the first adjustments, and yet explain its
+    own frames: their poses and the points are fitted to each other. Matches between the images
+    know nothing of the points.
+
+    Parameters
+    ----------
+    limits : InitializationThresholds
+        Limits.
+    seed : int
+        Of the draws.
+    """
+
+    def __init__(self, limits: InitializationThresholds, seed: int) -> None:
+        self._limits = limits
+        self._seed = seed
+        self._kept = KeptViews(limits)
+        # Maps in a row that came to nothing by this; where all do, the watch must be what is wrong.
+        self._n_contradicted = 0
+        self.end()
+
+    def begin(self, frame: core.TrackedFrame) -> None:
+        """Watch the map that has begun with a frame."""
+        self.end()
+        self._watching = self._n_contradicted < self._limits.contradicted_maps
+        if self._watching:
+            self._map_index = frame.map_index
+            self._follow(frame)
+            self._kept.keep_last()
+
+    def end(self) -> None:
+        """Watch no longer."""
+        self._watching = False
+        self._map_index = -1
+        self._n_frames = self._n_agreeing = self._n_contradicting = 0
+        self._poses: dict[int, core.Pose] = {}
+        self._kept.clear()
+
+    @property
+    def watching(self) -> bool:
+        """Whether the next frame may contradict the map."""
+        return self._watching
+
+    def contradicted(self, frame: core.TrackedFrame, *, blurred: bool) -> bool:
+        """Compare a frame that was tracked in the map; whether the map must be wrong by now.
+
+        Parameters
+        ----------
+        frame
+            With its pose.
+        blurred
+            It is matched, to follow the image, but says nothing.
+        """
+        if self._watching and frame.map_index != self._map_index:
+            self.end()
+        if not self._watching:
+            return False
+        self._follow(frame)
+        if not blurred:
+            self._compare(frame)
+            self._kept.keep_last()
+        limits = self._limits
+        self._n_frames += 1
+        contradicted = self._n_contradicting >= limits.contradictions
+        if contradicted:
+            self._n_contradicted += 1
+        elif self._n_agreeing >= limits.agreements or self._n_frames >= limits.watched_frames:
+            self._n_contradicted = 0
+        else:
+            return False
+        self.end()
+        return contradicted
+
+    def _follow(self, frame: core.TrackedFrame) -> None:
+        assert frame.T_cw is not None
+        self._kept.follow(frame.features)
+        self._poses[frame.id] = frame.T_cw
+
+    def _compare(self, frame: core.TrackedFrame) -> None:
+        apart = self._degrees_apart(frame)
+        if apart is None:
+            return
+        self._n_contradicting += apart > self._limits.contradicting_direction
+        self._n_agreeing += apart < self._limits.other_direction
+
+    def _degrees_apart(self, frame: core.TrackedFrame) -> float | None:
+        """Between the ways that map and images say it went; None if the images do not say."""
+        limits = self._limits
+        view = max(self._kept.views, key=lambda view: view.displacement, default=None)
+        if view is None or view.displacement < limits.displacement:
+            return None
+        by_images = self._motion_since(view, frame.features)
+        if by_images is None:
+            return None
+        assert frame.T_cw is not None
+        by_map = (frame.T_cw @ self._poses[view.frame.id].inverse()).translation
+        length = float(np.linalg.norm(by_map))
+        if length == 0:
+            return None
+        cosine = float(by_map @ by_images.T_21.translation) / length
+        return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+
+    def _motion_since(self, view: View, last: core.Frame) -> core.TwoViewMotion | None:
+        candidate = Candidate.of(view, reconstruct(view, last, self._seed))
+        if candidate is None:
+            return None
+        motion = confirmed_motion(candidate, self._kept.views, last, self._limits)
+        if motion is None:
+            return None
+        together = SeveralViews(candidate, self._kept.views, last, self._limits)
+        return together.best_motion(motion, self._seed)
