@@ -6,10 +6,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from orbslam2py import _core as core
-from orbslam2py.slam.initialization.kept_views import KeptViews, View
+from orbslam2py._arrays import FloatArray
+from orbslam2py.slam.initialization.kept_views import KeptViews
 from orbslam2py.slam.initialization.several_views import SeveralViews
 from orbslam2py.slam.initialization.third_view import Candidate, confirmed_motion, reconstruct
 from orbslam2py.slam.thresholds import InitializationThresholds
@@ -108,23 +111,27 @@ class YoungMapWatch:
         view = max(self._kept.views, key=lambda view: view.displacement, default=None)
         if view is None or view.displacement < limits.displacement:
             return None
-        by_images = self._motion_since(view, frame.features)
-        if by_images is None:
-            return None
         assert frame.T_cw is not None
         by_map = (frame.T_cw @ self._poses[view.frame.id].inverse()).translation
-        length = float(np.linalg.norm(by_map))
-        if length == 0:
-            return None
-        cosine = float(by_map @ by_images.T_21.translation) / length
-        return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
-
-    def _motion_since(self, view: View, last: core.Frame) -> core.TwoViewMotion | None:
+        last = frame.features
         candidate = Candidate.of(view, reconstruct(view, last, self._seed))
         if candidate is None:
             return None
-        motion = confirmed_motion(candidate, self._kept.views, last, self._limits)
+        motion = confirmed_motion(candidate, self._kept.views, last, limits)
         if motion is None:
             return None
-        together = SeveralViews(candidate, self._kept.views, last, self._limits)
-        return together.best_motion(motion, self._seed)
+        apart = _degrees_between(by_map, motion.T_21.translation)
+        if apart < limits.other_direction:
+            return apart
+        # To speak against a map takes more than a draw that a third view agrees with.
+        together = SeveralViews(candidate, self._kept.views, last, limits)
+        best = together.best_motion(motion, self._seed)
+        return None if best is None else _degrees_between(by_map, best.T_21.translation)
+
+
+def _degrees_between(way: FloatArray, other: FloatArray) -> float:
+    """The angle between two directions; not a number if one has no length."""
+    lengths = float(np.linalg.norm(way) * np.linalg.norm(other))
+    if lengths == 0:
+        return math.nan
+    return math.degrees(math.acos(np.clip(way @ other / lengths, -1.0, 1.0)))
