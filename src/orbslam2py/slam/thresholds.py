@@ -84,15 +84,17 @@ class InitializationThresholds:
     """So many frames are remembered, to be tracked in the map once it has begun ..."""
     followed_again: int = 20
     """... and so many of the last of them serve a new beginning, if the map came to nothing."""
-    watched_frames: int = 30
+    watched_frames: int = 60
     """In so many frames after a single camera's map began it is compared with what their matches
     say without it. If ..."""
-    contradictions: int = 3
-    """... so many times the camera's way ..."""
-    contradicting_direction: float = 45.0
-    """... differs by more than so many degrees, the map is given up; if it differs ..."""
     agreements: int = 2
-    """... so many times by less than `other_direction`, it is believed."""
+    """... so many times the camera's way differs ..."""
+    agreeing_direction: float = 15.0
+    """... by less than so many degrees, the map is believed; if it does ..."""
+    contradictions: int = 3
+    """... so many times ..."""
+    contradicting_direction: float = 35.0
+    """... by more than so many, it is given up."""
     contradicted_maps: int = 3
     """After so many maps in a row that came to nothing by this, the next is not compared."""
     settled_map: int = 10

@@ -31,7 +31,7 @@ from support.small_sequences import ate, new_system, play, track
 pytestmark = pytest.mark.watchdog(120)
 
 LIMITS = InitializationThresholds()
-_N_FRAMES = 36
+_N_FRAMES = 70
 
 
 class Walk:
@@ -109,7 +109,7 @@ def test_a_wrong_map_is_contradicted(walk: Walk, degrees: float) -> None:
 
 
 def test_a_map_that_is_somewhat_bent_is_neither(walk: Walk) -> None:
-    frames = walk.tracked(37)
+    frames = walk.tracked(25)
     watch = watch_of(frames)
     assert shown(watch, frames[1:]) == (LIMITS.watched_frames, False)
     assert not watch.watching

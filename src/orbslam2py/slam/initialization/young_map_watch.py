@@ -103,7 +103,7 @@ class YoungMapWatch:
         if apart is None:
             return
         self._n_contradicting += apart > self._limits.contradicting_direction
-        self._n_agreeing += apart < self._limits.other_direction
+        self._n_agreeing += apart < self._limits.agreeing_direction
 
     def _degrees_apart(self, frame: core.TrackedFrame) -> float | None:
         """Between the ways that map and images say it went; None if the images do not say."""
@@ -121,7 +121,7 @@ class YoungMapWatch:
         if motion is None:
             return None
         apart = _degrees_between(by_map, motion.T_21.translation)
-        if apart < limits.other_direction:
+        if apart < limits.agreeing_direction:
             return apart
         # To speak against a map takes more than a draw that a third view agrees with.
         together = SeveralViews(candidate, self._kept.views, last, limits)
