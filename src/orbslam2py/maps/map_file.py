@@ -117,9 +117,11 @@ class MapFile:
     def _opened(self) -> Iterator[MapTables]:
         with opened(self.source) as (connection, tables):
             totals = connection.execute("SELECT name, rows, checksum FROM totals").fetchall()
-            if totals != self._totals:
-                raise MapFileError("another program has changed it since it was opened")
-            yield MapTables(connection, tables)
+            if totals == self._totals:
+                yield MapTables(connection, tables)
+                return
+        # Not within the block, where whatever is wrong is said to be damage.
+        raise MapFileError(f"{self.source} was changed since it was opened; open it again")
 
 
 def save_map(saved: SavedMap, path: str | os.PathLike[str]) -> None:
