@@ -26,6 +26,8 @@ from orbslam2py.slam.front_end import FrontEnd
 from orbslam2py.slam.initialization.young_map_watch import YoungMapWatch
 from orbslam2py.slam.thresholds import InitializationThresholds
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+from support.cut_sequences import corridor, cut, settings_of
+from support.cut_sequences import track as track_all
 from support.small_sequences import ate, new_system, play, track
 
 pytestmark = pytest.mark.watchdog(120)
@@ -224,3 +226,23 @@ def test_a_wrong_start_of_a_real_camera_is_replaced(first: int, shared_data: Pat
         path = system.trajectory()
     figures = evaluate_trajectory(path.select(~path.lost), truth, Alignment.SIM3)
     assert figures.as_dict()["ate_rmse_m"] < 0.04
+
+
+def test_one_that_began_beside_another_leaves_that_as_it_was(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def apart(watch: YoungMapWatch, frame: core.TrackedFrame) -> float:
+        return 90.0 if frame.map_index == 1 else 0.0
+
+    monkeypatch.setattr(YoungMapWatch, "_degrees_apart", apart)
+    sequence = cut(corridor("mono"), range(80), 60, range(200, 300))
+    with System(settings_of(sequence), "mono", deterministic=True) as system:
+        records = track_all(system, sequence)
+        assert [r.reason for r in records].count(Reason.MAP_CONTRADICTED) == 1
+        first, given_up, last = system.trajectories()
+        assert not first.lost[:80].any()
+        # The frames that the wrong map held are in the next one as well.
+        assert set(given_up.timestamps) <= set(last.timestamps)
+        assert (~last.lost).sum() > 90
+        assert [there.map_index for there in system.maps] == [0, 2]
+        assert system.check_map() == []
