@@ -119,7 +119,7 @@ class BackEnd:
         self.map.clear()
         self.events.post(MapChanged(ended, MapChangeCause.RESET))
 
-    def drop_map(self, map_index: int, timeout: float, *, keep: Callable[[int], None]) -> None:
+    def drop_map(self, map_index: int, timeout: float, *, keep: Callable[[int], None]) -> bool:
         """Drop the active map alone: the youngest of the others becomes the active one.
 
         Parameters
@@ -131,6 +131,11 @@ class BackEnd:
         keep : callable
             Called with its number when nobody works on it any more, before it is dropped.
 
+        Returns
+        -------
+        bool
+            Whether it was dropped.
+
         Raises
         ------
         WorkerError
@@ -141,11 +146,13 @@ class BackEnd:
             if not worker.wait_until_idle(timeout):
                 raise WorkerError(f"{worker.name} did not end its work within {timeout} s")
         if self.map.active_map != map_index:
-            return
-        keep(map_index)
-        for keyframe in self.map.erase_map(map_index).tolist():
-            self.keyframe_index.erase(keyframe)
+            return False
+        with self.adjustment.kept_away():
+            keep(map_index)
+            for keyframe in self.map.erase_map(map_index).tolist():
+                self.keyframe_index.erase(keyframe)
         self.events.post(MapChanged(map_index, MapChangeCause.RESET))
+        return True
 
     def wait_until_idle(self, timeout: float | None, *, close_loop: bool = False) -> bool:
         """Wait until every worker is idle.

@@ -236,14 +236,14 @@ class Pipeline:
             self.recorder.look_again()
 
     def _keep(self, frame: core.TrackedFrame, outcome: TrackingOutcome) -> None:
-        if outcome.reset_needed:
+        if outcome.given_up is not None:
             reason = outcome.estimate.reason
             self._start_failed = reason is Reason.INITIAL_MAP_FAILED
             if reason is Reason.MAP_CONTRADICTED:
                 _log.info("%s; starting a new map", reason)
             elif not self._start_failed:
                 _log.info("lost soon after initialization; starting a new map")
-            self._given_up = self.back_end.map.active_map
+            self._given_up = outcome.given_up
         elif outcome.state in (TrackingState.OK, TrackingState.LOST):
             evidence = outcome.estimate.evidence
             if outcome.earlier:
@@ -315,43 +315,50 @@ class Pipeline:
 
     # ---- a new map -------------------------------------------------------------------------------
     def _reset(self) -> None:
-        _log.info("resetting: map %d ends", self.back_end.map.active_map)
         # Cleared first: a reset that is asked for while this one is carried out is another one.
         asked = self.reset_requested.is_set()
         self.reset_requested.clear()
         try:
             if asked or self._given_up is None:
                 self._forget_all()
+                ended = True
             else:
-                self._give_up(self._given_up)
+                ended = self._give_up(self._given_up)
         except BaseException:
             if asked:
                 self.reset_requested.set()
             raise
         self._given_up = None
         # A map that never began was not given up.
-        self.n_resets += not self._start_failed
+        self.n_resets += ended and not self._start_failed
         self._start_failed = False
 
     def _forget_all(self) -> None:
+        _log.info("resetting: map %d ends", self.back_end.map.active_map)
         self.back_end.reset(RESET_PATIENCE, keep=self.recorder.end_maps)
         self.tracking.reset()
         self.front_end.reset()
         self._next_frame_id = 0
         self._last_timestamp = -math.inf
 
-    def _give_up(self, map_index: int) -> None:
+    def _give_up(self, map_index: int) -> bool:
+        """End a map; False if it has become part of another one meanwhile."""
         slam_map = self.back_end.map
         if len(slam_map.maps) > 1 or slam_map.active_map != map_index:
-            self.back_end.drop_map(map_index, RESET_PATIENCE, keep=self.recorder.end_map)
+            keep = self.recorder.end_map
+            if not self.back_end.drop_map(map_index, RESET_PATIENCE, keep=keep):
+                return False
+            _log.info("map %d ends", map_index)
             self.tracking.go_back()
         elif self._sensor.has_depth:
             # Depths begin a map with one frame.
             self._forget_all()
         else:
             # One camera's frames from before serve again.
+            _log.info("map %d ends", map_index)
             self.back_end.reset(RESET_PATIENCE, keep=self.recorder.end_maps)
             self.tracking.restart()
+        return True
 
 
 def _make_search(

@@ -46,8 +46,8 @@ class Reason(str, enum.Enum):
     FEW_MATCHES_REFERENCE = "too few matches with the reference keyframe"
     FEW_INLIERS_REFERENCE = "too few inliers from the reference keyframe"
     FEW_INLIERS_LOCAL_MAP = "too few inliers in the local map"
-    MAP_CONTRADICTED = "the images since the map began contradict it"
     WEAK_EVIDENCE = "the pose found explains too little of what should be seen"
+    MAP_CONTRADICTED = "the images since the map began contradict it"
 
     def __str__(self) -> str:
         return self.value
@@ -260,8 +260,8 @@ class TrackingOutcome:
     state: TrackingState
     estimate: PoseEstimate
     is_keyframe: bool = False
-    reset_needed: bool = False
-    """The map was lost so soon that it is better to begin another one."""
+    given_up: int | None = None
+    """Number of a map that was lost so soon, or is so wrong, that it is better to begin another."""
     earlier: tuple[core.TrackedFrame, ...] = ()
     """Frames before this one that have found their poses now that there is a map, in order."""
     inliers: npt.NDArray[np.bool_] | None = None

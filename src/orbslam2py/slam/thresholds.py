@@ -96,7 +96,7 @@ class InitializationThresholds:
     contradicting_direction: float = 35.0
     """... by more than so many, it is given up."""
     contradicted_maps: int = 3
-    """After so many maps in a row that came to nothing by this, the next is not compared."""
+    """After so many maps in a row that came to nothing by this, one is not compared."""
     settled_map: int = 10
     """With more keyframes than this a map has settled: bundle adjustment has moved its first
     points, and its first frames are looked at again ..."""

@@ -93,7 +93,7 @@ class Tracking:
     def restart(self) -> None:
         """Forget a map that came to nothing, but not the frames that a new one may begin from."""
         frames = self._initializer.remembered()
-        self.reset()
+        self._forget_maps()
         if frames:
             # The count of the frames goes on, and the next map is young as well.
             self._search.last_relocalization = frames[-1].id
@@ -103,6 +103,10 @@ class Tracking:
 
     def reset(self) -> None:
         """Forget the map's past; the map itself is cleared by the pipeline."""
+        self._forget_maps()
+        self._initializer.reset()
+
+    def _forget_maps(self) -> None:
         self.state = TrackingState.NO_IMAGES_YET
         self._since_keyframe = SinceKeyframe()
         # Maps that were loaded, and those that localization mode has been on in.
@@ -112,7 +116,6 @@ class Tracking:
         self._search.reset()
         self._belief.reset()
         self._in_fixed_map.reset()
-        self._initializer.reset()
         self._blur_watch.reset()
         self._confirmation.reset()
         # A frame found again that becomes a keyframe with the next one.
@@ -222,14 +225,12 @@ class Tracking:
         if not estimate.found:
             begun = self._begin_map_beside(frame, timer, localize=localize)
             return begun or self._lose(frame, estimate)
-        if localize:
-            self._initializer.believe_map()
-        elif not estimate.unconfirmed:
+        if not (localize or estimate.unconfirmed):
             with timer("keyframe"):
-                wrong = self._initializer.contradicts(frame)
-            if wrong:
+                wrong = self._wrong_map(frame)
+            if wrong is not None:
                 contradicted = estimate.failed(Reason.MAP_CONTRADICTED)
-                return self._lose(frame, contradicted, map_is_wrong=True)
+                return self._lose(frame, contradicted, wrong_map=wrong)
 
         self.state = TrackingState.OK
         if not estimate.unconfirmed:
@@ -270,6 +271,7 @@ class Tracking:
         strategy: FirstEstimate = self._in_growing_map
         if localize:
             self._kept_maps.add(self._map.active_map)
+            self._initializer.believe_map()
             strategy = self._in_fixed_map
         self._search.map_is_fixed = localize
         with timer("predict"):
@@ -311,7 +313,8 @@ class Tracking:
             reason = self._initializer.try_initialize(frame)
         if reason is not Reason.NONE:
             spoilt = reason is Reason.INITIAL_MAP_FAILED
-            return TrackingOutcome(self.state, PoseEstimate(reason), reset_needed=spoilt)
+            given_up = self._map.active_map if spoilt else None
+            return TrackingOutcome(self.state, PoseEstimate(reason), given_up=given_up)
         return self._map_begun(frame)
 
     def _begin_map_beside(
@@ -329,7 +332,8 @@ class Tracking:
         with timer("keyframe"):
             reason = self._initializer.try_initialize(frame)
         if reason is Reason.INITIAL_MAP_FAILED:
-            return TrackingOutcome(self.state, PoseEstimate(reason), reset_needed=True)
+            spoilt = self._map.active_map
+            return TrackingOutcome(self.state, PoseEstimate(reason), given_up=spoilt)
         if reason is not Reason.NONE:
             return None
         self._leave_map()
@@ -355,8 +359,15 @@ class Tracking:
         earlier = self._initializer.take_earlier()
         return TrackingOutcome(self.state, estimate, is_keyframe=True, earlier=earlier)
 
+    def _wrong_map(self, frame: core.TrackedFrame) -> int | None:
+        """The number of a map that the images contradict by now."""
+        there = frame.map_index
+        contradicted = self._initializer.contradicts(frame)
+        # While they were compared loop closing may have joined it to another map.
+        return there if contradicted and self._map.active_map == there else None
+
     def _lose(
-        self, frame: core.TrackedFrame, estimate: PoseEstimate, *, map_is_wrong: bool = False
+        self, frame: core.TrackedFrame, estimate: PoseEstimate, *, wrong_map: int | None = None
     ) -> TrackingOutcome:
         was_ok = self.state is TrackingState.OK
         self._loss.lost(frame.timestamp)
@@ -372,12 +383,13 @@ class Tracking:
         frame.clear_associations()
         frame.T_cw = None
         # A map that was loaded, or used for localization, is the user's, however small.
-        small = self._is_small and self._map.active_map not in self._kept_maps
+        active = self._map.active_map
+        small = self._is_small and active not in self._kept_maps
         # Others are given up for one that begins. Under a hand none does, and the camera may be
         # found behind it; a blurred frame was not even searched.
         another = self._initializer.shows_enough(frame) and estimate.reason is not Reason.BLURRED
-        given_up = map_is_wrong or (small and another)
-        return TrackingOutcome(self.state, estimate, reset_needed=given_up)
+        given_up = active if small and another else wrong_map
+        return TrackingOutcome(self.state, estimate, given_up=given_up)
 
     def _stay(self, frame: core.TrackedFrame) -> None:
         """Go on in the map that a frame was found in, which may have rested."""

@@ -59,6 +59,14 @@ def core(monkeypatch: pytest.MonkeyPatch) -> FakeCore:
 
 
 @pytest.fixture
+def single(core: FakeCore) -> Scene:
+    """One camera whose map begins with image 0."""
+    scene = Scene(Sensor.MONOCULAR, core)
+    scene.run(2)
+    return scene
+
+
+@pytest.fixture
 def scene(core: FakeCore, sensor: Sensor) -> Scene:
     """A tracker among fakes."""
     return Scene(sensor, core)

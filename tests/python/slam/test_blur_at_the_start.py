@@ -20,14 +20,6 @@ SHARP, BLURRED = 1.4, 0.5  # fine detail; the latter is a smear of 22 pixels
 YOUNG = EvidenceThresholds().young_map
 
 
-@pytest.fixture
-def single(core: FakeCore) -> Scene:
-    """One camera whose map begins with image 0."""
-    scene = Scene(Sensor.MONOCULAR, core)
-    scene.run(2)
-    return scene
-
-
 def track_blurred(scene: Scene, frame_id: int | None = None) -> TrackingOutcome:
     scene.core.fine_detail_of_images = BLURRED
     outcome = scene.track(frame_id)

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +17,17 @@ from support.cut_sequences import FPS, Cut, corridor, cut, settings_of, track
 #: A lap is 376 frames. The camera is covered for three seconds and set down elsewhere; after a
 #: while it comes to where it began.
 KIDNAPPED = range(100), 60, range(250, 450)
+
+
+@dataclass
+class _Followed:
+    """A commit that says that one keyframe was only moved along."""
+
+    made: Any
+    n_followed_keyframes: int = 1
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.made, name)
 
 
 @dataclass
@@ -175,8 +188,47 @@ def test_a_map_that_became_part_of_another_is_not_dropped() -> None:
         track(slam, sequence)
         back_end = slam.pipeline.back_end
         n_keyframes = back_end.map.n_keyframes
-        back_end.drop_map(1, 5.0, keep=lambda _: pytest.fail("the map was ended"))
+        keep = lambda _: pytest.fail("the map was ended")  # noqa: E731
+        assert not back_end.drop_map(1, 5.0, keep=keep)
         assert back_end.map.n_keyframes == n_keyframes > 0
+        # Nor does the next image, if that map was to be given up.
+        n_frames = len(slam.trajectory())
+        slam.pipeline._given_up = 1
+        image = sequence.load(29)
+        record = slam.track_rgbd(image.image, image.depth, 30 / FPS)
+        assert record.state is orb.TrackingState.OK
+        assert slam.n_resets == 0
+        assert len(slam.trajectory()) == n_frames + 1
+
+
+def test_a_map_is_dropped_when_an_adjustment_of_it_has_ended() -> None:
+    sequence = cut(corridor("rgbd"), range(30))
+    with orb.System(settings_of(sequence), "rgbd") as slam:
+        track(slam, sequence)
+        assert slam.wait_until_idle(20)
+        back_end = slam.pipeline.back_end
+        adjustment = back_end.adjustment
+        refining, dropped = threading.Event(), threading.Event()
+        refine = adjustment._refine_newest
+
+        def slowly(*arguments: Any) -> None:
+            refining.set()
+            assert not dropped.wait(0.3), "while it was at work"
+            refine(*arguments)
+
+        adjustment._refine_newest = slowly  # type: ignore[method-assign]
+        # As if a keyframe had been made meanwhile.
+        commit = orb._core.commit_full_bundle
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(orb._core, "commit_full_bundle", lambda *a: _Followed(commit(*a)))
+            thread = threading.Thread(target=slam.optimize)
+            thread.start()
+            assert refining.wait(20)
+            assert back_end.drop_map(0, 20.0, keep=slam.pipeline.recorder.end_map)
+            dropped.set()
+            thread.join(20)
+        assert back_end.map.n_keyframes == 0
+        adjustment.worker.raise_if_failed()
 
 
 def test_patience_is_a_setting() -> None:

@@ -22,7 +22,7 @@ def test_lost(scene: Scene) -> None:
     assert outcome.estimate.reason is Reason.FEW_MATCHES_REFERENCE
     assert scene.last.T_cw is None, "a lost frame has no pose"
     assert scene.last.n_cleared > 0
-    assert not outcome.reset_needed
+    assert outcome.given_up is None
     assert not outcome.is_keyframe
 
 
@@ -38,7 +38,7 @@ def test_no_pose_when_the_local_map_fails(scene: Scene) -> None:
 def test_a_small_map_is_given_up(scene: Scene, n_keyframes: int, reset: bool) -> None:
     scene.run(3)
     scene.map.n_keyframes = n_keyframes
-    assert lose(scene).reset_needed == reset
+    assert (lose(scene).given_up is not None) == reset
 
 
 def test_a_small_map_is_kept_in_the_dark_and_given_up_in_the_light(scene: Scene) -> None:
@@ -55,8 +55,8 @@ def test_a_small_map_is_kept_in_the_dark_and_given_up_in_the_light(scene: Scene)
     for _ in range(4):
         outcome = look(n_keypoints=20)
         assert outcome.state is TrackingState.LOST
-        assert not outcome.reset_needed, "no map begins in the dark"
-    assert look(n_keypoints=1000).reset_needed
+        assert outcome.given_up is None, "no map begins in the dark"
+    assert look(n_keypoints=1000).given_up is not None
 
 
 def test_a_small_map_that_shows_again_after_the_dark_goes_on(scene: Scene) -> None:
@@ -66,12 +66,12 @@ def test_a_small_map_that_shows_again_after_the_dark_goes_on(scene: Scene) -> No
     scene.core.words.append(0)
     features = FakeFrame(3).features
     features.size = 20
-    assert not scene.track(features=features).reset_needed
+    assert scene.track(features=features).given_up is None
     scene.core.motion.clear()
     scene.core.words.clear()
     outcome = scene.track()
     assert outcome.state is TrackingState.OK
-    assert not outcome.reset_needed
+    assert outcome.given_up is None
 
 
 def test_a_small_map_that_was_used_for_localization_is_kept(scene: Scene) -> None:
@@ -80,9 +80,9 @@ def test_a_small_map_that_was_used_for_localization_is_kept(scene: Scene) -> Non
     scene.map.n_keyframes = 3
     scene.localize = True
     scene.core.motion.extend([0, 0])
-    assert not scene.track().reset_needed
+    assert scene.track().given_up is None
     scene.localize = False
-    assert not lose(scene).reset_needed, "the map is the user's, also after the mode"
+    assert lose(scene).given_up is None, "the map is the user's, also after the mode"
 
 
 @pytest.mark.parametrize(("inliers", "found"), [(49, False), (50, True)])

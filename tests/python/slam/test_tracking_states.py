@@ -33,7 +33,7 @@ def test_waits_for_a_frame_that_can_begin_a_map(scene: Scene) -> None:
         assert outcome.state is scene.tracking.state is TrackingState.NOT_INITIALIZED
         assert outcome.estimate.reason is Reason.TOO_FEW_KEYPOINTS
         assert not outcome.is_keyframe
-        assert not outcome.reset_needed
+        assert outcome.given_up is None
     outcome = scene.track()
     assert outcome.state is scene.tracking.state is TrackingState.OK
     assert outcome.is_keyframe

@@ -90,8 +90,9 @@ class MonocularInitializer:
         self.reset()
 
     def reset(self) -> None:
-        """Drop all views, and how sharp the camera's images were."""
+        """Drop all views, how sharp the camera's images were, and what became of earlier maps."""
         self._smear.reset()
+        self._watch.reset()
         self._drop_views()
 
     def _drop_views(self) -> None:
@@ -113,9 +114,9 @@ class MonocularInitializer:
     def restart(self, frames: list[core.Frame]) -> None:
         """Begin anew, with the views of the last moments of an earlier attempt."""
         self._drop_views()
-        if not self._smear.knows_images:  # after a reset
-            for frame in frames:
-                self._smear.see(frame)
+        # Those that were tracked in a map are not among the images known.
+        for frame in frames:
+            self._smear.see(frame)
         # Their poses were those in the map that is gone.
         self._history.extend(core.TrackedFrame(frame) for frame in frames)
         for frame in frames[-self._limits.followed_again :]:

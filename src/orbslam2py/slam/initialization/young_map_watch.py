@@ -37,18 +37,24 @@ class YoungMapWatch:
         self._limits = limits
         self._seed = seed
         self._kept = KeptViews(limits)
+        self.reset()
+
+    def reset(self) -> None:
+        """Watch no longer, and forget what became of the maps before."""
         # Maps in a row that came to nothing by this; where all do, the watch must be what is wrong.
         self._n_contradicted = 0
         self.end()
 
     def begin(self, frame: core.TrackedFrame) -> None:
-        """Watch the map that has begun with a frame."""
+        """Watch the map that has begun with a frame, unless all before were contradicted."""
         self.end()
-        self._watching = self._n_contradicted < self._limits.contradicted_maps
-        if self._watching:
-            self._map_index = frame.map_index
-            self._follow(frame)
-            self._kept.keep_last()
+        if self._n_contradicted == self._limits.contradicted_maps:
+            self._n_contradicted = 0
+            return
+        self._watching = True
+        self._map_index = frame.map_index
+        self._follow(frame)
+        self._kept.keep_last()
 
     def end(self) -> None:
         """Watch no longer."""
@@ -113,6 +119,8 @@ class YoungMapWatch:
             return None
         assert frame.T_cw is not None
         by_map = (frame.T_cw @ self._poses[view.frame.id].inverse()).translation
+        if not by_map.any():
+            return None
         last = frame.features
         candidate = Candidate.of(view, reconstruct(view, last, self._seed))
         if candidate is None:
@@ -130,8 +138,5 @@ class YoungMapWatch:
 
 
 def _degrees_between(way: FloatArray, other: FloatArray) -> float:
-    """The angle between two directions; not a number if one has no length."""
     lengths = float(np.linalg.norm(way) * np.linalg.norm(other))
-    if lengths == 0:
-        return math.nan
     return math.degrees(math.acos(np.clip(way @ other / lengths, -1.0, 1.0)))
