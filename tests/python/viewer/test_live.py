@@ -81,12 +81,12 @@ def test_image_map_cameras_and_figures_are_seen(steady: Show, tmp_path: Path) ->
     def complete(seen: np.ndarray) -> bool:
         middle = map_part(seen)
         points, cameras = amount(middle, LOCAL_POINTS), amount(middle, KEYFRAME, 40)
-        return points > 300 and cameras > 60 and amount(middle, MAPPED, tolerance=65) > 40
+        keypoints = amount(seen[:, :430], MAPPED, 40)
+        camera = amount(middle, MAPPED, tolerance=65)
+        return points > 300 and cameras > 60 and camera > 40 and keypoints > 300
 
-    seen = wait_until_seen(steady.page, complete, "points, keyframes and camera")
-    left = seen[:, :430]
-    assert amount(left, MAPPED, 40) > 300  # keypoints in the image
-    image = left[80:380, 20:400]
+    seen = wait_until_seen(steady.page, complete, "points, keyframes, camera and keypoints")
+    image = seen[80:380, 20:400]
     assert image.std() > 30  # a picture, and no grey rectangle
     for text in ("SLAM", f"{steady.system.n_keyframes} keyframes", "from the ground truth"):
         steady.page.wait_for(f"document.body.innerText.includes('{text}')", 50)

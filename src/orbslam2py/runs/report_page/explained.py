@@ -199,7 +199,7 @@ STAGES = {
     "stereo": "stereo matching, or depth of keypoints",
     "predict": "first pose: motion model, reference keyframe, relocalization",
     "local_map": "matching the local map, final pose",
-    "keyframe": "deciding about and making a keyframe; beginning a map",
+    "keyframe": "deciding about and making a keyframe; beginning a map, or doubting a young one",
 }
 
 #: What the stages beside tracking are.
