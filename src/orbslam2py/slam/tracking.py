@@ -388,7 +388,9 @@ class Tracking:
         # Others are given up for one that begins. Under a hand none does, and the camera may be
         # found behind it; a blurred frame was not even searched.
         another = self._initializer.shows_enough(frame) and estimate.reason is not Reason.BLURRED
-        given_up = active if small and another else wrong_map
+        given_up = wrong_map
+        if given_up is None and small and another:
+            given_up = active
         return TrackingOutcome(self.state, estimate, given_up=given_up)
 
     def _stay(self, frame: core.TrackedFrame) -> None:
