@@ -80,6 +80,9 @@ class InitializationThresholds:
     """... and when it has not started ..."""
     patience: int = 10
     """... after so many frames."""
+    view_between: float = 0.9
+    """Of the kept views between the two, those that find less than this share of the map's first
+    points become keyframes as well."""
     remembered_frames: int = 200
     """So many frames are remembered, to be tracked in the map once it has begun ..."""
     followed_again: int = 20
@@ -130,6 +133,14 @@ class TrackingThresholds:
     """... with an RGB-D camera ..."""
     local_map_window_after_relocalization: float = 5.0
     """... and in the frames right after a relocalization, with any sensor."""
+    further_look: float = 3.0
+    """So many times further around, points that should be in view are looked for once more ..."""
+    further_look_every: int = 5
+    """... in one of so many frames, and where a pose is in doubt or less certain than usual ..."""
+    better_look: float = 1.02
+    """... and another pose is taken from it with so many times the inliers ..."""
+    much_better_look: float = 1.1
+    """... and one that is the same within its noise with so many times."""
     frames_after_relocalization: int = 2
     """How many frames that is; meanwhile there is no motion model either."""
     local_map_inliers: int = 30

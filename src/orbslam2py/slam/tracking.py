@@ -345,7 +345,12 @@ class Tracking:
 
     def _map_begun(self, frame: core.TrackedFrame) -> TrackingOutcome:
         self.state = TrackingState.OK
+        earlier = self._initializer.take_earlier()
         self._search.reference_keyframe = frame.reference_keyframe
+        if earlier:
+            # So the speed is known: a pose that is sought from where the camera was may stay there.
+            self._search.motion.remember(earlier[-1])
+            self._search.motion.update_velocity(frame)
         self._search.motion.remember(frame)
         self._since_keyframe = SinceKeyframe(frame.id)
         if not self._has_depth:
@@ -356,7 +361,6 @@ class Tracking:
         # It is the origin, and yet lies in its map no better than the keypoints that became points.
         covariance = core.pose_covariance(frame)
         estimate = PoseEstimate(n_matches=n, n_inliers=n, covariance=covariance)
-        earlier = self._initializer.take_earlier()
         return TrackingOutcome(self.state, estimate, is_keyframe=True, earlier=earlier)
 
     def _wrong_map(self, frame: core.TrackedFrame) -> int | None:
@@ -406,7 +410,8 @@ class Tracking:
     @property
     def _is_small(self) -> bool:
         """Whether the map is given up if tracking is lost."""
-        n_keyframes = self._map.n_keyframes_of(self._map.active_map)
+        active = self._map.active_map
+        n_keyframes = self._map.n_keyframes_of(active) - self._initializer.n_between(active)
         return bool(n_keyframes <= self._search.limits.small_map)
 
     # ---- keyframes -------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,8 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py._timing import StageTimer
 from orbslam2py.evaluation import match_poses
 from orbslam2py.slam.frame_recorder import FrameRecorder
-from orbslam2py.slam.thresholds import InitializationThresholds
+from orbslam2py.slam.initialization import MonocularInitializer
+from orbslam2py.slam.thresholds import InitializationThresholds, TrackingThresholds
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.trajectory.rotations import rotation_angles
 from support.moved_frames import MovedByAMetre
@@ -109,3 +111,75 @@ def test_poses_that_are_estimated_again_replace_the_first_ones() -> None:
     assert moved.seen == [(0, False), (1, False), (2, False)]
     assert list(after.lost) == [False, False, True]
     assert after.positions[:, 2] == pytest.approx(before.positions[:, 2] + 1.0)
+
+
+# ---- views between the two that begin a map ------------------------------------------------------
+def begun(sequence: SyntheticSequence) -> System:
+    """A system that has just begun its map."""
+    system = System(sequence.settings, "mono", deterministic=True)
+    for i in range(len(sequence)):
+        if system.track_monocular(sequence.load(i).image, i / 20).T_cw is not None:
+            return system
+    raise AssertionError("no map began")
+
+
+@pytest.fixture(scope="module")
+def room() -> SyntheticSequence:
+    return SyntheticSequence(
+        SyntheticOptions(world="room", sensor="mono", size=(320, 240), frames=40)
+    )
+
+
+@pytest.mark.parametrize("all_of_them", [False, True])
+def test_kept_views_that_see_the_points_otherwise_become_keyframes(
+    all_of_them: bool, room: SyntheticSequence, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[int, float]] = []
+    added: list[int] = []
+    original = MonocularInitializer._adds
+
+    def adds(start: MonocularInitializer, frame: core.TrackedFrame, n_points: int) -> bool:
+        asked.append((frame.id, frame.n_associated() / n_points))
+        kept = any(view.frame.id == frame.id for view in start._kept.views)
+        assert original(start, frame, n_points) == (kept and asked[-1][1] < 0.9)
+        if original(start, frame, n_points) or all_of_them:
+            added.append(frame.id)
+        return added[-1:] == [frame.id]
+
+    monkeypatch.setattr(MonocularInitializer, "_adds", adds)
+    with begun(room) as system:
+        slam_map = system.pipeline.back_end.map
+        frames = {slam_map.keyframe_frame(k).id for k in slam_map.keyframe_ids()}
+        first, second = min(frames), system.pipeline.tracking.motion.last.id
+        assert asked, "there are frames between the two"
+        assert all(first < frame < second for frame, _ in asked)
+        # Those that add nothing to the others are culled at once.
+        assert frames <= {first, second, *added}
+        if all_of_them:
+            assert frames & set(added)
+        assert core.check_invariants(slam_map, require_words=True) == []
+        initializer = system.pipeline.tracking._initializer
+        assert initializer.n_between(slam_map.active_map) == len(added)
+        assert initializer.n_between(slam_map.active_map + 1) == 0
+
+
+def test_views_between_do_not_make_a_young_map_a_firm_one(
+    room: SyntheticSequence, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(MonocularInitializer, "_adds", lambda *_: True)
+    with begun(room) as system:
+        tracking = system.pipeline.tracking
+        limits = replace(TrackingThresholds(), small_map=2)
+        monkeypatch.setattr(tracking._search, "limits", limits)
+        assert system.n_keyframes > limits.small_map
+        assert tracking._is_small
+
+
+def test_the_speed_is_known_from_the_first_frame_on(room: SyntheticSequence) -> None:
+    with begun(room) as system:
+        motion = system.pipeline.tracking.motion
+        path = system.trajectory()
+        assert motion.velocity is not None
+        # Mapping, which comes after it, moves the map a little.
+        T_cl = np.linalg.inv(path.T_wc[-1]) @ path.T_wc[-2]
+        np.testing.assert_allclose(motion.velocity.matrix, T_cl, atol=0.02)

@@ -18,7 +18,7 @@ from orbslam2py.slam.evidence.belief import Belief
 from orbslam2py.slam.evidence.harder_search import HarderSearch
 from orbslam2py.slam.evidence.judgement import EvidenceJudge
 from orbslam2py.slam.keyframe_decision import KeyframeDecision
-from orbslam2py.slam.pose_search import PoseSearch
+from orbslam2py.slam.pose_search import PoseSearch, RefinedPose
 from orbslam2py.slam.records import TrackingOutcome
 from orbslam2py.slam.thresholds import EvidenceThresholds, TrackingThresholds
 from orbslam2py.slam.tracking import Tracking
@@ -323,6 +323,9 @@ class FakeInitializer:
     def restart(self, frames: list[FakeFrame]) -> None:
         assert not frames
 
+    def n_between(self, map_index: int) -> int:
+        return 0
+
     def take_earlier(self) -> tuple[FakeFrame, ...]:
         return ()
 
@@ -364,6 +367,18 @@ class NoFurtherSearch:
         return first
 
 
+class NearSearch(PoseSearch):
+    """Looks no further around than at first, and notes in which frames it was to."""
+
+    def __init__(self, *parts: Any, **limits: Any) -> None:
+        super().__init__(*parts, **limits)
+        self.looked_further: list[int] = []
+
+    def look_further(self, refined: RefinedPose) -> RefinedPose:
+        self.looked_further.append(refined.frame.id)
+        return refined
+
+
 class Scene:
     """A tracker among fakes, which believes what it finds unless it is given `evidence`."""
 
@@ -382,7 +397,7 @@ class Scene:
         self.localize = False
         fakes: Any = self
         vocabulary: Any = "vocabulary"
-        search = PoseSearch(
+        self.search = search = NearSearch(
             fakes.map,
             vocabulary,
             sensor,

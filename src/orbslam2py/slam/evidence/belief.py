@@ -77,13 +77,12 @@ class Belief:
         estimate, hypothesis = first, None
         if first.found:
             refined = self._refined(frame, first)
+            hypothesis = self._hypothesis(refined, first)
+            if hypothesis and self._is_to_look_further(frame, hypothesis.evidence):
+                refined = self._search.look_further(refined)
+                hypothesis = self._hypothesis(refined, first)
             estimate = refined.estimate
-            if estimate.found:
-                evidence = self._judge.weigh(refined, self._search.motion, first.method)
-                hypothesis = Hypothesis(refined, first.method, evidence)
-        doubted = (
-            hypothesis is None or first.left_map or self._judge.fell_suddenly(hypothesis.evidence)
-        )
+        doubted = first.left_map or self._is_doubted(hypothesis)
         if doubted and not lost:
             hypothesis = self._harder_search.look_again(frame, hypothesis)
         if hypothesis is None:
@@ -93,6 +92,21 @@ class Belief:
         if doubted:
             hypothesis = replace(hypothesis, evidence=replace(hypothesis.evidence, doubted=True))
         return self._take(frame, hypothesis, lost=lost)
+
+    def _hypothesis(self, refined: RefinedPose, first: PoseEstimate) -> Hypothesis | None:
+        if not refined.estimate.found:
+            return None
+        evidence = self._judge.weigh(refined, self._search.motion, first.method)
+        return Hypothesis(refined, first.method, evidence)
+
+    def _is_doubted(self, hypothesis: Hypothesis | None) -> bool:
+        return hypothesis is None or self._judge.fell_suddenly(hypothesis.evidence)
+
+    def _is_to_look_further(self, frame: core.TrackedFrame, evidence: Evidence) -> bool:
+        judge = self._judge
+        if judge.fell_suddenly(evidence) or judge.is_loose(evidence):
+            return True
+        return self._search.further_look_due(frame)
 
     def _refined(self, frame: core.TrackedFrame, first: PoseEstimate) -> RefinedPose:
         if first.visual_odometry:

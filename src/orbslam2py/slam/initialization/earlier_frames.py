@@ -37,7 +37,9 @@ class EarlierFrames:
         tracked, self._tracked = self._tracked, ()
         return tracked
 
-    def track(self, history: list[core.TrackedFrame], first: core.TrackedFrame) -> None:
+    def track(
+        self, history: list[core.TrackedFrame], first: core.TrackedFrame
+    ) -> list[core.TrackedFrame]:
         """Give poses to the frames of a history before its last, as far as they are found.
 
         Parameters
@@ -46,13 +48,19 @@ class EarlierFrames:
             In the order of time; the last one has begun the map.
         first : TrackedFrame
             The first view, which is in the history and has its pose.
+
+        Returns
+        -------
+        list of TrackedFrame
+            Those found between the first view and the last frame, in the order of time.
         """
         if self._search is None:
-            return
+            return []
         at = next(i for i, frame in enumerate(history) if frame.id == first.id)
         before = self._follow(first, reversed(history[:at]))
         between = self._follow(first, history[at + 1 : -1])
         self._tracked = (*reversed(before), first, *between)
+        return between
 
     def _follow(
         self, first: core.TrackedFrame, frames: Iterable[core.TrackedFrame]

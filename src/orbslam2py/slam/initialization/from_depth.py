@@ -67,6 +67,11 @@ class DepthInitializer:
         """None: the first frame that can begin the map does."""
         return ()
 
+    def n_between(self, map_index: int) -> int:
+        """None: one frame is enough."""
+        del map_index
+        return 0
+
     def remember(self, frame: core.TrackedFrame) -> None:
         """Nothing: the next frame can begin a map as well."""
 

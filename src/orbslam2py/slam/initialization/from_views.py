@@ -87,6 +87,8 @@ class MonocularInitializer:
         self._kept = KeptViews(self._limits)
         self._watch = YoungMapWatch(self._limits, seed)
         self._earlier = earlier or EarlierFrames(None, None)
+        # Keyframes between the two that the last map began from, by its number.
+        self._n_between: dict[int, int] = {}
         self.reset()
 
     def reset(self) -> None:
@@ -125,6 +127,10 @@ class MonocularInitializer:
             self._kept.follow(frame)
             if not self._smear.is_long(self._smear.length(frame)):
                 self._kept.keep_last()
+
+    def n_between(self, map_index: int) -> int:
+        """Keyframes that a map began with, beyond the two that it needs."""
+        return self._n_between.get(map_index, 0)
 
     @property
     def watches_map(self) -> bool:
@@ -236,9 +242,26 @@ class MonocularInitializer:
         _log.info("new map with %d points", n_points)
         self._mapping.insert_keyframe(begun.first)
         self._mapping.insert_keyframe(begun.second)
-        self._earlier.track(list(self._history), first)
+        between = self._earlier.track(list(self._history), first)
+        self._insert_views([frame for frame in between if self._adds(frame, n_points)])
         self._watch.begin(second)
         self._kept.clear()
         self._n_waiting = 0
         self._last = self._shown = None
         return Reason.NONE
+
+    def _adds(self, frame: core.TrackedFrame, n_points: int) -> bool:
+        """Whether a frame between the two views is a kept one that sees the points otherwise."""
+        kept = any(view.frame.id == frame.id for view in self._kept.views)
+        return kept and frame.n_associated() < self._limits.view_between * n_points
+
+    def _insert_views(self, frames: list[core.TrackedFrame]) -> None:
+        """Make keyframes of views between the two that began the map.
+
+        All views have chosen its motion; two alone would let bundle adjustment bend it again.
+        """
+        for frame in frames:
+            core.describe(frame.features, self._vocabulary)
+            keyframe = core.insert_keyframe(self._map, frame, create_points=False)
+            self._mapping.insert_keyframe(keyframe)
+        self._n_between = {self._map.active_map: len(frames)}

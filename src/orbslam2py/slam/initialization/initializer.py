@@ -53,6 +53,10 @@ class Initializer(Protocol):
         """Frames before the one that began the map, with their poses in it, in order; once."""
         ...
 
+    def n_between(self, map_index: int) -> int:
+        """Keyframes that a map began with, beyond those that it needs."""
+        ...
+
     def remember(self, frame: core.TrackedFrame) -> None:
         """A frame that was tracked in a young map, which may yet come to nothing."""
         ...

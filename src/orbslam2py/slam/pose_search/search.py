@@ -18,6 +18,9 @@ from orbslam2py.slam.records import PoseEstimate, PoseMethod, Reason
 from orbslam2py.slam.relocalization import PlaceOfLoss, Relocalizer
 from orbslam2py.slam.thresholds import TrackingThresholds
 
+#: Standard deviations of a position, from which on another one is elsewhere.
+_OTHER_POSE = 3.0
+
 
 @dataclass(frozen=True)
 class RefinedPose:
@@ -314,19 +317,66 @@ class PoseSearch:
             frame.discard_outliers()
             core.match_local_map(frame, local_map.points, first.discarded, self._usual_window())
             optimized = core.optimize_pose(frame)
-        n_matches = frame.n_associated()
+        estimate = self._enough_found(frame, first, optimized)
+        if estimate.visual_odometry:
+            return self.beyond_the_map(frame, estimate)
+        return RefinedPose(frame, estimate, local_map, visible, n_held + len(visible))
+
+    def _enough_found(
+        self, frame: core.TrackedFrame, first: PoseEstimate, optimized: core.PoseEstimate
+    ) -> PoseEstimate:
+        """What a pose is by what was found of the local map."""
         estimate = PoseEstimate(
-            n_matches=n_matches,
+            n_matches=frame.n_associated(),
             n_inliers=optimized.n_inliers,
             covariance=optimized.covariance,
             discarded=first.discarded,
             relocalized=first.relocalized,
         )
         if estimate.n_inliers < self._local_map_inliers(frame):
-            estimate = estimate.failed(Reason.FEW_INLIERS_LOCAL_MAP)
-        elif frame.n_map_inliers() < self.limits.map_matches:
+            return estimate.failed(Reason.FEW_INLIERS_LOCAL_MAP)
+        if frame.n_map_inliers() < self.limits.map_matches:
             # What the frame before measured speaks for itself, and says nothing of the map.
-            return self.beyond_the_map(frame, replace(estimate, visual_odometry=True))
+            return replace(estimate, visual_odometry=True)
+        return estimate
+
+    def further_look_due(self, frame: core.TrackedFrame) -> bool:
+        """Whether a frame's pose is to be held against what lies further around."""
+        return frame.id % self.limits.further_look_every == 0
+
+    def look_further(self, refined: RefinedPose) -> RefinedPose:
+        """Look further around for the points that a pose should show and does not.
+
+        Where most of what is seen lies in one plane, a pose may be turned about it: the plane fits,
+        and what stands before or behind it is out of the windows, frame after frame.
+
+        Returns
+        -------
+        RefinedPose
+            That of another version of the frame, if more fits it; else the one that was given.
+        """
+        limits, local_map, narrow = self.limits, refined.local_map, self._usual_window()
+        if local_map is None or refined.frame.T_cw is None:
+            return refined
+        frame = core.TrackedFrame(refined.frame.features)
+        frame.copy_associations(refined.frame, ~refined.frame.outlier)
+        frame.T_cw = refined.frame.T_cw
+        frame.share_anchor(refined.frame)
+        # Those thrown out before as well: by a pose that is in question.
+        nothing = np.zeros(0, np.int64)
+        core.match_local_map(frame, local_map.points, nothing, limits.further_look * narrow)
+        if core.optimize_pose(frame).n_inliers < limits.map_matches:
+            return refined
+        frame.discard_outliers()
+        n_held = frame.n_associated()
+        visible = core.match_local_map(frame, local_map.points, nothing, narrow).visible
+        optimized = core.optimize_pose(frame)
+        gain = limits.better_look if _is_elsewhere(frame, refined) else limits.much_better_look
+        if optimized.n_inliers <= gain * refined.estimate.n_inliers:
+            return refined
+        estimate = self._enough_found(frame, refined.estimate, optimized)
+        if estimate.visual_odometry:
+            return refined
         return RefinedPose(frame, estimate, local_map, visible, n_held + len(visible))
 
     def beyond_the_map(self, frame: core.TrackedFrame, odometry: PoseEstimate) -> RefinedPose:
@@ -363,3 +413,12 @@ class PoseSearch:
     def _usual_window(self) -> float:
         is_rgbd = self._sensor is Sensor.RGBD
         return self.limits.local_map_window_rgbd if is_rgbd else self.limits.local_map_window
+
+
+def _is_elsewhere(frame: core.TrackedFrame, refined: RefinedPose) -> bool:
+    """Whether a version of a frame lies apart from a refined pose, by what that one tells."""
+    covariance, T_cw = refined.estimate.covariance, refined.frame.T_cw
+    if covariance is None or T_cw is None or frame.T_cw is None:
+        return True
+    _, move = frame.T_cw.difference(T_cw)
+    return bool(move**2 > _OTHER_POSE**2 * np.trace(covariance[3:, 3:]))
