@@ -134,13 +134,16 @@ class TrackingThresholds:
     local_map_window_after_relocalization: float = 5.0
     """... and in the frames right after a relocalization, with any sensor."""
     further_look: float = 3.0
-    """So many times further around, points that should be in view are looked for once more ..."""
+    """By this factor, where the usual one is smaller, points that should be in view are looked for
+    once more ..."""
     further_look_every: int = 5
     """... in one of so many frames, and where a pose is in doubt or less certain than usual ..."""
     better_look: float = 1.02
     """... and another pose is taken from it with so many times the inliers ..."""
+    elsewhere: float = 3.0
+    """... if it lies so many standard deviations away ..."""
     much_better_look: float = 1.1
-    """... and one that is the same within its noise with so many times."""
+    """... and else with so many times."""
     frames_after_relocalization: int = 2
     """How many frames that is; meanwhile there is no motion model either."""
     local_map_inliers: int = 30

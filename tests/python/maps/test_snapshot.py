@@ -4,11 +4,14 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from orbslam2py import MapSnapshot, Sensor
+from orbslam2py.maps import snapshot as snapshots
 from support.small_sequences import new_system, play
 
 pytestmark = pytest.mark.watchdog(30)
@@ -73,3 +76,15 @@ def test_equal_runs_give_equal_snapshots() -> None:
 
 def test_a_snapshot_is_printed_in_one_line() -> None:
     assert repr(made_up()) == "<MapSnapshot: keyframes 2, points 3, loop edges 1>"
+
+
+def test_keyframes_are_told_in_the_order_of_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those between the two that begin a single camera's map have later ids than these."""
+    T_wc = np.stack([np.eye(4)] * 3)
+    T_wc[:, 0, 3] = [1, 3, 2]
+    keyframes = SimpleNamespace(timestamps=np.array([0.5, 1.5, 1.0]), T_wc=T_wc)
+    monkeypatch.setattr(snapshots.core, "snapshot_keyframes", lambda *_: keyframes)
+    nothing: Any = None
+    path = snapshots.keyframe_trajectory(nothing)
+    np.testing.assert_array_equal(path.timestamps, [0.5, 1.0, 1.5])
+    np.testing.assert_array_equal(path.T_wc[:, 0, 3], [0, 1, 2])

@@ -79,8 +79,11 @@ class Belief:
             refined = self._refined(frame, first)
             hypothesis = self._hypothesis(refined, first)
             if hypothesis and self._is_to_look_further(frame, hypothesis.evidence):
-                refined = self._search.look_further(refined)
-                hypothesis = self._hypothesis(refined, first)
+                further = self._search.look_further(refined)
+                if further is not refined:
+                    frame.take_over(further.frame)
+                    refined = replace(further, frame=frame)
+                    hypothesis = self._hypothesis(refined, first)
             estimate = refined.estimate
         doubted = first.left_map or self._is_doubted(hypothesis)
         if doubted and not lost:

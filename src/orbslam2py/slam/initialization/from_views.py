@@ -57,7 +57,7 @@ class MonocularInitializer:
     vocabulary : orbslam2py._core.Vocabulary
         Describes the first keyframes.
     mapping : LocalMapping
-        Takes the two first keyframes.
+        Takes the first keyframes.
     seed : int
         Seed of the draws.
     smear : Smear
@@ -87,8 +87,9 @@ class MonocularInitializer:
         self._kept = KeptViews(self._limits)
         self._watch = YoungMapWatch(self._limits, seed)
         self._earlier = earlier or EarlierFrames(None, None)
-        # Keyframes between the two that the last map began from, by its number.
-        self._n_between: dict[int, int] = {}
+        # The last map's number, and the keyframes between the two that it began from.
+        self._begun_map = -1
+        self._between: list[int] = []
         self.reset()
 
     def reset(self) -> None:
@@ -129,8 +130,10 @@ class MonocularInitializer:
                 self._kept.keep_last()
 
     def n_between(self, map_index: int) -> int:
-        """Keyframes that a map began with, beyond the two that it needs."""
-        return self._n_between.get(map_index, 0)
+        """Living keyframes that a map began with, beyond the two that it needs."""
+        if map_index != self._begun_map:
+            return 0
+        return sum(self._map.living(keyframe) == keyframe for keyframe in self._between)
 
     @property
     def watches_map(self) -> bool:
@@ -260,8 +263,9 @@ class MonocularInitializer:
 
         All views have chosen its motion; two alone would let bundle adjustment bend it again.
         """
+        self._begun_map, self._between = self._map.active_map, []
         for frame in frames:
             core.describe(frame.features, self._vocabulary)
             keyframe = core.insert_keyframe(self._map, frame, create_points=False)
             self._mapping.insert_keyframe(keyframe)
-        self._n_between = {self._map.active_map: len(frames)}
+            self._between.append(keyframe)

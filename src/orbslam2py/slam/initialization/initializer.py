@@ -54,7 +54,7 @@ class Initializer(Protocol):
         ...
 
     def n_between(self, map_index: int) -> int:
-        """Keyframes that a map began with, beyond those that it needs."""
+        """Living keyframes that a map began with, beyond those that it needs."""
         ...
 
     def remember(self, frame: core.TrackedFrame) -> None:

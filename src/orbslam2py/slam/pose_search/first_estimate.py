@@ -62,7 +62,8 @@ class FirstEstimateInGrowingMap:
             if relocalized.found or not search.has_last_frame:
                 return relocalized
         search.follow_map()
-        if search.motion.velocity is not None and not search.just_relocalized(frame):
+        # There is none right after a relocalization, but where a map has just begun.
+        if search.motion.velocity is not None:
             estimate = search.by_motion_model(frame)
             if estimate.found:
                 return estimate

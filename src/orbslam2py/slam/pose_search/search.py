@@ -18,9 +18,6 @@ from orbslam2py.slam.records import PoseEstimate, PoseMethod, Reason
 from orbslam2py.slam.relocalization import PlaceOfLoss, Relocalizer
 from orbslam2py.slam.thresholds import TrackingThresholds
 
-#: Standard deviations of a position, from which on another one is elsewhere.
-_OTHER_POSE = 3.0
-
 
 @dataclass(frozen=True)
 class RefinedPose:
@@ -341,7 +338,7 @@ class PoseSearch:
         return estimate
 
     def further_look_due(self, frame: core.TrackedFrame) -> bool:
-        """Whether a frame's pose is to be held against what lies further around."""
+        """Whether a frame's pose is to be held against what lies further around, doubted or not."""
         return frame.id % self.limits.further_look_every == 0
 
     def look_further(self, refined: RefinedPose) -> RefinedPose:
@@ -356,7 +353,7 @@ class PoseSearch:
             That of another version of the frame, if more fits it; else the one that was given.
         """
         limits, local_map, narrow = self.limits, refined.local_map, self._usual_window()
-        if local_map is None or refined.frame.T_cw is None:
+        if local_map is None or refined.frame.T_cw is None or narrow >= limits.further_look:
             return refined
         frame = core.TrackedFrame(refined.frame.features)
         frame.copy_associations(refined.frame, ~refined.frame.outlier)
@@ -364,18 +361,19 @@ class PoseSearch:
         frame.share_anchor(refined.frame)
         # Those thrown out before as well: by a pose that is in question.
         nothing = np.zeros(0, np.int64)
-        core.match_local_map(frame, local_map.points, nothing, limits.further_look * narrow)
+        core.match_local_map(frame, local_map.points, nothing, limits.further_look)
         if core.optimize_pose(frame).n_inliers < limits.map_matches:
             return refined
         frame.discard_outliers()
         n_held = frame.n_associated()
         visible = core.match_local_map(frame, local_map.points, nothing, narrow).visible
         optimized = core.optimize_pose(frame)
-        gain = limits.better_look if _is_elsewhere(frame, refined) else limits.much_better_look
+        elsewhere = _deviations_apart(frame, refined) > limits.elsewhere
+        gain = limits.better_look if elsewhere else limits.much_better_look
         if optimized.n_inliers <= gain * refined.estimate.n_inliers:
             return refined
         estimate = self._enough_found(frame, refined.estimate, optimized)
-        if estimate.visual_odometry:
+        if estimate.visual_odometry or not estimate.found:
             return refined
         return RefinedPose(frame, estimate, local_map, visible, n_held + len(visible))
 
@@ -415,10 +413,11 @@ class PoseSearch:
         return self.limits.local_map_window_rgbd if is_rgbd else self.limits.local_map_window
 
 
-def _is_elsewhere(frame: core.TrackedFrame, refined: RefinedPose) -> bool:
-    """Whether a version of a frame lies apart from a refined pose, by what that one tells."""
+def _deviations_apart(frame: core.TrackedFrame, refined: RefinedPose) -> float:
+    """Standard deviations, as a refined pose is told with, to where another version lies."""
     covariance, T_cw = refined.estimate.covariance, refined.frame.T_cw
     if covariance is None or T_cw is None or frame.T_cw is None:
-        return True
+        return np.inf
     _, move = frame.T_cw.difference(T_cw)
-    return bool(move**2 > _OTHER_POSE**2 * np.trace(covariance[3:, 3:]))
+    variance = float(np.trace(covariance[3:, 3:]))
+    return move / np.sqrt(variance) if variance > 0 else np.inf
