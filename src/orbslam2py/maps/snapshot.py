@@ -97,8 +97,9 @@ def take_snapshots(slam_map: core.Map) -> list[MapSnapshot]:
 
 
 def keyframe_trajectory(slam_map: core.Map, map_index: int | None = None) -> Trajectory:
-    """Poses of the keyframes of a map (None: the active one), relative to the first one, in the
-    order of time: that of their ids may differ where a single camera's map began.
+    """Poses of the keyframes of a map (None: the active one), relative to the first one.
+
+    In the order of time; that of their ids may differ where a single camera's map began.
     """
     keyframes = core.snapshot_keyframes(slam_map, -1 if map_index is None else map_index)
     T_wc = keyframes.T_wc
