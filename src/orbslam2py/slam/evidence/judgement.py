@@ -159,7 +159,7 @@ class EvidenceJudge:
         if T_first is None or T_second is None:
             return False
         turn, move = difference(T_first, T_second)
-        deviations = _position_deviation(first) + _position_deviation(second)
+        deviations = first.position_deviation + second.position_deviation
         return (
             self._windows(turn) < self.limits.same_windows
             and move <= self.limits.same_deviations * deviations
@@ -300,17 +300,8 @@ def _figures(refined: RefinedPose) -> UsualFigures:
     return UsualFigures(
         float(n_inliers),
         min(1.0, n_inliers / max(1, refined.n_predicted)),
-        _position_deviation(refined),
+        refined.position_deviation,
     )
-
-
-def _position_deviation(refined: RefinedPose) -> float:
-    """Standard deviation of a pose's position, all directions together [m]; 0 if not known."""
-    covariance = refined.estimate.covariance
-    if covariance is None:
-        return 0.0
-    # Three numbers: NumPy's functions take longer than what they do here, and in each frame.
-    return math.sqrt(max(0.0, float(covariance[3, 3] + covariance[4, 4] + covariance[5, 5])))
 
 
 def _ratio(value: float, usual: float) -> float:

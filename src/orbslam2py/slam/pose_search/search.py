@@ -6,6 +6,7 @@ Mur-Artal, Montiel and Tardos, 2015, sections V-B to V-D; ``docs/method/tracking
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,6 +33,15 @@ class RefinedPose:
     """Ids of the points in view that the first estimate did not hold."""
     n_predicted: int
     """Points that should be in view."""
+
+    @property
+    def position_deviation(self) -> float:
+        """Standard deviation of the position, all directions together [m]; 0 if not known."""
+        covariance = self.estimate.covariance
+        if covariance is None:
+            return 0.0
+        # Three numbers: NumPy's functions take longer than what they do here, and in each frame.
+        return math.sqrt(max(0.0, float(covariance[3, 3] + covariance[4, 4] + covariance[5, 5])))
 
 
 class PoseSearch:
@@ -368,7 +378,7 @@ class PoseSearch:
         n_held = frame.n_associated()
         visible = core.match_local_map(frame, local_map.points, nothing, narrow).visible
         optimized = core.optimize_pose(frame)
-        elsewhere = _deviations_apart(frame, refined) > limits.elsewhere
+        elsewhere = _is_elsewhere(frame, refined, limits.elsewhere)
         gain = limits.better_look if elsewhere else limits.much_better_look
         if optimized.n_inliers <= gain * refined.estimate.n_inliers:
             return refined
@@ -413,11 +423,9 @@ class PoseSearch:
         return self.limits.local_map_window_rgbd if is_rgbd else self.limits.local_map_window
 
 
-def _deviations_apart(frame: core.TrackedFrame, refined: RefinedPose) -> float:
-    """Standard deviations, as a refined pose is told with, to where another version lies."""
-    covariance, T_cw = refined.estimate.covariance, refined.frame.T_cw
-    if covariance is None or T_cw is None or frame.T_cw is None:
-        return np.inf
+def _is_elsewhere(frame: core.TrackedFrame, refined: RefinedPose, deviations: float) -> bool:
+    """Whether another version of a frame lies so many deviations from a refined pose."""
+    T_cw = refined.frame.T_cw
+    assert T_cw is not None and frame.T_cw is not None
     _, move = frame.T_cw.difference(T_cw)
-    variance = float(np.trace(covariance[3:, 3:]))
-    return move / np.sqrt(variance) if variance > 0 else np.inf
+    return move > deviations * refined.position_deviation
