@@ -61,8 +61,10 @@ class InitializationThresholds:
     third_view_fits: float = 0.75
     """... and agrees when it sees this share of the points where they should be."""
     clearly_worse: float = 2.0
-    """Of motions that two views cannot tell apart, the others must fit a third view worse than
-    the right one by this factor."""
+    """Of motions that two views cannot tell apart, the others must fit third views worse than
+    the right one by this factor ..."""
+    clearly_worse_alternative: float = 1.5
+    """... or, where they do not, all views together by this one."""
     same_direction: float = 20.0
     """Two that lead to within so many degrees of each other count as one."""
     further_draws: int = 5
@@ -209,7 +211,13 @@ class EvidenceThresholds:
     fewest_inliers: int = 30
     """... down to this number."""
     unknown_change: float = 2.0
-    """So many times the variance is told where it is not known yet what is usual."""
+    """So many times the variance is told where it is not known yet what is usual, as after a loss;
+    then also ..."""
+    few_found: float = 0.15
+    """... with twice the variance where this share of the points in view is found, and with more by
+    the fourth power where it is less ..."""
+    fewest_found: float = 0.05
+    """... down to this share."""
     visible_smear: float = 0.5
     """Pixels of smear that sharp images seem to have as well; what is beyond ..."""
     smear_of_sharpest: float = 2.0

@@ -16,7 +16,7 @@ from orbslam2py._timing import StageTimer
 from orbslam2py.slam.front_end import FrontEnd, intrinsics
 from orbslam2py.slam.initialization.kept_views import KeptViews, View
 from orbslam2py.slam.initialization.several_views import SeveralViews
-from orbslam2py.slam.initialization.third_view import Candidate, confirmed_motion
+from orbslam2py.slam.initialization.third_view import Candidate, agreeing_motions, reconstruct
 from orbslam2py.slam.thresholds import InitializationThresholds
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
@@ -37,11 +37,12 @@ class Seen(NamedTuple):
             self.view.keypoints, self.last.keypoints, self.view.matches, camera, T_21
         )
 
-    def best_motion(self, motion: core.TwoViewMotion, **limits: float) -> core.TwoViewMotion | None:
-        candidate = Candidate(self.view, (motion,))
+    def best_motion(
+        self, *motions: core.TwoViewMotion, **limits: float
+    ) -> core.TwoViewMotion | None:
         chosen = InitializationThresholds(**limits)  # type: ignore[arg-type]
-        together = SeveralViews(candidate, self.kept.views, self.last, chosen)
-        return together.best_motion(motion, seed=0)
+        together = SeveralViews(Candidate(self.view, motions), self.kept.views, self.last, chosen)
+        return together.best_motion(motions, seed=0)
 
     def off(self, motion: core.TwoViewMotion) -> float:
         """Degrees between its direction and the true one."""
@@ -124,14 +125,53 @@ def test_a_plane_passed_on_a_straight_way_waits() -> None:
     assert wall.best_motion(wall.place(wall.T_21), other_direction=180.0) is not None
 
 
+def test_two_motions_of_a_plane_are_told_apart_by_all_views() -> None:
+    """Third views fit both; once all are adjusted the wrong one costs several times as much."""
+    wall = look("wall")
+    limits = InitializationThresholds()
+    candidate = Candidate.of(wall.view, reconstruct(wall.view, wall.last, seed=0))
+    assert candidate is not None and not candidate.is_clear
+    left = agreeing_motions(candidate, wall.kept.views, wall.last, limits)
+    assert len(left) == 2
+    assert max(wall.off(motion) for motion in left) > 60
+    best = wall.best_motion(*left)
+    assert best is not None
+    assert wall.off(best) < 2
+    # Whatever their order; and with a limit that nothing passes the map waits.
+    again = wall.best_motion(*left[::-1])
+    assert again is not None
+    assert wall.off(again) < 2
+    assert wall.best_motion(*left, clearly_worse_alternative=100.0) is None
+
+
+def test_an_adjustment_that_fits_worse_is_not_taken(
+    seen: Seen, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that ends with all views in one place says nothing against where it began."""
+    solve_bundle = core.solve_bundle
+
+    def collapsed(poses: list[core.Pose], *rest: object) -> tuple[list[core.Pose], object, object]:
+        _, points, outliers = solve_bundle(poses, *rest)  # type: ignore[arg-type]
+        nearly = [core.Pose(T.quaternion_xyzw, 1e-9 * np.roll(T.translation, 1)) for T in poses]
+        return nearly, points, outliers
+
+    monkeypatch.setattr(core, "solve_bundle", collapsed)
+    motion = seen.place(seen.T_21)
+    best = seen.best_motion(motion, other_direction=180.0)
+    assert best is not None
+    assert seen.off(best) < 10
+    assert best.parallax > 1.0
+
+
 @pytest.mark.parametrize(("degrees", "is_one"), [(0, True), (15, True), (45, False)])
 def test_two_motions_to_nearly_the_same_place_are_one(
     seen: Seen, degrees: float, is_one: bool
 ) -> None:
     motions = tuple(seen.place(turned(seen.T_21, turn)) for turn in (0, degrees))
     limits = InitializationThresholds(clearly_worse=1e9)  # none fits that much worse
-    chosen = confirmed_motion(Candidate(seen.view, motions), seen.kept.views, seen.last, limits)
-    assert (chosen is not None) == is_one
+    left = agreeing_motions(Candidate(seen.view, motions), seen.kept.views, seen.last, limits)
+    assert len(left) == (1 if is_one else 2)
+    assert set(left) <= set(motions)
 
 
 def test_too_little_parallax_or_too_few_points_wait(seen: Seen) -> None:

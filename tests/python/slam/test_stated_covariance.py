@@ -59,17 +59,24 @@ def test_few_inliers_are_less_certain_than_their_number_says(
     assert larger == pytest.approx(n_inliers / 100 * by_number)
 
 
-def test_where_nothing_is_usual_yet_a_pose_is_less_certain(careful: Scene) -> None:
+@pytest.mark.parametrize("n_visible", [3, 600, 1000, 5000])
+def test_where_nothing_is_usual_yet_a_pose_is_less_certain(careful: Scene, n_visible: int) -> None:
+    """In a map's first frame or in one found again: most where little of what is there is found."""
     usual = careful.track().estimate
     careful.tracking.reset()
     careful.run(1)  # the first frame of a map
+    careful.core.n_visible = n_visible  # beside those held
     first = careful.track().estimate
+    careful.core.n_visible = 3
     careful.run(EvidenceThresholds().changes_seen + 1)
     later = careful.track().estimate
     assert usual.covariance is not None
-    assert first.covariance is not None
+    assert first.covariance is not None and first.evidence is not None
     assert later.covariance is not None
-    np.testing.assert_allclose(first.covariance, 2 * usual.covariance)
+    limits = EvidenceThresholds()
+    found = max(first.evidence.found, limits.fewest_found)
+    few = 1 + (limits.few_found / found) ** 4
+    np.testing.assert_allclose(first.covariance, 2 * few * usual.covariance)
     np.testing.assert_allclose(later.covariance, usual.covariance)
 
 

@@ -202,11 +202,12 @@ class EvidenceJudge:
         """The covariance that a pose is told with.
 
         Keypoints that are off by more than they are taken for make a pose that is less certain, and
-        so do few of them, and images of which it is not known what is usual. Keypoints near each
-        other are wrong together: by a map point in the wrong place, a lens that is not as stated,
-        and on the way that a blurred image is smeared. As far as that shows they count as fewer.
-        Errors far beyond the usual ones are those of whole regions that move: then each cell with
-        inliers counts as one observation, and errors as large as they are. A camera that suddenly
+        so do few of them, and images of which it is not known what is usual, most where few of the
+        points in view were found. Keypoints near each other are wrong together: by a map point in
+        the wrong place, a lens that is not as stated, and on the way that a blurred image is
+        smeared. As far as that shows they count as fewer. Errors far beyond the usual ones are
+        those of whole regions that move: then each cell with inliers counts as one observation, and
+        errors as large as they are. A camera that suddenly
         turns otherwise smears and bends its images while they are taken, and matches that hold a
         pose less firmly than usual let it be pulled further by what is wrong in all of them. A
         blurred image is of any moment while the shutter was open. Where the map moved since the
@@ -224,7 +225,7 @@ class EvidenceJudge:
         covariance = covariance * (
             self._error_factor(refined, evidence)
             * (1.0 + (limits.few_inliers / n_inliers) ** 4)
-            * (1.0 if self._change.is_known else limits.unknown_change)
+            * (1.0 if self._change.is_known else self._unknown_factor(evidence))
             * (1.0 + surprise**2)
             * looseness
         )
@@ -239,6 +240,15 @@ class EvidenceJudge:
         if beyond is not None:
             covariance = covariance + limits.mistaken_share * beyond[:, None] * beyond
         return covariance
+
+    def _unknown_factor(self, evidence: Evidence) -> float:
+        """How many times the variance is while it is not known what is usual.
+
+        In a camera that was just found, few of the points in view may be those of another place.
+        """
+        limits = self.limits
+        found = max(evidence.found, limits.fewest_found)
+        return limits.unknown_change * (1.0 + (limits.few_found / found) ** 4)
 
     def _error_factor(self, refined: RefinedPose, evidence: Evidence) -> float:
         """How many times the variance is by how the matches fit, and how many are independent."""

@@ -20,7 +20,7 @@ from orbslam2py.slam.initialization.several_views import SeveralViews
 from orbslam2py.slam.initialization.third_view import (
     Candidate,
     Motion,
-    confirmed_motion,
+    agreeing_motions,
     placed_matches,
     reconstruct,
 )
@@ -211,12 +211,12 @@ class MonocularInitializer:
             if not result.success and reason is Reason.LOW_PARALLAX:
                 reason = _REASONS[result.outcome.name]
         for candidate in sorted(candidates, key=lambda candidate: -candidate.worth):
-            motion = confirmed_motion(candidate, self._kept.views, frame.features, self._limits)
-            if motion is None:
+            motions = agreeing_motions(candidate, self._kept.views, frame.features, self._limits)
+            if not motions:
                 reason = Reason.NO_THIRD_VIEW if candidate.is_clear else reason
                 continue
             together = SeveralViews(candidate, self._kept.views, frame.features, self._limits)
-            best = together.best_motion(motion, self._seed)
+            best = together.best_motion(motions, self._seed)
             if best is not None:
                 return self._build_map(candidate.view, best, frame)
             reason = Reason.AMBIGUOUS_MOTION

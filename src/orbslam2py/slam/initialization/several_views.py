@@ -26,6 +26,7 @@ from orbslam2py.slam.initialization.third_view import (
     Candidate,
     Motion,
     is_another_direction,
+    on_the_way,
     other_views,
     pose_of_view,
     reconstruct,
@@ -111,53 +112,72 @@ class SeveralViews:
             rows = np.flatnonzero(partners >= 0)
             self._sightings.append(_Sightings.of(third.frame, rows, partners[rows]))
 
-    def best_motion(self, motion: Motion, seed: int) -> core.TwoViewMotion | None:
+    def best_motion(self, motions: Sequence[Motion], seed: int) -> core.TwoViewMotion | None:
         """The motion that all views agree with best; None if they do not tell it from another.
 
         Parameters
         ----------
-        motion
-            The one that was found.
+        motions
+            Those that third views agree with; of more than one, they could not tell which is right.
         seed
             Of the further draws that give others to compare with.
         """
-        draws = range(self._limits.further_draws + 1)
+        limits = self._limits
+        is_ambiguous = len(motions) > 1
         # Nothing else is mapped yet, so the other cores are free. The order is that of the draws.
-        judge = functools.partial(self._judged, motion, seed)
-        judged = list(itertools.chain.from_iterable(side_by_side(judge, draws)))
-        found, costs = [placed for placed, _ in judged], [cost for _, cost in judged]
-        best = int(np.argmin(costs))
-        chosen = found[best].motion
-        enough = self._limits.clearly_worse_direction * costs[best]
-        for placed, cost in zip(found, costs, strict=True):
-            other = self._limits.other_direction
-            if cost < enough and is_another_direction(placed.motion, chosen, other):
-                return None
-        n_points = np.count_nonzero(chosen.triangulated)
-        if chosen.parallax < self._limits.parallax or n_points < self._limits.points:
+        judged = side_by_side(self._refined, motions)
+        if is_ambiguous and self._told_apart(judged, is_ambiguous=True) is None:
+            return None  # other draws take time, and would not help
+        draws = range(1, limits.further_draws + 1)
+        judge = functools.partial(self._judged, seed)
+        judged += itertools.chain.from_iterable(side_by_side(judge, draws))
+        chosen = self._told_apart(judged, is_ambiguous=is_ambiguous)
+        if chosen is None or chosen.parallax < limits.parallax:
             return None
-        return chosen
+        return chosen if np.count_nonzero(chosen.triangulated) >= limits.points else None
 
-    def _judged(self, motion: Motion, seed: int, draw: int) -> list[tuple[_Placed, float]]:
-        """What comes of each motion of a draw, with its cost; draw 0 is the motion given."""
-        found = [self._refined(other) for other in self._drawn(motion, seed, draw)]
-        return [(placed, self._cost(placed)) for placed in found]
+    def _told_apart(
+        self, judged: Sequence[tuple[_Placed, float]], *, is_ambiguous: bool
+    ) -> core.TwoViewMotion | None:
+        """The motion that costs least, if it costs clearly less than those that lead elsewhere."""
+        limits = self._limits
+        other, worse = limits.other_direction, limits.clearly_worse_direction
+        if is_ambiguous:
+            other, worse = limits.same_direction, limits.clearly_worse_alternative
+        best, least = min(judged, key=lambda placed_and_cost: placed_and_cost[1])
+        for placed, cost in judged:
+            if cost < worse * least and is_another_direction(placed.motion, best.motion, other):
+                return None
+        return best.motion
 
-    def _drawn(self, motion: Motion, seed: int, draw: int) -> Sequence[Motion]:
-        if draw == 0:
-            return [motion]
+    def _judged(self, seed: int, draw: int) -> list[tuple[_Placed, float]]:
+        """What comes of each motion of another draw, with its cost."""
         result = reconstruct(self._view, self._last, seed + draw)
-        return [result] if result.success else result.alternatives
+        drawn = [result] if result.success else result.alternatives
+        return [self._refined(motion) for motion in drawn]
 
     # ---- adjustment ------------------------------------------------------------------------------
-    def _refined(self, motion: Motion) -> _Placed:
-        """Adjust motion, points and the other views' poses; place all matches by the result."""
-        placed = self._place(motion.T_21)
-        for _ in range(_ROUNDS):
-            placed = self._place(self._adjusted(placed))
-        return placed
+    def _refined(self, motion: Motion) -> tuple[_Placed, float]:
+        """Adjust motion, points and the other views' poses, as long as that fits better; its cost.
 
-    def _place(self, T_21: core.Pose) -> _Placed:
+        With little parallax an adjustment may end where no point is placed at all. That says
+        nothing against the motion that it began with.
+        """
+        placed = self._place(motion.T_21)
+        cost = self._cost(placed)
+        for _ in range(_ROUNDS):
+            adjusted = self._place(*self._adjusted(placed))
+            new_cost = self._cost(adjusted)
+            if new_cost >= cost:
+                break
+            placed, cost = adjusted, new_cost
+        return placed, cost
+
+    def _place(self, T_21: core.Pose, others: Sequence[core.Pose | None] = ()) -> _Placed:
+        """All matches by a motion, and the other views by what it places.
+
+        Those views are sought from where they are taken to be, or on the way.
+        """
         view = self._view
         motion = core.place_points(
             view.keypoints, self._last.keypoints, view.matches, self._camera, T_21
@@ -165,26 +185,32 @@ class SeveralViews:
         points = motion.points[self._keypoints]
         is_placed = motion.triangulated[self._keypoints] != 0
         poses: list[core.Pose | None] = [core.Pose(), motion.T_21]
-        for seen in self._sightings[2:]:
+        anywhere = on_the_way(motion.T_21)
+        known = others or [None] * (len(self._sightings) - 2)
+        for seen, pose in zip(self._sightings[2:], known, strict=True):
             use = is_placed[seen.rows]
             if np.count_nonzero(use) < FEWEST_COMMON:
                 poses.append(None)
                 continue
-            pose, _ = pose_of_view(
-                motion.T_21,
+            found, _ = pose_of_view(
+                anywhere if pose is None else [pose],
                 points[seen.rows[use]],
                 seen.pixels[use],
                 seen.inverse_sigma2[use],
                 self._camera,
             )
-            poses.append(pose)
+            poses.append(found)
         return _Placed(motion, points, is_placed, poses)
 
-    def _adjusted(self, placed: _Placed) -> core.Pose:
-        """T_21 after a bundle adjustment of all views and the points placed so far."""
+    def _adjusted(self, placed: _Placed) -> tuple[core.Pose, list[core.Pose | None]]:
+        """T_21 and the other views' poses after a bundle adjustment of all views.
+
+        With the points placed so far; the way between the first view and the last is of length 1.
+        """
+        unchanged = placed.motion.T_21, placed.poses[2:]
         rows = np.flatnonzero(placed.is_placed)
         if len(rows) < FEWEST_COMMON:
-            return placed.motion.T_21
+            return unchanged
         number = np.full(len(placed.is_placed), -1, np.int64)
         number[rows] = np.arange(len(rows))
         poses: list[core.Pose] = []
@@ -215,9 +241,13 @@ class SeveralViews:
             np.concatenate(weights),
             options,
         )
-        T_21: core.Pose = adjusted[1]
-        # Views without parallax may end in one place: then the motion stays what it was.
-        return T_21 if np.linalg.norm(T_21.translation) > 0 else placed.motion.T_21
+        length = np.linalg.norm(adjusted[1].translation)
+        if length == 0:
+            # Views without parallax may end in one place: then the motion stays what it was.
+            return unchanged
+        T_21, *others = (core.Pose(T.quaternion_xyzw, T.translation / length) for T in adjusted[1:])
+        left = iter(others)
+        return T_21, [None if pose is None else next(left) for pose in placed.poses[2:]]
 
     def _cost(self, placed: _Placed) -> float:
         """Mean squared error over everything seen, in units of its variance, at most 5.99 each.

@@ -82,32 +82,35 @@ def placed_matches(view: View, motion: Motion) -> Indices:
     return np.where(motion.triangulated != 0, view.matches, -1).astype(np.int32)
 
 
-def confirmed_motion(
+def agreeing_motions(
     candidate: Candidate, views: Sequence[View], last: core.Frame, limits: InitializationThresholds
-) -> Motion | None:
-    """The motion that most of the other views agree with; None if they do not, or cannot say.
+) -> tuple[Motion, ...]:
+    """The motion that most of the other views agree with, and those that they mistake for it.
 
-    A view that lies so near to one of the two that any motion would suit it is not asked. Where
-    two motions are left, the right one must fit much better than one that leads elsewhere.
+    A view that lies so near to one of the two that any motion would suit it is not asked. None of
+    the motions is left if the other views do not agree, or cannot say. Where more than one is left,
+    the best fits them, but not much better than those that lead elsewhere.
     """
     thirds = other_views(candidate.view, views, limits)
     verdicts = [_verdicts(candidate, third, last) for third in thirds]
     asked = np.array([verdict for verdict in verdicts if verdict is not None])
     if not len(asked):
-        return None
+        return ()
     shares, costs = np.moveaxis(asked, -1, 0)  # (views, motions)
     mean_costs = costs.mean(axis=0)
     best = int(np.argmin(mean_costs))
     if 2 * np.count_nonzero(shares[:, best] >= limits.third_view_fits) <= len(asked):
-        return None
+        return ()
     if candidate.motions[best].parallax < limits.parallax:
-        return None
+        return ()
     chosen = candidate.motions[best]
     enough = limits.clearly_worse * mean_costs[best]
-    for motion, cost in zip(candidate.motions, mean_costs, strict=True):
-        if cost < enough and is_another_direction(motion, chosen, limits.same_direction):
-            return None
-    return chosen
+    others = [
+        motion
+        for motion, cost in zip(candidate.motions, mean_costs, strict=True)
+        if cost < enough and is_another_direction(motion, chosen, limits.same_direction)
+    ]
+    return (chosen, *others)
 
 
 def is_another_direction(motion: Motion, other: Motion, degrees: float) -> bool:
@@ -144,7 +147,7 @@ def _verdicts(candidate: Candidate, third: View, last: core.Frame) -> FloatArray
             return None
         seen = partners[common]
         _, chi2 = pose_of_view(
-            motion.T_21,
+            on_the_way(motion.T_21),
             motion.points[common],
             third.keypoints[seen],
             1 / third.frame.sigma2[seen],
@@ -154,8 +157,13 @@ def _verdicts(candidate: Candidate, third: View, last: core.Frame) -> FloatArray
     return np.array(verdicts)
 
 
+def on_the_way(T_21: core.Pose) -> list[core.Pose]:
+    """Where a view may have been while the camera went from the first one to the last."""
+    return [core.Pose.exp(share * T_21.log()) for share in (0.5, 0.0, 1.0)]
+
+
 def pose_of_view(
-    T_21: core.Pose,
+    starts: Sequence[core.Pose],
     points: FloatArray,
     keypoints: npt.NDArray[np.floating],
     inverse_sigma2: npt.NDArray[np.floating],
@@ -165,11 +173,10 @@ def pose_of_view(
 
     Parameters
     ----------
-    T_21
-        From the first view, whose frame the points are in, to the last; the estimate begins on the
-        way between the two.
+    starts
+        Where the estimate begins; what fits best is taken.
     points
-        (n, 3).
+        (n, 3), in the frame of the first view.
     keypoints
         Where the view sees them, (n, 2) pixels.
     inverse_sigma2
@@ -181,8 +188,7 @@ def pose_of_view(
     pixels = np.full((len(points), 3), np.nan)
     pixels[:, :2] = keypoints
     poses, errors = [], []
-    for share in (0.5, 0.0, 1.0):
-        start = core.Pose.exp(share * T_21.log())
+    for start in starts:
         found = core.optimize_pose(start, camera, 0.0, points, pixels, inverse_sigma2)
         poses.append(found.T_cw)
         errors.append(squared_errors(found.T_cw, points, keypoints, inverse_sigma2, camera))
