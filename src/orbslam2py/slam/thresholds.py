@@ -63,7 +63,7 @@ class InitializationThresholds:
     clearly_worse: float = 2.0
     """Of motions that two views cannot tell apart, the others must fit third views worse than
     the right one by this factor ..."""
-    clearly_worse_alternative: float = 1.5
+    clearly_worse_alternative: float = 1.75
     """... or, where they do not, all views together by this one."""
     same_direction: float = 20.0
     """Two that lead to within so many degrees of each other count as one."""
