@@ -14,9 +14,15 @@ from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py._timing import StageTimer
 from orbslam2py.slam.front_end import FrontEnd, intrinsics
+from orbslam2py.slam.initialization import several_views
 from orbslam2py.slam.initialization.kept_views import KeptViews, View
 from orbslam2py.slam.initialization.several_views import SeveralViews
-from orbslam2py.slam.initialization.third_view import Candidate, agreeing_motions, reconstruct
+from orbslam2py.slam.initialization.third_view import (
+    Candidate,
+    Motion,
+    agreeing_motions,
+    reconstruct,
+)
 from orbslam2py.slam.thresholds import InitializationThresholds
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
@@ -81,6 +87,12 @@ def seen() -> Seen:
     return look("corridor")
 
 
+@pytest.fixture(scope="module")
+def wall_of_a_room() -> Seen:
+    """Passed on a straight way: its two motions fit all views alike."""
+    return look("room")
+
+
 def turned(T_21: core.Pose, degrees: float) -> core.Pose:
     """The same rotation, and another direction."""
     axis = np.cross(T_21.translation, [0.0, 0.0, 1.0])
@@ -117,9 +129,9 @@ def test_it_is_better_than_what_a_draw_gives(seen: Seen) -> None:
         assert seen.off(best) < 0.5 * seen.off(seen.place(drawn.T_21))
 
 
-def test_a_plane_passed_on_a_straight_way_waits() -> None:
+def test_a_plane_passed_on_a_straight_way_waits(wall_of_a_room: Seen) -> None:
     """Two motions explain it in all views alike: only one of them has been drawn or both."""
-    wall = look("room")
+    wall = wall_of_a_room
     assert wall.best_motion(wall.place(wall.T_21)) is None
     # If they counted as one, the map would begin with either.
     assert wall.best_motion(wall.place(wall.T_21), other_direction=180.0) is not None
@@ -144,23 +156,103 @@ def test_two_motions_of_a_plane_are_told_apart_by_all_views() -> None:
     assert wall.best_motion(*left, clearly_worse_alternative=100.0) is None
 
 
-def test_an_adjustment_that_fits_worse_is_not_taken(
-    seen: Seen, monkeypatch: pytest.MonkeyPatch
+def test_motions_that_are_not_told_apart_take_no_further_draws(
+    wall_of_a_room: Seen, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One that ends with all views in one place says nothing against where it began."""
-    solve_bundle = core.solve_bundle
+    wall, draws = wall_of_a_room, []
+    candidate = Candidate.of(wall.view, reconstruct(wall.view, wall.last, seed=0))
+    assert candidate is not None and len(candidate.motions) == 2
 
-    def collapsed(poses: list[core.Pose], *rest: object) -> tuple[list[core.Pose], object, object]:
-        _, points, outliers = solve_bundle(poses, *rest)  # type: ignore[arg-type]
-        nearly = [core.Pose(T.quaternion_xyzw, 1e-9 * np.roll(T.translation, 1)) for T in poses]
-        return nearly, points, outliers
+    def counted(view: View, last: core.Frame, seed: int) -> core.TwoViewResult:
+        draws.append(seed)
+        return reconstruct(view, last, seed)
 
-    monkeypatch.setattr(core, "solve_bundle", collapsed)
+    monkeypatch.setattr(several_views, "reconstruct", counted)
+    assert wall.best_motion(*candidate.motions) is None
+    assert not draws
+    # Were they told apart, the draws would have their say, and be held to the same limit.
+    every = {"same_direction": 180.0}
+    assert wall.best_motion(*candidate.motions, **every) is not None
+    assert sorted(draws) == [1, 2, 3, 4, 5]
+
+
+def test_a_draw_that_leads_elsewhere_and_fits_as_well_lets_the_map_wait(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Also where the motions that were given are told apart: there is a third one."""
+    wall = look("wall")
+    candidate = Candidate.of(wall.view, reconstruct(wall.view, wall.last, seed=0))
+    assert candidate is not None
+    assert wall.best_motion(*candidate.motions) is not None
+    refined = SeveralViews._refined
+    elsewhere = turned(wall.T_21, 25)  # of one motion it would count as the same
+
+    def cheap(self: SeveralViews, motion: Motion) -> tuple[object, float]:
+        placed, cost = refined(self, motion)
+        if motion in candidate.motions:
+            return placed, cost
+        return self._place(elsewhere), 1.3 * 0.174
+
+    monkeypatch.setattr(SeveralViews, "_refined", cheap)
+    assert wall.best_motion(*candidate.motions) is None
+    assert wall.best_motion(*candidate.motions, clearly_worse_alternative=1.01) is not None
+
+
+@pytest.mark.parametrize("not_known", [(), (2,)])
+def test_adjusted_poses_lead_to_the_views_that_they_are_of(
+    seen: Seen, not_known: tuple[int, ...]
+) -> None:
+    limits = InitializationThresholds()
+    candidate = Candidate(seen.view, (seen.place(seen.T_21),))
+    together = SeveralViews(candidate, seen.kept.views, seen.last, limits)
+    placed = together._place(seen.T_21)
+    assert len(placed.poses) == 4
+    for number in not_known:
+        placed.poses[number] = None  # as of a view that sees too few of the points
+    T_21, others = together._adjusted(placed)
+    assert np.linalg.norm(T_21.translation) == pytest.approx(1.0)
+    assert [pose is None for pose in others] == [pose is None for pose in placed.poses[2:]]
+    for pose, before in zip(others, placed.poses[2:], strict=True):
+        if pose is not None:
+            assert before is not None
+            turn, move = pose.difference(before)
+            assert turn < np.radians(1)
+            assert move < 0.1  # of the way, on which they lie a fifth apart or more
+    again = together._place(T_21, others)
+    assert all(pose is not None for pose in again.poses)
+
+
+@pytest.mark.parametrize("length", [0.0, 1e-310, np.nan])
+def test_views_that_end_in_one_place_leave_the_motion_as_it_was(
+    seen: Seen, monkeypatch: pytest.MonkeyPatch, length: float
+) -> None:
+    class Collapsed:
+        quaternion_xyzw = np.array([0.0, 0.0, 0.0, 1.0])
+        translation = np.full(3, length)
+
+    monkeypatch.setattr(core, "solve_bundle", lambda poses, *_: ([Collapsed] * len(poses), 0, 0))
     motion = seen.place(seen.T_21)
     best = seen.best_motion(motion, other_direction=180.0)
     assert best is not None
-    assert seen.off(best) < 10
-    assert best.parallax > 1.0
+    assert seen.off(best) < 1
+
+
+def test_an_adjustment_that_fits_worse_is_not_taken(
+    seen: Seen, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that leads away says nothing against where it began."""
+    solve_bundle = core.solve_bundle
+
+    def led_away(poses: list[core.Pose], *rest: object) -> tuple[list[core.Pose], object, object]:
+        _, points, outliers = solve_bundle(poses, *rest)  # type: ignore[arg-type]
+        away = [core.Pose(T.quaternion_xyzw, np.roll(T.translation, 1)) for T in poses]
+        return away, points, outliers
+
+    monkeypatch.setattr(core, "solve_bundle", led_away)
+    motion = seen.place(seen.T_21)
+    best = seen.best_motion(motion, other_direction=180.0)
+    assert best is not None
+    assert seen.off(best) < 1
 
 
 @pytest.mark.parametrize(("degrees", "is_one"), [(0, True), (15, True), (45, False)])

@@ -207,12 +207,11 @@ class EvidenceJudge:
         the wrong place, a lens that is not as stated, and on the way that a blurred image is
         smeared. As far as that shows they count as fewer. Errors far beyond the usual ones are
         those of whole regions that move: then each cell with inliers counts as one observation, and
-        errors as large as they are. A camera that suddenly
-        turns otherwise smears and bends its images while they are taken, and matches that hold a
-        pose less firmly than usual let it be pulled further by what is wrong in all of them. A
-        blurred image is of any moment while the shutter was open. Where the map moved since the
-        frame before, it was off by as much. And a pose far from where the motion led may be a
-        mistake, however well it fits.
+        errors as large as they are. A camera that suddenly turns otherwise smears and bends its
+        images while they are taken, and matches that hold a pose less firmly than usual let it be
+        pulled further by what is wrong in all of them. A blurred image is of any moment while the
+        shutter was open. Where the map moved since the frame before, it was off by as much. And a
+        pose far from where the motion led may be a mistake, however well it fits.
         """
         covariance = refined.estimate.covariance
         if covariance is None:
@@ -244,7 +243,8 @@ class EvidenceJudge:
     def _unknown_factor(self, evidence: Evidence) -> float:
         """How many times the variance is while it is not known what is usual.
 
-        In a camera that was just found, few of the points in view may be those of another place.
+        As in a map's first frames and in a camera that was just found. Of that one, few of the
+        points in view may be those of another place.
         """
         limits = self.limits
         found = max(evidence.found, limits.fewest_found)

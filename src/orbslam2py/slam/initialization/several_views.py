@@ -35,6 +35,7 @@ from orbslam2py.slam.initialization.third_view import (
 from orbslam2py.slam.thresholds import InitializationThresholds
 
 _ROUNDS = 2  # of adjustment, each followed by placing all matches anew
+_COLLAPSED = 1e-9  # of the way before the adjustment
 
 
 @dataclass(frozen=True)
@@ -118,18 +119,21 @@ class SeveralViews:
         Parameters
         ----------
         motions
-            Those that third views agree with; of more than one, they could not tell which is right.
+            The one that third views agree with, and those that fit them nearly as well.
         seed
             Of the further draws that give others to compare with.
         """
         limits = self._limits
         is_ambiguous = len(motions) > 1
+        judged: list[tuple[_Placed, float]] = []
+        draws = range(limits.further_draws + 1)
+        if is_ambiguous:
+            judged = side_by_side(self._refined, motions)
+            if self._told_apart(judged, is_ambiguous=True) is None:
+                return None  # other draws take time, and would not help
+            draws = draws[1:]
         # Nothing else is mapped yet, so the other cores are free. The order is that of the draws.
-        judged = side_by_side(self._refined, motions)
-        if is_ambiguous and self._told_apart(judged, is_ambiguous=True) is None:
-            return None  # other draws take time, and would not help
-        draws = range(1, limits.further_draws + 1)
-        judge = functools.partial(self._judged, seed)
+        judge = functools.partial(self._judged, motions, seed)
         judged += itertools.chain.from_iterable(side_by_side(judge, draws))
         chosen = self._told_apart(judged, is_ambiguous=is_ambiguous)
         if chosen is None or chosen.parallax < limits.parallax:
@@ -150,15 +154,19 @@ class SeveralViews:
                 return None
         return best.motion
 
-    def _judged(self, seed: int, draw: int) -> list[tuple[_Placed, float]]:
-        """What comes of each motion of another draw, with its cost."""
-        result = reconstruct(self._view, self._last, seed + draw)
-        drawn = [result] if result.success else result.alternatives
+    def _judged(
+        self, motions: Sequence[Motion], seed: int, draw: int
+    ) -> list[tuple[_Placed, float]]:
+        """What comes of each motion of a draw, with its cost; draw 0 are the motions given."""
+        drawn = motions
+        if draw > 0:
+            result = reconstruct(self._view, self._last, seed + draw)
+            drawn = [result] if result.success else result.alternatives
         return [self._refined(motion) for motion in drawn]
 
     # ---- adjustment ------------------------------------------------------------------------------
     def _refined(self, motion: Motion) -> tuple[_Placed, float]:
-        """Adjust motion, points and the other views' poses, as long as that fits better; its cost.
+        """Adjust motion, points and the other views' poses while that fits better; with the cost.
 
         With little parallax an adjustment may end where no point is placed at all. That says
         nothing against the motion that it began with.
@@ -242,7 +250,7 @@ class SeveralViews:
             options,
         )
         length = np.linalg.norm(adjusted[1].translation)
-        if length == 0:
+        if not length > _COLLAPSED:  # nor not a number
             # Views without parallax may end in one place: then the motion stays what it was.
             return unchanged
         T_21, *others = (core.Pose(T.quaternion_xyzw, T.translation / length) for T in adjusted[1:])

@@ -85,7 +85,7 @@ def placed_matches(view: View, motion: Motion) -> Indices:
 def agreeing_motions(
     candidate: Candidate, views: Sequence[View], last: core.Frame, limits: InitializationThresholds
 ) -> tuple[Motion, ...]:
-    """The motion that most of the other views agree with, and those that they mistake for it.
+    """The motion that most of the other views agree with, and those that fit them nearly as well.
 
     A view that lies so near to one of the two that any motion would suit it is not asked. None of
     the motions is left if the other views do not agree, or cannot say. Where more than one is left,
