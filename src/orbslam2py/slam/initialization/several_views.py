@@ -82,7 +82,7 @@ class SeveralViews:
     Parameters
     ----------
     candidate
-        The first view, with a motion that other views agree with.
+        The first view, with motions that other views agree with.
     views
         All views kept.
     last
