@@ -1852,7 +1852,7 @@ class TwoViewResult:
     @property
     def alternatives(self) -> list[TwoViewMotion]:
         """
-        Where the motion is ambiguous: TwoViewMotion of each that a third view may choose.
+        Where the motion is ambiguous: TwoViewMotion of each that further views may choose.
         """
     @property
     def best_hypothesis(self) -> int:
@@ -3287,9 +3287,11 @@ def select_local_map(map: Map, frame: TrackedFrame) -> LocalMap:
     """
     Keyframes voted for by the frame's points, extended, and all their points.
     """
-def sharpness(frame: Frame) -> float:
+def sharpness(frame: Frame, n_usual: typing.SupportsInt | typing.SupportsIndex) -> float:
     """
-    Sum of the corners' responses on the two finest levels, grey levels: what blur takes away first. To be compared with that of other frames of the same camera.
+    Sum of the corners' responses on the two finest levels, grey levels: what blur takes
+    away first. To be compared with that of other frames of the same camera. Of one with
+    more than `n_usual` corners only the share of the strongest ones counts.
     """
 def similarity(a: WordVector, b: WordVector) -> float:
     """

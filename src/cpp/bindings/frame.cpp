@@ -458,9 +458,12 @@ void bind_frame(py::module_& module) {
       "Median distance between a frame's matched keypoints, outliers too, and the projections\n"
       "of their points, in standard deviations of the keypoints' levels; 0 without any.\n"
       "Raises StateError without a pose.");
-  module.def("sharpness", &sharpness, py::arg("frame"), py::call_guard<py::gil_scoped_release>(),
-             "Sum of the corners' responses on the two finest levels, grey levels: what blur takes "
-             "away first. To be compared with that of other frames of the same camera.");
+  module.def(
+      "sharpness", &sharpness, py::arg("frame"), py::arg("n_usual"),
+      py::call_guard<py::gil_scoped_release>(),
+      "Sum of the corners' responses on the two finest levels, grey levels: what blur takes\n"
+      "away first. To be compared with that of other frames of the same camera. Of one with\n"
+      "more than `n_usual` corners only the share of the strongest ones counts.");
   module.def("fine_detail", &fine_detail, py::arg("frame"),
              py::call_guard<py::gil_scoped_release>(),
              "Mean response of the corners on the two finest levels by that of the corners from\n"

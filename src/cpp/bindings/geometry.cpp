@@ -106,8 +106,8 @@ void bind_two_view_result(py::module_& module) {
       .def_readonly("n_fundamental_inliers", &Result::n_fundamental_inliers, "Matches that fit F.")
       .def_readonly("hypotheses", &Result::hypotheses, "MotionScore of each motion tried.")
       .def_readonly("alternatives", &Result::alternatives,
-                    "Where the motion is ambiguous: TwoViewMotion of each that a third view may "
-                    "choose.")
+                    "Where the motion is ambiguous: TwoViewMotion of each that further views "
+                    "may choose.")
       .def_readonly("best_hypothesis", &Result::best_hypothesis, "Index of the best one.")
       .def_readonly("T_21", &Result::T_21,
                     "Pose from camera 1 to camera 2, translation of length 1.")

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "frame/sharpness.hpp"
 
+#include <algorithm>
+#include <functional>
+#include <numeric>
+#include <vector>
+
 namespace orbslam {
 namespace {
 
@@ -9,12 +14,19 @@ constexpr int kFirstCoarseLevel = 4;
 
 }  // namespace
 
-double sharpness(const Frame& frame) {
-  double sum = 0;
+double sharpness(const Frame& frame, std::size_t n_usual) {
+  std::vector<float> responses;
+  responses.reserve(frame.keypoints.size());
   for (const Keypoint& keypoint : frame.keypoints) {
-    if (keypoint.level < kFineLevels) sum += static_cast<double>(keypoint.response);
+    if (keypoint.level < kFineLevels) responses.push_back(keypoint.response);
   }
-  return sum;
+  if (frame.keypoints.size() > n_usual) {
+    const std::size_t n = responses.size() * n_usual / frame.keypoints.size();
+    std::partial_sort(responses.begin(), responses.begin() + static_cast<std::ptrdiff_t>(n),
+                      responses.end(), std::greater<>());
+    responses.resize(n);
+  }
+  return std::accumulate(responses.begin(), responses.end(), 0.0);
 }
 
 double fine_detail(const Frame& frame) {

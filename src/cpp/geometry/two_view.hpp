@@ -63,8 +63,8 @@ struct TwoViewResult {
   std::vector<std::uint8_t> homography_inlier, fundamental_inlier;
 
   /// Where the motion is ambiguous: all that place at least half as many points as the best, also
-  /// with little parallax, in the order of `hypotheses`. A third view can tell them apart: from two
-  /// views of a plane follow two motions, of which only one agrees with another view.
+  /// with little parallax, in the order of `hypotheses`. Further views can tell them apart: from
+  /// two views of a plane follow two motions, of which only one agrees with all others.
   std::vector<TwoViewMotion> alternatives;
 
   bool success() const { return outcome == TwoViewOutcome::reconstructed; }

@@ -139,6 +139,11 @@ class Pipeline:
             worker.start()
 
     # ---- one image -------------------------------------------------------------------------------
+    @property
+    def feature_factor(self) -> int:
+        """Features that a single camera's next image needs, in multiples of the settings'."""
+        return self.tracking.feature_factor(localize=self.localization.on)
+
     def process(
         self, timestamp: float, build: BuildFrame, image: ByteArray, *, details: bool
     ) -> TrackingRecord:
@@ -425,5 +430,6 @@ def _make_tracking(setup: Setup, back_end: BackEnd, options: SystemOptions) -> T
             waits=options.wait_for_mapping and not options.deterministic,
         ),
         has_depth=sensor.has_depth,
+        n_features=n_features,
         new_map_after=options.new_map_after if options.several_maps else None,
     )

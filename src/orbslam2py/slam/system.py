@@ -303,7 +303,7 @@ class System:
                 timestamp,
                 timer,
                 mask,
-                feature_factor=self.pipeline.tracking.feature_factor,
+                feature_factor=self.pipeline.feature_factor,
             ),
         )
 

@@ -146,6 +146,9 @@ class TrackingThresholds:
     """... if it lies so many standard deviations away ..."""
     much_better_look: float = 1.1
     """... and else with so many times."""
+    feature_factor: int = 2
+    """Extracted features of a single camera in localization mode, in multiples of the settings'
+    number; while it is lost, of every second image."""
     frames_after_relocalization: int = 2
     """How many frames that is; meanwhile there is no motion model either."""
     local_map_inliers: int = 30

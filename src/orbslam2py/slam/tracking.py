@@ -29,6 +29,7 @@ from orbslam2py.slam.pose_search import (
 )
 from orbslam2py.slam.records import PoseEstimate, Reason, TrackingOutcome, TrackingState
 from orbslam2py.slam.relocalization import BlurWatch, Confirmation, LossClock
+from orbslam2py.slam.thresholds import TrackingThresholds
 from orbslam2py.slam.watched_frame import accepted_keypoints
 
 _log = logging.getLogger(__name__)
@@ -55,6 +56,8 @@ class Tracking:
         Which frames become keyframes.
     has_depth : bool
         Whether frames measure depths, which become points of the map with a keyframe.
+    n_features : int
+        Features of the settings.
     new_map_after : float or None
         Seconds that tracking is lost before another map begins beside those there are; None: only
         the old one is searched, for ever.
@@ -71,6 +74,7 @@ class Tracking:
         belief: Belief,
         keyframe_decision: KeyframeDecision,
         has_depth: bool,
+        n_features: int,
         new_map_after: float | None = None,
     ) -> None:
         self._map = slam_map
@@ -83,7 +87,7 @@ class Tracking:
         self._has_depth = has_depth
         self._in_growing_map = FirstEstimateInGrowingMap(search)
         self._in_fixed_map = FirstEstimateInFixedMap(search, has_depth=has_depth)
-        self._blur_watch = BlurWatch()
+        self._blur_watch = BlurWatch(n_features)
         self._confirmation = Confirmation()
         self._loss = LossClock(new_map_after)
         #: How often tracking was found again, over all maps.
@@ -121,6 +125,8 @@ class Tracking:
         # A frame found again that becomes a keyframe with the next one.
         self._waits_for_confirmation: core.TrackedFrame | None = None
         self._loss.reset()
+        # Images in a row without a pose.
+        self._n_lost = 0
         self._blurred = False
 
     def begin_in_loaded_map(self, initial_pose: core.Pose | None) -> None:
@@ -161,11 +167,16 @@ class Tracking:
         """Whether the next image may begin a map."""
         return self.state in (TrackingState.NO_IMAGES_YET, TrackingState.NOT_INITIALIZED)
 
-    @property
-    def feature_factor(self) -> int:
-        """Features that a single camera's next image needs, in multiples of the settings'."""
-        begins = self.initializing or self._seeks_map
-        return self._initializer.feature_factor if begins else 1
+    def feature_factor(self, *, localize: bool) -> int:
+        """Features that a single camera's next image needs, in multiples of the settings'.
+
+        In localization mode nobody else needs the time, and more features find more of the map.
+        Those of a lost camera are harder to tell apart as well: there they take turns.
+        """
+        if self.initializing or self._seeks_map:
+            return self._initializer.feature_factor
+        more = localize and (self.state is TrackingState.OK or self._n_lost % 2 == 1)
+        return TrackingThresholds().feature_factor if more else 1
 
     @property
     def motion(self) -> MotionModel:
@@ -375,6 +386,7 @@ class Tracking:
     ) -> TrackingOutcome:
         was_ok = self.state is TrackingState.OK
         self._loss.lost(frame.timestamp)
+        self._n_lost += 1
         if was_ok:
             _log.info("tracking lost at frame %d: %s", frame.id, estimate.reason)
         self.state = TrackingState.LOST
@@ -400,6 +412,7 @@ class Tracking:
     def _stay(self, frame: core.TrackedFrame) -> None:
         """Go on in the map that a frame was found in, which may have rested."""
         self._loss.followed(frame.timestamp)
+        self._n_lost = 0
         if self._seeks_map:
             self._seeks_map = False
             self._initializer.restart([])

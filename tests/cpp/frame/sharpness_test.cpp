@@ -24,17 +24,21 @@ cv::Mat texture() {
   return image;
 }
 
-std::shared_ptr<const Frame> frame_of(const cv::Mat& image) {
+std::shared_ptr<const Frame> frame_of(const cv::Mat& image, int n_features = 1000) {
   CameraOptions options;
   options.pinhole = {300, 300, 160, 120};
   options.image_size = {320, 240};
-  OrbExtractor extractor{OrbOptions{}};
+  OrbOptions orb;
+  orb.n_features = n_features;
+  OrbExtractor extractor{orb};
   const FrameContext context{std::make_shared<Camera>(options),
                              std::make_shared<ScalePyramid>(extractor.scales())};
   return build_monocular_frame(context, 0, 0, extractor.extract(image).features);
 }
 
-double sharpness_of(const cv::Mat& image) { return sharpness(*frame_of(image)); }
+constexpr int kFeatures = 1000;
+
+double sharpness_of(const cv::Mat& image) { return sharpness(*frame_of(image), kFeatures); }
 
 TEST(Sharpness, FallsWithEveryBlur) {
   const cv::Mat image = texture();
@@ -51,6 +55,26 @@ TEST(Sharpness, FallsWithEveryBlur) {
 
 TEST(Sharpness, WithoutCornersItIsZero) {
   EXPECT_EQ(sharpness_of(cv::Mat(240, 320, CV_8UC1, cv::Scalar(90))), 0);
+}
+
+TEST(Sharpness, MoreFeaturesMakeNoImageSharper) {
+  const cv::Mat image = texture();
+  constexpr int n_usual = 200;
+  const auto usual = frame_of(image, n_usual);
+  const auto more = frame_of(image, 2 * n_usual);
+  ASSERT_GT(more->size(), 1.8 * n_usual);
+  const double expected = sharpness(*usual, n_usual);
+  EXPECT_GT(sharpness(*more, 2 * n_usual), 1.5 * expected) << "all of them";
+  EXPECT_NEAR(sharpness(*more, n_usual), expected, 0.3 * expected);
+  cv::Mat blurred;
+  cv::blur(image, blurred, {11, 1});
+  EXPECT_LT(sharpness(*frame_of(blurred, 2 * n_usual), n_usual), 0.7 * expected);
+}
+
+TEST(Sharpness, OfFewerCornersThanUsualAllCount) {
+  const auto frame = frame_of(texture(), 200);
+  EXPECT_EQ(sharpness(*frame, frame->size()), sharpness(*frame, 10'000));
+  EXPECT_EQ(sharpness(*frame, 0), 0);
 }
 
 TEST(FineDetail, FallsWithEveryBlurAndNotWithContrast) {

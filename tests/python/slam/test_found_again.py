@@ -141,3 +141,36 @@ def test_a_black_frame_says_nothing_of_sharpness(scene: Scene) -> None:
         assert lose(scene).estimate.reason is not Reason.BLURRED
     blurred(scene)
     assert scene.track().estimate.reason is Reason.BLURRED, "the sharp ones are remembered"
+
+
+# ---- features of a single camera -----------------------------------------------------------------
+def test_more_features_in_localization_mode_and_in_turns_while_lost(scene: Scene) -> None:
+    def factor() -> int:
+        return scene.tracking.feature_factor(localize=True)
+
+    scene.run(40)
+    assert scene.tracking.feature_factor(localize=False) == 1
+    assert factor() == 2
+    factors = []
+    for _ in range(4):
+        assert lose(scene).state is TrackingState.LOST
+        factors.append(factor())
+    assert factors == [2, 1, 2, 1]
+    assert scene.tracking.feature_factor(localize=False) == 1
+    assert [scene.track().state, scene.track().state] == [TrackingState.OK] * 2
+    assert factor() == 2
+    lose(scene)
+    assert factor() == 2, "counted from the last pose"
+
+
+def test_a_loaded_map_is_searched_with_the_usual_features_first(scene: Scene) -> None:
+    scene.tracking.begin_in_loaded_map(None)
+    assert scene.tracking.feature_factor(localize=True) == 1
+
+
+def test_while_a_map_begins_the_initializer_decides(scene: Scene) -> None:
+    scene.initializer.feature_factor = 4
+    assert scene.tracking.feature_factor(localize=False) == 4
+    assert scene.tracking.feature_factor(localize=True) == 4
+    scene.run(40)
+    assert scene.tracking.feature_factor(localize=False) == 1

@@ -14,6 +14,7 @@ from orbslam2py import Sensor, System, TrackingRecord, TrackingState
 from orbslam2py import _core as core
 from orbslam2py._worker import PauseTicket
 from orbslam2py.evaluation import pose_error
+from orbslam2py.slam.frame_source import track_images
 from orbslam2py.slam.local_mapping import LocalMapping
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.small_sequences import black, images, new_system, play, track
@@ -142,6 +143,20 @@ def test_a_single_camera_is_lost_outside_the_map_and_found_inside() -> None:
         assert world.error(record, T_wc).translation_m < 0.02
     assert TrackingState.LOST in states
     assert system.map_hash() == before
+
+
+def test_a_single_camera_takes_more_features_in_localization_mode() -> None:
+    options = SyntheticOptions(world="corridor", sensor="mono", size=(320, 240), noise=1)
+    world = MappedWorld(SyntheticSequence(options), range(30))
+    shown = world.sequence.load(29)
+    counts = []
+    for seconds, mode in ((10.0, False), (10.1, True), (10.2, False)):
+        world.system.localization_mode = mode
+        record = track_images(world.system, shown, seconds, details=True)
+        assert record.features is not None
+        counts.append(len(record.features.keypoints))
+    assert 1.5 * counts[0] < counts[1] <= 2.02 * counts[0]
+    assert counts[2] == counts[0]
 
 
 def _turned(degrees: float) -> np.ndarray:

@@ -54,7 +54,7 @@ class Played:
 
 
 def test_a_plane_begins_a_map() -> None:
-    """Two views of a plane allow two motions; a third one tells them apart."""
+    """Two views of a plane allow two motions; further ones tell them apart."""
     played = Played(world="wall", frames=40)
     assert played.first <= 25
     assert played.error() < 0.02

@@ -24,6 +24,7 @@ from orbslam2py.slam.thresholds import EvidenceThresholds, TrackingThresholds
 from orbslam2py.slam.tracking import Tracking
 
 MAX_FRAMES = 30
+N_FEATURES = 1000
 OUTLIERS = np.array([7, 9])
 
 
@@ -222,7 +223,8 @@ class FakeCore:
         frame.anchor_x = world.keyframe_x
         frame.reference_keyframe = keyframe
 
-    def sharpness(self, features: object) -> float:
+    def sharpness(self, features: object, n_usual: int) -> float:
+        assert n_usual == N_FEATURES
         return self.sharpnesses.popleft() if self.sharpnesses else 1000.0
 
     def add_temporary_points(self, last: FakeFrame, points: str) -> int:
@@ -416,6 +418,7 @@ class Scene:
             belief=Belief(search, judge, again),
             keyframe_decision=KeyframeDecision(fakes.map, fakes.mapping.worker, sensor, MAX_FRAMES),
             has_depth=sensor.has_depth,
+            n_features=N_FEATURES,
         )
         self.frames: list[FakeFrame] = []
 

@@ -19,16 +19,19 @@ class BlurWatch:
 
     Parameters
     ----------
+    n_features : int
+        How many keypoints a frame usually has; one that was extracted with more is not sharper.
     thresholds : BlurThresholds, optional
         Limits.
     """
 
-    def __init__(self, thresholds: BlurThresholds | None = None) -> None:
+    def __init__(self, n_features: int, thresholds: BlurThresholds | None = None) -> None:
+        self._n_features = n_features
         self._limits = thresholds or BlurThresholds()
         self._recent: deque[float] = deque(maxlen=self._limits.frames)
 
     def reset(self) -> None:
-        """Forget the frames before: another camera, or another number of features."""
+        """Forget the frames before, of another camera."""
         self._recent.clear()
 
     def is_blurred(self, frame: core.Frame) -> bool:
@@ -43,7 +46,7 @@ class BlurWatch:
         frame : orbslam2py._core.Frame
             With its keypoints.
         """
-        sharpness = core.sharpness(frame)
+        sharpness = core.sharpness(frame, self._n_features)
         if sharpness <= 0:
             return False
         known = len(self._recent) >= self._limits.fewest
