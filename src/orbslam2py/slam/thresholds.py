@@ -146,9 +146,6 @@ class TrackingThresholds:
     """... if it lies so many standard deviations away ..."""
     much_better_look: float = 1.1
     """... and else with so many times."""
-    feature_factor: int = 2
-    """Extracted features of a single camera in localization mode, in multiples of the settings'
-    number; while it is lost, of every second image."""
     frames_after_relocalization: int = 2
     """How many frames that is; meanwhile there is no motion model either."""
     local_map_inliers: int = 30
@@ -157,6 +154,9 @@ class TrackingThresholds:
     """The same for the first second after a relocalization."""
     small_map: int = 5
     """A map with so few keyframes is given up when tracking is lost, and a new one is begun."""
+    feature_factor: int = 2
+    """Extracted features of a single camera in localization mode, in multiples of the settings'
+    number; while it is lost, of every second image."""
 
     def for_features(self, n_features: int) -> TrackingThresholds:
         """These limits for images with so many features: of few ones fewer are asked for."""
