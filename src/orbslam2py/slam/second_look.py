@@ -15,6 +15,10 @@ from orbslam2py.slam.records import PoseEstimate
 #: Times that a frame whose pose is in doubt is matched, at most: each is nearer to where it was.
 _MOST_LOOKS = 6
 
+#: Inliers that each of them must bring, by those before. In images that show little, one look leads
+#: to the next one with as many wrong matches, further and further away.
+_MORE_INLIERS = 1.1
+
 
 class SecondLook:
     """Gives frames that were tracked long ago new poses; the map is only read.
@@ -41,7 +45,8 @@ class SecondLook:
         frame : TrackedFrame
             As it was tracked; it stays as it is.
         in_doubt : bool
-            Its pose may be far off: look further around, and again from where it is then found.
+            Its pose may be far off: look further around, and again from where it is then found, as
+            long as that shows clearly more of the map.
         """
         followed = _copy_of(frame)
         if followed.T_cw is None:
@@ -53,12 +58,9 @@ class SecondLook:
         found = followed
         for _ in range(_MOST_LOOKS if in_doubt else 1):
             looked = self._look(found, wide=in_doubt)
-            if looked is None:
+            if looked is None or (in_doubt and not _shows_more(looked, found)):
                 break
-            same = np.array_equal(looked.map_points, found.map_points)
             found = looked
-            if same:
-                break
         return found
 
     def _look(self, frame: core.TrackedFrame, *, wide: bool) -> core.TrackedFrame | None:
@@ -70,6 +72,10 @@ class SecondLook:
             return None
         refined.frame.discard_outliers()
         return refined.frame
+
+
+def _shows_more(looked: core.TrackedFrame, found: core.TrackedFrame) -> bool:
+    return looked.n_associated() >= _MORE_INLIERS * found.n_associated()
 
 
 def _copy_of(frame: core.TrackedFrame) -> core.TrackedFrame:

@@ -155,8 +155,8 @@ class TrackingThresholds:
     small_map: int = 5
     """A map with so few keyframes is given up when tracking is lost, and a new one is begun."""
     feature_factor: int = 2
-    """Extracted features of a single camera in localization mode, in multiples of the settings'
-    number; while it is lost, of every second image."""
+    """Extracted features of a single camera in localization mode, and of every second image while
+    it is lost, in multiples of the settings' number."""
 
     def for_features(self, n_features: int) -> TrackingThresholds:
         """These limits for images with so many features: of few ones fewer are asked for."""

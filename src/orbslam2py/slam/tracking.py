@@ -170,12 +170,12 @@ class Tracking:
     def feature_factor(self, *, localize: bool) -> int:
         """Features that a single camera's next image needs, in multiples of the settings'.
 
-        In localization mode nobody else needs the time, and more features find more of the map.
-        Those of a lost camera are harder to tell apart as well: there they take turns.
+        In localization mode nobody else needs the time, and more features find more of the map; so
+        they do for a lost camera. But they are harder to tell apart there, and take turns.
         """
         if self.initializing or self._seeks_map:
             return self._initializer.feature_factor
-        more = localize and (self.state is TrackingState.OK or self._n_lost % 2 == 1)
+        more = self._n_lost % 2 == 1 or (localize and self.state is TrackingState.OK)
         return TrackingThresholds().feature_factor if more else 1
 
     @property

@@ -145,22 +145,21 @@ def test_a_black_frame_says_nothing_of_sharpness(scene: Scene) -> None:
 
 # ---- features of a single camera -----------------------------------------------------------------
 def test_more_features_in_localization_mode_and_in_turns_while_lost(scene: Scene) -> None:
-    def factor() -> int:
-        return scene.tracking.feature_factor(localize=True)
+    def factors() -> tuple[int, int]:
+        tracking = scene.tracking
+        return tracking.feature_factor(localize=False), tracking.feature_factor(localize=True)
 
     scene.run(40)
-    assert scene.tracking.feature_factor(localize=False) == 1
-    assert factor() == 2
-    factors = []
+    assert factors() == (1, 2)
+    while_lost = []
     for _ in range(4):
         assert lose(scene).state is TrackingState.LOST
-        factors.append(factor())
-    assert factors == [2, 1, 2, 1]
-    assert scene.tracking.feature_factor(localize=False) == 1
+        while_lost.append(factors())
+    assert while_lost == [(2, 2), (1, 1), (2, 2), (1, 1)]
     assert [scene.track().state, scene.track().state] == [TrackingState.OK] * 2
-    assert factor() == 2
+    assert factors() == (1, 2)
     lose(scene)
-    assert factor() == 2, "counted from the last pose"
+    assert factors() == (2, 2), "counted from the last pose"
 
 
 def test_a_loaded_map_is_searched_with_the_usual_features_first(scene: Scene) -> None:
