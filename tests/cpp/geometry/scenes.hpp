@@ -47,6 +47,18 @@ struct TwoViewScene {
   std::vector<int> matches;
 };
 
+/// The keypoints of a golden set.
+inline TwoViewScene golden_two_views(const std::string& set) {
+  const auto uv_1 = golden<float>(set, "uv1"), uv_2 = golden<float>(set, "uv2");
+  TwoViewScene scene;
+  for (std::size_t i = 0; i < uv_1.rows(); ++i) {
+    scene.initial.emplace_back(uv_1.at(i, 0), uv_1.at(i, 1));
+    scene.current.emplace_back(uv_2.at(i, 0), uv_2.at(i, 1));
+    scene.matches.push_back(static_cast<int>(i));
+  }
+  return scene;
+}
+
 inline TwoViewScene make_two_view_scene(SceneShape shape, const Pose& T_21, std::size_t count,
                                         double noise, std::uint64_t seed,
                                         double outlier_share = 0) {

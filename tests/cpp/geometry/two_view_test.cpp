@@ -275,13 +275,7 @@ class GoldenTwoViews : public ::testing::TestWithParam<const char*> {
 };
 
 TEST_P(GoldenTwoViews, AgreeWithTheReference) {
-  const auto uv_1 = golden<float>("uv1"), uv_2 = golden<float>("uv2");
-  TwoViewScene scene;
-  for (std::size_t i = 0; i < uv_1.rows(); ++i) {
-    scene.initial.emplace_back(uv_1.at(i, 0), uv_1.at(i, 1));
-    scene.current.emplace_back(uv_2.at(i, 0), uv_2.at(i, 1));
-    scene.matches.push_back(static_cast<int>(i));
-  }
+  const TwoViewScene scene = testing::golden_two_views(GetParam());
   const auto sets = golden<int>("out_sets");
   std::vector<EightPairs> samples(sets.rows());
   for (std::size_t k = 0; k < 8 * sets.rows(); ++k) samples[k / 8][k % 8] = sets.values[k];
