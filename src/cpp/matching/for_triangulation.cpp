@@ -93,13 +93,15 @@ FeaturePairs find_pairs(const FreeFeatures& a, FreeFeatures& b) {
     if (free_b.empty()) return;
     for (const std::uint32_t i : node_a) {
       if (a.occupied[i]) continue;
-      geometry.select(frame_a.keypoints[i]);
+      bool selected = false;  // most features resemble none of b, and need no line
       int best = kDescriptorLow;
       std::int64_t match = -1;
       for (const std::uint32_t j : free_b) {
         const int distance = hamming_distance(frame_a.descriptors[i], frame_b.descriptors[j]);
         if (distance > best) continue;  // the last of equals wins
         if (b.occupied[j]) continue;    // since a moment ago
+        if (!selected) geometry.select(frame_a.keypoints[i]);
+        selected = true;
         const Keypoint& feature = frame_b.keypoints[j];
         const bool has_depth = frame_a.has_depth(i) || frame_b.has_depth(j);
         if (!has_depth && geometry.near_epipole(feature)) continue;
