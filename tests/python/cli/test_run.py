@@ -19,11 +19,10 @@ from orbslam2py import Sensor, Settings
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.trajectory import read_tum
 from support.command_line import RUN_FILES, CommandLine, Results
-from support.small_sequences import elsewhere
+from support.small_sequences import N_FAST, elsewhere, write_fast_part
 
 pytestmark = pytest.mark.watchdog(40)
 
-N = 24
 STAGES = ["extract", "stereo", "predict", "local_map", "keyframe", "track"]
 PARTS = ["insert", "cull_points", "new_points", "fuse", "cull_keyframes"]
 
@@ -31,13 +30,10 @@ PARTS = ["insert", "cull_points", "new_points", "fuse", "cull_keyframes"]
 @pytest.fixture(scope="module")
 def sequences(tmp_path_factory: pytest.TempPathFactory) -> dict[Sensor, Path]:
     folder = tmp_path_factory.mktemp("sequences")
-    made = {}
-    for sensor in (Sensor.RGBD, Sensor.STEREO):
-        options = SyntheticOptions(
-            world="corridor", sensor=sensor, frames=N, size=(320, 240), speed=2.0
-        )
-        made[sensor] = SyntheticSequence(options).write(folder / str(sensor))
-    return made
+    return {
+        sensor: write_fast_part(folder / str(sensor), sensor)
+        for sensor in (Sensor.RGBD, Sensor.STEREO)
+    }
 
 
 @pytest.fixture
@@ -62,8 +58,8 @@ def test_results(command: CommandLine, sequences: dict[Sensor, Path], sensor: Se
         "sensor": str(sensor),
         "deterministic": False,
         "seed": 0,
-        "frames": N,
-        "tracked": N,
+        "frames": N_FAST,
+        "tracked": N_FAST,
         "tracked_fraction": 1.0,
         "skipped_frames": 0,
         "loops_closed": 0,
@@ -78,7 +74,7 @@ def test_results(command: CommandLine, sequences: dict[Sensor, Path], sensor: Se
     assert report["rpe_translation_rmse_m"] < 0.03
     assert report["rpe_rotation_rmse_deg"] < 0.5
     assert report["slam_frames_per_second"] > 0
-    assert 0 < report["frames_per_second"] <= N / report["seconds"] * 1.001
+    assert 0 < report["frames_per_second"] <= N_FAST / report["seconds"] * 1.001
     assert 50 < report["peak_memory_mb"] < 4000
     assert Settings.load(results.folder / "settings.yaml", sensor).sensor is sensor
     assert "Camera.fx" in report["settings"]
@@ -129,7 +125,7 @@ def test_frames_csv(command: CommandLine, rgbd: Path) -> None:
     assert header[16:19] == ["std_position", "std_angle", "visual_odometry"]
     assert set(header[19:]) >= {f"ms_{stage}" for stage in STAGES}
     frames = results.frames
-    assert [int(row["index"]) for row in frames] == list(range(N))
+    assert [int(row["index"]) for row in frames] == list(range(N_FAST))
     assert all(row["state"] == "OK" and row["reason"] == "" for row in frames)
     assert all(row["map"] == "0" for row in frames)
     assert frames[0]["keyframe"] == "1"
@@ -181,7 +177,7 @@ def test_part_of_a_sequence(command: CommandLine, rgbd: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--start", N), "past the end"),
+        (("--start", N_FAST), "past the end"),
         (("--deterministic", "--realtime"), "exclude each other"),
         (("--stride", 0), "--stride"),
         (("--max-frames", 0), "--max-frames"),
@@ -230,7 +226,7 @@ def test_real_time_drops_frames(command: CommandLine, tmp_path: Path) -> None:
 def test_real_time_takes_as_long_as_the_recording(command: CommandLine, rgbd: Path) -> None:
     done = command("run", rgbd, "--sensor", "rgbd", "--output", "r", "--realtime")
     assert done.code == 0
-    assert Results(Path("r")).report["seconds"] >= (N - 1) / 20
+    assert Results(Path("r")).report["seconds"] >= (N_FAST - 1) / 20
 
 
 def test_quiet(command: CommandLine, rgbd: Path) -> None:
@@ -320,7 +316,7 @@ def test_nothing_to_see(command: CommandLine, rgbd: Path) -> None:
     results = Results(Path("r"))
     assert results.report["tracked"] == 0
     assert results.report["tracked_fraction"] == 0.0
-    assert len(results.frames) == N
+    assert len(results.frames) == N_FAST
     assert {row["reason"] for row in results.frames} == {"too few keypoints"}
     assert {row["state"] for row in results.frames} == {"NOT_INITIALIZED"}
     names = {path.name for path in results.folder.iterdir()}
@@ -354,16 +350,16 @@ def test_earlier_maps_are_kept(command: CommandLine, rgbd: Path) -> None:
     assert done.code == 0
     results = Results(Path("r"))
     assert results.report["resets"] == 1
-    assert results.report["tracked"] == N - 2
+    assert results.report["tracked"] == N_FAST - 2
     maps = [row["map"] for row in results.frames]
-    assert maps == ["0"] * 9 + ["1"] * (N - 9)
+    assert maps == ["0"] * 9 + ["1"] * (N_FAST - 9)
     states = [row["state"] for row in results.frames]
     assert states[8:10] == ["LOST", "NOT_INITIALIZED"]
     assert len(read_tum(Path("r/trajectory_map0.txt"))) == 8
-    assert len(read_tum(Path("r/trajectory.txt"))) == N - 10
+    assert len(read_tum(Path("r/trajectory.txt"))) == N_FAST - 10
     # Poses of two maps are in no file together; frames.csv has all of them.
-    assert len(read_tum(Path("r/trajectory_online.txt"))) == N - 10
-    assert sum(row["tx"] != "" for row in results.frames) == N - 2
+    assert len(read_tum(Path("r/trajectory_online.txt"))) == N_FAST - 10
+    assert sum(row["tx"] != "" for row in results.frames) == N_FAST - 2
 
 
 def test_a_last_map_without_a_pose(command: CommandLine, rgbd: Path) -> None:

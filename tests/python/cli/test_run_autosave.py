@@ -12,20 +12,15 @@ import pytest
 from orbslam2py import Sensor
 from orbslam2py.maps import load_map
 from orbslam2py.maps.map_writer import MapWriter
-from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.command_line import CommandLine, Outcome
+from support.small_sequences import N_FAST, write_fast_part
 
 pytestmark = pytest.mark.watchdog(60)
-
-N = 24
 
 
 @pytest.fixture(scope="module")
 def sequence(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    options = SyntheticOptions(
-        world="corridor", sensor=Sensor.RGBD, frames=N, size=(320, 240), speed=2.0
-    )
-    return SyntheticSequence(options).write(tmp_path_factory.mktemp("sequences") / "lap")
+    return write_fast_part(tmp_path_factory.mktemp("sequences") / "lap", Sensor.RGBD)
 
 
 def full_after(monkeypatch: pytest.MonkeyPatch, n_commits: int) -> None:
@@ -55,9 +50,9 @@ def test_a_file_with_an_older_state_is_told(
     done, told = run(command, sequence)
     assert done.code == 1
     n = len(load_map("a.orbmap").runs[-1].frames)
-    assert 0 < n < N
+    assert 0 < n < N_FAST
     assert "Map saved" not in told
-    assert f"a.orbmap holds an older state of the map, with {n} of {N} frames" in told
+    assert f"a.orbmap holds an older state of the map, with {n} of {N_FAST} frames" in told
     last = done.err.splitlines()[-1]
     assert last.startswith("Error: cannot write a.orbmap: the disk is full; make room, ")
     assert last.endswith("(the other results are saved)")

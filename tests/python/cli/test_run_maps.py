@@ -12,18 +12,14 @@ from orbslam2py import Sensor
 from orbslam2py.maps import load_map
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.command_line import CommandLine, Results
+from support.small_sequences import N_FAST, write_fast_part
 
 pytestmark = pytest.mark.watchdog(60)
-
-N = 24
 
 
 @pytest.fixture(scope="module")
 def sequence(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    options = SyntheticOptions(
-        world="corridor", sensor=Sensor.RGBD, frames=N, size=(320, 240), speed=2.0
-    )
-    return SyntheticSequence(options).write(tmp_path_factory.mktemp("sequences") / "lap")
+    return write_fast_part(tmp_path_factory.mktemp("sequences") / "lap", Sensor.RGBD)
 
 
 def test_a_saved_map_is_loaded_and_localised_in(command: CommandLine, sequence: Path) -> None:
@@ -48,7 +44,7 @@ def test_a_saved_map_is_loaded_and_localised_in(command: CommandLine, sequence: 
         "map_points": first["map_points"],
         "runs": 1,
     }
-    assert second["tracked"] == N
+    assert second["tracked"] == N_FAST
     assert second["map_points"] == first["map_points"]
     assert second["saved_map"] is None
     assert "Map saved" not in done.out
@@ -76,7 +72,7 @@ def test_a_map_is_extended_and_saved_under_its_own_name(
     assert (done.code, done.err) == (0, "")
     large = load_map("a.orbmap")
     assert len(large.contents.keyframes) > len(small.contents.keyframes)
-    assert [len(run.frames) for run in large.runs] == [14, N - 10]
+    assert [len(run.frames) for run in large.runs] == [14, N_FAST - 10]
 
 
 def test_autosave_and_images(command: CommandLine, sequence: Path) -> None:
@@ -94,7 +90,7 @@ def test_a_pose_may_be_guessed(command: CommandLine, sequence: Path) -> None:
     guess = ("--load", "a.orbmap", "--initial-pose", "0.01,0,0.02")
     done = command("run", sequence, *guess, "--localize", "--output", "second")
     assert (done.code, done.err) == (0, "")
-    assert Results(Path("second")).report["tracked"] == N
+    assert Results(Path("second")).report["tracked"] == N_FAST
 
 
 def test_a_run_that_finds_nothing_of_the_map_says_so(

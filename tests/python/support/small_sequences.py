@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from pathlib import Path
 
 from orbslam2py import Sensor, System, TrackingRecord
 from orbslam2py.datasets import Images
@@ -13,12 +14,21 @@ from support.feeding import blackened, feed
 
 SIZE = (320, 240)
 
+#: Frames of `write_fast_part`.
+N_FAST = 24
+
 
 @lru_cache
 def sequence(sensor: Sensor, frames: int = 80) -> SyntheticSequence:
     return SyntheticSequence(
         SyntheticOptions(world="corridor", sensor=sensor, frames=frames, size=SIZE)
     )
+
+
+def write_fast_part(folder: Path, sensor: Sensor) -> Path:
+    """The beginning of the corridor at twice the pace, as files."""
+    options = SyntheticOptions(world="corridor", sensor=sensor, frames=N_FAST, size=SIZE, speed=2.0)
+    return SyntheticSequence(options).write(folder)
 
 
 @lru_cache
