@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 from orbslam2py import _core as core
@@ -14,6 +15,7 @@ from orbslam2py.slam.pose_search import PoseSearch
 from orbslam2py.slam.records import PoseEstimate, Verdict
 
 _PATIENCE = 5  # frames that may be missing between those that are found
+_MOST_DEVIATION = math.radians(1.0)  # standard deviation of a rotation, all directions together
 
 
 class EarlierFrames:
@@ -94,7 +96,7 @@ class EarlierFrames:
             frame.clear_associations()
             estimate = search.by_reference_keyframe(frame)
         estimate = belief.refine(frame, estimate, lost=False)
-        if not estimate.found or not _is_strong(estimate):
+        if not (estimate.found and _is_strong(estimate) and _is_exact(estimate)):
             return False
         frame.discard_outliers()
         # Not update_velocity: the numbers of the frames may fall.
@@ -110,3 +112,11 @@ def _is_strong(estimate: PoseEstimate) -> bool:
     misled alike.
     """
     return estimate.evidence is not None and estimate.evidence.verdict is Verdict.STRONG
+
+
+def _is_exact(estimate: PoseEstimate) -> bool:
+    """Whether a pose is known so well that a path may hold it, which says nothing of deviations."""
+    covariance = estimate.covariance
+    if covariance is None:
+        return False
+    return float(covariance[0, 0] + covariance[1, 1] + covariance[2, 2]) <= _MOST_DEVIATION**2
