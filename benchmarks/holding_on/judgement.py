@@ -38,6 +38,11 @@ class Figures:
     wrong_before: int
     """Of these right by where the frame before lies when this one is told: it was adjustment that
     moved the map between them."""
+    path_compared: int
+    """Poses of the last map's final path compared with the frame before."""
+    path_off: int
+    """Of these off by more than 0.2 m or 1 degree, whatever was known of it: a path has no
+    deviations."""
     losses: int
     """Losses after which a mapped place came into view ..."""
     found: int
@@ -65,7 +70,9 @@ def judge(played: Played) -> Figures:
     monocular = played.sequence.sensor is Sensor.MONOCULAR
     start = judge_start(played) if monocular else StartFigures.of_depth(played)
     compared = consecutive(played)
-    scale = local_scale(played, compared) if monocular else np.ones(len(played.posed))
+    scale = np.ones(len(played.posed))
+    if monocular:
+        scale = local_scale(played.truth, played.T_cw, played.map_index, compared)
     told = relative(played.T_cw, compared)
     error, deviation = errors_between_frames(played, compared, told, scale)
     by_now, _ = errors_between_frames(played, compared, played.motion[compared], scale)
@@ -74,6 +81,7 @@ def judge(played: Played) -> Figures:
     wrong_before = wrong.copy()
     known = np.isfinite(played.motion[compared]).all(axis=(1, 2))
     wrong_before[compared] &= known & ~is_wrong(by_now, deviation)
+    path_error = errors_of_path(played, with_scale=monocular)
     losses, found, left_view = found_again(played)
     trackable = ~played.covered & started_by_now(played, monocular)
     return Figures(
@@ -84,6 +92,8 @@ def judge(played: Played) -> Figures:
         wrong=int(wrong.sum()),
         wrong_keyframes=int((wrong & played.keyframe).sum()),
         wrong_before=int(wrong_before.sum()),
+        path_compared=len(path_error),
+        path_off=int((path_error > [TURNED, FAR]).any(axis=1).sum()),
         losses=losses,
         found=found,
         left_view=left_view,
@@ -124,15 +134,17 @@ def relative(T_cw: Floats, frames: NDArray[np.int64]) -> Floats:
     return np.asarray(T_cw[frames] @ inverse_poses(T_cw[frames - 1]))
 
 
-def local_scale(played: Played, frames: NDArray[np.int64]) -> Floats:
+def local_scale(
+    truth: Floats, T_cw: Floats, map_index: NDArray[np.int64], frames: NDArray[np.int64]
+) -> Floats:
     """Metres per unit of a single camera's map, (n,): the median over the frames around each."""
-    true = np.linalg.norm(relative(played.truth, frames)[:, :3, 3], axis=1)
-    told = np.linalg.norm(relative(played.T_cw, frames)[:, :3, 3], axis=1)
+    true = np.linalg.norm(relative(truth, frames)[:, :3, 3], axis=1)
+    told = np.linalg.norm(relative(T_cw, frames)[:, :3, 3], axis=1)
     moving = (true > 1e-3) & (told > 1e-9)
-    scale = np.full(len(played.posed), np.nan)
+    scale = np.full(len(truth), np.nan)
     for frame in frames:
         near = moving & (np.abs(frames - frame) <= _SCALE_FRAMES)
-        near &= played.map_index[frames] == played.map_index[frame]
+        near &= map_index[frames] == map_index[frame]
         if near.any():
             scale[frame] = np.median(true[near] / told[near])
     usual = np.nanmedian(scale) if np.isfinite(scale).any() else 1.0
@@ -147,17 +159,37 @@ def errors_between_frames(
     Rotation [rad], then translation [m], in the camera's frame. The covariance is that of this
     pose and of the one before, carried over: a frame's own says how well it lies in the map.
     """
-    told, true = motion.copy(), relative(played.truth, frames)
+    told = motion.copy()
     told[:, :3, 3] *= scale[frames, None]
-    gap = true @ inverse_poses(told)
-    error = np.zeros((len(frames), 6))
-    for k, T in enumerate(gap):
-        error[k, :3] = cv2.Rodrigues(T[:3, :3])[0].ravel()
-    error[:, 3:] = gap[:, :3, 3]
+    error = errors_of_motions(told, relative(played.truth, frames))
     here = in_metres(played.covariance[frames], scale[frames])
     before = in_metres(played.covariance[frames - 1], scale[frames])
     carry = adjoint(told)
     return error, here + carry @ before @ np.swapaxes(carry, 1, 2)
+
+
+def errors_of_motions(told: Floats, true: Floats) -> Floats:
+    """Errors (m, 6) of motions (m, 4, 4): rotation [rad], then translation [m]."""
+    gap = true @ inverse_poses(told)
+    error = np.zeros((len(gap), 6))
+    for k, T in enumerate(gap):
+        error[k, :3] = cv2.Rodrigues(T[:3, :3])[0].ravel()
+    error[:, 3:] = gap[:, :3, 3]
+    return error
+
+
+def errors_of_path(played: Played, *, with_scale: bool) -> Floats:
+    """Angles [rad] and distances [m], (m, 2), of the final path's motions from frame to frame."""
+    known = np.isfinite(played.path).all(axis=(1, 2))
+    frames = np.flatnonzero(known[1:] & known[:-1]) + 1
+    T_cw = np.full_like(played.path, np.nan)
+    T_cw[known] = inverse_poses(played.path[known])
+    told = relative(T_cw, frames)
+    if with_scale and len(frames):
+        one_map = np.zeros(len(T_cw), np.int64)
+        told[:, :3, 3] *= local_scale(played.truth, T_cw, one_map, frames)[frames, None]
+    error = errors_of_motions(told, relative(played.truth, frames))
+    return np.linalg.norm(error.reshape(-1, 2, 3), axis=2)
 
 
 def in_metres(covariance: Floats, scale: Floats) -> Floats:

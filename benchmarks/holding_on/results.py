@@ -36,14 +36,17 @@ def row_of(case: Case, figures: Figures) -> Row:
 
 
 def read_rows(path: Path) -> dict[str, Row]:
-    """Rows by their keys; none without a file. A line that was cut short is left out."""
+    """Rows by their keys; none without a file.
+
+    A line that was cut short is left out, and so are those of a version with other figures.
+    """
     if not path.is_file():
         return {}
     kinds = {field.name: field.type for field in dataclasses.fields(Figures)}
     rows = {}
     with path.open(newline="", encoding="utf-8") as file:
         for row in csv.DictReader(file):
-            if any(value is None for value in row.values()) or not row["options"].endswith("}"):
+            if any(row.get(name) is None for name in COLUMNS) or not row["options"].endswith("}"):
                 continue
             numbers = {
                 name: float(row[name]) if kinds[name] == "float" else int(row[name])
@@ -79,6 +82,7 @@ def motions_table(rows: Iterable[Row], title: str) -> Table:
             "wrong,\nbelieved",
             "of these\nkeyframes",
             "the map\nmoved",
+            "final path\noff",
             "tracked of\ntrackable",
             "found within\n1 s of losses",
             "place left\nthe view",
@@ -113,6 +117,7 @@ def line_of(rows: list[Row]) -> list[str]:
         str(total("wrong")),
         str(total("wrong_keyframes")),
         str(total("wrong_before")),
+        str(total("path_off")),
         share(total("tracked"), total("trackable")),
         f"{total('found')} of {total('losses')}" if total("losses") else "",
         str(total("left_view")) if total("losses") else "",

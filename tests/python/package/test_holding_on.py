@@ -81,6 +81,7 @@ def test_an_honest_run_has_no_wrong_pose_and_a_spread_of_one():
     assert figures.translation_spread == pytest.approx(1, abs=0.12)
     assert figures.tracked == figures.trackable == N
     assert figures.ate < 1e-9
+    assert (figures.path_off, figures.path_compared) == (0, N - 1)
 
 
 @pytest.mark.parametrize(
@@ -110,6 +111,21 @@ def test_a_jump_that_the_covariance_admits_or_that_is_small_is_not_wrong():
     changed = jumping.changed.copy()
     changed[50] = True
     assert judge(dataclasses.replace(jumping, changed=changed)).wrong == 0
+
+
+@pytest.mark.parametrize(
+    "vector", [np.array([0, 0.03, 0, 0, 0, 0.0]), np.array([0, 0, 0, 0.4, 0, 0])]
+)
+def test_a_pose_aside_of_the_final_path_is_off_however_little_is_known_of_it(vector):
+    played = honest_run()
+    path = played.path.copy()
+    path[50] = path[50] @ small_pose(vector)
+    vague = dataclasses.replace(played, path=path, covariance=played.covariance * 1e6)
+    figures = judge(vague)
+    assert (figures.wrong, figures.path_off) == (0, 2), "from the one before, and to the next"
+    path[49] = np.nan
+    figures = judge(dataclasses.replace(vague, path=path))
+    assert (figures.path_off, figures.path_compared) == (1, N - 3)
 
 
 def test_overconfidence_widens_the_spread():
@@ -148,7 +164,7 @@ def test_a_single_camera_is_measured_in_metres_and_its_start_against_the_paralla
     path[:, :3, 3] /= 2.5
     played = dataclasses.replace(played, T_cw=units, covariance=covariance, path=path)
     figures = judge(without(played, slice(0, 15)))
-    assert figures.wrong == 0
+    assert (figures.wrong, figures.path_off) == (0, 0)
     assert figures.ate < 1e-9
     assert figures.started == pytest.approx(15 / 20)
     assert 0 < figures.enough_parallax < 1.5
@@ -188,6 +204,9 @@ def test_an_interrupted_file_is_read_and_made_whole(tmp_path):
     assert list(rows) == [case.key]
     assert rows[case.key]["wrong"] == 0
     assert rows[case.key]["rotation_spread"] == pytest.approx(row["rotation_spread"])
+    older = path.read_text().replace("path_off", "a_figure_that_went")
+    path.write_text(older)
+    assert read_rows(path) == {}, "played again"
 
 
 def test_a_run_is_the_same_each_time():
