@@ -44,6 +44,19 @@ class EqualByValue:
         return hash(tuple(value for value in same if isinstance(value, Hashable)))
 
 
+class MadeAgainByCopies:
+    """Gives a dataclass copies and pickles that are made as the record was, from its fields.
+
+    So they are checked, and their arrays are read-only where it makes them so, which no array is
+    that comes out of a pickle.
+    """
+
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+
+    def __reduce__(self) -> tuple[type[Any], tuple[Any, ...]]:
+        return type(self), tuple(getattr(self, one.name) for one in fields(self) if one.init)
+
+
 def _equal(one: Any, other: Any) -> bool:
     if not (isinstance(one, np.ndarray) and isinstance(other, np.ndarray)):
         if one is None or other is None:

@@ -21,7 +21,7 @@ from orbslam2py.cli.targets import check_apart
 from orbslam2py.cli.viewing import ViewerOptions, Viewing
 from orbslam2py.cli.watching import file_watchers, watch_all
 from orbslam2py.datasets.base import LiveSource, Sequence
-from orbslam2py.errors import MapFileError, OrbSlamError
+from orbslam2py.errors import OrbSlamError
 from orbslam2py.maps import MapFile
 from orbslam2py.runs.feeds import is_sequence
 from orbslam2py.runs.options import RunOptions
@@ -105,8 +105,8 @@ def run_and_show(
         if report_page and html is not None and html.is_file():
             text = f"To look at them: [bold]{escape(str(html))}[/]"
             console.print(text, highlight=False, soft_wrap=True)
-        if done.result.saved_map is not None:
-            about_map = _about_map(done.result, done.result.saved_map, there_before)
+        if options.save_map is not None:
+            about_map = _about_map(done.result, options.save_map, there_before)
             console.print(about_map, highlight=False, soft_wrap=True)
         files.tell(console)
         code = _conclude(done, errors)
@@ -133,7 +133,7 @@ def _identity_of(path: Path | None) -> tuple[int, int] | None:
 def _about_map(result: RunResult, path: Path, before: tuple[int, int] | None) -> str:
     """Say what the map file holds; a last save that failed has left what there was."""
     named = f"[bold]{escape(str(path))}[/]"
-    if not _last_save_failed(result):
+    if result.saved_map is not None:
         return f"Map saved in {named}"
     now = _identity_of(path)
     if now is None:
@@ -147,10 +147,6 @@ def _about_map(result: RunResult, path: Path, before: tuple[int, int] | None) ->
     return f"{named} holds an older state of the map, with {n} of {result.n_frames} frames"
 
 
-def _last_save_failed(result: RunResult) -> bool:
-    return result.options.autosave is not None and isinstance(result.error, MapFileError)
-
-
 def _conclude(done: FinishedRun, errors: Console) -> ExitCode:
     result = done.result
     for problem in done.problems:
@@ -158,7 +154,7 @@ def _conclude(done: FinishedRun, errors: Console) -> ExitCode:
     if result.error is not None:
         what = describe_error(result.error)
         saved = (
-            "the other results are" if _last_save_failed(result) else "what was done until then is"
+            "the other results are" if result.last_save_failed else "what was done until then is"
         )
         print_error(errors, "Error", f"{what} ({saved} saved)")
     if result.error is not None or done.problems:

@@ -117,7 +117,9 @@ class RunResult:
     is_live: bool = False
     """The images came from a camera."""
     saved_map: Path | None = None
-    """The file that the maps were saved in."""
+    """The file that the maps were saved in; None if there is none, or only an older state in it."""
+    last_save_failed: bool = False
+    """The maps were to be saved, and were not, or not in their last state."""
     interrupted: bool = False
     """The run was stopped before its end; never for a camera, which has none."""
     error: Exception | None = None

@@ -19,7 +19,7 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py._files import describe_error
 from orbslam2py.datasets.base import Images, Layout, LiveSource, Sequence
-from orbslam2py.errors import DatasetError, ImageError, OrbSlamError
+from orbslam2py.errors import DatasetError, ImageError, MapFileError, OrbSlamError
 from orbslam2py.maps.map_arrays import MapArrays
 from orbslam2py.runs.calibration_watch import CalibrationWatch, settings_beside
 from orbslam2py.runs.control import RunControl
@@ -275,12 +275,13 @@ class SequenceRunner:
         try:
             system.shutdown(drain=not self.result.interrupted and self.result.error is None)
         except Exception as error:
+            self.result.last_save_failed = isinstance(error, MapFileError)
             if self.result.error is None:
                 self._take_note(error)
 
     def _save_map(self, system: System) -> None:
         path = self._options.save_map
-        if path is None:
+        if path is None or self.result.last_save_failed:
             return
         if system.n_keyframes == 0:
             _log.warning("there is no map to save: %s is not written", path)
@@ -290,6 +291,7 @@ class SequenceRunner:
                 system.save_map(path)
             self.result.saved_map = path
         except Exception as error:
+            self.result.last_save_failed = True
             if self.result.error is None:
                 self._take_note(error)
 

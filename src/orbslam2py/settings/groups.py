@@ -13,7 +13,7 @@ from typing import TypedDict
 import numpy as np
 
 from orbslam2py._arguments import array_of, choice_of, is_whole, numbers_of, pose_of, shown
-from orbslam2py._arrays import FloatArray
+from orbslam2py._arrays import FloatArray, MadeAgainByCopies
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings.keys import check_group, focal_problems
 from orbslam2py.settings.projection import on_image_plane
@@ -206,7 +206,7 @@ class ViewerSettings:
 
 
 @dataclass(frozen=True, eq=False)
-class CameraRectification:
+class CameraRectification(MadeAgainByCopies):
     """How one raw camera of a stereo pair becomes a rectified one (OpenCV's conventions).
 
     Attributes

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orbslam2py._arguments import array_of, finite_number, shown
-from orbslam2py._arrays import EqualByValue, FloatArray, IntArray
+from orbslam2py._arrays import EqualByValue, FloatArray, IntArray, MadeAgainByCopies
 from orbslam2py.errors import DatasetError
 from orbslam2py.trajectory.rotations import inverse_poses, quaternions_from_rotations
 from orbslam2py.trajectory.writers import TrajectoryFormat, write_kitti, write_tum
@@ -21,7 +21,7 @@ _LARGEST_INDEX = 2.0**63
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory(EqualByValue):
+class Trajectory(EqualByValue, MadeAgainByCopies):
     """Poses of a camera over time; two are equal if all their arrays are, number by number.
 
     The arrays are copies of those that were given, and read-only; ``trajectory.T_wc.copy()`` may be

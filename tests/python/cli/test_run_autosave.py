@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import sqlite3
 from pathlib import Path
 from typing import Any
@@ -43,6 +44,11 @@ def run(command: CommandLine, sequence: Path, *more: str) -> tuple[Outcome, str]
     return done, " ".join(done.out.split())
 
 
+def report() -> dict[str, Any]:
+    content: dict[str, Any] = json.loads(Path("r/report.json").read_text())
+    return content
+
+
 def test_a_file_with_an_older_state_is_told(
     command: CommandLine, sequence: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -56,6 +62,7 @@ def test_a_file_with_an_older_state_is_told(
     last = done.err.splitlines()[-1]
     assert last.startswith("Error: cannot write a.orbmap: the disk is full; make room, ")
     assert last.endswith("(the other results are saved)")
+    assert report()["saved_map"] is None
 
 
 @pytest.mark.parametrize("earlier", [False, True])
@@ -82,3 +89,4 @@ def test_a_last_save_that_works_is_told_as_ever(command: CommandLine, sequence: 
     done, told = run(command, sequence)
     assert done.code == 0, done.err
     assert "Map saved in a.orbmap" in told
+    assert report()["saved_map"] == "a.orbmap"

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import copy
 import math
+import pickle
 from pathlib import Path
 
 import cv2
@@ -65,8 +67,10 @@ def test_matrices(tmp_path: Path) -> None:
     assert left.D.shape == (5,)
     assert left.P.shape == (3, 4)
     assert (left.width, left.height) == (752, 480)
-    with pytest.raises(ValueError, match="read-only"):
-        left.K[0, 0] = 1
+    for same in (left, copy.deepcopy(left), pickle.loads(pickle.dumps(left))):
+        np.testing.assert_array_equal(same.K, left.K)
+        with pytest.raises(ValueError, match="read-only"):
+            same.K[0, 0] = 1
 
 
 def test_what_other_sensors_need_is_not_looked_at(tmp_path: Path) -> None:

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 from collections.abc import Callable
 from pathlib import Path
 
@@ -19,6 +21,11 @@ from orbslam2py.trajectory import (
     write_euroc,
 )
 from support.made_up_paths import made_up
+
+
+def through_pickle(trajectory: Trajectory) -> Trajectory:
+    read: Trajectory = pickle.loads(pickle.dumps(trajectory))
+    return read
 
 
 def test_fields_are_filled_in_and_checked() -> None:
@@ -41,6 +48,18 @@ def test_prints_in_a_line() -> None:
     assert "3 poses (1 lost)" in repr(lost)
     assert f"path length {steps[0]:.3f}" in repr(lost), "lost poses are no part of the path"
     assert repr(trajectory.select([])) == "<Trajectory: no poses>"
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, through_pickle])
+def test_copies_are_equal_and_read_only_as_well(
+    copied: Callable[[Trajectory], Trajectory],
+) -> None:
+    given = made_up(4)
+    trajectory = Trajectory(given.timestamps, given.T_wc, np.arange(4) > 2, np.arange(4) * 2)
+    same = copied(trajectory)
+    assert same == trajectory
+    for name in ("timestamps", "T_wc", "lost", "indices"):
+        assert not getattr(same, name).flags.writeable, name
 
 
 def test_the_other_way_round() -> None:
