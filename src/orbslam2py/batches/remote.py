@@ -7,6 +7,7 @@ import contextlib
 import errno
 import gzip
 import importlib
+import io
 import re
 import shutil
 import tarfile
@@ -221,6 +222,7 @@ def _extract_tar(
 ) -> None:
     with tarfile.open(archive) as tar:
         members = [one for one in tar.getmembers() if one.isfile()]
+        _check_end(tar)
         reserve(taken + sum(one.size for one in members))
         for member in members:
             stream = tar.extractfile(member)
@@ -228,6 +230,14 @@ def _extract_tar(
             _write(stream, folder, member.name, named)
         assert tar.fileobj is not None
         _read_to_the_end(tar.fileobj)
+
+
+def _check_end(tar: tarfile.TarFile) -> None:
+    """Refuse a spoilt header, at which the list of members ends as if nothing came after it."""
+    if isinstance(tar.fileobj, io.BufferedReader):  # what is packed more tightly has a sum of all
+        tar.fileobj.seek(tar.offset)
+        if any(tar.fileobj.read(tarfile.BLOCKSIZE)):
+            raise tarfile.ReadError(f"no header at byte {tar.offset}")
 
 
 def _read_to_the_end(stream: Any) -> None:

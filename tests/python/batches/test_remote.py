@@ -184,6 +184,21 @@ def test_broken_archives(data: Path, tmp_path: Path) -> None:
         assert "is no whole archive; fetch or pack it again" in row["reason"]
 
 
+def test_an_archive_is_not_read_up_to_what_is_spoilt_in_it(tmp_path: Path) -> None:
+    path = tmp_path / "spoilt.tar"
+    with tarfile.open(path, "w") as tar:
+        for name in ("1.txt", "2.txt", "3.txt"):
+            member = tarfile.TarInfo(name)
+            member.size = 1
+            tar.addfile(member, io.BytesIO(b"x"))
+    spoilt = bytearray(path.read_bytes())
+    spoilt[2 * 2 * tarfile.BLOCKSIZE] ^= 1  # the header of the last: each has one, and a block
+    path.write_bytes(spoilt)
+    cache = Cache(tmp_path / "cache", 10_000)
+    with pytest.raises(orb.DatasetError, match="is no whole archive"), here(str(path), cache):
+        pass
+
+
 @pytest.mark.parametrize(
     ("path", "message"),
     [
