@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import _thread
 import contextlib
 import os
 import signal
@@ -81,11 +82,12 @@ class StopOnInterrupt:
     Attributes
     ----------
     event : threading.Event
-        Set once an end was asked for.
+        Set once an end was asked for; at the end of the block at the latest.
     """
 
     def __init__(self) -> None:
         self.event = threading.Event()
+        self._asked = False
         self._before: dict[int, _Handler] = {}
 
     def __enter__(self) -> StopOnInterrupt:
@@ -100,14 +102,19 @@ class StopOnInterrupt:
     def __exit__(self, *_: object) -> None:
         for number, before in self._before.items():
             signal.signal(number, before)
+        if self._asked:
+            self.event.set()
 
     def _on_interrupt(self, number: int, frame: FrameType | None) -> None:
         try:
             self._before[number](number, frame)
         except KeyboardInterrupt:
-            if self.event.is_set():
+            if self._asked:
                 raise
-            self.event.set()
+            self._asked = True
+            # By another thread: this one may be about to wait for the event, and hold its lock. Not
+            # through threading.Thread, whose own locks it may hold as well.
+            _thread.start_new_thread(self.event.set, ())
 
 
 @contextlib.contextmanager

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import Annotated
 
@@ -54,7 +55,9 @@ def view(
         images = opened
     replay = Replay(run, images, host=viewer_host or LOOPBACK, port=viewer_port)
     try:
-        announce(replay.address, open_browser=True)
-        wait_for_interrupt()
+        # Heard from the moment that the address is told.
+        with contextlib.suppress(KeyboardInterrupt):
+            announce(replay.address, open_browser=True)
+            wait_for_interrupt()
     finally:
         replay.stop()

@@ -150,8 +150,10 @@ class Viewing:
             return
         self._view.tell_end(f"The run has ended; its results are in {folder}.")
         text = f"The viewer stays at {self._view.address} until Ctrl-C."
-        console.print(text, highlight=False, soft_wrap=True)
-        self._view.wait()
+        # Heard from the moment that it is told.
+        with contextlib.suppress(KeyboardInterrupt):
+            console.print(text, highlight=False, soft_wrap=True)
+            self._view.wait()
 
     def _stop_run(self) -> None:
         self._stopped_in_page = True

@@ -158,11 +158,26 @@ def test_only_a_second_request_later_on_breaks_off(monkeypatch: pytest.MonkeyPat
     with interrupts.EndingSignals() as ending, interrupts.StopOnInterrupt() as stop:
         for _ in range(2):
             signal.raise_signal(signal.SIGTERM)
-            assert stop.event.is_set()
+            assert stop.event.wait(30)
         monkeypatch.setattr(interrupts, "_ECHO_SECONDS", 0.0)
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGTERM)
     assert ending.exit_code == 143
+
+
+def test_a_request_while_the_event_is_locked_waits_for_nobody() -> None:
+    """As for a moment in each wait, before which and after which the signal may come as well."""
+    with interrupts.StopOnInterrupt() as stop:
+        with stop.event._cond:  # type: ignore[attr-defined]
+            signal.raise_signal(signal.SIGINT)
+        assert stop.event.wait(30)
+
+
+def test_a_request_is_known_when_the_block_has_ended() -> None:
+    for _ in range(200):
+        with interrupts.StopOnInterrupt() as stop:
+            signal.raise_signal(signal.SIGINT)
+        assert stop.event.is_set()
 
 
 def test_the_command_line_leaves_no_handlers_behind() -> None:
