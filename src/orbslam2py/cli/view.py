@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import contextlib
+import threading
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
 
+from orbslam2py._waiting import wait_for_event
 from orbslam2py.cli.messages import log_to
 from orbslam2py.cli.viewing import ViewerHost, ViewerPort
 from orbslam2py.datasets import open_input
@@ -41,7 +43,7 @@ def view(
         orbslam2py view runs/06 --sequence dataset/sequences/06
     """
     from orbslam2py.runs.report_page import read_run  # noqa: PLC0415
-    from orbslam2py.viewer.live import announce, wait_for_interrupt  # noqa: PLC0415  # slow to load
+    from orbslam2py.viewer.live import announce  # noqa: PLC0415  # slow to load
     from orbslam2py.viewer.replay import Replay  # noqa: PLC0415
     from orbslam2py.viewer.server import LOOPBACK  # noqa: PLC0415
 
@@ -58,6 +60,6 @@ def view(
         # Heard from the moment that the address is told.
         with contextlib.suppress(KeyboardInterrupt):
             announce(replay.address, open_browser=True)
-            wait_for_interrupt()
+            wait_for_event(threading.Event())
     finally:
         replay.stop()

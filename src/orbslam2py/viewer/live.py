@@ -343,9 +343,3 @@ def announce(address: str, *, open_browser: bool) -> None:
     """Open the page where there is a screen, and print where it is."""
     opened = open_browser and open_page(address)
     print(f"The viewer is at {address}" + ("" if opened else ": open it in a browser"), flush=True)
-
-
-def wait_for_interrupt() -> None:
-    """Return at Ctrl-C."""
-    with contextlib.suppress(KeyboardInterrupt):
-        wait_for_event(threading.Event())

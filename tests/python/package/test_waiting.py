@@ -18,8 +18,8 @@ pytestmark = pytest.mark.skipif(
 
 #: The signal reaches another thread, as it may by the rules of POSIX.
 PROGRAM = """
-import signal, threading, time
-from orbslam2py.viewer.live import wait_for_interrupt
+import contextlib, signal, threading, time
+from orbslam2py._waiting import wait_for_event
 
 def press():
     time.sleep(0.5)
@@ -27,7 +27,8 @@ def press():
     time.sleep(60)
 
 threading.Thread(target=press, daemon=True).start()
-wait_for_interrupt()
+with contextlib.suppress(KeyboardInterrupt):
+    wait_for_event(threading.Event())
 print("heard")
 """
 
