@@ -114,7 +114,10 @@ NewMapAfterOption = Annotated[
 ]
 EffortOption = Annotated[
     Effort,
-    typer.Option(help="How often frames become keyframes: fewer take less time."),
+    typer.Option(
+        help="How much work goes into map and path: fast makes fewer keyframes, thorough matches "
+        "every frame with the finished map once more."
+    ),
 ]
 SeedOption = Annotated[int, typer.Option(help="Seed of all random draws.", min=0)]
 

@@ -10,7 +10,7 @@ from orbslam2py.slam.thresholds import KeyframeThresholds
 
 
 class Effort(str, Enum):
-    """How often frames become keyframes, which is what mapping's time goes into."""
+    """How often frames become keyframes, and whether all of them are matched with the map again."""
 
     FAST = "fast"
     NORMAL = "normal"
@@ -23,6 +23,11 @@ class Effort(str, Enum):
         """When a frame becomes a keyframe."""
         return (_WITH_DEPTH if sensor.has_depth else _MONOCULAR)[self]
 
+    @property
+    def looks_again(self) -> bool:
+        """Whether every frame is matched with the finished map once more, not only doubted ones."""
+        return self is Effort.THOROUGH
+
 
 _WITH_DEPTH = {
     Effort.FAST: KeyframeThresholds(spacing=4, share=0.6),
@@ -32,5 +37,6 @@ _WITH_DEPTH = {
 _MONOCULAR = {
     Effort.FAST: KeyframeThresholds(share_monocular=0.8),
     Effort.NORMAL: KeyframeThresholds(),
-    Effort.THOROUGH: KeyframeThresholds(share_monocular=0.95),
+    # More of them, nearer to each other, bend a long path further.
+    Effort.THOROUGH: KeyframeThresholds(),
 }

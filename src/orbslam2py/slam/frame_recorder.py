@@ -17,8 +17,8 @@ from orbslam2py.trajectory.trajectory import Trajectory
 #: So many frames wait for the end, when the map has settled, to be estimated again; those before
 #: them are where the map was settled long ago.
 _MOST_WAITING = 1000
-#: So many frames whose pose was in doubt wait for the end with all their keypoints, the youngest.
-_MOST_IN_DOUBT = 100
+#: So many frames wait for the end with all their keypoints, the youngest.
+_MOST_WITH_KEYPOINTS = 100
 
 _NO_POSES = Trajectory(timestamps=np.zeros(0), T_wc=np.zeros((0, 4, 4)))
 
@@ -28,9 +28,10 @@ class FrameRecorder:
 
     A frame is kept relative to its reference keyframe, so its pose moves with whatever refines the
     map later. In the end, or when many frames have come after it, it is estimated once more from
-    the points it saw, each of which has moved in its own way; one that was in doubt is then
-    matched with the map once more (``docs/method/map.md``, settled frames). May be used from any
-    thread, also while a frame is recorded.
+    the points it saw, each of which has moved in its own way. Before that, one that was in doubt or
+    came while a single camera's map was young is matched with the map once more
+    (``docs/method/map.md``, settled frames). May be used from any thread, also while a frame is
+    recorded.
 
     Parameters
     ----------
@@ -38,9 +39,13 @@ class FrameRecorder:
         The map that the frames were tracked in.
     second_look : SecondLook
         Matches frames with the map again.
+    every_frame : bool
+        It is to match every frame again, when many have come after it at the latest.
     """
 
-    def __init__(self, slam_map: core.Map, second_look: SecondLook) -> None:
+    def __init__(
+        self, slam_map: core.Map, second_look: SecondLook, *, every_frame: bool = False
+    ) -> None:
         self._map = slam_map
         self._second_look = second_look
         self._recorder = core.TrajectoryRecorder()
@@ -52,7 +57,9 @@ class FrameRecorder:
         # Frames of a young map, whose poses are estimated again; None: those of no map.
         self._young: list[tuple[core.TrackedFrame, bool]] | None = None
         self._young_map = -1
-        self._in_doubt: dict[int, core.TrackedFrame] = {}
+        self._every_frame = every_frame
+        # Frames to be matched again, by id, and whether they were in doubt.
+        self._with_keypoints: dict[int, tuple[core.TrackedFrame, bool]] = {}
         # The youngest map that a frame was recorded in.
         self._last_map = 0
 
@@ -79,7 +86,10 @@ class FrameRecorder:
             self._record_waiting()
             young, self._young = self._young or [], None
             for frame, lost in young:
-                self._append(self._second_look(frame), lost=lost)
+                again = self._second_look(frame)
+                self._append(again, lost=lost)
+                if not lost and frame.id not in self._with_keypoints:
+                    self._keep_keypoints(again, in_doubt=False)
 
     def _append(self, frame: core.TrackedFrame, *, lost: bool, fixed_map: bool = False) -> None:
         self._recorder.record(self._map, frame, lost=lost)
@@ -130,10 +140,18 @@ class FrameRecorder:
             else:
                 self._append(frame, lost=lost, fixed_map=fixed_map)
             self._doubted = None
-            if in_doubt and not lost and not fixed_map:
-                self._in_doubt[frame.id] = frame
-                if len(self._in_doubt) > _MOST_IN_DOUBT:
-                    del self._in_doubt[min(self._in_doubt)]
+            if (in_doubt or self._every_frame) and not lost and not fixed_map:
+                self._keep_keypoints(frame, in_doubt=in_doubt)
+
+    def _keep_keypoints(self, frame: core.TrackedFrame, *, in_doubt: bool) -> None:
+        """Let a frame be matched again later; of too many, the oldest now or not at all."""
+        waiting = self._with_keypoints
+        waiting[frame.id] = (frame, in_doubt)
+        if len(waiting) <= (_MOST_WAITING if self._every_frame else _MOST_WITH_KEYPOINTS):
+            return
+        oldest, was_in_doubt = waiting.pop(min(waiting))
+        if self._every_frame:
+            self._append(self._second_look(oldest, in_doubt=was_in_doubt), lost=False)
 
     def _record_waiting(self, *, believed: bool = True) -> None:
         """Record the frame that waits for the next one; who asks before that gets its pose."""
@@ -142,7 +160,7 @@ class FrameRecorder:
             return
         if not believed:
             frame.T_cw = None
-            self._in_doubt.pop(frame.id, None)
+            self._with_keypoints.pop(frame.id, None)
         self._append(frame, lost=not believed)
 
     def settle(self) -> None:
@@ -151,14 +169,14 @@ class FrameRecorder:
             self._settle()
 
     def _settle(self, only_map: int | None = None) -> None:
-        """Look once more at the frames in doubt, of all maps or of one, and settle those around."""
+        """Match frames again that wait for it, of all maps or of one, and settle those around."""
         self._record_waiting()
-        in_doubt, self._in_doubt = self._in_doubt, {}
-        for frame in in_doubt.values():
+        waiting, self._with_keypoints = self._with_keypoints, {}
+        for frame, in_doubt in waiting.values():
             if only_map is None or self._map_of(frame) == only_map:
-                self._append(self._second_look(frame, in_doubt=True), lost=False)
+                self._append(self._second_look(frame, in_doubt=in_doubt), lost=False)
             else:
-                self._in_doubt[frame.id] = frame
+                self._with_keypoints[frame.id] = (frame, in_doubt)
         self._sightings.settle(self._map, self._recorder)
 
     def _map_of(self, frame: core.TrackedFrame) -> int:

@@ -106,7 +106,9 @@ class Pipeline:
             back_end.map, 1 if sensor.has_depth else 2, back_end.map_workers
         )
         self.recorder = FrameRecorder(
-            back_end.map, SecondLook(back_end.map, _make_search(setup, back_end))
+            back_end.map,
+            SecondLook(back_end.map, _make_search(setup, back_end)),
+            every_frame=options.effort.looks_again,
         )
         self.statistics = StageStatistics()
         self.reset_requested = threading.Event()

@@ -6,10 +6,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from orbslam2py import _core as core
-from orbslam2py.slam.pose_search import PoseSearch
+from orbslam2py.slam.pose_search import PoseSearch, RefinedPose
 from orbslam2py.slam.records import PoseEstimate
 
 #: Times that a frame whose pose is in doubt is matched, at most: each is nearer to where it was.
@@ -55,27 +57,41 @@ class SecondLook:
         keyframe = self._map.living(followed.reference_keyframe)
         if keyframe >= 0 and self._map.frame_of(keyframe) == frame.id:
             return followed
-        found = followed
+        refined: RefinedPose | None = None
         for _ in range(_MOST_LOOKS if in_doubt else 1):
+            found = followed if refined is None else refined.frame
             looked = self._look(found, wide=in_doubt)
-            if looked is None or (in_doubt and not _shows_more(looked, found)):
+            if looked is None:
                 break
-            found = looked
-        return found
+            if in_doubt and not _shows_more(looked.frame, found):
+                refined = refined or _at_its_pose(found, looked)
+                break
+            refined = looked
+        if refined is None:
+            return followed
+        return _without_outliers(self._search.look_afresh(refined, in_doubt=in_doubt)).frame
 
-    def _look(self, frame: core.TrackedFrame, *, wide: bool) -> core.TrackedFrame | None:
+    def _look(self, frame: core.TrackedFrame, *, wide: bool) -> RefinedPose | None:
         self._search.reset()
         if wide:
             self._search.found_again(frame)
         refined = self._search.in_local_map(_copy_of(frame), PoseEstimate())
-        if not refined.estimate.found:
-            return None
-        refined.frame.discard_outliers()
-        return refined.frame
+        return _without_outliers(refined) if refined.estimate.found else None
 
 
 def _shows_more(looked: core.TrackedFrame, found: core.TrackedFrame) -> bool:
     return looked.n_associated() >= _MORE_INLIERS * found.n_associated()
+
+
+def _without_outliers(refined: RefinedPose) -> RefinedPose:
+    refined.frame.discard_outliers()
+    return refined
+
+
+def _at_its_pose(frame: core.TrackedFrame, looked: RefinedPose) -> RefinedPose:
+    """A frame where it was, in the local map that a look from there found."""
+    estimate = replace(looked.estimate, n_inliers=frame.n_associated())
+    return replace(looked, frame=frame, estimate=estimate)
 
 
 def _copy_of(frame: core.TrackedFrame) -> core.TrackedFrame:

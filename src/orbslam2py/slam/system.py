@@ -98,8 +98,8 @@ class System:
     new_map_after : float
         Seconds of time stamps that tracking is lost before another map begins.
     effort : {"fast", "normal", "thorough"}
-        How often frames become keyframes. Fewer take less time; with a single camera on the move
-        more of them err less.
+        How much work goes into map and path: ``fast`` makes fewer keyframes, ``thorough`` matches
+        every frame with the finished map once more.
     check_calibration : bool
         Log one warning if the calibration cannot belong to images of the first one's size.
         `orbslam2py.check_calibration` looks into the images, too.

@@ -146,6 +146,13 @@ class TrackingThresholds:
     """... if it lies so many standard deviations away ..."""
     much_better_look: float = 1.1
     """... and else with so many times."""
+    afresh_window: float = 3.0
+    """Matched with the local map from nothing, in this multiple of the usual windows and then in
+    those, a frame ..."""
+    afresh_share: float = 0.9
+    """... takes the pose with at least this share of the inliers that is `elsewhere` ..."""
+    afresh_share_in_doubt: float = 0.6
+    """... and if it was in doubt, the one with at least this share, wherever it is."""
     frames_after_relocalization: int = 2
     """How many frames that is; meanwhile there is no motion model either."""
     local_map_inliers: int = 30

@@ -108,9 +108,14 @@ def test_poses_that_are_estimated_again_replace_the_first_ones() -> None:
         recorder.look_again()
         after = recorder.trajectories()[0]
         assert recorder.n_young == 0
-    assert moved.seen == [(0, False), (1, False), (2, False)]
-    assert list(after.lost) == [False, False, True]
+        recorder.settle()
+        finished = recorder.trajectories()[0]
+    assert moved.seen[:3] == [(0, False), (1, False), (2, False)]
+    # Once more when the map is finished, from where they were found.
+    assert moved.seen[3:] == [(0, False), (1, False)]
+    assert list(after.lost) == list(finished.lost) == [False, False, True]
     assert after.positions[:, 2] == pytest.approx(before.positions[:, 2] + 1.0)
+    assert finished.positions[:2, 2] == pytest.approx(before.positions[:2, 2] + 2.0)
 
 
 # ---- views between the two that begin a map ------------------------------------------------------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Frames whose pose was in doubt are matched with the finished map once more."""
+"""Frames that were in doubt, or came early, are matched with the finished map once more."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ import pytest
 from orbslam2py import Sensor, System
 from orbslam2py import _core as core
 from orbslam2py.slam import frame_recorder
+from orbslam2py.slam.effort import Effort
 from orbslam2py.slam.frame_recorder import FrameRecorder
-from orbslam2py.slam.pose_search import PoseSearch
+from orbslam2py.slam.pose_search import PoseSearch, RefinedPose
 from orbslam2py.slam.second_look import SecondLook
 from orbslam2py.slam.thresholds import TrackingThresholds
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
@@ -91,10 +92,30 @@ def test_a_frame_in_doubt_is_found_where_it_was(walk: Walk) -> None:
     np.testing.assert_array_equal(again.T_cw.matrix, found.T_cw.matrix)
 
 
-def test_a_frame_in_doubt_stays_where_a_look_does_not_show_clearly_more(walk: Walk) -> None:
-    """What it saw settles its pose; a look that finds as much may have found other things."""
+@pytest.mark.parametrize("in_doubt", [False, True])
+def test_a_frame_that_holds_all_of_its_points_is_found_where_it_was(
+    walk: Walk, in_doubt: bool
+) -> None:
+    frame = walk.no_keyframe()
+    found = walk.second_look(walk.put_aside(frame, every=1), in_doubt=in_doubt)
+    assert way(found, frame) < 0.01
+
+
+def test_a_look_that_does_not_show_clearly_more_is_not_followed(
+    walk: Walk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It may have found other things, and led to where still other ones are found."""
+    began: list[core.TrackedFrame] = []
+
+    def remember(_: PoseSearch, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
+        assert in_doubt
+        began.append(refined.frame)
+        return refined
+
+    monkeypatch.setattr(PoseSearch, "look_afresh", remember)
     aside = walk.put_aside(walk.no_keyframe(), every=1)
     assert way(walk.second_look(aside, in_doubt=True), aside) < 1e-9
+    assert way(began[0], aside) < 1e-9
 
 
 def test_a_frame_that_sees_nothing_of_the_map_keeps_its_pose(walk: Walk) -> None:
@@ -150,13 +171,35 @@ def test_a_pose_that_was_taken_back_is_not_looked_for(walk: Walk) -> None:
 def test_of_many_in_doubt_the_youngest_are_kept(
     walk: Walk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(frame_recorder, "_MOST_IN_DOUBT", 3)
+    monkeypatch.setattr(frame_recorder, "_MOST_WITH_KEYPOINTS", 3)
     moved = MovedByAMetre()
     recorder = FrameRecorder(walk.map, moved)
     for frame in walk.frames:
         recorder.record(frame, lost=False, in_doubt=True)
     recorder.settle()
     assert [number for number, _ in moved.seen] == [N - 3, N - 2, N - 1]
+
+
+def test_every_frame_is_looked_at_where_that_is_asked_for(
+    walk: Walk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(frame_recorder, "_MOST_WAITING", 3)
+    moved = MovedByAMetre()
+    recorder = FrameRecorder(walk.map, moved, every_frame=True)
+    for frame in walk.frames:
+        recorder.record(frame, lost=frame.id == 5, in_doubt=frame.id == 6)
+    # Of too many the oldest does not wait for the end.
+    early = [(number, number == 6) for number in range(N) if number != 5][:-3]
+    assert moved.seen == early
+    recorder.settle()
+    assert moved.seen == [*early, (N - 3, False), (N - 2, False), (N - 1, False)]
+    assert list(recorder.trajectory().indices) == list(range(N))
+    recorder.settle()
+    assert len(moved.seen) == N - 1, "once"
+
+
+def test_thorough_looks_at_every_frame() -> None:
+    assert [effort.looks_again for effort in Effort] == [False, False, True]
 
 
 def test_a_map_that_ends_is_finished_others_are_not(

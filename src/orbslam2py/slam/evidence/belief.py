@@ -92,6 +92,8 @@ class Belief:
             if first.found:
                 self._search.settle(refined)
             return estimate
+        if self._search.map_is_fixed:
+            hypothesis = self._looked_at_afresh(hypothesis, in_doubt=doubted)
         if doubted:
             hypothesis = replace(hypothesis, evidence=replace(hypothesis.evidence, doubted=True))
         return self._take(frame, hypothesis, lost=lost)
@@ -101,6 +103,20 @@ class Belief:
             return None
         evidence = self._judge.weigh(refined, self._search.motion, first.method)
         return Hypothesis(refined, first.method, evidence)
+
+    def _looked_at_afresh(self, hypothesis: Hypothesis, *, in_doubt: bool) -> Hypothesis:
+        """The same frame in the same map is to be in the same place, whatever came before it."""
+        refined = hypothesis.refined
+        afresh = self._search.look_afresh(refined, in_doubt=in_doubt)
+        if afresh is refined:
+            return hypothesis
+        same = self._judge.is_same(refined, afresh)
+        refined.frame.take_over(afresh.frame)
+        refined = replace(afresh, frame=refined.frame)
+        evidence = self._judge.weigh(refined, self._search.motion, hypothesis.method)
+        if hypothesis.evidence.confirmed and same:
+            evidence = self._judge.confirm(evidence)
+        return replace(hypothesis, refined=refined, evidence=evidence)
 
     def _is_doubted(self, hypothesis: Hypothesis | None) -> bool:
         return hypothesis is None or self._judge.fell_suddenly(hypothesis.evidence)

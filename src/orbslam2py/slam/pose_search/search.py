@@ -387,6 +387,50 @@ class PoseSearch:
             return refined
         return RefinedPose(frame, estimate, local_map, visible, n_held + len(visible))
 
+    def look_afresh(self, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
+        """Match a frame with the map from nothing, so that its pose does not hang on the way to it.
+
+        What is matched with the frame before stays matched from frame to frame, and holds a pose
+        where it was. In a map that does not change, an image is to be in one place, whatever was
+        seen before it.
+
+        Parameters
+        ----------
+        refined : RefinedPose
+            Where the search begins. It is not changed.
+        in_doubt : bool
+            Whether few points held the pose, or wrong ones: then it is taken from wherever the
+            search leads.
+
+        Returns
+        -------
+        RefinedPose
+            That of another version of the frame, if it lies clearly elsewhere; else the one that
+            was given.
+        """
+        limits, local_map, narrow = self.limits, refined.local_map, self._usual_window()
+        if local_map is None or refined.frame.T_cw is None:
+            return refined
+        frame = core.TrackedFrame(refined.frame.features)
+        frame.T_cw = refined.frame.T_cw
+        frame.share_anchor(refined.frame)
+        nothing = np.zeros(0, np.int64)
+        core.match_local_map(frame, local_map.points, nothing, limits.afresh_window * narrow)
+        if core.optimize_pose(frame).n_inliers < limits.map_matches:
+            return refined
+        frame.clear_associations()
+        visible = core.match_local_map(frame, local_map.points, nothing, narrow).visible
+        optimized = core.optimize_pose(frame)
+        share = limits.afresh_share_in_doubt if in_doubt else limits.afresh_share
+        if optimized.n_inliers < share * refined.estimate.n_inliers:
+            return refined
+        if not (in_doubt or _is_elsewhere(frame, refined, limits.elsewhere)):
+            return refined
+        estimate = self._enough_found(frame, refined.estimate, optimized)
+        if estimate.visual_odometry or not estimate.found:
+            return refined
+        return RefinedPose(frame, estimate, local_map, visible, len(visible))
+
     def beyond_the_map(self, frame: core.TrackedFrame, odometry: PoseEstimate) -> RefinedPose:
         """Take a pose that hangs on the depths of the frame before; these should be in view."""
         assert frame.T_cw is not None
