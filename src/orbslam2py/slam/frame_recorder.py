@@ -86,7 +86,7 @@ class FrameRecorder:
             self._record_waiting()
             young, self._young = self._young or [], None
             for frame, lost in young:
-                again = self._second_look(frame)
+                again = self._second_look(frame, finished=False)
                 self._append(again, lost=lost)
                 if not lost and frame.id not in self._with_keypoints:
                     self._keep_keypoints(again, in_doubt=False)

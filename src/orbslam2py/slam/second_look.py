@@ -37,7 +37,9 @@ class SecondLook:
         self._map = slam_map
         self._search = search
 
-    def __call__(self, frame: core.TrackedFrame, *, in_doubt: bool = False) -> core.TrackedFrame:
+    def __call__(
+        self, frame: core.TrackedFrame, *, in_doubt: bool = False, finished: bool = True
+    ) -> core.TrackedFrame:
         """A version of a frame with its pose in the map as it is now.
 
         One that is no longer found, or is a keyframe, keeps the pose that follows its keyframe.
@@ -49,6 +51,8 @@ class SecondLook:
         in_doubt : bool
             Its pose may be far off: look further around, and again from where it is then found, as
             long as that shows clearly more of the map.
+        finished : bool
+            No other look will follow: the pose is not to hang on the one that was tracked.
         """
         followed = _copy_of(frame)
         if followed.T_cw is None:
@@ -69,7 +73,9 @@ class SecondLook:
             refined = looked
         if refined is None:
             return followed
-        return _without_outliers(self._search.look_afresh(refined, in_doubt=in_doubt)).frame
+        if finished:
+            refined = self._search.look_afresh(refined, in_doubt=in_doubt)
+        return _without_outliers(refined).frame
 
     def _look(self, frame: core.TrackedFrame, *, wide: bool) -> RefinedPose | None:
         self._search.reset()

@@ -113,6 +113,7 @@ def test_poses_that_are_estimated_again_replace_the_first_ones() -> None:
     assert moved.seen[:3] == [(0, False), (1, False), (2, False)]
     # Once more when the map is finished, from where they were found.
     assert moved.seen[3:] == [(0, False), (1, False)]
+    assert moved.finished == [False] * 3 + [True] * 2
     assert list(after.lost) == list(finished.lost) == [False, False, True]
     assert after.positions[:, 2] == pytest.approx(before.positions[:, 2] + 1.0)
     assert finished.positions[:2, 2] == pytest.approx(before.positions[:2, 2] + 2.0)

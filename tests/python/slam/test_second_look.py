@@ -213,3 +213,20 @@ def test_a_map_that_ends_is_finished_others_are_not(
     assert moved.seen == []
     recorder.settle()
     assert moved.seen == [(9, True)]
+
+
+def test_only_the_last_look_is_matched_from_nothing(
+    walk: Walk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looked: list[int] = []
+
+    def note(_: PoseSearch, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
+        looked.append(refined.frame.id)
+        return refined
+
+    monkeypatch.setattr(PoseSearch, "look_afresh", note)
+    frame = walk.no_keyframe()
+    walk.second_look(frame, finished=False)
+    assert looked == []
+    walk.second_look(frame)
+    assert looked == [frame.id]

@@ -14,9 +14,13 @@ class MovedByAMetre(SecondLook):
 
     def __init__(self) -> None:
         self.seen: list[tuple[int, bool]] = []
+        self.finished: list[bool] = []
 
-    def __call__(self, frame: core.TrackedFrame, *, in_doubt: bool = False) -> core.TrackedFrame:
+    def __call__(
+        self, frame: core.TrackedFrame, *, in_doubt: bool = False, finished: bool = True
+    ) -> core.TrackedFrame:
         self.seen.append((frame.id, in_doubt))
+        self.finished.append(finished)
         assert frame.T_cw is not None
         moved = core.TrackedFrame(frame.features)
         moved.T_cw = core.Pose(np.array([0.0, 0, 0, 1]), np.array([0, 0, -1.0])) @ frame.T_cw
