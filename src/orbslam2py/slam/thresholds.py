@@ -147,8 +147,8 @@ class TrackingThresholds:
     much_better_look: float = 1.1
     """... and else with so many times."""
     afresh_window: float = 3.0
-    """Matched with the local map from nothing, in this multiple of the usual windows and then in
-    those, a frame ..."""
+    """Matched with the local map from nothing, by this factor and then in the usual windows, a frame
+    ..."""
     afresh_share: float = 0.9
     """... takes the pose with at least this share of the inliers that is `elsewhere` ..."""
     afresh_share_in_doubt: float = 0.6

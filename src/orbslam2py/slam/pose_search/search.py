@@ -415,7 +415,7 @@ class PoseSearch:
         frame.T_cw = refined.frame.T_cw
         frame.share_anchor(refined.frame)
         nothing = np.zeros(0, np.int64)
-        core.match_local_map(frame, local_map.points, nothing, limits.afresh_window * narrow)
+        core.match_local_map(frame, local_map.points, nothing, limits.afresh_window)
         if core.optimize_pose(frame).n_inliers < limits.map_matches:
             return refined
         frame.clear_associations()
