@@ -25,7 +25,7 @@ class Effort(str, Enum):
 
     @property
     def looks_again(self) -> bool:
-        """Whether every frame is matched with the finished map once more, not only doubted ones."""
+        """Whether every frame is matched with the map once more, when it has settled around it."""
         return self is Effort.THOROUGH
 
 
@@ -37,6 +37,6 @@ _WITH_DEPTH = {
 _MONOCULAR = {
     Effort.FAST: KeyframeThresholds(share_monocular=0.8),
     Effort.NORMAL: KeyframeThresholds(),
-    # More of them, nearer to each other, bend a long path further.
+    # More keyframes, nearer to each other, bend a long path further.
     Effort.THOROUGH: KeyframeThresholds(),
 }

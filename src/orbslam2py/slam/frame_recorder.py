@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,13 +15,19 @@ from orbslam2py.maps.saved_map import RecordedFrames
 from orbslam2py.slam.second_look import SecondLook
 from orbslam2py.trajectory.trajectory import Trajectory
 
-#: So many frames wait for the end, when the map has settled, to be estimated again; those before
-#: them are where the map was settled long ago.
+#: So many frames wait for the end, when the map has settled, to be estimated or matched again;
+#: those before them are where the map was settled long ago.
 _MOST_WAITING = 1000
-#: So many frames wait for the end with all their keypoints, the youngest.
+#: So many frames in doubt wait for the end with all their keypoints, and so many of young maps.
 _MOST_WITH_KEYPOINTS = 100
 
 _NO_POSES = Trajectory(timestamps=np.zeros(0), T_wc=np.zeros((0, 4, 4)))
+
+
+class _YoungFrame(NamedTuple):
+    frame: core.TrackedFrame
+    lost: bool
+    fixed_map: bool
 
 
 class FrameRecorder:
@@ -28,8 +35,8 @@ class FrameRecorder:
 
     A frame is kept relative to its reference keyframe, so its pose moves with whatever refines the
     map later. In the end, or when many frames have come after it, it is estimated once more from
-    the points it saw, each of which has moved in its own way. Before that, one that was in doubt or
-    came while a single camera's map was young is matched with the map once more
+    the points it saw, each of which has moved in its own way. One that was in doubt, or came while
+    a single camera's map was young, is matched with the map once more as well
     (``docs/method/map.md``, settled frames). May be used from any thread, also while a frame is
     recorded.
 
@@ -40,7 +47,7 @@ class FrameRecorder:
     second_look : SecondLook
         Matches frames with the map again.
     every_frame : bool
-        It is to match every frame again, when many have come after it at the latest.
+        `second_look` gets every frame, when many have come after it at the latest.
     """
 
     def __init__(
@@ -55,7 +62,7 @@ class FrameRecorder:
         self._doubted: core.TrackedFrame | None = None
         self._waiting: core.TrackedFrame | None = None
         # Frames of a young map, whose poses are estimated again; None: those of no map.
-        self._young: list[tuple[core.TrackedFrame, bool]] | None = None
+        self._young: list[_YoungFrame] | None = None
         self._young_map = -1
         self._every_frame = every_frame
         # Frames to be matched again, by id, and whether they were in doubt.
@@ -85,13 +92,22 @@ class FrameRecorder:
         with self._lock:
             self._record_waiting()
             young, self._young = self._young or [], None
-            for frame, lost in young:
+            for frame, lost, fixed_map in young:
                 again = self._second_look(frame, finished=False)
-                self._append(again, lost=lost)
-                if not lost and frame.id not in self._with_keypoints:
+                self._write(again, lost=lost, fixed_map=fixed_map)
+                if not (lost or fixed_map or frame.id in self._with_keypoints):
                     self._keep_keypoints(again, in_doubt=False)
 
     def _append(self, frame: core.TrackedFrame, *, lost: bool, fixed_map: bool = False) -> None:
+        """Write down a frame that came after all others."""
+        self._write(frame, lost=lost, fixed_map=fixed_map)
+        if not lost and frame.map_index != self._young_map:
+            self._young = None
+        if self._young is not None:
+            self._young.append(_YoungFrame(frame, lost, fixed_map))
+
+    def _write(self, frame: core.TrackedFrame, *, lost: bool, fixed_map: bool = False) -> None:
+        """Write down a frame, in place of what was written of it before."""
         self._recorder.record(self._map, frame, lost=lost)
         if lost or fixed_map:
             self._sightings.forget(frame.id)
@@ -99,10 +115,6 @@ class FrameRecorder:
             self._sightings.keep(frame)
             self._sightings.settle(self._map, self._recorder, _MOST_WAITING)
         self._last_map = max(self._last_map, frame.map_index)
-        if not lost and frame.map_index != self._young_map:
-            self._young = None
-        if self._young is not None:
-            self._young.append((frame, lost))
 
     def doubt(self, frame: core.TrackedFrame) -> None:
         """Take back the pose of this frame, recorded next, if the one after it is lost."""
@@ -144,14 +156,17 @@ class FrameRecorder:
                 self._keep_keypoints(frame, in_doubt=in_doubt)
 
     def _keep_keypoints(self, frame: core.TrackedFrame, *, in_doubt: bool) -> None:
-        """Let a frame be matched again later; of too many, the oldest now or not at all."""
+        """Let a frame be matched again later; of too many, the oldest is now or not at all."""
         waiting = self._with_keypoints
         waiting[frame.id] = (frame, in_doubt)
-        if len(waiting) <= (_MOST_WAITING if self._every_frame else _MOST_WITH_KEYPOINTS):
-            return
-        oldest, was_in_doubt = waiting.pop(min(waiting))
         if self._every_frame:
-            self._append(self._second_look(oldest, in_doubt=was_in_doubt), lost=False)
+            if len(waiting) > _MOST_WAITING:
+                oldest, was_in_doubt = waiting.pop(min(waiting))
+                self._write(self._second_look(oldest, in_doubt=was_in_doubt), lost=False)
+            return
+        alike = [number for number, (_, doubted) in waiting.items() if doubted == in_doubt]
+        if len(alike) > _MOST_WITH_KEYPOINTS:
+            del waiting[min(alike)]
 
     def _record_waiting(self, *, believed: bool = True) -> None:
         """Record the frame that waits for the next one; who asks before that gets its pose."""
@@ -174,7 +189,7 @@ class FrameRecorder:
         waiting, self._with_keypoints = self._with_keypoints, {}
         for frame, in_doubt in waiting.values():
             if only_map is None or self._map_of(frame) == only_map:
-                self._append(self._second_look(frame, in_doubt=in_doubt), lost=False)
+                self._write(self._second_look(frame, in_doubt=in_doubt), lost=False)
             else:
                 self._with_keypoints[frame.id] = (frame, in_doubt)
         self._sightings.settle(self._map, self._recorder)

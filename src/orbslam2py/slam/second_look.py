@@ -96,8 +96,7 @@ def _without_outliers(refined: RefinedPose) -> RefinedPose:
 
 def _at_its_pose(frame: core.TrackedFrame, looked: RefinedPose) -> RefinedPose:
     """A frame where it was, in the local map that a look from there found."""
-    estimate = replace(looked.estimate, n_inliers=frame.n_associated())
-    return replace(looked, frame=frame, estimate=estimate)
+    return replace(looked, frame=frame)
 
 
 def _copy_of(frame: core.TrackedFrame) -> core.TrackedFrame:

@@ -147,7 +147,7 @@ class TrackingThresholds:
     much_better_look: float = 1.1
     """... and else with so many times."""
     afresh_window: float = 3.0
-    """Matched with the local map from nothing, by this factor and then in the usual windows, a frame
+    """Matched with the local map from nothing, first by this factor on the search radius, a frame
     ..."""
     afresh_share: float = 0.9
     """... takes the pose with at least this share of the inliers that is `elsewhere` ..."""

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orbslam2py import Sensor, System
+from orbslam2py import Sensor, System, TrackingState
 from orbslam2py import _core as core
 from orbslam2py.slam.pose_search import PoseSearch, RefinedPose
-from orbslam2py.slam.records import PoseEstimate
+from orbslam2py.slam.records import PoseEstimate, TrackingOutcome
 from orbslam2py.slam.thresholds import EvidenceThresholds, TrackingThresholds
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.vocabulary import load_vocabulary
@@ -64,6 +64,18 @@ class Walk:
         version.share_anchor(self.last)
         estimate = PoseEstimate(n_inliers=n_inliers, covariance=metres**2 / 3 * np.eye(6))
         return replace(refined, frame=version, estimate=estimate)
+
+    def held(self, radians: float, n: int, *, metres: float = 1e-3) -> RefinedPose:
+        """The same, held by so many points of the map."""
+        beside = self.turned(radians, n, metres=metres)
+        inliers = np.flatnonzero((self.last.map_points >= 0) & ~self.last.outlier)
+        kept = np.zeros(len(self.last.features), bool)
+        kept[inliers[:n]] = True
+        T_cw = beside.frame.T_cw
+        beside.frame.copy_associations(self.last, kept)
+        beside.frame.T_cw = T_cw
+        assert beside.frame.n_map_inliers() == n
+        return beside
 
     def degrees_off(self, frame: core.TrackedFrame) -> float:
         assert frame.T_cw is not None and self.last.T_cw is not None
@@ -135,43 +147,56 @@ def test_a_pose_matched_from_nothing_does_not_hang_on_where_it_began(
     walk: Walk, in_doubt: bool
 ) -> None:
     ends = []
-    for radians in (-0.01, -0.005, 0.005, 0.01):
-        beside = walk.turned(radians, n_inliers=60)
+    for radians in (-0.02, -0.005, 0.005, 0.02):
+        beside = walk.held(radians, 60)
         found = walk.search.look_afresh(beside, in_doubt=in_doubt)
         assert found is not beside
-        assert found.n_predicted == len(found.visible) >= found.estimate.n_inliers > 60
+        assert found.n_predicted == len(found.visible) > beside.n_predicted - 300
+        assert found.n_predicted >= found.estimate.n_inliers > 60
         assert walk.degrees_off(beside.frame) > 0.25, "what was given stays as it was"
+        assert beside.frame.n_associated() == 60
         ends.append(walk.degrees_off(found.frame))
     assert max(ends) < 0.1
     assert max(ends) - min(ends) < 0.02
 
 
 def test_a_pose_that_lies_at_the_same_place_is_kept_unless_it_was_in_doubt(walk: Walk) -> None:
-    vague = walk.turned(0.005, n_inliers=60, metres=1.0)
+    vague = walk.held(0.005, 60, metres=1.0)
     assert walk.search.look_afresh(vague, in_doubt=False) is vague
     assert walk.search.look_afresh(vague, in_doubt=True) is not vague
 
 
-def test_fewer_inliers_are_enough_where_a_pose_was_in_doubt(walk: Walk) -> None:
-    n = walk.search.look_afresh(walk.turned(0.01, n_inliers=60), in_doubt=True).estimate.n_inliers
-    limits = ((False, LIMITS.afresh_share), (True, LIMITS.afresh_share_in_doubt))
-    for in_doubt, share in limits:
-        enough = walk.turned(0.01, n_inliers=int(n / share) - 1)
-        assert walk.search.look_afresh(enough, in_doubt=in_doubt) is not enough
-        too_few = walk.turned(0.01, n_inliers=int(n / share) + 2)
-        assert walk.search.look_afresh(too_few, in_doubt=in_doubt) is too_few
+@pytest.mark.parametrize("in_doubt", [False, True])
+def test_a_pose_from_nothing_needs_its_share_of_inliers(
+    walk: Walk, in_doubt: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    beside = walk.held(0.01, 60)
+    n = walk.search.look_afresh(beside, in_doubt=in_doubt).estimate.n_inliers
+    name = "afresh_share_in_doubt" if in_doubt else "afresh_share"
+    for share, is_taken in ((n / 60, True), ((n + 0.5) / 60, False)):
+        monkeypatch.setattr(walk.search, "limits", replace(LIMITS, **{name: share}))
+        assert (walk.search.look_afresh(beside, in_doubt=in_doubt) is not beside) == is_taken
+    assert LIMITS.afresh_share_in_doubt < LIMITS.afresh_share <= 1
+
+
+def test_what_the_frame_before_measured_holds_a_pose_unless_it_was_in_doubt(walk: Walk) -> None:
+    """Its points are not of the map, and matching from nothing does not find them."""
+    beside = walk.held(0.01, 60)
+    beside = replace(beside, estimate=replace(beside.estimate, n_inliers=61))
+    assert walk.search.look_afresh(beside, in_doubt=False) is beside
+    assert walk.search.look_afresh(beside, in_doubt=True) is not beside
 
 
 def test_nothing_to_match_from_nothing_changes_nothing(
     walk: Walk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    away = walk.turned(1.5, n_inliers=40)
-    beyond_the_map = replace(walk.turned(0.01, n_inliers=60), local_map=None)
+    away = walk.held(1.5, 40)
+    beyond_the_map = replace(walk.held(0.01, 60), local_map=None)
     for refined in (away, beyond_the_map):
         for in_doubt in (False, True):
             assert walk.search.look_afresh(refined, in_doubt=in_doubt) is refined
     monkeypatch.setattr(walk.search, "limits", replace(LIMITS, local_map_inliers=10_000))
-    beside = walk.turned(0.01, n_inliers=60)
+    beside = walk.held(0.01, 60)
     assert walk.search.look_afresh(beside, in_doubt=True) is beside, "not enough for a pose"
 
 
@@ -203,37 +228,70 @@ def test_poses_are_matched_from_nothing_in_a_map_that_stays_as_it_is(scene: Scen
     assert scene.search.looked_afresh == [(3, False), (4, False), (5, False)]
 
 
-@pytest.mark.parametrize(("metres", "confirmed"), [(0.0, True), (1000.0, False)])
-def test_what_is_matched_from_nothing_is_weighed_anew(
-    core: FakeCore, monkeypatch: pytest.MonkeyPatch, metres: float, confirmed: bool
-) -> None:
-    """It was confirmed by a second way only if it is still where both had led."""
+class FromNothing:
+    """What is matched from nothing in frames that were in doubt, so far from where they were."""
+
+    def __init__(self, scene: Scene, metres: float, n_inliers: int) -> None:
+        self._metres, self._n_inliers = metres, n_inliers
+        self.ends: list[float] = []
+        scene.search.look_afresh = self  # type: ignore[method-assign]
+
+    def __call__(self, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
+        if not in_doubt:
+            return refined
+        assert refined.frame.T_cw is not None
+        version: Any = FakeFrame(refined.frame.id)
+        version.share_anchor(refined.frame)
+        version.T_cw = pose(self._metres) @ refined.frame.T_cw
+        self.ends.append(float(version.T_cw.matrix[0, 3]))
+        estimate = replace(refined.estimate, n_inliers=self._n_inliers)
+        return replace(refined, frame=version, estimate=estimate)
+
+
+def in_doubt(
+    core: FakeCore, metres: float, n_inliers: int, *, confirmed: bool
+) -> tuple[TrackingOutcome, FakeFrame, list[float]]:
+    """A frame in a fixed map whose inliers fall; another way leads there as well, or none does."""
     scene = Scene(Sensor.STEREO, core, evidence=EvidenceThresholds())
     scene.run(12)
     scene.localize = True
     scene.run(3)
+    from_nothing = FromNothing(scene, metres, n_inliers)
+    core.inliers.extend([50, 45])
+    if confirmed:
+        # What turns with the images.
+        no_turn = SimpleNamespace(quaternion_xyzw=np.array([0.0, 0, 0, 1]), correlation=0.9)
+        core.aligned.append(no_turn)
+        core.inliers.extend([50, 46])
+    else:
+        core.words.extend([0, 0])
+        core.motion.extend([50, 0, 0])
+    return scene.track(), scene.last, from_nothing.ends
 
-    ends: list[float] = []
 
-    def from_nothing(refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
-        assert in_doubt
-        assert refined.frame.T_cw is not None
-        version: Any = FakeFrame(refined.frame.id)
-        version.share_anchor(refined.frame)
-        version.T_cw = pose(metres) @ refined.frame.T_cw
-        ends.append(float(version.T_cw.matrix[0, 3]))
-        return replace(refined, frame=version, estimate=replace(refined.estimate, n_inliers=77))
-
-    monkeypatch.setattr(scene.search, "look_afresh", from_nothing)
-    # What turns with the images leads to the place that is in doubt as well.
-    core.aligned.append(SimpleNamespace(quaternion_xyzw=np.array([0.0, 0, 0, 1]), correlation=0.9))
-    for n_inliers in (45, 46):
-        core.inliers.extend([50, n_inliers])
-    outcome = scene.track()
+@pytest.mark.parametrize(
+    ("metres", "another_way", "confirmed"),
+    [(0.0, True, True), (1000.0, True, False), (0.0, False, False)],
+)
+def test_what_is_matched_from_nothing_is_weighed_anew(
+    core: FakeCore, metres: float, another_way: bool, confirmed: bool
+) -> None:
+    """It was confirmed by a second way only if it is still where both had led."""
+    outcome, frame, ends = in_doubt(core, metres, 77, confirmed=another_way)
     evidence = outcome.estimate.evidence
     assert evidence is not None
     assert outcome.estimate.n_inliers == 77
     assert evidence.inliers_to_usual == pytest.approx(0.77)
     assert (evidence.doubted, evidence.confirmed) == (True, confirmed)
-    assert scene.last.T_cw is not None
-    assert ends == [float(scene.last.T_cw.matrix[0, 3])]
+    assert frame.T_cw is not None
+    assert ends == [float(frame.T_cw.matrix[0, 3])]
+
+
+def test_a_pose_stays_that_from_nothing_would_be_refused(core: FakeCore) -> None:
+    outcome, frame, ends = in_doubt(core, 1000.0, 12, confirmed=True)
+    assert outcome.state is TrackingState.OK
+    assert outcome.estimate.n_inliers == 45
+    assert outcome.estimate.evidence is not None
+    assert outcome.estimate.evidence.confirmed
+    assert frame.T_cw is not None
+    assert ends != [float(frame.T_cw.matrix[0, 3])]

@@ -198,8 +198,108 @@ def test_every_frame_is_looked_at_where_that_is_asked_for(
     assert len(moved.seen) == N - 1, "once"
 
 
-def test_thorough_looks_at_every_frame() -> None:
-    assert [effort.looks_again for effort in Effort] == [False, False, True]
+@pytest.mark.parametrize("effort", list(Effort))
+def test_thorough_looks_at_every_frame(effort: Effort, monkeypatch: pytest.MonkeyPatch) -> None:
+    looked: list[int] = []
+    original = SecondLook.__call__
+
+    def note(self: SecondLook, frame: core.TrackedFrame, **options: bool) -> core.TrackedFrame:
+        looked.append(frame.id)
+        return original(self, frame, **options)
+
+    monkeypatch.setattr(SecondLook, "__call__", note)
+    sequence = SyntheticSequence(
+        SyntheticOptions(world="corridor", sensor="rgbd", size=(320, 240), frames=6)
+    )
+    with System(sequence.settings, "rgbd", deterministic=True, effort=effort) as system:
+        for i in range(6):
+            images = sequence.load(i)
+            system.track_rgbd(images.image, images.depth, i / 20)
+        assert looked == []
+    assert looked == (list(range(6)) if effort is Effort.THOROUGH else [])
+
+
+# ---- frames of young maps ------------------------------------------------------------------------
+def young(
+    walk: Walk, frames: list[core.TrackedFrame], in_doubt: tuple[int, ...] = ()
+) -> FrameRecorder:
+    """A recorder whose map has begun with the first of these frames, and settled with the last."""
+    moved = MovedByAMetre()
+    recorder = FrameRecorder(walk.map, moved)
+    recorder.begin(frames[:1])
+    for frame in frames[1:]:
+        recorder.record(frame, lost=False, in_doubt=frame.id in in_doubt)
+    recorder.look_again()
+    moved.seen.clear()
+    return recorder
+
+
+def seen_at_the_end(recorder: FrameRecorder) -> list[tuple[int, bool]]:
+    recorder.settle()
+    moved = recorder._second_look
+    assert isinstance(moved, MovedByAMetre)
+    return moved.seen
+
+
+def test_frames_of_a_young_map_are_looked_at_again_and_doubt_is_not_forgotten(walk: Walk) -> None:
+    recorder = young(walk, walk.frames[:5], in_doubt=(2,))
+    recorder.record(walk.frames[5], lost=False)
+    assert sorted(seen_at_the_end(recorder)) == [
+        (0, False),
+        (1, False),
+        (2, True),
+        (3, False),
+        (4, False),
+    ]
+
+
+def test_frames_of_a_young_map_do_not_push_out_those_in_doubt(
+    walk: Walk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(frame_recorder, "_MOST_WITH_KEYPOINTS", 3)
+    recorder = young(walk, walk.frames[:8], in_doubt=(1, 2))
+    recorder.record(walk.frames[8], lost=False, in_doubt=True)
+    recorder.record(walk.frames[9], lost=False, in_doubt=True)
+    # Of each kind the youngest: frame 1 was in doubt and is the oldest of four.
+    assert sorted(seen_at_the_end(recorder)) == [
+        (2, True),
+        (5, False),
+        (6, False),
+        (7, False),
+        (8, True),
+        (9, True),
+    ]
+
+
+def test_frames_that_were_localised_while_a_map_was_young_stay(walk: Walk) -> None:
+    moved = MovedByAMetre()
+    recorder = FrameRecorder(walk.map, moved)
+    recorder.begin(walk.frames[:1])
+    recorder.record(walk.frames[1], lost=False, fixed_map=True)
+    recorder.record(walk.frames[2], lost=True)
+    recorder.look_again()
+    moved.seen.clear()
+    recorder.settle()
+    assert moved.seen == [(0, False)]
+
+
+def test_looks_at_old_frames_leave_those_of_a_young_map_alone(
+    walk: Walk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They may be of another map, and came before."""
+    monkeypatch.setattr(frame_recorder, "_MOST_WAITING", 3)
+    moved = MovedByAMetre()
+    recorder = FrameRecorder(walk.map, moved, every_frame=True)
+    for frame in walk.frames[:4]:
+        recorder.record(frame, lost=False)
+    assert moved.seen == [(0, False)]
+    recorder.begin(walk.frames[4:5])
+    for frame in walk.frames[5:8]:
+        recorder.record(frame, lost=False)
+    assert len(moved.seen) > 2
+    assert recorder.n_young == 4
+    recorder.settle()
+    assert recorder.n_young == 4
 
 
 def test_a_map_that_ends_is_finished_others_are_not(
@@ -211,17 +311,19 @@ def test_a_map_that_ends_is_finished_others_are_not(
         recorder.record(frame, lost=False, in_doubt=frame.id == 9)
     recorder.end_map(walk.map.active_map + 1)
     assert moved.seen == []
-    recorder.settle()
+    recorder.end_map(walk.map.active_map)
     assert moved.seen == [(9, True)]
+    recorder.settle()
+    assert moved.seen == [(9, True)], "once"
 
 
 def test_only_the_last_look_is_matched_from_nothing(
     walk: Walk, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    looked: list[int] = []
+    looked: list[tuple[int, bool]] = []
 
     def note(_: PoseSearch, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
-        looked.append(refined.frame.id)
+        looked.append((refined.frame.id, in_doubt))
         return refined
 
     monkeypatch.setattr(PoseSearch, "look_afresh", note)
@@ -229,4 +331,5 @@ def test_only_the_last_look_is_matched_from_nothing(
     walk.second_look(frame, finished=False)
     assert looked == []
     walk.second_look(frame)
-    assert looked == [frame.id]
+    walk.second_look(frame, in_doubt=True)
+    assert looked == [(frame.id, False), (frame.id, True)]

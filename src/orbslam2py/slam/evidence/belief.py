@@ -106,17 +106,19 @@ class Belief:
 
     def _looked_at_afresh(self, hypothesis: Hypothesis, *, in_doubt: bool) -> Hypothesis:
         """The same frame in the same map is to be in the same place, whatever came before it."""
-        refined = hypothesis.refined
+        refined, evidence = hypothesis.refined, hypothesis.evidence
         afresh = self._search.look_afresh(refined, in_doubt=in_doubt)
         if afresh is refined:
             return hypothesis
-        same = self._judge.is_same(refined, afresh)
+        if in_doubt:
+            # Much of what held the old pose was not found again.
+            evidence = self._judge.weigh(afresh, self._search.motion, hypothesis.method)
+            if hypothesis.evidence.confirmed and self._judge.is_same(refined, afresh):
+                evidence = self._judge.confirm(evidence)
+            if evidence.verdict is Verdict.REFUSED:
+                return hypothesis
         refined.frame.take_over(afresh.frame)
-        refined = replace(afresh, frame=refined.frame)
-        evidence = self._judge.weigh(refined, self._search.motion, hypothesis.method)
-        if hypothesis.evidence.confirmed and same:
-            evidence = self._judge.confirm(evidence)
-        return replace(hypothesis, refined=refined, evidence=evidence)
+        return replace(hypothesis, refined=replace(afresh, frame=refined.frame), evidence=evidence)
 
     def _is_doubted(self, hypothesis: Hypothesis | None) -> bool:
         return hypothesis is None or self._judge.fell_suddenly(hypothesis.evidence)

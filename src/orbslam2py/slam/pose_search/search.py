@@ -405,26 +405,26 @@ class PoseSearch:
         Returns
         -------
         RefinedPose
-            That of another version of the frame, if it lies clearly elsewhere; else the one that
-            was given.
+            That of another version of the frame, if it lies clearly elsewhere or, in doubt,
+            wherever it lies; the one that was given if too little of it is found.
         """
-        limits, local_map, narrow = self.limits, refined.local_map, self._usual_window()
-        if local_map is None or refined.frame.T_cw is None:
+        limits, local_map = self.limits, refined.local_map
+        n_of_map = refined.frame.n_map_inliers()
+        # Depths that the frame before measured hold it as well, and make it steadier.
+        is_steady = n_of_map < refined.estimate.n_inliers and not in_doubt
+        if local_map is None or refined.frame.T_cw is None or is_steady:
             return refined
         frame = core.TrackedFrame(refined.frame.features)
         frame.T_cw = refined.frame.T_cw
         frame.share_anchor(refined.frame)
-        nothing = np.zeros(0, np.int64)
-        core.match_local_map(frame, local_map.points, nothing, limits.afresh_window)
-        if core.optimize_pose(frame).n_inliers < limits.map_matches:
-            return refined
-        frame.clear_associations()
-        visible = core.match_local_map(frame, local_map.points, nothing, narrow).visible
-        optimized = core.optimize_pose(frame)
+        for window in (limits.afresh_window, self._usual_window()):
+            frame.clear_associations()
+            nothing = np.zeros(0, np.int64)
+            visible = core.match_local_map(frame, local_map.points, nothing, window).visible
+            optimized = core.optimize_pose(frame)
         share = limits.afresh_share_in_doubt if in_doubt else limits.afresh_share
-        if optimized.n_inliers < share * refined.estimate.n_inliers:
-            return refined
-        if not (in_doubt or _is_elsewhere(frame, refined, limits.elsewhere)):
+        elsewhere = in_doubt or _is_elsewhere(frame, refined, limits.elsewhere)
+        if optimized.n_inliers < share * n_of_map or not elsewhere:
             return refined
         estimate = self._enough_found(frame, refined.estimate, optimized)
         if estimate.visual_odometry or not estimate.found:
