@@ -115,8 +115,8 @@ NewMapAfterOption = Annotated[
 EffortOption = Annotated[
     Effort,
     typer.Option(
-        help="How much work goes into map and path: fast makes fewer keyframes; thorough makes "
-        "more with depth, and matches every frame with the map once more when it has settled."
+        help="How much work goes into map and path: fast makes fewer keyframes, thorough matches "
+        "every frame with the map once more when that has settled."
     ),
 ]
 SeedOption = Annotated[int, typer.Option(help="Seed of all random draws.", min=0)]

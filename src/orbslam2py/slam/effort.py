@@ -29,14 +29,14 @@ class Effort(str, Enum):
         return self is Effort.THOROUGH
 
 
+# More keyframes than normal, nearer to each other, bend a long path further.
 _WITH_DEPTH = {
     Effort.FAST: KeyframeThresholds(spacing=4, share=0.6),
     Effort.NORMAL: KeyframeThresholds(spacing=2),
-    Effort.THOROUGH: KeyframeThresholds(spacing=1),
+    Effort.THOROUGH: KeyframeThresholds(spacing=2),
 }
 _MONOCULAR = {
     Effort.FAST: KeyframeThresholds(share_monocular=0.8),
     Effort.NORMAL: KeyframeThresholds(),
-    # More keyframes, nearer to each other, bend a long path further.
     Effort.THOROUGH: KeyframeThresholds(),
 }

@@ -222,7 +222,7 @@ class Pipeline:
 
     def _wait_for_mapping(self, frame: core.TrackedFrame) -> None:
         worker = self.back_end.mapping.worker
-        if worker.held or (self._sensor.has_depth and not self.tracking.every_frame_in_turn):
+        if worker.held or self._sensor.has_depth:
             # A frame that is worth a keyframe waits when that is known.
             worker.wait_until_waiting(at_most=1)
             return

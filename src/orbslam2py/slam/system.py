@@ -98,9 +98,8 @@ class System:
     new_map_after : float
         Seconds of time stamps that tracking is lost before another map begins.
     effort : {"fast", "normal", "thorough"}
-        How much work goes into map and path: ``fast`` makes fewer keyframes; ``thorough`` makes
-        more with depth, and matches every frame with the map once more when it has settled, the
-        last thousand in `shutdown`.
+        How much work goes into map and path: ``fast`` makes fewer keyframes, ``thorough`` matches
+        every frame with the map once more when that has settled, the last thousand in `shutdown`.
     check_calibration : bool
         Log one warning if the calibration cannot belong to images of the first one's size.
         `orbslam2py.check_calibration` looks into the images, too.

@@ -313,11 +313,6 @@ class Tracking:
             self._search.confirm()
         return estimate
 
-    @property
-    def every_frame_in_turn(self) -> bool:
-        """Whether any frame may become a keyframe, however well it is tracked."""
-        return self._keyframe_decision.limits.spacing <= 1
-
     def _begin_map(self, frame: core.TrackedFrame, timer: StageTimer) -> TrackingOutcome:
         self.state = TrackingState.NOT_INITIALIZED
         with timer("keyframe"):
