@@ -68,7 +68,8 @@ class SecondLook:
             if looked is None:
                 break
             if in_doubt and not _shows_more(looked.frame, found):
-                refined = refined or _at_its_pose(found, looked)
+                # From where it was, in the local map that the look found.
+                refined = refined or replace(looked, frame=found)
                 break
             refined = looked
         if refined is None:
@@ -92,11 +93,6 @@ def _shows_more(looked: core.TrackedFrame, found: core.TrackedFrame) -> bool:
 def _without_outliers(refined: RefinedPose) -> RefinedPose:
     refined.frame.discard_outliers()
     return refined
-
-
-def _at_its_pose(frame: core.TrackedFrame, looked: RefinedPose) -> RefinedPose:
-    """A frame where it was, in the local map that a look from there found."""
-    return replace(looked, frame=frame)
 
 
 def _copy_of(frame: core.TrackedFrame) -> core.TrackedFrame:

@@ -417,9 +417,9 @@ class PoseSearch:
         frame = core.TrackedFrame(refined.frame.features)
         frame.T_cw = refined.frame.T_cw
         frame.share_anchor(refined.frame)
+        nothing = np.zeros(0, np.int64)
         for window in (limits.afresh_window, self._usual_window()):
             frame.clear_associations()
-            nothing = np.zeros(0, np.int64)
             visible = core.match_local_map(frame, local_map.points, nothing, window).visible
             optimized = core.optimize_pose(frame)
         share = limits.afresh_share_in_doubt if in_doubt else limits.afresh_share
