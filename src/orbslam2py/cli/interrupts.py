@@ -73,6 +73,24 @@ class EndingSignals:
                 os.close(nowhere)
 
 
+class _Request(threading.Event):
+    """An event that is known to be set at once, even if the thread that sets it has yet to run."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.asked = False
+
+    def is_set(self) -> bool:
+        return self.asked or super().is_set()
+
+    def ask(self) -> None:
+        """Be set; may be called by a signal's handler."""
+        self.asked = True
+        # By another thread: this one may be about to wait for the event, and hold its lock. Not
+        # through threading.Thread, whose own locks it may hold as well.
+        _thread.start_new_thread(self.set, ())
+
+
 class StopOnInterrupt:
     """In its ``with`` block the first Ctrl-C sets `event`; the next ones interrupt as usual.
 
@@ -82,12 +100,12 @@ class StopOnInterrupt:
     Attributes
     ----------
     event : threading.Event
-        Set once an end was asked for; at the end of the block at the latest.
+        Set once an end was asked for.
     """
 
     def __init__(self) -> None:
-        self.event = threading.Event()
-        self._asked = False
+        self._request = _Request()
+        self.event: threading.Event = self._request
         self._before: dict[int, _Handler] = {}
 
     def __enter__(self) -> StopOnInterrupt:
@@ -102,19 +120,14 @@ class StopOnInterrupt:
     def __exit__(self, *_: object) -> None:
         for number, before in self._before.items():
             signal.signal(number, before)
-        if self._asked:
-            self.event.set()
 
     def _on_interrupt(self, number: int, frame: FrameType | None) -> None:
         try:
             self._before[number](number, frame)
         except KeyboardInterrupt:
-            if self._asked:
+            if self._request.asked:
                 raise
-            self._asked = True
-            # By another thread: this one may be about to wait for the event, and hold its lock. Not
-            # through threading.Thread, whose own locks it may hold as well.
-            _thread.start_new_thread(self.event.set, ())
+            self._request.ask()
 
 
 @contextlib.contextmanager
