@@ -401,7 +401,9 @@ class BlurThresholds:
     fewest: int = 5
     """... and how many there must be at least."""
     share: float = 0.4
-    """Less than this share of their median sharpness is blur."""
+    """Less than this share of their median sharpness is blur ..."""
+    detail_share: float = 0.7
+    """... if their fine corners by coarse ones, too, are below this share: else it is dark."""
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,19 @@ WANTED = 1000
 """Points of a reference keyframe of which so few are seen that a keyframe is wanted."""
 
 
-def blurred(scene: Scene) -> None:
+def track_blurred(scene: Scene, detail: float = 0.5) -> TrackingOutcome:
+    """An image with weak corners, fine ones above all."""
     scene.core.sharpnesses.append(0.3 * SHARP)
+    usual = scene.core.fine_detail_of_images
+    scene.core.fine_detail_of_images = detail * usual
+    outcome = scene.track()
+    scene.core.fine_detail_of_images = usual
+    return outcome
+
+
+def track_darkened(scene: Scene) -> TrackingOutcome:
+    """An image with weak corners, coarse ones as well."""
+    return track_blurred(scene, detail=0.9)
 
 
 # ---- confirmed by the next frame ---------------------------------------------------------------
@@ -107,9 +118,8 @@ def test_fifteen_points_in_common_confirm(scene: Scene) -> None:
 def test_a_blurred_frame_is_not_searched_while_lost(scene: Scene) -> None:
     scene.run(40)
     lose(scene)
-    blurred(scene)
     scene.core.calls.clear()
-    outcome = scene.track()
+    outcome = track_blurred(scene)
     assert (outcome.state, outcome.estimate.reason) == (TrackingState.LOST, Reason.BLURRED)
     assert scene.core.calls == []
     assert scene.track().state is TrackingState.OK
@@ -118,9 +128,17 @@ def test_a_blurred_frame_is_not_searched_while_lost(scene: Scene) -> None:
 def test_a_blurred_frame_is_tracked_but_no_keyframe(scene: Scene) -> None:
     scene.run(40)
     scene.core.n_reference = WANTED
-    blurred(scene)
-    assert not scene.track().is_keyframe
+    assert not track_blurred(scene).is_keyframe
     assert scene.track().is_keyframe
+
+
+def test_a_dark_frame_is_searched_and_becomes_a_keyframe(scene: Scene) -> None:
+    """All of its corners are weak, as after a sudden change of exposure: that is no blur."""
+    scene.run(40)
+    scene.core.n_reference = WANTED
+    assert track_darkened(scene).is_keyframe
+    lose(scene)
+    assert track_darkened(scene).state is TrackingState.OK
 
 
 def test_what_stays_as_it_is_counts_as_sharp_after_half_of_the_frames(scene: Scene) -> None:
@@ -128,8 +146,7 @@ def test_what_stays_as_it_is_counts_as_sharp_after_half_of_the_frames(scene: Sce
     scene.run(40)
     scene.core.n_reference = WANTED
     n_frames = BlurThresholds().frames
-    scene.core.sharpnesses.extend([0.3 * SHARP] * n_frames)
-    keyframes = [scene.track().is_keyframe for _ in range(n_frames)]
+    keyframes = [track_blurred(scene).is_keyframe for _ in range(n_frames)]
     assert keyframes.index(True) == n_frames // 2 + 1
 
 
@@ -139,8 +156,7 @@ def test_a_black_frame_says_nothing_of_sharpness(scene: Scene) -> None:
     lose(scene)
     for _ in range(20):
         assert lose(scene).estimate.reason is not Reason.BLURRED
-    blurred(scene)
-    assert scene.track().estimate.reason is Reason.BLURRED, "the sharp ones are remembered"
+    assert track_blurred(scene).estimate.reason is Reason.BLURRED, "the sharp ones are remembered"
 
 
 # ---- features of a single camera -----------------------------------------------------------------

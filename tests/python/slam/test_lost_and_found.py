@@ -90,6 +90,16 @@ def test_a_blurred_frame_is_never_a_keyframe(world: MappedWorld) -> None:
     assert any(record.is_keyframe for record in records)
 
 
+def test_a_dark_frame_becomes_a_keyframe(world: MappedWorld) -> None:
+    """As when the camera looks at a window: the exposure falls for a second."""
+    records = []
+    for k in range(20):
+        images = world.sequence.load(N_MAPPED + k)
+        records.append(world.show(with_image(images, cv2.convertScaleAbs(images.image, alpha=0.3))))
+    assert all(record.state is TrackingState.OK for record in records)
+    assert any(record.is_keyframe for record in records[:8])
+
+
 def test_a_jump_away_and_back(world: MappedWorld) -> None:
     options = SyntheticOptions(world="room", sensor=Sensor.RGBD, size=SIZE, noise=2, seed=7)
     elsewhere = SyntheticSequence(options)

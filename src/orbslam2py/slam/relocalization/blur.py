@@ -15,7 +15,7 @@ from orbslam2py.slam.thresholds import BlurThresholds
 
 
 class BlurWatch:
-    """Tells frames that have lost the fine detail that those before them had.
+    """Tells frames that have lost the fine detail that those before them had, more than the coarse.
 
     Parameters
     ----------
@@ -28,7 +28,8 @@ class BlurWatch:
     def __init__(self, n_features: int, thresholds: BlurThresholds | None = None) -> None:
         self._n_features = n_features
         self._limits = thresholds or BlurThresholds()
-        self._recent: deque[float] = deque(maxlen=self._limits.frames)
+        # Sharpness and fine detail.
+        self._recent: deque[tuple[float, float]] = deque(maxlen=self._limits.frames)
 
     def reset(self) -> None:
         """Forget the frames before, of another camera."""
@@ -49,7 +50,12 @@ class BlurWatch:
         sharpness = core.sharpness(frame, self._n_features)
         if sharpness <= 0:
             return False
-        known = len(self._recent) >= self._limits.fewest
-        usual = statistics.median(self._recent) if known else 0.0
-        self._recent.append(sharpness)
-        return sharpness < self._limits.share * usual
+        detail = core.fine_detail(frame)
+        limits = self._limits
+        usual_sharpness = usual_detail = 0.0
+        if len(self._recent) >= limits.fewest:
+            usual_sharpness, usual_detail = map(statistics.median, zip(*self._recent, strict=True))
+        self._recent.append((sharpness, detail))
+        # In a dark image all corners are weak, and the coarse ones as much as the fine ones.
+        weak = sharpness < limits.share * usual_sharpness
+        return weak and detail < limits.detail_share * usual_detail
