@@ -3,18 +3,22 @@
 
 Worlds with motions that are hard to follow are played with the three sensors, 400 to 2000
 features and new seeds, small and deterministic, and every pose is compared with the truth.
-`--part block` drives around 320 m of street with sharp corners, at full size. What has been played
-with the present code stands in the CSV file and is not played again.
+`--part block` drives around 320 m of street with sharp corners, at full size. `--part recorded`
+plays the recorded sequences in ways that are harder than they were: every second to fourth image,
+backwards, images dropped, blurred, darkened, rolled. What has been played with the present code
+stands in the CSV file and is not played again.
 
     python -m benchmarks.holding_on --runs 60
     python -m benchmarks.holding_on --runs 1000 --sensors stereo rgbd --jobs 2
     python -m benchmarks.holding_on --part block --runs 10
+    python -m benchmarks.holding_on --part recorded --runs 248
 """
 
 from __future__ import annotations
 
 import argparse
 import subprocess
+from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
@@ -28,7 +32,8 @@ from benchmarks.harness.arguments import (
     new_parser,
 )
 from benchmarks.harness.folders import CHECKOUT
-from benchmarks.holding_on.cases import Case, block_cases, motion_cases
+from benchmarks.holding_on.made_up import block_cases, motion_cases
+from benchmarks.holding_on.recorded import recorded_cases
 from benchmarks.holding_on.results import (
     append_row,
     block_table,
@@ -37,6 +42,7 @@ from benchmarks.holding_on.results import (
     write_rows,
 )
 from benchmarks.holding_on.runs import all_rows
+from benchmarks.holding_on.scene import Case
 
 
 def version() -> str:
@@ -49,10 +55,11 @@ def version() -> str:
 
 def main() -> None:
     parser = new_parser(__doc__)
-    parser.add_argument("--part", choices=("motions", "block"), default="motions", help="[motions]")
+    parts = ("motions", "block", "recorded")
+    parser.add_argument("--part", choices=parts, default="motions", help="[motions]")
     add_counts(parser, runs=(60, "how many"), jobs=(1, "processes at once"))
     add_sensors(parser)
-    parser.add_argument("--only", metavar="TEXT", help="situations with this text in their name")
+    parser.add_argument("--only", metavar="TEXT", help="runs with this text in their name")
     parser.add_argument("--csv", type=Path, help="file of all runs [build/holding_on/COMMIT.csv]")
     parser.add_argument("--again", action="store_true", help="play what is in the file, too")
     add_width(parser)
@@ -84,11 +91,11 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
 def chosen_cases(arguments: argparse.Namespace) -> list[Case]:
     if arguments.part == "block":
         return list(block_cases(arguments.runs))
-    every = motion_cases(arguments.sensors)
-    if arguments.only is None:
-        return list(islice(every, arguments.runs))
-    named = (case for case in islice(every, 100_000) if arguments.only in case.situation.name)
-    return list(islice(named, arguments.runs))
+    cases_of = recorded_cases if arguments.part == "recorded" else motion_cases
+    every: Iterator[Case] = cases_of(arguments.sensors)
+    if arguments.only is not None:
+        every = (case for case in islice(every, 100_000) if arguments.only in case.key)
+    return list(islice(every, arguments.runs))
 
 
 if __name__ == "__main__":

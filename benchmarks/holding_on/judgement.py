@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.holding_on.play import Flags, Floats, Played
+from benchmarks.holding_on.play import Flags, Played
+from benchmarks.holding_on.scene import Floats
 from benchmarks.holding_on.start import StartFigures, judge_start
 from orbslam2py.settings import Sensor
 from orbslam2py.trajectory import align
@@ -25,6 +26,8 @@ class Figures:
     """What is counted in a run; the names are the columns of the CSV file."""
 
     frames: int
+    lasted: float
+    """Seconds from the first frame to the last."""
     tracked: int
     """Frames with a pose ..."""
     trackable: int
@@ -67,7 +70,7 @@ class Figures:
 
 def judge(played: Played) -> Figures:
     """Compare a run with the truth."""
-    monocular = played.sequence.sensor is Sensor.MONOCULAR
+    monocular = played.scene.sensor is Sensor.MONOCULAR
     start = judge_start(played) if monocular else StartFigures.of_depth(played)
     compared = consecutive(played)
     scale = np.ones(len(played.posed))
@@ -86,6 +89,7 @@ def judge(played: Played) -> Figures:
     trackable = ~played.covered & started_by_now(played, monocular)
     return Figures(
         frames=len(played.posed),
+        lasted=float(played.scene.timestamps[-1] - played.scene.timestamps[0]),
         tracked=int((played.posed & trackable).sum()),
         trackable=int(trackable.sum()),
         compared=len(compared),
@@ -124,7 +128,9 @@ def consecutive(played: Played) -> NDArray[np.int64]:
     """
     both = played.posed[1:] & played.posed[:-1]
     same = played.map_index[1:] == played.map_index[:-1]
-    stated: Flags = np.asarray(np.isfinite(played.covariance).all(axis=(1, 2)))
+    same &= played.truth_part[1:] == played.truth_part[:-1]
+    known = np.isfinite(played.covariance) & np.isfinite(played.truth[:, :1, :1])
+    stated: Flags = np.asarray(known.all(axis=(1, 2)))
     fine = both & same & ~played.changed[1:] & ~played.changed[:-1] & stated[1:] & stated[:-1]
     return np.flatnonzero(fine) + 1
 
@@ -178,10 +184,16 @@ def errors_of_motions(told: Floats, true: Floats) -> Floats:
     return error
 
 
+def path_known(played: Played) -> Flags:
+    """Frames (n,) of the final path whose true pose is known."""
+    return np.asarray(np.isfinite(played.path + played.truth).all(axis=(1, 2)))
+
+
 def errors_of_path(played: Played, *, with_scale: bool) -> Floats:
     """Angles [rad] and distances [m], (m, 2), of the final path's motions from frame to frame."""
-    known = np.isfinite(played.path).all(axis=(1, 2))
-    frames = np.flatnonzero(known[1:] & known[:-1]) + 1
+    known = path_known(played)
+    same = played.truth_part[1:] == played.truth_part[:-1]
+    frames = np.flatnonzero(known[1:] & known[:-1] & same) + 1
     T_cw = np.full_like(played.path, np.nan)
     T_cw[known] = inverse_poses(played.path[known])
     told = relative(T_cw, frames)
@@ -236,7 +248,6 @@ def spread(error: Floats, covariance: Floats) -> float:
 
 
 # ---- losses --------------------------------------------------------------------------------------
-_NEAR = {True: 5.0, False: 0.5}  # metres, outdoors and indoors
 _ALIKE = np.cos(np.radians(20.0))
 
 
@@ -245,7 +256,7 @@ def found_again(played: Played) -> tuple[int, int, int]:
 
     Last, how many were not, of which no mapped place stayed in view for that second.
     """
-    fps = round(played.sequence.camera.fps)
+    fps = max(1, round(played.scene.fps))
     n = len(played.posed)
     losses = found = left_view = 0
     for k in np.flatnonzero(played.posed[:-1] & ~played.posed[1:]) + 1:
@@ -270,15 +281,14 @@ def mapped_place(played: Played, lost: int, frame: int) -> bool:
     before = np.flatnonzero(played.posed[:lost])
     before = before[played.map_index[before] == played.map_index[lost - 1]]
     T_wc = inverse_poses(played.truth[[*before, frame]])
-    outdoors = str(played.sequence.options.world).startswith("street")
-    near = np.linalg.norm(T_wc[:-1, :3, 3] - T_wc[-1, :3, 3], axis=1) < _NEAR[outdoors]
+    near = np.linalg.norm(T_wc[:-1, :3, 3] - T_wc[-1, :3, 3], axis=1) < played.scene.near
     return bool((near & (T_wc[:-1, :3, 2] @ T_wc[-1, :3, 2] > _ALIKE)).any())
 
 
 # ---- the whole -----------------------------------------------------------------------------------
 def absolute_error(played: Played, *, with_scale: bool) -> float:
     """RMSE [m] of the last map's final path, aligned; NaN with fewer than three poses."""
-    known = np.isfinite(played.path).all(axis=(1, 2))
+    known = path_known(played)
     if known.sum() < 3:
         return float("nan")
     points = played.path[known][:, :3, 3]

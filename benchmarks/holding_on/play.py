@@ -10,14 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 import orbslam2py as orb
-from benchmarks.holding_on.cases import Case
-from orbslam2py.datasets import Images
-from orbslam2py.settings import Sensor
+from benchmarks.holding_on.scene import Case, Floats, Integers, Scene
+from orbslam2py.slam.frame_source import track_images
 from orbslam2py.slam.records import TrackingRecord
-from orbslam2py.synthetic import SyntheticSequence
 from orbslam2py.trajectory.rotations import inverse_poses
 
-Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 
@@ -27,10 +24,12 @@ class Played:
 
     Attributes
     ----------
-    sequence
+    scene
         What was played.
     truth
-        ``T_cw`` of every frame, (n, 4, 4).
+        ``T_cw`` of every frame, (n, 4, 4); NaN where not known.
+    truth_part
+        (n,) see `Scene.truth_part`.
     posed
         Frames with a pose, (n,).
     T_cw
@@ -53,14 +52,15 @@ class Played:
         Loops closed, and wall-clock time of it all.
     """
 
-    sequence: SyntheticSequence
+    scene: Scene
     truth: Floats
+    truth_part: Integers
     posed: Flags
     T_cw: Floats
     motion: Floats
     covariance: Floats
     keyframe: Flags
-    map_index: NDArray[np.int64]
+    map_index: Integers
     changed: Flags
     covered: Flags
     path: Floats
@@ -71,28 +71,28 @@ class Played:
 def play(case: Case) -> Played:
     """Run a case from its first frame to its last; two runs give the same."""
     began = time.perf_counter()
-    sequence = case.sequence()
-    n = len(sequence)
+    scene = case.scene()
+    n = len(scene)
     records: list[TrackingRecord] = []
     changes = np.zeros(n, np.int64)
     nowhere, unknown = np.full((4, 4), np.nan), np.full((6, 6), np.nan)
     motion = np.tile(nowhere, (n, 1, 1))
-    settings = case.settings(sequence)
-    system = orb.System(settings, case.sensor, deterministic=True, seed=case.seed)
+    system = orb.System(scene.settings, scene.sensor, deterministic=True, seed=case.seed)
     with system as slam:
-        for i, timestamp in enumerate(sequence.timestamps):
-            records.append(_tracked(slam, sequence.load(i), float(timestamp)))
+        for i, timestamp in enumerate(scene.timestamps):
+            records.append(track_images(slam, scene.load(i), float(timestamp)))
             changes[i] = slam.pipeline.back_end.map.big_change_index
             velocity = slam.pipeline.tracking.motion.velocity
             if velocity is not None:
                 motion[i] = velocity.matrix
     path = np.full((n, 4, 4), np.nan)
     last = system.trajectory()
-    path[_indices(sequence, last.timestamps)] = last.T_wc
-    path[_indices(sequence, last.timestamps[last.lost])] = np.nan
+    path[_indices(scene, last.timestamps)] = last.T_wc
+    path[_indices(scene, last.timestamps[last.lost])] = np.nan
     return Played(
-        sequence=sequence,
-        truth=inverse_poses(sequence.ground_truth().T_wc),
+        scene=scene,
+        truth=inverse_poses(scene.truth),
+        truth_part=scene.truth_part,
         posed=np.array([r.T_cw is not None for r in records]),
         T_cw=np.stack([nowhere if r.T_cw is None else r.T_cw for r in records]),
         motion=motion,
@@ -100,23 +100,13 @@ def play(case: Case) -> Played:
         keyframe=np.array([r.is_keyframe for r in records]),
         map_index=np.array([r.map_index for r in records]),
         changed=np.diff(changes, prepend=0) != 0,
-        covered=np.array([sequence.covered(i) for i in range(n)]),
+        covered=np.array([scene.covered(i) for i in range(n)]),
         path=path,
         loops=system.n_loops_closed,
         seconds=time.perf_counter() - began,
     )
 
 
-def _tracked(slam: orb.System, images: Images, timestamp: float) -> TrackingRecord:
-    if slam.sensor is Sensor.STEREO:
-        assert images.right is not None
-        return slam.track_stereo(images.image, images.right, timestamp)
-    if slam.sensor is Sensor.RGBD:
-        assert images.depth is not None
-        return slam.track_rgbd(images.image, images.depth, timestamp)
-    return slam.track_monocular(images.image, timestamp)
-
-
-def _indices(sequence: SyntheticSequence, timestamps: Floats) -> NDArray[np.int64]:
-    found: NDArray[np.int64] = np.searchsorted(sequence.timestamps, timestamps - 1e-6)
+def _indices(scene: Scene, timestamps: Floats) -> Integers:
+    found: Integers = np.searchsorted(scene.timestamps, timestamps - 1e-6)
     return found

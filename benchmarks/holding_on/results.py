@@ -14,8 +14,9 @@ import numpy as np
 from rich.table import Table
 
 from benchmarks.harness.tables import new_table
-from benchmarks.holding_on.cases import BLOCK, Case
 from benchmarks.holding_on.judgement import Figures
+from benchmarks.holding_on.made_up import BLOCK
+from benchmarks.holding_on.scene import Case
 
 Row = dict[str, Any]
 _NAMES = [field.name for field in dataclasses.fields(Figures)]
@@ -27,7 +28,7 @@ LATE = 2.0  # seconds after enough parallax
 def row_of(case: Case, figures: Figures) -> Row:
     about = {
         "key": case.key,
-        "situation": case.situation.name,
+        "situation": case.situation,
         "sensor": case.sensor,
         "features": case.features,
         "seed": case.seed,
@@ -142,8 +143,7 @@ def is_late(row: Row) -> bool | None:
         return None
     if not math.isnan(started):
         return bool(started > enough + LATE)
-    fps = 10.0 if row["situation"].startswith("street") else 20.0
-    return True if enough + LATE <= (row["frames"] - 1) / fps else None
+    return True if enough + LATE <= row["lasted"] else None
 
 
 def middle(values: Iterable[float]) -> str:

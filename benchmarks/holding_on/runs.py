@@ -3,16 +3,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 
 import cv2
 
-from benchmarks.holding_on.cases import Case
 from benchmarks.holding_on.judgement import judge
 from benchmarks.holding_on.play import play
 from benchmarks.holding_on.results import Row, row_of
+from benchmarks.holding_on.scene import Case
 
 
 def played_row(case: Case) -> Row:
@@ -21,7 +21,7 @@ def played_row(case: Case) -> Row:
     return row_of(case, judge(play(case)))
 
 
-def all_rows(cases: list[Case], jobs: int) -> Iterator[Row]:
+def all_rows(cases: Sequence[Case], jobs: int) -> Iterator[Row]:
     """Rows as they are done."""
     if jobs == 1:
         yield from map(played_row, cases)

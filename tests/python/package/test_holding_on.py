@@ -9,12 +9,19 @@ from itertools import islice
 import cv2
 import numpy as np
 import pytest
-from benchmarks.holding_on.cases import SENSORS, SITUATIONS, Case, Situation, motion_cases
 from benchmarks.holding_on.judgement import judge
+from benchmarks.holding_on.made_up import (
+    SENSORS,
+    SITUATIONS,
+    MadeUpCase,
+    MadeUpScene,
+    Situation,
+    motion_cases,
+)
 from benchmarks.holding_on.play import Played, play
 from benchmarks.holding_on.results import is_late, read_rows, row_of, write_rows
 
-from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+from orbslam2py.synthetic import SyntheticOptions
 
 N = 120
 ROTATION, TRANSLATION = 1e-3, 2e-3  # stated deviations [rad], [m]
@@ -29,19 +36,17 @@ def small_pose(vector: np.ndarray) -> np.ndarray:
 
 def honest_run(**options) -> Played:
     """Poses that are off by exactly what their covariance says."""
-    sequence = SyntheticSequence(
-        SyntheticOptions(
-            **{"world": "corridor", "sensor": "rgbd", "frames": N, "size": (64, 64)} | options
-        )
-    )
-    truth = np.linalg.inv(sequence.ground_truth().T_wc)
+    options = {"world": "corridor", "sensor": "rgbd", "frames": N, "size": (64, 64)} | options
+    scene = MadeUpScene(SyntheticOptions(**options), 1000)
+    truth = np.linalg.inv(scene.truth)
     random = np.random.default_rng(0)
     deviations = np.array([ROTATION] * 3 + [TRANSLATION] * 3)
     noise = random.standard_normal((N, 6)) * deviations
     T_cw = np.stack([small_pose(e) @ T for e, T in zip(noise, truth, strict=True)])
     return Played(
-        sequence=sequence,
+        scene=scene,
         truth=truth,
+        truth_part=scene.truth_part,
         posed=np.ones(N, bool),
         T_cw=T_cw,
         motion=motions(T_cw),
@@ -49,7 +54,7 @@ def honest_run(**options) -> Played:
         keyframe=np.arange(N) % 10 == 0,
         map_index=np.zeros(N, np.int64),
         changed=np.zeros(N, bool),
-        covered=np.array([sequence.covered(i) for i in range(N)]),
+        covered=np.array([scene.covered(i) for i in range(N)]),
         path=np.linalg.inv(truth),
         loops=0,
         seconds=1.0,
@@ -136,7 +141,7 @@ def test_overconfidence_widens_the_spread():
 
 def test_a_loss_counts_as_found_within_a_second_of_seeing_a_mapped_place():
     played = honest_run(motion="stops", pace=0.2)
-    assert played.sequence.camera.fps == 20
+    assert played.scene.fps == 20
     assert (judge(without(played, slice(60, 70))).losses) == 1
     assert (judge(without(played, slice(60, 70))).found) == 1
     assert (judge(without(played, slice(60, 90))).found) == 0
@@ -175,11 +180,11 @@ def test_a_single_camera_is_measured_in_metres_and_its_start_against_the_paralla
 
 
 def test_starts_are_late_two_seconds_after_enough_parallax():
-    row = {"situation": "corridor, stops", "frames": 100, "enough_parallax": 0.5, "started": 2.4}
+    row = {"lasted": 4.95, "enough_parallax": 0.5, "started": 2.4}
     assert is_late(row) is False
     assert is_late({**row, "started": 2.6}) is True
     assert is_late({**row, "started": float("nan")}) is True
-    assert is_late({**row, "started": float("nan"), "frames": 40}) is None
+    assert is_late({**row, "started": float("nan"), "lasted": 1.95}) is None
     assert is_late({**row, "enough_parallax": float("nan")}) is None
 
 
@@ -187,15 +192,15 @@ def test_every_round_plays_all_situations_and_all_sensors_come_up():
     cases = list(islice(motion_cases(SENSORS), 9 * len(SITUATIONS)))
     assert len({case.key for case in cases}) == len(cases)
     for situation in SITUATIONS:
-        some = [case for case in cases if case.situation is situation]
+        some = [case for case in cases if case.of is situation]
         assert {(case.sensor, case.features) for case in some} == {
             (sensor, features) for sensor in SENSORS for features in (400, 1000, 2000)
         }
-        assert all(len(case.sequence()) >= 60 for case in some[:1])
+        assert all(len(case.scene()) >= 60 for case in some[:1])
 
 
 def test_an_interrupted_file_is_read_and_made_whole(tmp_path):
-    case = Case(SITUATIONS[0], "rgbd", 400, 3)
+    case = MadeUpCase(SITUATIONS[0], "rgbd", 400, 3)
     row = row_of(case, judge(honest_run()))
     path = tmp_path / "runs.csv"
     write_rows(path, [row, {**row, "key": "another"}])
@@ -211,7 +216,7 @@ def test_an_interrupted_file_is_read_and_made_whole(tmp_path):
 
 def test_a_run_is_the_same_each_time():
     situation = Situation("try", {"world": "corridor", "frames": 12, "size": (320, 240)})
-    case = Case(situation, "stereo", 1000, 1)
+    case = MadeUpCase(situation, "stereo", 1000, 1)
     once, again = play(case), play(case)
     assert once.posed.all()
     np.testing.assert_array_equal(once.T_cw, again.T_cw)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is played: worlds and motions, by sensors, features and seeds."""
+"""Worlds and motions that are hard to follow, by sensors, features and seeds."""
 
 from __future__ import annotations
 
@@ -7,14 +7,21 @@ import dataclasses
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
-from orbslam2py.settings import Settings
+import numpy as np
+
+from benchmarks.holding_on.scene import OVERLAP, Floats, Integers, median_angle
+from orbslam2py.datasets import Images
+from orbslam2py.settings import Sensor, Settings
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
+from orbslam2py.trajectory.rotations import inverse_poses
 
 INDOORS, OUTDOORS, WHOLE = (320, 240), (620, 188), (1241, 376)
 FEATURES = (1000, 400, 2000)
 BLOCK = "block"
+_NEAR_INDOORS, _NEAR_OUTDOORS = 0.5, 5.0  # see `Scene.near`
 
 
 @dataclass(frozen=True)
@@ -34,10 +41,6 @@ class Situation:
     name: str
     options: dict[str, Any] = field(hash=False)
     sensors: tuple[str, ...] | None = None
-
-    @property
-    def world(self) -> str:
-        return str(self.options["world"])
 
 
 def _indoors(name: str, world: str, frames: int = 100, **options: Any) -> Situation:
@@ -85,44 +88,108 @@ SITUATIONS = [
 SENSORS = ("stereo", "rgbd", "mono")
 
 
+class MadeUpScene:
+    """A made-up sequence with the exact calibration; see `Scene`."""
+
+    def __init__(self, options: SyntheticOptions, features: int) -> None:
+        self.sequence = SyntheticSequence(options)
+        self.sensor = Sensor(options.sensor)
+        self.settings = with_features(self.sequence.default_settings(), features)
+        self.timestamps = self.sequence.timestamps
+        self.fps = self.sequence.camera.fps
+        self.near = _NEAR_OUTDOORS if options.world.startswith("street") else _NEAR_INDOORS
+        self._points: dict[int, Floats] = {}
+
+    def __len__(self) -> int:
+        return len(self.sequence)
+
+    def load(self, index: int) -> Images:
+        """Render an image."""
+        return self.sequence.load(index)
+
+    @cached_property
+    def truth(self) -> Floats:
+        """Poses of the way."""
+        return self.sequence.ground_truth().T_wc
+
+    @property
+    def truth_part(self) -> Integers:
+        """All of it is known."""
+        return np.zeros(len(self), np.int64)
+
+    def covered(self, index: int) -> bool:
+        """Whether a hand is over the lens."""
+        return self.sequence.covered(index)
+
+    def parallax(self, first: int, second: int) -> float:
+        """Median angle [rad] at which two views see the first one's points."""
+        if first not in self._points:
+            self._points[first] = self._points_in_view(first)
+        points, camera = self._points[first], self.sequence.camera
+        assert camera.width is not None and camera.height is not None
+        T_wc = self.truth
+        seen = camera.project(points, inverse_poses(T_wc[second]))
+        inside = ((seen > 0) & (seen < (camera.width - 1, camera.height - 1))).all(axis=1)
+        if len(points) == 0 or inside.mean() < OVERLAP:
+            return 0.0
+        rays = [points[inside] - T_wc[k, :3, 3] for k in (first, second)]
+        return median_angle(*rays)
+
+    def _points_in_view(self, frame: int) -> Floats:
+        """Points of the world (m, 3) on a coarse grid over a frame."""
+        camera = self.sequence.camera
+        depth = self.sequence.exact_depth(frame)
+        rows = np.linspace(4, depth.shape[0] - 5, 12).astype(int)
+        columns = np.linspace(4, depth.shape[1] - 5, 16).astype(int)
+        y, x = (grid.ravel() for grid in np.meshgrid(rows, columns, indexing="ij"))
+        z = depth[y, x].astype(np.float64)
+        seen = z > 0
+        x, y, z = x[seen], y[seen], z[seen]
+        rays = [(x - camera.cx) / camera.fx * z, (y - camera.cy) / camera.fy * z, z]
+        T_wc = self.truth[frame]
+        return np.asarray(np.stack(rays, axis=1) @ T_wc[:3, :3].T + T_wc[:3, 3])
+
+
 @dataclass(frozen=True)
-class Case:
-    """One run.
+class MadeUpCase:
+    """One run of a made-up world; see `Case`.
 
     Attributes
     ----------
-    situation
+    of
         World and motion.
     sensor, features, seed
         Of the run; the seed is that of the world, of its motion and of the system.
     """
 
-    situation: Situation
+    of: Situation
     sensor: str
     features: int
     seed: int
 
     @property
+    def situation(self) -> str:
+        """Name of world and motion."""
+        return self.of.name
+
+    @property
     def key(self) -> str:
-        return f"{self.situation.name} | {self.sensor} | {self.features} | {self.seed}"
+        """All that tells it from other runs."""
+        return f"{self.situation} | {self.sensor} | {self.features} | {self.seed}"
 
     def options(self) -> SyntheticOptions:
+        """Options of the sequence."""
         return SyntheticOptions(
             sensor=self.sensor,
             seed=self.seed,
             noise=1.5,
             depth_noise=0.002,
-            **self.situation.options,
+            **self.of.options,
         )
 
-    def sequence(self) -> SyntheticSequence:
-        return SyntheticSequence(self.options())
-
-    def settings(self, sequence: SyntheticSequence) -> Settings:
-        """The exact calibration, with the case's number of features."""
-        settings = sequence.default_settings()
-        orb = dataclasses.replace(settings.orb, n_features=self.features)
-        return dataclasses.replace(settings, orb=orb)
+    def scene(self) -> MadeUpScene:
+        """World and motion, to be played."""
+        return MadeUpScene(self.options(), self.features)
 
     def described(self) -> str:
         """The options as text, so that a case can be played again by hand."""
@@ -130,7 +197,12 @@ class Case:
         return json.dumps({k: v for k, v in about.items() if v is not None}, default=str)
 
 
-def motion_cases(sensors: Sequence[str]) -> Iterator[Case]:
+def with_features(settings: Settings, features: int) -> Settings:
+    """The same with another number of features."""
+    return dataclasses.replace(settings, orb=dataclasses.replace(settings.orb, n_features=features))
+
+
+def motion_cases(sensors: Sequence[str]) -> Iterator[MadeUpCase]:
     """Endless: every round plays all situations, with other sensors, features and a new seed.
 
     The first ones are as mixed as all of them, so any number of runs is a fair sample.
@@ -141,12 +213,12 @@ def motion_cases(sensors: Sequence[str]) -> Iterator[Case]:
         situation = SITUATIONS[place]
         sensor = sensors[(turn + place) % len(sensors)]
         features = FEATURES[(turn // len(sensors) + place) % len(FEATURES)]
-        yield Case(situation, sensor, features, seed=turn)
+        yield MadeUpCase(situation, sensor, features, seed=turn)
         number += 1
 
 
-def block_cases(n: int) -> Iterator[Case]:
+def block_cases(n: int) -> Iterator[MadeUpCase]:
     """Once around 320 m of street, and on into the loop: stereo, corners that begin at once."""
     options = {"world": "street-block", "corners": "sharp", "size": WHOLE, "laps": 1.15}
     for seed in range(n):
-        yield Case(Situation(BLOCK, options), "stereo", 2000, seed)
+        yield MadeUpCase(Situation(BLOCK, options), "stereo", 2000, seed)
