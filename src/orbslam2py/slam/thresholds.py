@@ -81,7 +81,9 @@ class InitializationThresholds:
     raised_feature_factor: int = 4
     """... and when it has not started ..."""
     patience: int = 10
-    """... after so many frames."""
+    """... after so many frames ..."""
+    patience_seconds: float = 1.0
+    """... or so many seconds."""
     view_between: float = 0.9
     """Of the kept views between the two, those that find less than this share of the map's first
     points become keyframes as well."""
@@ -162,8 +164,10 @@ class TrackingThresholds:
     small_map: int = 5
     """A map with so few keyframes is given up when tracking is lost, and a new one is begun."""
     feature_factor: int = 2
-    """Extracted features of a single camera in localization mode, and of every second image while
-    it is lost, in multiples of the settings' number."""
+    """Extracted features of a single camera in localization mode, of every second image while it is
+    lost, and after a pose with fewer ..."""
+    scarce_inliers: int = 100
+    """... inliers than this, in multiples of the settings' number."""
 
     def for_features(self, n_features: int) -> TrackingThresholds:
         """These limits for images with so many features: of few ones fewer are asked for."""

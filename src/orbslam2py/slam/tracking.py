@@ -127,6 +127,8 @@ class Tracking:
         self._loss.reset()
         # Images in a row without a pose.
         self._n_lost = 0
+        # Of the last pose; a map's first one counts for none.
+        self._n_inliers = 0
         self._blurred = False
 
     def begin_in_loaded_map(self, initial_pose: core.Pose | None) -> None:
@@ -171,11 +173,15 @@ class Tracking:
         """Features that a single camera's next image needs, in multiples of the settings'.
 
         In localization mode nobody else needs the time, and more features find more of the map; so
-        they do for a lost camera. But they are harder to tell apart there, and take turns.
+        they do for a camera that is lost, or about to be. But they are harder to tell apart for a
+        lost one, and take turns.
         """
         if self.initializing or self._seeks_map:
             return self._initializer.feature_factor
-        more = self._n_lost % 2 == 1 or (localize and self.state is TrackingState.OK)
+        if self.state is TrackingState.OK:
+            more = localize or self._n_inliers < TrackingThresholds().scarce_inliers
+        else:
+            more = self._n_lost % 2 == 1
         return TrackingThresholds().feature_factor if more else 1
 
     @property
@@ -246,6 +252,7 @@ class Tracking:
         self.state = TrackingState.OK
         if not estimate.unconfirmed:
             self._stay(frame)
+        self._n_inliers = estimate.n_inliers
         self._search.motion.update_velocity(frame)
         # Before temporary points go, and a keyframe's keypoints become points.
         inliers = accepted_keypoints(frame) if details else None
@@ -382,6 +389,7 @@ class Tracking:
         was_ok = self.state is TrackingState.OK
         self._loss.lost(frame.timestamp)
         self._n_lost += 1
+        self._n_inliers = 0
         if was_ok:
             _log.info("tracking lost at frame %d: %s", frame.id, estimate.reason)
         self.state = TrackingState.LOST

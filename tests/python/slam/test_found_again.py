@@ -8,7 +8,7 @@ import pytest
 
 from orbslam2py import Reason, TrackingState
 from orbslam2py.slam.records import TrackingOutcome
-from orbslam2py.slam.thresholds import BlurThresholds
+from orbslam2py.slam.thresholds import BlurThresholds, TrackingThresholds
 from support.tracking_scene import Scene, lose
 
 SHARP = 1000.0
@@ -176,6 +176,24 @@ def test_more_features_in_localization_mode_and_in_turns_while_lost(scene: Scene
     assert factors() == (1, 2)
     lose(scene)
     assert factors() == (2, 2), "counted from the last pose"
+
+
+def test_more_features_after_a_pose_with_few_inliers(scene: Scene) -> None:
+    """It is about to be lost."""
+    scene.run(40)
+    scarce = TrackingThresholds().scarce_inliers
+    for n_inliers, factor in ((scarce - 1, 2), (scarce, 1), (60, 2), (3 * scarce, 1)):
+        scene.core.inliers.extend([n_inliers] * 2)
+        assert scene.track().estimate.n_inliers == n_inliers
+        assert scene.tracking.feature_factor(localize=False) == factor
+
+
+def test_more_features_in_the_first_frame_of_a_map(scene: Scene) -> None:
+    """Its points come from images with more of them."""
+    scene.track()
+    assert scene.tracking.feature_factor(localize=False) == 2
+    scene.track()
+    assert scene.tracking.feature_factor(localize=False) == 1
 
 
 def test_a_loaded_map_is_searched_with_the_usual_features_first(scene: Scene) -> None:

@@ -201,3 +201,18 @@ def test_too_few_matches_leave_the_motion_as_it_was() -> None:
     motion.fit(places, places)
     assert not motion.at(places).any()
     assert motion.spread is None
+
+
+@pytest.mark.parametrize(("fps", "waits"), [(30.0, 10), (10.0, 10), (2.5, 4)])
+def test_more_features_after_ten_images_or_a_second(fps: float, waits: int) -> None:
+    """A camera of few images a second would wait for seconds else."""
+    sequence = SyntheticSequence(
+        SyntheticOptions(world="wall", sensor="mono", size=(320, 240), frames=1)
+    )
+    image = sequence.load(0).image
+    factors = []
+    with System(sequence.settings, "mono", deterministic=True) as slam:
+        for i in range(12):
+            slam.track_monocular(image, 100.0 + i / fps)
+            factors.append(slam.pipeline.feature_factor)
+    assert factors == [2] * (waits - 1) + [4] * (12 - waits + 1)

@@ -103,6 +103,7 @@ class MonocularInitializer:
         self._kept.clear()
         self._history: deque[core.TrackedFrame] = deque(maxlen=self._limits.remembered_frames)
         self._n_waiting = 0
+        self._waited = self._waits_since = 0.0  # seconds
         self._last: core.TrackedFrame | None = None
         self._shown: View | None = None
 
@@ -155,7 +156,7 @@ class MonocularInitializer:
     def feature_factor(self) -> int:
         """Twice the features of the settings, and more when it takes long to begin."""
         limits = self._limits
-        waited = self._n_waiting >= limits.patience
+        waited = self._n_waiting >= limits.patience or self._waited >= limits.patience_seconds
         return limits.raised_feature_factor if waited else limits.feature_factor
 
     def lines(self) -> FloatArray | None:
@@ -177,7 +178,10 @@ class MonocularInitializer:
 
     def try_initialize(self, frame: core.TrackedFrame) -> Reason:
         """Begin the map with this frame as second view; or say why not."""
+        if self._n_waiting == 0:
+            self._waits_since = frame.timestamp
         self._n_waiting += 1
+        self._waited = frame.timestamp - self._waits_since
         if not self.shows_enough(frame):
             self._kept.clear()
             self._last = self._shown = None
@@ -249,7 +253,7 @@ class MonocularInitializer:
         self._insert_views([frame for frame in between if self._adds(frame, n_points)])
         self._watch.begin(second)
         self._kept.clear()
-        self._n_waiting = 0
+        self._n_waiting, self._waited = 0, 0.0
         self._last = self._shown = None
         return Reason.NONE
 
