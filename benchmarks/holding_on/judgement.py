@@ -163,7 +163,8 @@ def errors_between_frames(
     """Errors (m, 6) of motions from the frames before, and their stated covariance (m, 6, 6).
 
     Rotation [rad], then translation [m], in the camera's frame. The covariance is that of this
-    pose and of the one before, carried over: a frame's own says how well it lies in the map.
+    pose and of the one before, carried over, for a frame's own says how well it lies in the map;
+    and that of the truth.
     """
     told = motion.copy()
     told[:, :3, 3] *= scale[frames, None]
@@ -171,7 +172,8 @@ def errors_between_frames(
     here = in_metres(played.covariance[frames], scale[frames])
     before = in_metres(played.covariance[frames - 1], scale[frames])
     carry = adjoint(told)
-    return error, here + carry @ before @ np.swapaxes(carry, 1, 2)
+    of_truth = np.diag(played.scene.truth_variance)
+    return error, here + carry @ before @ np.swapaxes(carry, 1, 2) + of_truth
 
 
 def errors_of_motions(told: Floats, true: Floats) -> Floats:

@@ -96,6 +96,7 @@ class MadeUpScene:
         self.sensor = Sensor(options.sensor)
         self.settings = with_features(self.sequence.default_settings(), features)
         self.timestamps = self.sequence.timestamps
+        self.truth_variance = np.zeros(6)
         self.fps = self.sequence.camera.fps
         self.near = _NEAR_OUTDOORS if options.world.startswith("street") else _NEAR_INDOORS
         self._points: dict[int, Floats] = {}

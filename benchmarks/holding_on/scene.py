@@ -39,6 +39,8 @@ class Scene(Protocol):
         True poses ``T_wc`` (n, 4, 4), NaN where they are not known.
     truth_part
         (n,) which part of the truth a frame's pose is of: what lies between two parts is not known.
+    truth_variance
+        (6,) of its motions from frame to frame, rotation [rad^2] and translation [m^2].
     near
         Metres within which two views in the same direction see the same place.
     """
@@ -46,6 +48,7 @@ class Scene(Protocol):
     sensor: Sensor
     settings: Settings
     timestamps: Floats
+    truth_variance: Floats
     fps: float
     near: float
 

@@ -20,7 +20,9 @@ class SinceKeyframe:
     """What has been tracked since the last keyframe was made."""
 
     frame_id: int = 0
-    """Of that keyframe."""
+    """Of the frame that became it."""
+    keyframe: int = -1
+    """Its id; -1 if there is none of this run."""
     most_inliers: int = 0
     """Of one frame; counted anew where the camera is found again."""
 
@@ -107,7 +109,11 @@ class KeyframeDecision:
         tracking_is_weak = self._has_depth and (
             n_inliers < limits.weak_share * n_reference or needs_new_points
         )
-        sees_new_things = n_inliers < self._share(n_keyframes) * n_reference or needs_new_points
+        sees_new_things = (
+            n_inliers < self._share(n_keyframes) * n_reference
+            or needs_new_points
+            or self._hangs_on_few(frame, n_inliers, since)
+        )
         worth_it = sees_new_things and n_inliers > limits.inliers
         due = self.due(frame.id, since)
         if worth_it and due and self._waits:
@@ -131,6 +137,21 @@ class KeyframeDecision:
         if not self._has_depth:
             return self.limits.share_monocular
         return self.limits.share_of_first if n_keyframes < 2 else self.limits.share
+
+    def _hangs_on_few(self, frame: core.TrackedFrame, n_inliers: int, since: SinceKeyframe) -> bool:
+        """Whether a single camera has few points, and has come far enough to place new ones.
+
+        The reference's count if three keyframes see them: of a fast camera's few do.
+        """
+        limits = self.limits
+        T_cw = frame.T_cw
+        if self._has_depth or n_inliers >= limits.scarce_inliers or T_cw is None:
+            return False
+        if since.keyframe < 0:
+            return True
+        center = self._map.keyframe_pose(since.keyframe).center
+        T_there = core.Pose(T_cw.quaternion_xyzw, -T_cw.matrix[:3, :3] @ center)
+        return core.median_displacement(frame, T_there) > limits.new_view
 
     def _lacks_close_points(self, frame: core.TrackedFrame) -> bool:
         tracked, untracked = frame.n_close_tracked_untracked()

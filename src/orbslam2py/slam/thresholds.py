@@ -310,6 +310,11 @@ class KeyframeThresholds:
     staying_share: float = 0.65
     """... less than this share of the inliers would still be in view: a keyframe is needed before
     the camera has turned away from them (stereo, RGB-D), if many close points are not tracked."""
+    scarce_inliers: int = 150
+    """A frame with fewer inliers than this hangs on few points, however many its reference keyframe
+    has: another keyframe is made (single camera) ..."""
+    new_view: float = 5.0
+    """... if their median has moved by so many pixels since the last one, turns left out."""
     inliers: int = 15
     """A keyframe needs more inliers than this."""
     spacing: int = 1

@@ -127,8 +127,8 @@ class Tracking:
         self._loss.reset()
         # Images in a row without a pose.
         self._n_lost = 0
-        # Of the last pose; a map's first one counts for none.
-        self._n_inliers = 0
+        # Whether the last pose hangs on few points; unknown of a map's first one.
+        self._is_scarce = False
         self._blurred = False
 
     def begin_in_loaded_map(self, initial_pose: core.Pose | None) -> None:
@@ -179,7 +179,7 @@ class Tracking:
         if self.initializing or self._seeks_map:
             return self._initializer.feature_factor
         if self.state is TrackingState.OK:
-            more = localize or self._n_inliers < TrackingThresholds().scarce_inliers
+            more = localize or self._is_scarce
         else:
             more = self._n_lost % 2 == 1
         return TrackingThresholds().feature_factor if more else 1
@@ -252,7 +252,7 @@ class Tracking:
         self.state = TrackingState.OK
         if not estimate.unconfirmed:
             self._stay(frame)
-        self._n_inliers = estimate.n_inliers
+        self._is_scarce = estimate.n_inliers < self._search.limits.scarce_inliers
         self._search.motion.update_velocity(frame)
         # Before temporary points go, and a keyframe's keypoints become points.
         inliers = accepted_keypoints(frame) if details else None
@@ -365,7 +365,7 @@ class Tracking:
             self._search.motion.remember(earlier[-1])
             self._search.motion.update_velocity(frame)
         self._search.motion.remember(frame)
-        self._since_keyframe = SinceKeyframe(frame.id)
+        self._since_keyframe = SinceKeyframe(frame.id, frame.reference_keyframe)
         if not self._has_depth:
             # The images before the first map were not tracked: how sharp they were is known here.
             self._belief.see(self._initializer.remembered())
@@ -389,7 +389,7 @@ class Tracking:
         was_ok = self.state is TrackingState.OK
         self._loss.lost(frame.timestamp)
         self._n_lost += 1
-        self._n_inliers = 0
+        self._is_scarce = False
         if was_ok:
             _log.info("tracking lost at frame %d: %s", frame.id, estimate.reason)
         self.state = TrackingState.LOST
@@ -471,5 +471,5 @@ class Tracking:
         core.describe(frame.features, self._vocabulary)
         keyframe = core.insert_keyframe(self._map, frame, create_points=self._has_depth)
         self._search.reference_keyframe = keyframe
-        self._since_keyframe = SinceKeyframe(frame.id)
+        self._since_keyframe = SinceKeyframe(frame.id, keyframe)
         self._mapping.insert_keyframe(keyframe)

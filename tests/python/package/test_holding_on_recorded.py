@@ -151,6 +151,14 @@ def test_nothing_is_compared_across_a_jump_of_the_truth(recording: Recording) ->
     assert N - 20 not in consecutive(backwards)
 
 
+def test_errors_are_no_larger_than_those_of_the_truth(recording: Recording) -> None:
+    exact = play(RecordedCase(recording, "as it is", "rgbd", 500, 0))
+    vague = Recording("lap", ("rgbd",), 0.5, truth_deviation=(3.0, 0.2))
+    figures = judge(play(RecordedCase(vague, "as it is", "rgbd", 500, 0)))
+    assert figures.rotation_spread < 0.1 * judge(exact).rotation_spread
+    assert figures.translation_spread < 0.1 * judge(exact).translation_spread
+
+
 def test_without_truth_only_what_is_tracked_counts(recording: Recording) -> None:
     blind = Recording(recording.name, recording.sensors, recording.near, has_truth=False)
     figures = judge(play(RecordedCase(blind, "as it is", "mono", 500, 0)))

@@ -188,14 +188,6 @@ def test_more_features_after_a_pose_with_few_inliers(scene: Scene) -> None:
         assert scene.tracking.feature_factor(localize=False) == factor
 
 
-def test_more_features_in_the_first_frame_of_a_map(scene: Scene) -> None:
-    """Its points come from images with more of them."""
-    scene.track()
-    assert scene.tracking.feature_factor(localize=False) == 2
-    scene.track()
-    assert scene.tracking.feature_factor(localize=False) == 1
-
-
 def test_a_loaded_map_is_searched_with_the_usual_features_first(scene: Scene) -> None:
     scene.tracking.begin_in_loaded_map(None)
     assert scene.tracking.feature_factor(localize=True) == 1

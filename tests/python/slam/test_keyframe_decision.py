@@ -6,9 +6,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from orbslam2py import Sensor, TrackingState
+from orbslam2py._core import Pose
 from orbslam2py.slam.records import TrackingOutcome
 from orbslam2py.slam.thresholds import TrackingThresholds
 from support.tracking_scene import (
@@ -128,6 +130,31 @@ def test_a_keyframe_when_the_camera_leaves_what_the_last_one_saw(
     for seen in (200, 300, 250):
         assert not track_with(scene, seen).is_keyframe
     assert track_with(scene, n_inliers).is_keyframe == keyframe
+
+
+@pytest.mark.parametrize(
+    ("n_inliers", "moved", "keyframe"), [(149, 5.1, True), (150, 5.1, False), (149, 5.0, False)]
+)
+def test_a_keyframe_where_a_single_camera_hangs_on_few_points(
+    single: Scene, monkeypatch: pytest.MonkeyPatch, n_inliers: int, moved: float, keyframe: bool
+) -> None:
+    """The reference keyframe has fewer; but from where the last one was there is nothing to see."""
+    single.core.n_reference = 100
+    last = pose(3.0)
+    monkeypatch.setattr(single.map, "keyframe_pose", lambda keyframe: last)
+    compared = []
+
+    def displacement(frame: FakeFrame, T_there: Pose) -> float:
+        assert frame.T_cw is not None
+        np.testing.assert_allclose(T_there.matrix[:3, :3], frame.T_cw.matrix[:3, :3])
+        compared.append(T_there.center)
+        return moved
+
+    monkeypatch.setattr(single.core, "median_displacement", displacement)
+    monkeypatch.setattr(single.core, "insert_keyframe", lambda *_, create_points: 77)
+    assert track_with(single, n_inliers).is_keyframe == keyframe
+    if n_inliers < 150:
+        np.testing.assert_allclose(compared[-1], last.center)
 
 
 def test_what_was_seen_before_a_loss_does_not_count(scene: Scene) -> None:

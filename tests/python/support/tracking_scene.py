@@ -103,6 +103,9 @@ class FakeMap:
     def n_points_of(self, map_index: int) -> int:
         return self.n_points if map_index == self.active_map else 0
 
+    def keyframe_pose(self, keyframe: int) -> _core.Pose:
+        return pose(self.keyframe_x)
+
     def map_of(self, keyframe: int) -> int:
         return 0 if keyframe >= 0 else -1
 
