@@ -53,10 +53,11 @@ class FlowParallax:
             for pixels in (before, now)
         ]
         limit = _OFF_LINE / camera.fx
-        E, _ = cv2.findEssentialMat(*rays, np.eye(3), cv2.RANSAC, 0.999, limit)
+        E, inliers = cv2.findEssentialMat(*rays, np.eye(3), cv2.RANSAC, 0.999, limit)
         if E is None or E.shape != (3, 3):
             return 0.0
-        n, R, _, inliers = cv2.recoverPose(E, *rays, np.eye(3))
+        # However far they are.
+        n, R, _, inliers, _ = cv2.recoverPose(E, *rays, np.eye(3), distanceThresh=1e6, mask=inliers)
         if n < _FEWEST:
             return 0.0
         seen = inliers.ravel() > 0

@@ -97,7 +97,7 @@ def judge(played: Played) -> Figures:
         wrong_keyframes=int((wrong & played.keyframe).sum()),
         wrong_before=int(wrong_before.sum()),
         path_compared=len(path_error),
-        path_off=int((path_error > [TURNED, FAR]).any(axis=1).sum()),
+        path_off=int((path_error > limits_of_path(played)).any(axis=1).sum()),
         losses=losses,
         found=found,
         left_view=left_view,
@@ -204,6 +204,12 @@ def errors_of_path(played: Played, *, with_scale: bool) -> Floats:
         told[:, :3, 3] *= local_scale(played.truth, T_cw, one_map, frames)[frames, None]
     error = errors_of_motions(told, relative(played.truth, frames))
     return np.linalg.norm(error.reshape(-1, 2, 3), axis=2)
+
+
+def limits_of_path(played: Played) -> Floats:
+    """Angle [rad] and distance [m] from which on a motion is off, with room for the truth's own."""
+    of_truth = np.sqrt(played.scene.truth_variance[[0, 3]])
+    return np.asarray([TURNED, FAR] + MANY_DEVIATIONS * of_truth)
 
 
 def in_metres(covariance: Floats, scale: Floats) -> Floats:

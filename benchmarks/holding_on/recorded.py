@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable, Iterator
-from collections.abc import Sequence as Several
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -91,8 +90,8 @@ def _dropped(n: int, random: np.random.Generator) -> NDArray[np.int64]:
 
 
 # ---- what becomes of an image --------------------------------------------------------------------
-class Unchanged:
-    """Images as they were recorded."""
+class Shown:
+    """Images as they are shown: the base shows them as they were recorded."""
 
     def __init__(self, camera: CameraSettings, shape: tuple[int, int], seed: int) -> None:
         self.camera = camera
@@ -108,7 +107,7 @@ class Unchanged:
         return images
 
 
-class Blurred(Unchanged):
+class Blurred(Shown):
     """Four images of every twelve are smeared by 1.5 % of their width."""
 
     def of(self, images: Images, place: int, seconds: float) -> Images:
@@ -127,7 +126,7 @@ class Blurred(Unchanged):
         return _for_each(images, lambda image: cv2.filter2D(image, -1, kernel))
 
 
-class Darkened(Unchanged):
+class Darkened(Shown):
     """Ten images of every thirty have three tenths of their brightness, from one to the next."""
 
     def of(self, images: Images, place: int, seconds: float) -> Images:
@@ -137,7 +136,7 @@ class Darkened(Unchanged):
         return _for_each(images, lambda image: cv2.convertScaleAbs(image, alpha=0.3))
 
 
-class Rolled(Unchanged):
+class Rolled(Shown):
     """The camera sways about its axis within three seconds: 10 degrees, 3 of a wide image.
 
     Images are cut so that there is something everywhere.
@@ -209,7 +208,7 @@ class Change:
 
     name: str
     chosen: _Chosen = _all
-    shown: type[Unchanged] = Unchanged
+    shown: type[Shown] = Shown
     with_stereo: bool = True
 
 
@@ -304,8 +303,10 @@ class RecordedCase:
 
     Attributes
     ----------
-    recording, change
-        Names.
+    recording
+        What is played.
+    change
+        Name of how it is made harder.
     sensor, features, seed
         Of the run; the seed is that of the change and of the system.
     """
@@ -335,10 +336,11 @@ class RecordedCase:
 
     def described(self) -> str:
         """What is played."""
-        return json.dumps({"sequence": self.recording.name, "change": self.change})
+        about = {"sequence": self.recording.name, "change": self.change, "sensor": self.sensor}
+        return json.dumps({**about, "features": self.features, "seed": self.seed})
 
 
-def recorded_cases(sensors: Several[str]) -> Iterator[RecordedCase]:
+def recorded_cases(sensors: Collection[str]) -> Iterator[RecordedCase]:
     """Endless: every round plays all recordings in all ways.
 
     The first with the features of their settings, the next ones with other numbers and seeds.

@@ -22,7 +22,7 @@ class SinceKeyframe:
     frame_id: int = 0
     """Of the frame that became it."""
     keyframe: int = -1
-    """Its id; -1 if there is none of this run."""
+    """Its id; -1 if there was none."""
     most_inliers: int = 0
     """Of one frame; counted anew where the camera is found again."""
 
@@ -141,14 +141,15 @@ class KeyframeDecision:
     def _hangs_on_few(self, frame: core.TrackedFrame, n_inliers: int, since: SinceKeyframe) -> bool:
         """Whether a single camera has few points, and has come far enough to place new ones.
 
-        The reference's count if three keyframes see them: of a fast camera's few do.
+        The reference keyframe says nothing of that: its points count only if three keyframes see
+        them, and few of a fast camera's are seen so often.
         """
         limits = self.limits
         T_cw = frame.T_cw
-        if self._has_depth or n_inliers >= limits.scarce_inliers or T_cw is None:
+        if self._has_depth or n_inliers >= limits.few_inliers or T_cw is None:
             return False
-        if since.keyframe < 0:
-            return True
+        if self._map.map_of(since.keyframe) != self._map.active_map:
+            return True  # nothing was added to this map yet
         center = self._map.keyframe_pose(since.keyframe).center
         T_there = core.Pose(T_cw.quaternion_xyzw, -T_cw.matrix[:3, :3] @ center)
         return core.median_displacement(frame, T_there) > limits.new_view

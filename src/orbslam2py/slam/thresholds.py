@@ -176,6 +176,7 @@ class TrackingThresholds:
             self,
             local_map_inliers=_for_features(self.local_map_inliers, n_features),
             local_map_inliers_after_relocalization=_for_features(after, n_features),
+            scarce_inliers=_for_features(self.scarce_inliers, n_features),
         )
 
 
@@ -310,7 +311,7 @@ class KeyframeThresholds:
     staying_share: float = 0.65
     """... less than this share of the inliers would still be in view: a keyframe is needed before
     the camera has turned away from them (stereo, RGB-D), if many close points are not tracked."""
-    scarce_inliers: int = 150
+    few_inliers: int = 150
     """A frame with fewer inliers than this hangs on few points, however many its reference keyframe
     has: another keyframe is made (single camera) ..."""
     new_view: float = 5.0

@@ -141,6 +141,14 @@ def test_a_dark_frame_is_searched_and_becomes_a_keyframe(scene: Scene) -> None:
     assert track_darkened(scene).state is TrackingState.OK
 
 
+def test_without_coarse_levels_weak_corners_are_blur(scene: Scene) -> None:
+    """Nothing is there to compare the fine ones with: `fine_detail` is 0."""
+    scene.core.fine_detail_of_images = 0.0
+    scene.run(40)
+    lose(scene)
+    assert track_blurred(scene).estimate.reason is Reason.BLURRED
+
+
 def test_what_stays_as_it_is_counts_as_sharp_after_half_of_the_frames(scene: Scene) -> None:
     """A wall without texture is no blur."""
     scene.run(40)

@@ -139,9 +139,8 @@ def test_a_keyframe_where_a_single_camera_hangs_on_few_points(
     single: Scene, monkeypatch: pytest.MonkeyPatch, n_inliers: int, moved: float, keyframe: bool
 ) -> None:
     """The reference keyframe has fewer; but from where the last one was there is nothing to see."""
-    single.core.n_reference = 100
     last = pose(3.0)
-    monkeypatch.setattr(single.map, "keyframe_pose", lambda keyframe: last)
+    monkeypatch.setattr(single.map, "keyframe_pose", {77: last}.__getitem__)
     compared = []
 
     def displacement(frame: FakeFrame, T_there: Pose) -> float:
@@ -152,9 +151,24 @@ def test_a_keyframe_where_a_single_camera_hangs_on_few_points(
 
     monkeypatch.setattr(single.core, "median_displacement", displacement)
     monkeypatch.setattr(single.core, "insert_keyframe", lambda *_, create_points: 77)
+    single.core.n_reference = 1000
+    assert track_with(single, 500).is_keyframe, "the last one"
+    single.core.n_reference = 100
     assert track_with(single, n_inliers).is_keyframe == keyframe
     if n_inliers < 150:
         np.testing.assert_allclose(compared[-1], last.center)
+
+
+@pytest.mark.parametrize("map_of_last", [-1, 5])
+def test_a_map_that_has_none_of_the_last_keyframes_gets_one(
+    single: Scene, monkeypatch: pytest.MonkeyPatch, map_of_last: int
+) -> None:
+    """The last one went with a map that was dropped, or is in another one: nothing is compared."""
+    single.core.n_reference = 100
+    monkeypatch.setattr(single.map, "map_of", lambda keyframe: map_of_last)
+    monkeypatch.setattr(single.core, "insert_keyframe", lambda *_, create_points: 77)
+    assert not track_with(single, 150).is_keyframe
+    assert track_with(single, 149).is_keyframe
 
 
 def test_what_was_seen_before_a_loss_does_not_count(scene: Scene) -> None:

@@ -56,6 +56,7 @@ class BlurWatch:
         if len(self._recent) >= limits.fewest:
             usual_sharpness, usual_detail = map(statistics.median, zip(*self._recent, strict=True))
         self._recent.append((sharpness, detail))
-        # In a dark image all corners are weak, and the coarse ones as much as the fine ones.
-        weak = sharpness < limits.share * usual_sharpness
-        return weak and detail < limits.detail_share * usual_detail
+        # In a dark image all corners are weak, the coarse ones as much as the fine ones. Without
+        # coarse levels nothing is known of that.
+        dark = usual_detail > 0 and detail >= limits.detail_share * usual_detail
+        return sharpness < limits.share * usual_sharpness and not dark
