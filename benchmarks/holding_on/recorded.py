@@ -292,7 +292,7 @@ class RecordedScene:
         return image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)  # type: ignore[return-value]
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=16)
 def _opened(name: str, sensor: Sensor) -> Sequence:
     return open_sequence(sequence_folder(name), sensor)
 
