@@ -236,6 +236,8 @@ class PoseEstimate:
     """The frame before was in the map, and this one is not."""
     relocalized: bool = False
     """Found without a guess from the frame before."""
+    where_expected: bool = False
+    """Relocalized where the motion before the loss led."""
     method: PoseMethod = PoseMethod.MOTION_MODEL
     """What found it."""
     evidence: Evidence | None = None

@@ -43,6 +43,10 @@ class InitializationThresholds:
     """So many views are kept ..."""
     new_view: float = 5.0
     """... each moved by a median of so many pixels against the one before."""
+    distant_views: int = 3
+    """So many more, the last that fewer matches are left of, may confirm what is begun ..."""
+    distant_matches: int = 30
+    """... as long as there are so many."""
     window: float = 100.0
     """Half width of the search window from frame to frame, pixels ..."""
     wide_window: float = 200.0
@@ -343,7 +347,9 @@ class RelocalizationThresholds:
     inliers: int = 10
     """Fewest inliers of the first pose that are worth widening."""
     enough: int = 50
-    """Inliers that make a success."""
+    """Inliers that make a success ..."""
+    enough_near: int = 30
+    """... and where the camera was lost and its motion would have led it."""
     narrow: int = 30
     """More inliers than this, but not enough, are widened once more with a narrow window."""
     wide_window: float = 10.0
@@ -398,6 +404,7 @@ class RelocalizationThresholds:
         return replace(
             self,
             enough=_for_features(self.enough, n_features),
+            enough_near=_for_features(self.enough_near, n_features),
             narrow=_for_features(self.narrow, n_features),
         )
 

@@ -20,6 +20,7 @@ from orbslam2py.slam.initialization.several_views import SeveralViews
 from orbslam2py.slam.initialization.third_view import (
     Candidate,
     Motion,
+    ThirdViews,
     agreeing_motions,
     placed_matches,
     reconstruct,
@@ -215,11 +216,12 @@ class MonocularInitializer:
             if not result.success and reason is Reason.LOW_PARALLAX:
                 reason = _REASONS[result.outcome.name]
         for candidate in sorted(candidates, key=lambda candidate: -candidate.worth):
-            motions = agreeing_motions(candidate, self._kept.views, frame.features, self._limits)
+            thirds = ThirdViews.of(candidate, self._kept, self._limits)
+            motions = agreeing_motions(candidate, thirds, frame.features, self._limits)
             if not motions:
                 reason = Reason.NO_THIRD_VIEW if candidate.is_clear else reason
                 continue
-            together = SeveralViews(candidate, self._kept.views, frame.features, self._limits)
+            together = SeveralViews(candidate, thirds, frame.features, self._limits)
             best = together.best_motion(motions, self._seed)
             if best is not None:
                 return self._build_map(candidate.view, best, frame)

@@ -39,6 +39,8 @@ class View:
         self.positions: Pixels = self.keypoints
         self.matches: Indices = np.arange(frame.size, dtype=np.int32)
         self.displacement = 0.0
+        # By the frame of a view kept later: its keypoint for each of this one, -1 for none.
+        self._linked: dict[int, Indices] = {}
 
     @property
     def n_matches(self) -> int:
@@ -57,13 +59,36 @@ class View:
         moved = expected[found] - self.keypoints[found]
         self.displacement = float(np.median(np.linalg.norm(moved, axis=1))) if len(found) else 0.0
 
+    def link(self, later: View) -> None:
+        """Note what the last frame, now a view of its own, shows of these keypoints."""
+        self._linked[later.frame.id] = self.matches
+
     def partners(self, other: View) -> Indices:
         """Per keypoint of this view the index in another view that the last frame links it to."""
-        n_last = int(max(self.matches.max(initial=-1), other.matches.max(initial=-1))) + 1
-        back = np.full(n_last + 1, -1, np.int32)  # the last entry: not matched
-        matched = np.flatnonzero(other.matches >= 0)
-        back[other.matches[matched]] = matched
-        return back[self.matches]
+        return _inverse(other.matches, int(self.matches.max(initial=-1)) + 1)[self.matches]
+
+    def all_partners(self, other: View) -> Indices:
+        """The same, and what was matched when one of the two was the last frame."""
+        partners = self.partners(other)
+        if other.frame.id in self._linked:
+            then = self._linked[other.frame.id]
+        elif self.frame.id in other._linked:
+            every = np.arange(len(self.matches))
+            then = _inverse(other._linked[self.frame.id], len(every))[every]
+        else:
+            return partners
+        return np.where(partners >= 0, partners, then)
+
+
+def _inverse(matches: Indices, n: int) -> Indices:
+    """Per keypoint of the matched frame, `n` or more, the one matched with it; -1 for none.
+
+    The last entry is -1, too: what is not matched, -1, has no partner.
+    """
+    back = np.full(max(n, int(matches.max(initial=-1)) + 1) + 1, -1, np.int32)
+    matched = np.flatnonzero(matches >= 0)
+    back[matches[matched]] = matched
+    return back
 
 
 def _one_per_place(keypoints: Pixels, matches: Indices) -> npt.NDArray[np.int64]:
@@ -85,6 +110,13 @@ class KeptViews:
     ----------
     limits
         Windows, counts and how many are kept.
+
+    Attributes
+    ----------
+    views
+        Those that a map may begin from, oldest first.
+    distant
+        Those that see too little of the last frame for that, but may confirm what is begun.
     """
 
     def __init__(self, limits: InitializationThresholds) -> None:
@@ -94,6 +126,7 @@ class KeptViews:
     def clear(self) -> None:
         """Keep nothing."""
         self.views: list[View] = []
+        self.distant: list[View] = []
         self._last: View | None = None
         self._motion: ImageMotion | None = None
         self._n_usual = 0
@@ -107,9 +140,13 @@ class KeptViews:
             narrow = limits.window
             if motion.spread is not None:
                 narrow = min(limits.window, max(limits.narrow_window, 4 * motion.spread))
-            for view in self.views:
+            views = [*self.distant, *self.views]
+            for view in views:
                 view.follow(frame, seen, motion, narrow)
-            self.views = [view for view in self.views if view.n_matches >= limits.matches]
+            seen_less = [v for v in views if v in self.distant or v.n_matches < limits.matches]
+            self.views = [view for view in self.views if view not in seen_less]
+            seen_less = [view for view in seen_less if view.n_matches >= limits.distant_matches]
+            self.distant = seen_less[-limits.distant_views :]
         self._last = View(frame)
 
     def _follow_image(self, last: View, frame: core.Frame, seen: Pixels) -> ImageMotion:
@@ -140,7 +177,10 @@ class KeptViews:
         last, views = self._last, self.views
         if last is None or (views and views[-1].displacement < self._limits.new_view):
             return
-        views.append(View(last.frame))
+        kept = View(last.frame)
+        for view in (*views, *self.distant):
+            view.link(kept)
+        views.append(kept)
         if len(views) > self._limits.views:
             # The one that differs least from its neighbours; the first and the last stay.
             moved = np.array([view.displacement for view in views])

@@ -19,15 +19,13 @@ from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py._cores import side_by_side
 from orbslam2py.slam.front_end import intrinsics
-from orbslam2py.slam.initialization.kept_views import View
 from orbslam2py.slam.initialization.third_view import (
-    FEWEST_COMMON,
     INLIER_CHI2,
     Candidate,
     Motion,
+    ThirdViews,
     is_another_direction,
     on_the_way,
-    other_views,
     pose_of_view,
     reconstruct,
     squared_errors,
@@ -83,8 +81,8 @@ class SeveralViews:
     ----------
     candidate
         The first view, with motions that other views agree with.
-    views
-        All views kept.
+    thirds
+        The other views.
     last
         The frame that would be the second view.
     limits
@@ -94,7 +92,7 @@ class SeveralViews:
     def __init__(
         self,
         candidate: Candidate,
-        views: Sequence[View],
+        thirds: ThirdViews,
         last: core.Frame,
         limits: InitializationThresholds,
     ) -> None:
@@ -108,10 +106,11 @@ class SeveralViews:
             _Sightings.of(view.frame, every, matched),
             _Sightings.of(last, every, view.matches[matched]),
         ]
-        for third in other_views(view, views, limits):
-            partners = view.partners(third)[matched]
+        for third in thirds.views:
+            partners = third.partners[matched]
             rows = np.flatnonzero(partners >= 0)
-            self._sightings.append(_Sightings.of(third.frame, rows, partners[rows]))
+            self._sightings.append(_Sightings.of(third.view.frame, rows, partners[rows]))
+        self._fewest_common = thirds.fewest_common
 
     def best_motion(self, motions: Sequence[Motion], seed: int) -> core.TwoViewMotion | None:
         """The motion that all views agree with best; None if they do not tell it from another.
@@ -197,7 +196,7 @@ class SeveralViews:
         known = others or [None] * (len(self._sightings) - 2)
         for seen, pose in zip(self._sightings[2:], known, strict=True):
             use = is_placed[seen.rows]
-            if np.count_nonzero(use) < FEWEST_COMMON:
+            if np.count_nonzero(use) < self._fewest_common:
                 poses.append(None)
                 continue
             found, _ = pose_of_view(
@@ -217,7 +216,7 @@ class SeveralViews:
         """
         unchanged = placed.motion.T_21, placed.poses[2:]
         rows = np.flatnonzero(placed.is_placed)
-        if len(rows) < FEWEST_COMMON:
+        if len(rows) < self._fewest_common:
             return unchanged
         number = np.full(len(placed.is_placed), -1, np.int64)
         number[rows] = np.arange(len(rows))

@@ -14,13 +14,16 @@ import numpy.typing as npt
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py.slam.front_end import intrinsics
-from orbslam2py.slam.initialization.kept_views import Indices, View
+from orbslam2py.slam.initialization.image_motion import Pixels
+from orbslam2py.slam.initialization.kept_views import Indices, KeptViews, View
 from orbslam2py.slam.thresholds import InitializationThresholds
 
 Motion: TypeAlias = core.TwoViewResult | core.TwoViewMotion
 
-#: Points that a third view must see to be asked.
+#: Points that a third view must see to be asked ...
 FEWEST_COMMON = 30
+#: ... and where none sees as many.
+FEWEST_COMMON_AFAR = 20
 #: Limit of squared errors over their variance: 95 %, two degrees of freedom.
 INLIER_CHI2 = 5.991
 _MOST_PARALLAX = 5.0  # degrees that count: more does not make a better start
@@ -82,18 +85,105 @@ def placed_matches(view: View, motion: Motion) -> Indices:
     return np.where(motion.triangulated != 0, view.matches, -1).astype(np.int32)
 
 
+@dataclass(frozen=True)
+class ThirdView:
+    """A view beside a candidate's.
+
+    Attributes
+    ----------
+    view
+        The view.
+    partners
+        Per keypoint of the candidate's view its keypoint, -1 for none.
+    """
+
+    view: View
+    partners: Indices
+
+
+@dataclass(frozen=True)
+class ThirdViews:
+    """Views that say something of a candidate's motions.
+
+    Attributes
+    ----------
+    views
+        In the order of time.
+    fewest_common
+        So many of the candidate's points one of them must see.
+    """
+
+    views: tuple[ThirdView, ...]
+    fewest_common: int
+
+    @staticmethod
+    def of(candidate: Candidate, kept: KeptViews, limits: InitializationThresholds) -> ThirdViews:
+        """Those that show most of what the last frame shows; or, if none does, what is left.
+
+        A car that has few images a second sees little of a thing in three of them: then views count
+        that could not begin a map, and what was matched while one of the two was the last frame.
+        """
+        view = candidate.view
+        others = [third for third in kept.views if third is not view]
+        near = [
+            ThirdView(third, view.partners(third))
+            for third in others
+            if _moved(third, view, limits)
+        ]
+        thirds = ThirdViews(tuple(near), FEWEST_COMMON)
+        if any(thirds.asks(candidate, third) for third in near):
+            return thirds
+        others = [third for third in (*kept.distant, *kept.views) if third is not view]
+        every = (ThirdView(third, view.all_partners(third)) for third in others)
+        afar = tuple(third for third in every if _lies_between(third, view, limits))
+        return ThirdViews(afar, FEWEST_COMMON_AFAR)
+
+    def asks(self, candidate: Candidate, third: ThirdView) -> bool:
+        """Whether a view sees enough of what each of the motions has placed."""
+        seen = third.partners >= 0
+        return all(
+            np.count_nonzero(seen & (placed_matches(candidate.view, motion) >= 0))
+            >= self.fewest_common
+            for motion in candidate.motions
+        )
+
+
+def _moved(third: View, view: View, limits: InitializationThresholds) -> bool:
+    """Whether a view has moved enough from another and from the last frame to say something."""
+    between = min(third.displacement, abs(view.displacement - third.displacement))
+    return between >= limits.third_view_share * view.displacement
+
+
+def _lies_between(third: ThirdView, view: View, limits: InitializationThresholds) -> bool:
+    """The same of what all three see: what lies far away, which is seen for long, moves less."""
+    common = np.flatnonzero((view.matches >= 0) & (third.partners >= 0))
+    if not len(common):
+        return False
+    first, last = view.keypoints[common], view.positions[common]
+    there = third.view.keypoints[third.partners[common]]
+    between = min(_median_distance(first, there), _median_distance(there, last))
+    return between >= limits.third_view_share * _median_distance(first, last)
+
+
+def _median_distance(here: Pixels, there: Pixels) -> float:
+    return float(np.median(np.linalg.norm(there - here, axis=1)))
+
+
 def agreeing_motions(
-    candidate: Candidate, views: Sequence[View], last: core.Frame, limits: InitializationThresholds
+    candidate: Candidate, thirds: ThirdViews, last: core.Frame, limits: InitializationThresholds
 ) -> tuple[Motion, ...]:
     """The motion that most of the other views agree with, and those that fit them nearly as well.
 
-    A view that lies so near to one of the two that any motion would suit it is not asked. None of
-    the motions is left if the other views do not agree, or cannot say. Where more than one is left,
-    the best fits them, but not much better than those that lead elsewhere.
+    None of the motions is left if the other views do not agree, or cannot say. Where more than one
+    is left, the best fits them, but not much better than those that lead elsewhere.
     """
-    thirds = other_views(candidate.view, views, limits)
-    verdicts = [_verdicts(candidate, third, last) for third in thirds]
-    asked = np.array([verdict for verdict in verdicts if verdict is not None])
+    asked = np.array(
+        [
+            _verdicts(candidate, third, last)
+            for third in thirds.views
+            if thirds.asks(candidate, third)
+        ]
+    )
     if not len(asked):
         return ()
     shares, costs = np.moveaxis(asked, -1, 0)  # (views, motions)
@@ -122,35 +212,23 @@ def is_another_direction(motion: Motion, other: Motion, degrees: float) -> bool:
     return cosine < math.cos(math.radians(degrees))
 
 
-def other_views(view: View, views: Sequence[View], limits: InitializationThresholds) -> list[View]:
-    """Those that have moved enough from a view and from the last frame to say something."""
-
-    def says_something(third: View) -> bool:
-        between = min(third.displacement, abs(view.displacement - third.displacement))
-        return third is not view and between >= limits.third_view_share * view.displacement
-
-    return [third for third in views if says_something(third)]
-
-
-def _verdicts(candidate: Candidate, third: View, last: core.Frame) -> FloatArray | None:
-    """How well a third view fits to each motion, (motions, 2), None if it sees too few points.
+def _verdicts(candidate: Candidate, third: ThirdView, last: core.Frame) -> FloatArray:
+    """How well a third view fits to each motion, (motions, 2).
 
     The share of the common points that it sees where they should be, and their mean squared
     distance from there in units of its variance, at most 5.99 each.
     """
-    partners = candidate.view.partners(third)
+    view, partners = third.view, third.partners
     verdicts = []
     for motion in candidate.motions:
         placed = placed_matches(candidate.view, motion) >= 0
         common = np.flatnonzero(placed & (partners >= 0))
-        if len(common) < FEWEST_COMMON:
-            return None
         seen = partners[common]
         _, chi2 = pose_of_view(
             on_the_way(motion.T_21),
             motion.points[common],
-            third.keypoints[seen],
-            1 / third.frame.sigma2[seen],
+            view.keypoints[seen],
+            1 / view.frame.sigma2[seen],
             intrinsics(last.camera),
         )
         verdicts.append([np.mean(chi2 < INLIER_CHI2), np.mean(np.minimum(chi2, INLIER_CHI2))])

@@ -14,7 +14,12 @@ from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py.slam.initialization.kept_views import KeptViews
 from orbslam2py.slam.initialization.several_views import SeveralViews
-from orbslam2py.slam.initialization.third_view import Candidate, agreeing_motions, reconstruct
+from orbslam2py.slam.initialization.third_view import (
+    Candidate,
+    ThirdViews,
+    agreeing_motions,
+    reconstruct,
+)
 from orbslam2py.slam.thresholds import InitializationThresholds
 
 
@@ -125,14 +130,15 @@ class YoungMapWatch:
         candidate = Candidate.of(view, reconstruct(view, last, self._seed))
         if candidate is None:
             return None
-        motions = agreeing_motions(candidate, self._kept.views, last, limits)
+        thirds = ThirdViews.of(candidate, self._kept, limits)
+        motions = agreeing_motions(candidate, thirds, last, limits)
         if len(motions) != 1:
             return None
         apart = _degrees_between(by_map, motions[0].T_21.translation)
         if apart < limits.agreeing_direction:
             return apart
         # To speak against a map takes more than a draw that a third view agrees with.
-        together = SeveralViews(candidate, self._kept.views, last, limits)
+        together = SeveralViews(candidate, thirds, last, limits)
         best = together.best_motion(motions, self._seed)
         return None if best is None else _degrees_between(by_map, best.T_21.translation)
 

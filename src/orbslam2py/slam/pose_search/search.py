@@ -106,6 +106,8 @@ class PoseSearch:
         self.local_map: core.LocalMap | None = None
         self.last_relocalization = 0
         self._was_found_again = False
+        # With depth a map has its points where they are: nothing has to be proven.
+        self._proves_from = None if self._sensor.has_depth else 0
         self.initial_pose: core.Pose | None = None
         self.searches_loaded_map = False
         self.map_is_fixed = False
@@ -152,10 +154,26 @@ class PoseSearch:
         self.motion.follow_map(self._map)
         self.reference_keyframe = self._map.living(self.reference_keyframe)
 
-    def found_again(self, frame: core.TrackedFrame) -> None:
-        """The camera was found again in this frame."""
+    def found_again(self, frame: core.TrackedFrame, *, where_expected: bool = False) -> None:
+        """The camera was found again in this frame.
+
+        Parameters
+        ----------
+        frame : orbslam2py._core.TrackedFrame
+            The frame.
+        where_expected : bool
+            Where its motion before the loss led. Elsewhere it has to prove itself for a second.
+        """
         self.last_relocalization = frame.id
         self._was_found_again = True
+        if not where_expected:
+            self._proves_from = frame.id
+
+    def map_begun(self, frame_id: int) -> None:
+        """A map beside others, or after one that came to nothing, has begun with this frame."""
+        self.last_relocalization = frame_id
+        if not self._sensor.has_depth:
+            self._proves_from = frame_id
 
     def just_relocalized(self, frame: core.TrackedFrame) -> bool:
         """Whether the camera was found again in this frame or right before it."""
@@ -277,6 +295,7 @@ class PoseSearch:
             n_matches=n_inliers,
             n_inliers=n_inliers,
             relocalized=True,
+            where_expected=self._relocalizer.where_expected,
             method=PoseMethod.RELOCALIZATION,
         )
 
@@ -451,9 +470,8 @@ class PoseSearch:
             refined.frame.discard_outliers()
 
     def _local_map_inliers(self, frame: core.TrackedFrame) -> int:
-        # A map that begins with depths has its points where they are: nothing has to be proven.
-        in_doubt = self._was_found_again or not self._sensor.has_depth
-        if in_doubt and frame.id < self.last_relocalization + self._max_keyframe_interval:
+        proves_from = self._proves_from
+        if proves_from is not None and frame.id < proves_from + self._max_keyframe_interval:
             return self.limits.local_map_inliers_after_relocalization
         return self.limits.local_map_inliers
 

@@ -54,6 +54,8 @@ class Relocalizer:
         self.reset()
         #: Whether the last frame fits at several places, of which none is believed.
         self.looks_like_several = False
+        #: Whether the last frame was found where the motion before the loss led.
+        self.where_expected = False
 
     def reset(self) -> None:
         """Forget where tracking was lost: it was found, or the map is another one."""
@@ -76,7 +78,7 @@ class Relocalizer:
         int
             Number of inliers; 0 if the frame was not found, and then it has no associations.
         """
-        self.looks_like_several = False
+        self.looks_like_several = self.where_expected = False
         n_inliers = self._near_loss(frame)
         if n_inliers == 0:
             n_inliers = self._by_likeness(frame)
@@ -92,11 +94,15 @@ class Relocalizer:
         ids = np.array(place.keyframes(self._map, limits), np.int64)
         T_wc = np.array([self._map.keyframe_pose(k).inverse().matrix for k in ids])
         wider = min(1 + limits.widening * self._failures, limits.widest)
+        moves_on = frame.id - place.last.id <= limits.motion_frames
+        enough = limits.enough_near if moves_on else limits.enough
         for guess in place.guesses(frame.id, limits):
-            n_inliers = self._near(frame, guess, self._nearest(guess, ids, T_wc), wider)
+            nearest = self._nearest(guess, ids, T_wc)
+            n_inliers = self._near(frame, guess, nearest, wider, enough)
             if n_inliers > 0:
+                self.where_expected = moves_on
                 return n_inliers
-        if frame.id - place.last.id > limits.motion_frames:
+        if not moves_on:
             return 0
         likeliest = [int(keyframe) for keyframe in ids[: limits.thorough_keyframes]]
         return self._compare_with(frame, likeliest, limits.enough)
@@ -136,7 +142,8 @@ class Relocalizer:
             As for `relocalize`.
         """
         every = core.snapshot_keyframes(self._map)
-        return self._near(frame, T_cw, self._nearest(T_cw, every.ids, every.T_wc), 1.0)
+        nearest = self._nearest(T_cw, every.ids, every.T_wc)
+        return self._near(frame, T_cw, nearest, 1.0, self._limits.enough)
 
     def compare_with(self, frame: core.TrackedFrame, keyframes: list[int]) -> int:
         """Find pose and associations of a frame by all keypoints of keyframes that it may show.
@@ -162,7 +169,12 @@ class Relocalizer:
         return 0
 
     def _near(
-        self, frame: core.TrackedFrame, T_cw: core.Pose, keyframes: list[int], wider: float
+        self,
+        frame: core.TrackedFrame,
+        T_cw: core.Pose,
+        keyframes: list[int],
+        wider: float,
+        enough: int,
     ) -> int:
         limits = self._limits
         nothing = np.zeros(0, np.int64)
@@ -185,7 +197,7 @@ class Relocalizer:
                 self._map, keyframe, frame, found, limits.wide_window, limits.wide_distance
             )
             n_inliers = optimize(frame)
-            if n_inliers >= limits.enough:
+            if n_inliers >= enough:
                 return n_inliers
         frame.clear_associations()
         frame.T_cw = None
