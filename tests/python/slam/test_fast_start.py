@@ -77,4 +77,4 @@ def test_of_few_features_fewer_inliers_are_asked_for(
     assert limits.local_map_inliers_after_relocalization == after
     assert limits.map_matches == TrackingThresholds().map_matches
     again = RelocalizationThresholds().for_features(n_features)
-    assert (again.narrow, again.enough) == (inliers, after)
+    assert (again.narrow, again.enough_near, again.enough) == (inliers, inliers, after)

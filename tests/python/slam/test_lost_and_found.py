@@ -179,6 +179,26 @@ def test_near_the_place_of_loss_no_word_is_needed(world: MappedWorld) -> None:
     assert found.relocalize(described(world, N_MAPPED + 5)) == 0, "the place is forgotten"
 
 
+@pytest.mark.parametrize(("frames_since", "found"), [(10, True), (11, False)])
+def test_where_its_motion_led_fewer_inliers_are_enough(
+    world: MappedWorld, frames_since: int, found: bool
+) -> None:
+    motion = world.system.pipeline.tracking.motion
+    limits = RelocalizationThresholds(enough=10**6, enough_near=30)
+    again = relocalizer(world, limits)
+    reference = world.system.pipeline.tracking.reference_keyframe
+    again.lose(PlaceOfLoss(motion.last, None, reference))
+    frame = described(world, motion.last.id + frames_since)
+    assert (again.relocalize(frame) >= 30) == found
+    assert again.where_expected == found
+
+
+def test_found_by_likeness_it_is_not_where_it_was_expected(world: MappedWorld) -> None:
+    found = relocalizer(world)
+    assert found.relocalize(described(world, N_MAPPED + 5)) >= 50
+    assert not found.where_expected
+
+
 def test_the_window_grows_with_every_failure(world: MappedWorld) -> None:
     """Beside the path, where the first window does not reach."""
     motion = world.system.pipeline.tracking.motion

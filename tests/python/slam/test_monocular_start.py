@@ -75,6 +75,16 @@ def test_a_fast_car_begins_a_map() -> None:
     assert sum(r.state is TrackingState.OK for r in played.records) >= 15
 
 
+@pytest.mark.parametrize(("n_features", "stride", "latest"), [(800, 4, 4), (400, 3, 7)])
+def test_a_car_with_few_images_a_second_begins_a_map(
+    n_features: int, stride: int, latest: int
+) -> None:
+    """No three images show 30 of the same points by the last one's matches alone."""
+    played = Played(n_features, stride, world="street", size=(620, 188), frames=60)
+    assert played.first <= latest
+    assert played.error() < 0.02
+
+
 def test_few_features_begin_a_map() -> None:
     played = Played(400, world="corridor", frames=40)
     assert played.first <= 20

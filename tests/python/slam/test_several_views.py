@@ -20,6 +20,7 @@ from orbslam2py.slam.initialization.several_views import SeveralViews
 from orbslam2py.slam.initialization.third_view import (
     Candidate,
     Motion,
+    ThirdViews,
     agreeing_motions,
     reconstruct,
 )
@@ -47,8 +48,14 @@ class Seen(NamedTuple):
         self, *motions: core.TwoViewMotion, **limits: float
     ) -> core.TwoViewMotion | None:
         chosen = InitializationThresholds(**limits)  # type: ignore[arg-type]
-        together = SeveralViews(Candidate(self.view, motions), self.kept.views, self.last, chosen)
+        candidate = Candidate(self.view, motions)
+        together = SeveralViews(candidate, self.thirds(candidate, chosen), self.last, chosen)
         return together.best_motion(motions, seed=0)
+
+    def thirds(
+        self, candidate: Candidate, limits: InitializationThresholds | None = None
+    ) -> ThirdViews:
+        return ThirdViews.of(candidate, self.kept, limits or InitializationThresholds())
 
     def off(self, motion: core.TwoViewMotion) -> float:
         """Degrees between its direction and the true one."""
@@ -143,7 +150,7 @@ def test_two_motions_of_a_plane_are_told_apart_by_all_views() -> None:
     limits = InitializationThresholds()
     candidate = Candidate.of(wall.view, reconstruct(wall.view, wall.last, seed=0))
     assert candidate is not None and not candidate.is_clear
-    left = agreeing_motions(candidate, wall.kept.views, wall.last, limits)
+    left = agreeing_motions(candidate, wall.thirds(candidate), wall.last, limits)
     assert len(left) == 2
     assert max(wall.off(motion) for motion in left) > 60
     best = wall.best_motion(*left)
@@ -204,7 +211,7 @@ def test_adjusted_poses_lead_to_the_views_that_they_are_of(
 ) -> None:
     limits = InitializationThresholds()
     candidate = Candidate(seen.view, (seen.place(seen.T_21),))
-    together = SeveralViews(candidate, seen.kept.views, seen.last, limits)
+    together = SeveralViews(candidate, seen.thirds(candidate), seen.last, limits)
     placed = together._place(seen.T_21)
     assert len(placed.poses) == 4
     for number in not_known:
@@ -261,7 +268,8 @@ def test_two_motions_to_nearly_the_same_place_are_one(
 ) -> None:
     motions = tuple(seen.place(turned(seen.T_21, turn)) for turn in (0, degrees))
     limits = InitializationThresholds(clearly_worse=1e9)  # none fits that much worse
-    left = agreeing_motions(Candidate(seen.view, motions), seen.kept.views, seen.last, limits)
+    candidate = Candidate(seen.view, motions)
+    left = agreeing_motions(candidate, seen.thirds(candidate, limits), seen.last, limits)
     assert len(left) == (1 if is_one else 2)
     assert set(left) <= set(motions)
 

@@ -6,13 +6,9 @@ from __future__ import annotations
 import pytest
 
 from orbslam2py import Reason, TrackingState
+from orbslam2py.slam.records import PoseEstimate
 from orbslam2py.slam.tracking import TrackingOutcome
-from support.tracking_scene import (
-    MAX_FRAMES,
-    FakeFrame,
-    Scene,
-    lose,
-)
+from support.tracking_scene import MAX_FRAMES, FakeFrame, Scene, lose, pose
 
 
 def test_lost(scene: Scene) -> None:
@@ -94,6 +90,35 @@ def test_a_frame_found_again_has_to_prove_itself(scene: Scene, inliers: int, fou
     scene.core.inliers.extend([100, 60, inliers])
     assert (scene.track().state is TrackingState.OK) == found
     assert scene.tracking.n_relocalizations == int(found)
+
+
+@pytest.mark.parametrize(
+    ("where_expected", "inliers", "found"),
+    [(False, 49, False), (True, 30, True), (True, 29, False)],
+)
+def test_where_its_motion_led_nothing_has_to_be_proven(
+    scene: Scene,
+    monkeypatch: pytest.MonkeyPatch,
+    where_expected: bool,
+    inliers: int,
+    found: bool,
+) -> None:
+    scene.run(40)
+    lose(scene)
+    scene.core.n_reference = 0
+    again = PoseEstimate(relocalized=True, where_expected=where_expected)
+
+    def by_relocalization(frame: FakeFrame) -> PoseEstimate:
+        frame.T_cw = pose(0.0)
+        return again
+
+    monkeypatch.setattr(scene.search, "by_relocalization", by_relocalization)
+    # The local map by wide windows, and by narrow ones.
+    scene.core.inliers.extend([60, inliers])
+    assert (scene.track().state is TrackingState.OK) == found
+    if found:
+        scene.core.inliers.extend([100, 60, inliers])
+        assert scene.track().state is TrackingState.OK, "nor by the frames that follow"
 
 
 def test_lost_keeps_trying_the_reference_keyframe_and_recovers(scene: Scene) -> None:

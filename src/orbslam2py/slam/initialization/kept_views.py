@@ -140,14 +140,19 @@ class KeptViews:
             narrow = limits.window
             if motion.spread is not None:
                 narrow = min(limits.window, max(limits.narrow_window, 4 * motion.spread))
-            views = [*self.distant, *self.views]
-            for view in views:
+            for view in (*self.distant, *self.views):
                 view.follow(frame, seen, motion, narrow)
-            seen_less = [v for v in views if v in self.distant or v.n_matches < limits.matches]
-            self.views = [view for view in self.views if view not in seen_less]
-            seen_less = [view for view in seen_less if view.n_matches >= limits.distant_matches]
-            self.distant = seen_less[-limits.distant_views :]
+            self._let_go()
         self._last = View(frame)
+
+    def _let_go(self) -> None:
+        """Let no map begin from views that have lost too much, nor keep those that lost most."""
+        limits = self._limits
+        lost = [view for view in self.views if view.n_matches < limits.matches]
+        self.views = [view for view in self.views if view.n_matches >= limits.matches]
+        distant = [*self.distant, *lost]
+        distant = [view for view in distant if view.n_matches >= limits.distant_matches]
+        self.distant = distant[-limits.distant_views :]
 
     def _follow_image(self, last: View, frame: core.Frame, seen: Pixels) -> ImageMotion:
         """The motion from the last frame, searched in wide windows around where it would lead."""
