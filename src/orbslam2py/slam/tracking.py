@@ -230,9 +230,9 @@ class Tracking:
         details : bool
             The outcome is to say which keypoints the pose was accepted with.
         """
+        self._blurred = self._blur_watch.is_blurred(frame.features)
         if self.initializing:
             return self._begin_map(frame, timer)
-        self._blurred = self._blur_watch.is_blurred(frame.features)
         young = self._is_small or self._initializer.watches_map
         if young and not self._seeks_map:
             self._initializer.remember(frame)
@@ -323,7 +323,7 @@ class Tracking:
     def _begin_map(self, frame: core.TrackedFrame, timer: StageTimer) -> TrackingOutcome:
         self.state = TrackingState.NOT_INITIALIZED
         with timer("keyframe"):
-            reason = self._initializer.try_initialize(frame)
+            reason = self._initializer.try_initialize(frame, blurred=self._blurred)
         if reason is not Reason.NONE:
             spoilt = reason is Reason.INITIAL_MAP_FAILED
             given_up = self._map.active_map if spoilt else None
@@ -343,7 +343,7 @@ class Tracking:
             self._seeks_map = True
         frame.clear_associations()
         with timer("keyframe"):
-            reason = self._initializer.try_initialize(frame)
+            reason = self._initializer.try_initialize(frame, blurred=self._blurred)
         if reason is Reason.INITIAL_MAP_FAILED:
             spoilt = self._map.active_map
             return TrackingOutcome(self.state, PoseEstimate(reason), given_up=spoilt)

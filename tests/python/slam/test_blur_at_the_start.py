@@ -149,10 +149,10 @@ def starter(monkeypatch: pytest.MonkeyPatch) -> Starter:
     return Starter()
 
 
-def shown(starter: Starter, detail: float, frame_id: int = 0) -> Reason:
+def shown(starter: Starter, detail: float, frame_id: int = 0, *, blurred: bool = False) -> Reason:
     frame: Any = FakeFrame(frame_id)
     frame.features.detail = detail
-    return starter.try_initialize(frame)
+    return starter.try_initialize(frame, blurred=blurred)
 
 
 def test_no_map_begins_with_a_blurred_image(starter: Starter) -> None:
@@ -167,6 +167,29 @@ def test_nor_from_one(starter: Starter) -> None:
     shown(starter, BLURRED, 1)
     shown(starter, SHARP, 2)
     assert [view.frame.frame_id for view in starter._kept.views] == [0, 2]
+
+
+def test_nor_with_one_that_lost_what_those_right_before_it_had(starter: Starter) -> None:
+    """However much the sharpest of all had."""
+    shown(starter, SHARP, 0)
+    starter.willing = True
+    assert shown(starter, SHARP, 1, blurred=True) is Reason.TOO_BLURRED_TO_BEGIN
+    starter.willing = False
+    shown(starter, SHARP, 2)
+    assert [view.frame.frame_id for view in starter._kept.views] == [0, 2]
+
+
+def test_images_before_the_map_are_compared_with_those_before_them(core: FakeCore) -> None:
+    scene = Scene(Sensor.MONOCULAR, core)
+    scene.initializer.refusals = 8
+    fine = core.fine_detail_of_images
+    for i in range(8):
+        is_dull = i in (2, 6)
+        core.sharpnesses.append(300.0 if is_dull else 1000.0)
+        core.fine_detail_of_images = 0.5 * fine if is_dull else fine
+        assert scene.track().state is TrackingState.NOT_INITIALIZED
+    # The third image has too few before it.
+    assert [i for i, blurred in enumerate(scene.initializer.blurred) if blurred] == [6]
 
 
 def test_what_was_sharp_is_known_where_another_map_begins(starter: Starter) -> None:

@@ -312,6 +312,8 @@ class FakeInitializer:
 
     def __init__(self, refusals: int = 0) -> None:
         self.refusals = refusals
+        #: Whether those shown were blurred.
+        self.blurred: list[bool] = []
 
     def contradicts(self, frame: FakeFrame) -> bool:
         return False
@@ -343,7 +345,8 @@ class FakeInitializer:
     def lines(self) -> None:
         """None: one frame is enough."""
 
-    def try_initialize(self, frame: FakeFrame) -> Reason:
+    def try_initialize(self, frame: FakeFrame, *, blurred: bool) -> Reason:
+        self.blurred.append(blurred)
         if self.refusals:
             self.refusals -= 1
             return Reason.TOO_FEW_KEYPOINTS

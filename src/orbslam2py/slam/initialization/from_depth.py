@@ -102,8 +102,12 @@ class DepthInitializer:
         """Whether a frame has the keypoints that a map needs to begin."""
         return frame.features.size > self._least
 
-    def try_initialize(self, frame: core.TrackedFrame) -> Reason:
-        """Make the frame the first keyframe, with a point for every depth; or say why not."""
+    def try_initialize(self, frame: core.TrackedFrame, *, blurred: bool) -> Reason:
+        """Make the frame the first keyframe, with a point for every depth; or say why not.
+
+        A blurred one as well: its depths are measured.
+        """
+        del blurred
         if not self.shows_enough(frame):
             return Reason.TOO_FEW_KEYPOINTS
         if int(np.count_nonzero(frame.features.depth > 0)) < self._limits.depths:

@@ -177,8 +177,11 @@ class MonocularInitializer:
         """Whether a frame has the keypoints that a map needs to begin."""
         return frame.features.size > self._limits.keypoints
 
-    def try_initialize(self, frame: core.TrackedFrame) -> Reason:
-        """Begin the map with this frame as second view; or say why not."""
+    def try_initialize(self, frame: core.TrackedFrame, *, blurred: bool) -> Reason:
+        """Begin the map with this frame as second view; or say why not.
+
+        A blurred one is matched, to follow the image, and is no view.
+        """
         if self._n_waiting == 0:
             self._waits_since = frame.timestamp
         self._n_waiting += 1
@@ -191,7 +194,7 @@ class MonocularInitializer:
         self._kept.follow(frame.features)
         self._history.append(frame)
         self._last = frame
-        blurred = self._smear.is_long(self._smear.length(frame.features))
+        blurred = blurred or self._smear.is_long(self._smear.length(frame.features))
         self._smear.see(frame.features)
         reason = Reason.TOO_BLURRED_TO_BEGIN if blurred else self._from_best_pair(frame)
         if reason is Reason.NONE:

@@ -45,8 +45,16 @@ class Initializer(Protocol):
         """Whether a frame has the keypoints that a map needs to begin."""
         ...
 
-    def try_initialize(self, frame: core.TrackedFrame) -> Reason:
-        """Begin the map with this frame; or say why not (`Reason.NONE`: it has begun)."""
+    def try_initialize(self, frame: core.TrackedFrame, *, blurred: bool) -> Reason:
+        """Begin the map with this frame; or say why not (`Reason.NONE`: it has begun).
+
+        Parameters
+        ----------
+        frame : orbslam2py._core.TrackedFrame
+            The frame.
+        blurred : bool
+            It has lost the fine detail of those right before it.
+        """
         ...
 
     def take_earlier(self) -> tuple[core.TrackedFrame, ...]:
