@@ -237,7 +237,7 @@ class PoseEstimate:
     relocalized: bool = False
     """Found without a guess from the frame before."""
     where_expected: bool = False
-    """Relocalized where the motion before the loss led."""
+    """Relocalized where tracking was just lost, or its motion led from there."""
     method: PoseMethod = PoseMethod.MOTION_MODEL
     """What found it."""
     evidence: Evidence | None = None

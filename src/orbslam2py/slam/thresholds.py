@@ -44,9 +44,9 @@ class InitializationThresholds:
     new_view: float = 5.0
     """... each moved by a median of so many pixels against the one before."""
     distant_views: int = 3
-    """So many more, the last that fewer matches are left of, may confirm what is begun ..."""
+    """So many views with fewer matches are kept beside them: they may confirm what is begun ..."""
     distant_matches: int = 30
-    """... as long as there are so many."""
+    """... as long as they have so many."""
     window: float = 100.0
     """Half width of the search window from frame to frame, pixels ..."""
     wide_window: float = 200.0
@@ -349,7 +349,7 @@ class RelocalizationThresholds:
     enough: int = 50
     """Inliers that make a success ..."""
     enough_near: int = 30
-    """... and where the camera was lost and its motion would have led it."""
+    """... and where the camera was just lost, or its motion would have led it."""
     narrow: int = 30
     """More inliers than this, but not enough, are widened once more with a narrow window."""
     wide_window: float = 10.0

@@ -108,6 +108,7 @@ class Tracking:
     def reset(self) -> None:
         """Forget the map's past; the map itself is cleared by the pipeline."""
         self._forget_maps()
+        self._blur_watch.reset()
         self._initializer.reset()
 
     def _forget_maps(self) -> None:
@@ -120,7 +121,6 @@ class Tracking:
         self._search.reset()
         self._belief.reset()
         self._in_fixed_map.reset()
-        self._blur_watch.reset()
         self._confirmation.reset()
         # A frame found again that becomes a keyframe with the next one.
         self._waits_for_confirmation: core.TrackedFrame | None = None
@@ -235,7 +235,7 @@ class Tracking:
             return self._begin_map(frame, timer)
         young = self._is_small or self._initializer.watches_map
         if young and not self._seeks_map:
-            self._initializer.remember(frame)
+            self._initializer.remember(frame, blurred=self._blurred)
         estimate = self._find_pose(frame, timer, localize)
         if estimate.found:
             estimate = self._confirm(frame, estimate)
@@ -334,7 +334,7 @@ class Tracking:
         self, frame: core.TrackedFrame, timer: StageTimer, *, localize: bool
     ) -> TrackingOutcome | None:
         """Begin another map with a frame that is not found; None if the time has not come."""
-        if self.state is not TrackingState.LOST or localize or self._blurred:
+        if self.state is not TrackingState.LOST or localize:
             return None
         if not self._loss.overdue(frame.timestamp):
             return None

@@ -321,7 +321,7 @@ class FakeInitializer:
     def believe_map(self) -> None:
         """No map is doubted."""
 
-    def remember(self, frame: FakeFrame) -> None:
+    def remember(self, frame: FakeFrame, *, blurred: bool) -> None:
         """Frames of a young map are not needed again."""
 
     def remembered(self) -> list[FakeFrame]:

@@ -143,7 +143,8 @@ class Belief:
             refined = replace(refined, frame=frame)
             if refined.estimate.relocalized:
                 # Found without regard to where the camera was: the way from there is no speed.
-                self._search.found_again(frame)
+                expected = refined.estimate.where_expected
+                self._search.found_again(frame, where_expected=expected)
                 self._search.motion.jump(None)
         self._search.settle(refined)
         motion = self._search.motion

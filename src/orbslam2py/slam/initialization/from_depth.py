@@ -72,7 +72,7 @@ class DepthInitializer:
         del map_index
         return 0
 
-    def remember(self, frame: core.TrackedFrame) -> None:
+    def remember(self, frame: core.TrackedFrame, *, blurred: bool) -> None:
         """Nothing: the next frame can begin a map as well."""
 
     def remembered(self) -> list[core.Frame]:
@@ -105,9 +105,10 @@ class DepthInitializer:
     def try_initialize(self, frame: core.TrackedFrame, *, blurred: bool) -> Reason:
         """Make the frame the first keyframe, with a point for every depth; or say why not.
 
-        A blurred one as well: its depths are measured.
+        A blurred one begins none: where its keypoints are is not known well.
         """
-        del blurred
+        if blurred:
+            return Reason.TOO_BLURRED_TO_BEGIN
         if not self.shows_enough(frame):
             return Reason.TOO_FEW_KEYPOINTS
         if int(np.count_nonzero(frame.features.depth > 0)) < self._limits.depths:

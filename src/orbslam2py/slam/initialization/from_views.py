@@ -97,6 +97,7 @@ class MonocularInitializer:
         """Drop all views, how sharp the camera's images were, and what became of earlier maps."""
         self._smear.reset()
         self._watch.reset()
+        self._blurred: deque[int] = deque(maxlen=self._limits.remembered_frames)
         self._drop_views()
 
     def _drop_views(self) -> None:
@@ -108,9 +109,11 @@ class MonocularInitializer:
         self._last: core.TrackedFrame | None = None
         self._shown: View | None = None
 
-    def remember(self, frame: core.TrackedFrame) -> None:
+    def remember(self, frame: core.TrackedFrame, *, blurred: bool) -> None:
         """A frame that was tracked in a young map, which may yet come to nothing."""
         self._history.append(frame)
+        if blurred:
+            self._blurred.append(frame.id)
 
     def remembered(self) -> list[core.Frame]:
         """The frames from before and after a map began."""
@@ -128,7 +131,7 @@ class MonocularInitializer:
             if frame.size <= self._limits.keypoints:
                 continue
             self._kept.follow(frame)
-            if not self._smear.is_long(self._smear.length(frame)):
+            if not (frame.id in self._blurred or self._smear.is_long(self._smear.length(frame))):
                 self._kept.keep_last()
 
     def n_between(self, map_index: int) -> int:
@@ -194,6 +197,8 @@ class MonocularInitializer:
         self._kept.follow(frame.features)
         self._history.append(frame)
         self._last = frame
+        if blurred:
+            self._blurred.append(frame.id)
         blurred = blurred or self._smear.is_long(self._smear.length(frame.features))
         self._smear.see(frame.features)
         reason = Reason.TOO_BLURRED_TO_BEGIN if blurred else self._from_best_pair(frame)
@@ -241,7 +246,12 @@ class MonocularInitializer:
 
     # ---- the map ---------------------------------------------------------------------------------
     def _build_map(self, view: View, motion: Motion, second: core.TrackedFrame) -> Reason:
-        first = next(f for f in self._history if f.id == view.frame.id)
+        history = list(self._history)
+        first = next((f for f in history if f.id == view.frame.id), None)
+        if first is None:
+            # A camera that stands still keeps a view for longer than frames are remembered.
+            first = core.TrackedFrame(view.frame)
+            history.insert(0, first)
         core.describe(first.features, self._vocabulary)
         core.describe(second.features, self._vocabulary)
         self._map.begin_map()
@@ -254,7 +264,7 @@ class MonocularInitializer:
         _log.info("new map with %d points", n_points)
         self._mapping.insert_keyframe(begun.first)
         self._mapping.insert_keyframe(begun.second)
-        between = self._earlier.track(list(self._history), first)
+        between = self._earlier.track(history, first)
         self._insert_views([frame for frame in between if self._adds(frame, n_points)])
         self._watch.begin(second)
         self._kept.clear()

@@ -65,8 +65,16 @@ class Initializer(Protocol):
         """Living keyframes that a map began with, beyond those that it needs."""
         ...
 
-    def remember(self, frame: core.TrackedFrame) -> None:
-        """A frame that was tracked in a young map, which may yet come to nothing."""
+    def remember(self, frame: core.TrackedFrame, *, blurred: bool) -> None:
+        """A frame that was tracked in a young map, which may yet come to nothing.
+
+        Parameters
+        ----------
+        frame : orbslam2py._core.TrackedFrame
+            The frame.
+        blurred : bool
+            As of `try_initialize`.
+        """
         ...
 
     def contradicts(self, frame: core.TrackedFrame) -> bool:

@@ -14,7 +14,7 @@ Indices = npt.NDArray[np.int32]
 
 
 class View:
-    """A frame that a map may begin from, and where its keypoints have moved to.
+    """A frame that was kept, and where its keypoints have moved to.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class View:
         self.positions: Pixels = self.keypoints
         self.matches: Indices = np.arange(frame.size, dtype=np.int32)
         self.displacement = 0.0
-        # By the frame of a view kept later: its keypoint for each of this one, -1 for none.
+        # By the id of the frame of a view kept later: its keypoint for each of this one, or -1.
         self._linked: dict[int, Indices] = {}
 
     @property
@@ -63,6 +63,10 @@ class View:
         """Note what the last frame, now a view of its own, shows of these keypoints."""
         self._linked[later.frame.id] = self.matches
 
+    def unlink_all_but(self, kept: set[int]) -> None:
+        """Forget what was noted of views of other frames than those with these ids."""
+        self._linked = {frame: links for frame, links in self._linked.items() if frame in kept}
+
     def partners(self, other: View) -> Indices:
         """Per keypoint of this view the index in another view that the last frame links it to."""
         return _inverse(other.matches, int(self.matches.max(initial=-1)) + 1)[self.matches]
@@ -77,7 +81,9 @@ class View:
             then = _inverse(other._linked[self.frame.id], len(every))[every]
         else:
             return partners
-        return np.where(partners >= 0, partners, then)
+        # One to one: what the last frame says holds.
+        taken = np.isin(then, partners[partners >= 0])
+        return np.where(partners >= 0, partners, np.where(taken, -1, then))
 
 
 def _inverse(matches: Indices, n: int) -> Indices:
@@ -146,7 +152,7 @@ class KeptViews:
         self._last = View(frame)
 
     def _let_go(self) -> None:
-        """Let no map begin from views that have lost too much, nor keep those that lost most."""
+        """Sort views by how many matches they have left: those that may begin, confirm, or go."""
         limits = self._limits
         lost = [view for view in self.views if view.n_matches < limits.matches]
         self.views = [view for view in self.views if view.n_matches >= limits.matches]
@@ -191,3 +197,6 @@ class KeptViews:
             moved = np.array([view.displacement for view in views])
             gaps = np.abs(moved[:-2] - moved[2:])
             del views[1 + int(np.argmin(gaps))]
+        left = {view.frame.id for view in (*views, *self.distant)}
+        for view in (*views, *self.distant):
+            view.unlink_all_but(left)

@@ -108,7 +108,7 @@ class ThirdViews:
     Attributes
     ----------
     views
-        In the order of time.
+        The views.
     fewest_common
         So many of the candidate's points one of them must see.
     """

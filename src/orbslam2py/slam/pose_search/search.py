@@ -107,7 +107,7 @@ class PoseSearch:
         self.last_relocalization = 0
         self._was_found_again = False
         # With depth a map has its points where they are: nothing has to be proven.
-        self._proves_from = None if self._sensor.has_depth else 0
+        self._proves_from = self._proves_from_at_loss = None if self._sensor.has_depth else 0
         self.initial_pose: core.Pose | None = None
         self.searches_loaded_map = False
         self.map_is_fixed = False
@@ -125,6 +125,7 @@ class PoseSearch:
             tracking was lost before.
         """
         if confirmed:
+            self._proves_from_at_loss = self._proves_from
             self._place_of_loss = PlaceOfLoss(
                 self.motion.last, self.motion.velocity, self.reference_keyframe
             )
@@ -162,12 +163,12 @@ class PoseSearch:
         frame : orbslam2py._core.TrackedFrame
             The frame.
         where_expected : bool
-            Where its motion before the loss led. Elsewhere it has to prove itself for a second.
+            Where it was just lost, or its motion led from there: it goes on as before the loss.
+            Elsewhere it has to prove itself for a second.
         """
         self.last_relocalization = frame.id
         self._was_found_again = True
-        if not where_expected:
-            self._proves_from = frame.id
+        self._proves_from = self._proves_from_at_loss if where_expected else frame.id
 
     def map_begun(self, frame_id: int) -> None:
         """A map beside others, or after one that came to nothing, has begun with this frame."""
@@ -358,6 +359,7 @@ class PoseSearch:
             covariance=optimized.covariance,
             discarded=first.discarded,
             relocalized=first.relocalized,
+            where_expected=first.where_expected,
         )
         if estimate.n_inliers < self._local_map_inliers(frame):
             return estimate.failed(Reason.FEW_INLIERS_LOCAL_MAP)

@@ -54,7 +54,7 @@ class Relocalizer:
         self.reset()
         #: Whether the last frame fits at several places, of which none is believed.
         self.looks_like_several = False
-        #: Whether the last frame was found where the motion before the loss led.
+        #: Whether the last frame was found where tracking was just lost, or its motion led.
         self.where_expected = False
 
     def reset(self) -> None:
@@ -94,15 +94,15 @@ class Relocalizer:
         ids = np.array(place.keyframes(self._map, limits), np.int64)
         T_wc = np.array([self._map.keyframe_pose(k).inverse().matrix for k in ids])
         wider = min(1 + limits.widening * self._failures, limits.widest)
-        moves_on = frame.id - place.last.id <= limits.motion_frames
-        enough = limits.enough_near if moves_on else limits.enough
+        just_lost = frame.id - place.last.id <= limits.motion_frames
+        enough = limits.enough_near if just_lost else limits.enough
         for guess in place.guesses(frame.id, limits):
             nearest = self._nearest(guess, ids, T_wc)
             n_inliers = self._near(frame, guess, nearest, wider, enough)
             if n_inliers > 0:
-                self.where_expected = moves_on
+                self.where_expected = just_lost
                 return n_inliers
-        if not moves_on:
+        if not just_lost:
             return 0
         likeliest = [int(keyframe) for keyframe in ids[: limits.thorough_keyframes]]
         return self._compare_with(frame, likeliest, limits.enough)
@@ -141,6 +141,7 @@ class Relocalizer:
         int
             As for `relocalize`.
         """
+        self.where_expected = False
         every = core.snapshot_keyframes(self._map)
         nearest = self._nearest(T_cw, every.ids, every.T_wc)
         return self._near(frame, T_cw, nearest, 1.0, self._limits.enough)
