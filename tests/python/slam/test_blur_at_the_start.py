@@ -13,6 +13,7 @@ from orbslam2py.slam.evidence import smear as smear_module
 from orbslam2py.slam.evidence.smear import Smear
 from orbslam2py.slam.initialization import MonocularInitializer, from_views
 from orbslam2py.slam.records import TrackingOutcome
+from orbslam2py.slam.relocalization import LossClock
 from orbslam2py.slam.thresholds import EvidenceThresholds
 from support.tracking_scene import FakeCore, FakeFrame, Scene, lose
 
@@ -177,6 +178,42 @@ def test_nor_with_one_that_lost_what_those_right_before_it_had(starter: Starter)
     starter.willing = False
     shown(starter, SHARP, 2)
     assert [view.frame.frame_id for view in starter._kept.views] == [0, 2]
+
+
+def test_nor_after_a_map_that_came_to_nothing(starter: Starter) -> None:
+    shown(starter, SHARP, 0)
+    shown(starter, SHARP, 1, blurred=True)
+    frame: Any = FakeFrame(2)
+    frame.features.detail = SHARP
+    starter.remember(frame, blurred=True)
+    shown(starter, SHARP, 3)
+    starter.restart(starter.remembered())
+    assert [view.frame.frame_id for view in starter._kept.views] == [0, 3]
+
+
+def test_after_a_map_that_came_to_nothing_the_images_before_it_are_still_known(
+    single: Scene,
+) -> None:
+    single.run(8)
+    single.tracking.restart()
+    single.initializer.refusals = 1
+    single.core.sharpnesses.append(300.0)
+    single.core.fine_detail_of_images = 0.5 * SHARP
+    single.track()
+    assert single.initializer.blurred[-1]
+
+
+def test_while_lost_another_map_is_to_begin_with_no_blurred_image_either(single: Scene) -> None:
+    single.run(40)
+    lose(single)
+    single.tracking._loss = LossClock(0.0)
+    single.tracking._loss.be_overdue()
+    single.initializer.refusals = 9
+    single.core.sharpnesses.append(300.0)
+    single.core.fine_detail_of_images = 0.5 * SHARP
+    n_shown = len(single.initializer.blurred)
+    assert single.track().estimate.reason is Reason.BLURRED
+    assert single.initializer.blurred[n_shown:] == [True], "it follows the image"
 
 
 def test_images_before_the_map_are_compared_with_those_before_them(core: FakeCore) -> None:

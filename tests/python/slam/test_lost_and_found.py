@@ -193,6 +193,14 @@ def test_where_its_motion_led_fewer_inliers_are_enough(
     assert again.where_expected == found
 
 
+def test_later_it_is_found_there_but_was_not_expected(world: MappedWorld) -> None:
+    motion = world.system.pipeline.tracking.motion
+    again = relocalizer(world, words=False)
+    again.lose(PlaceOfLoss(motion.last, None, world.system.pipeline.tracking.reference_keyframe))
+    assert again.relocalize(described(world, motion.last.id + 11)) >= 50
+    assert not again.where_expected
+
+
 def test_found_by_likeness_it_is_not_where_it_was_expected(world: MappedWorld) -> None:
     found = relocalizer(world)
     assert found.relocalize(described(world, N_MAPPED + 5)) >= 50

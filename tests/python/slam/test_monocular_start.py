@@ -11,6 +11,7 @@ import pytest
 from orbslam2py import Reason, System, TrackingRecord, TrackingState, Trajectory
 from orbslam2py.evaluation import Alignment, evaluate_trajectory
 from orbslam2py.slam.initialization.image_motion import ImageMotion
+from orbslam2py.slam.thresholds import InitializationThresholds
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
 pytestmark = pytest.mark.watchdog(120)
@@ -102,6 +103,25 @@ def test_a_turn_before_the_first_step_begins_no_wrong_map() -> None:
     """Rotation first and translation later: views from behind the turn serve."""
     played = Played(world="corridor", motion="turn-on-the-spot", seed=3, frames=60)
     assert played.error() < 0.02
+
+
+def test_after_a_long_stand_a_map_begins() -> None:
+    """Its first view is older than all frames that are remembered."""
+    sequence = SyntheticSequence(
+        SyntheticOptions(world="corridor", sensor="mono", size=(320, 240), noise=1, frames=40)
+    )
+    standing = sequence.load(0).image
+    n_remembered = InitializationThresholds().remembered_frames
+    with System(sequence.settings, "mono", deterministic=True) as system:
+        for i in range(n_remembered + 5):
+            record = system.track_monocular(standing, i / 20)
+            assert record.state is TrackingState.NOT_INITIALIZED
+        for i in range(1, 40):
+            record = system.track_monocular(sequence.load(i).image, (n_remembered + 5 + i) / 20)
+        assert record.state is TrackingState.OK
+        assert system.check_map() == []
+        # It begins with the first view, or sooner.
+        assert system.trajectory().indices[0] <= n_remembered + 5
 
 
 # ---- where the trajectory begins -----------------------------------------------------------------

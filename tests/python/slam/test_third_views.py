@@ -70,13 +70,27 @@ def test_partners_by_what_was_matched_while_the_newer_was_the_last() -> None:
     old.matches = shifted
     old.link(new)
     old.matches = only(0, 50)
-    # 40 to 49 by the last frame; else number k was matched with k + 1.
+    # 40 to 49 by the last frame; else number k was matched with k + 1, where that is free.
     expected = np.where(only(40, 50) >= 0, only(40, 50), shifted)
+    expected[39] = -1
     np.testing.assert_array_equal(old.all_partners(new), expected)
     backwards = new.all_partners(old)
     np.testing.assert_array_equal(backwards[40:50], np.arange(40, 50))
-    np.testing.assert_array_equal(backwards[50:81], np.arange(49, 80))
-    assert (backwards[81:] == -1).all()
+    np.testing.assert_array_equal(backwards[51:81], np.arange(50, 80))
+    assert (backwards[[50, *range(81, N)]] == -1).all()
+
+
+def test_partners_are_one_to_one() -> None:
+    """Of two that claim the same keypoint that of the last frame has it."""
+    old, new = view(1, only(0, 80), 0, 10), view(2, only(40, 120), 10, 20)
+    old.matches = np.where(only(0, 80) >= 0, np.arange(N) + 1, -1).astype(np.int32)
+    old.link(new)
+    old.matches = only(60, 70)
+    partners = old.all_partners(new)
+    claimed = partners[partners >= 0]
+    assert len(np.unique(claimed)) == len(claimed)
+    np.testing.assert_array_equal(partners[60:70], np.arange(60, 70))
+    assert partners[59] == -1, "it was linked to 60"
 
 
 def test_views_without_a_match_have_no_partners() -> None:
@@ -135,8 +149,12 @@ class FakeCore:
 
     def __init__(self) -> None:
         self.n_matched: dict[int, int] = {}
+        #: By the frame that views are matched with: these, whatever the view.
+        self.shown: dict[int, Indices] = {}
 
-    def match_views(self, view: core.Frame, *_: object, **__: object) -> Indices:
+    def match_views(self, view: core.Frame, last: core.Frame, *_: object, **__: object) -> Indices:
+        if last.id in self.shown and view.id in self.n_matched:
+            return self.shown[last.id]
         return only(0, self.n_matched.get(view.id, N))
 
 
@@ -175,5 +193,18 @@ def test_the_last_few_of_them_stay(matcher: FakeCore) -> None:
     matcher.n_matched = dict.fromkeys(range(5), 50)
     follow(views, 1, first=6)
     assert [kept.frame.id for kept in views.distant] == [2, 3, 4]
-    linked = views.distant[0].all_partners(views.views[-1])
-    assert np.count_nonzero(linked >= 0) == 50
+    # What the next frame shows of the last of them is another thing.
+    matcher.shown[7] = only(100, 150)
+    follow(views, 1, first=7)
+    distant, last_but_one = views.distant[-1], views.views[-2]
+    assert (distant.frame.id, last_but_one.frame.id) == (4, 6)
+    assert np.count_nonzero(distant.partners(last_but_one) >= 0) == 50
+    assert np.count_nonzero(distant.all_partners(last_but_one) >= 0) == 100
+
+
+def test_what_was_noted_of_views_that_are_gone_is_forgotten(matcher: FakeCore) -> None:
+    views = KeptViews(LIMITS)
+    follow(views, 100)
+    kept = {view.frame.id for view in (*views.views, *views.distant)}
+    assert all(set(view._linked) <= kept for view in views.views)
+    assert len(views.views[0]._linked) == len(views.views) - 1

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from orbslam2py import Reason, TrackingState
@@ -112,6 +114,9 @@ def test_where_its_motion_led_nothing_has_to_be_proven(
         frame.T_cw = pose(0.0)
         return again
 
+    # An attempt that fails changes nothing: a first pose that the local map does not confirm.
+    scene.core.inliers.extend([100, 60, 29])
+    assert scene.track().state is TrackingState.LOST
     monkeypatch.setattr(scene.search, "by_relocalization", by_relocalization)
     # The local map by wide windows, and by narrow ones.
     scene.core.inliers.extend([60, inliers])
@@ -119,6 +124,37 @@ def test_where_its_motion_led_nothing_has_to_be_proven(
     if found:
         scene.core.inliers.extend([100, 60, inliers])
         assert scene.track().state is TrackingState.OK, "nor by the frames that follow"
+
+
+@pytest.mark.parametrize("where_expected", [True, False])
+def test_the_search_says_whether_it_was_found_where_it_was_expected(
+    scene: Scene, where_expected: bool
+) -> None:
+    class FoundThere:
+        looks_like_several = False
+
+        def __init__(self) -> None:
+            self.where_expected = where_expected
+
+        def relocalize(self, frame: FakeFrame) -> int:
+            return 40
+
+    scene.run(2)
+    there: Any = FoundThere()
+    frame: Any = scene.last
+    scene.search._relocalizer = there
+    estimate = scene.search.by_relocalization(frame)
+    assert estimate.relocalized
+    assert estimate.where_expected is where_expected
+    assert scene.search.in_local_map(frame, estimate).estimate.where_expected is where_expected
+
+
+def test_a_depth_sensors_other_map_has_nothing_to_prove(scene: Scene) -> None:
+    """Its points are where their depths say."""
+    scene.run(40)
+    scene.search.map_begun(scene.last.id)
+    scene.core.inliers.extend([100, 30])
+    assert scene.track().state is TrackingState.OK
 
 
 def test_lost_keeps_trying_the_reference_keyframe_and_recovers(scene: Scene) -> None:

@@ -43,6 +43,7 @@ class FakeFrame:
             depth=np.ones(1000, np.float32),
             described=False,
             frame_id=frame_id,
+            id=frame_id,
         )
         self.T_cw: _core.Pose | None = None
         self.reference_keyframe = -1

@@ -56,7 +56,8 @@ class PoseSearch:
     sensor : Sensor
         What the images come from.
     max_keyframe_interval : int
-        Frames of one second, during which a relocalization has to prove itself.
+        Frames of one second, during which a relocalization has to prove itself, unless it was
+        expected there.
     relocalizer : Relocalizer, optional
         Finds lost frames in the map; without it none is found there.
     thresholds : TrackingThresholds
@@ -71,8 +72,8 @@ class PoseSearch:
     local_map : orbslam2py._core.LocalMap or None
         Where the last frame was refined, None before the first.
     last_relocalization : int
-        Id of the frame in which the camera was last found again. 0 at the beginning, as if the
-        first frame had been: a single camera's young map has to prove itself.
+        Id of the frame in which the camera was last found again, or a map began. 0 at the
+        beginning.
     map_is_fixed : bool
         The map is not to change: what is seen of it is not counted.
     searches_loaded_map : bool
