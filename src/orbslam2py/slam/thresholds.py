@@ -62,6 +62,10 @@ class InitializationThresholds:
     third_view_share: float = 0.2
     """A third view says something if it has moved by this share of the way between the two, from
     both of them ..."""
+    third_view_points: int = 30
+    """... sees at least so many of the points that are placed between them ..."""
+    fewer_third_view_points: int = 20
+    """... or, where none does, so many ..."""
     third_view_fits: float = 0.75
     """... and agrees when it sees this share of the points where they should be."""
     clearly_worse: float = 2.0

@@ -20,10 +20,6 @@ from orbslam2py.slam.thresholds import InitializationThresholds
 
 Motion: TypeAlias = core.TwoViewResult | core.TwoViewMotion
 
-#: Points that a third view must see to be asked ...
-FEWEST_COMMON = 30
-#: ... and where none sees as many.
-FEWEST_COMMON_AFAR = 20
 #: Limit of squared errors over their variance: 95 %, two degrees of freedom.
 INLIER_CHI2 = 5.991
 _MOST_PARALLAX = 5.0  # degrees that count: more does not make a better start
@@ -130,13 +126,13 @@ class ThirdViews:
             for third in others
             if _moved(third, view, limits)
         ]
-        thirds = ThirdViews(tuple(near), FEWEST_COMMON)
+        thirds = ThirdViews(tuple(near), limits.third_view_points)
         if any(thirds.asks(candidate, third) for third in near):
             return thirds
         others = [third for third in (*kept.distant, *kept.views) if third is not view]
         every = (ThirdView(third, view.all_partners(third)) for third in others)
         afar = tuple(third for third in every if _lies_between(third, view, limits))
-        return ThirdViews(afar, FEWEST_COMMON_AFAR)
+        return ThirdViews(afar, limits.fewer_third_view_points)
 
     def asks(self, candidate: Candidate, third: ThirdView) -> bool:
         """Whether a view sees enough of what each of the motions has placed."""
