@@ -71,9 +71,9 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     commit = version()
     path: Path = arguments.csv or CHECKOUT / "build" / "holding_on" / f"{commit}.csv"
     cases = chosen_cases(arguments)
-    rows = {} if arguments.again else read_rows(path)
+    rows = read_rows(path)
     write_rows(path, rows.values())
-    missing = [case for case in cases if case.key not in rows]
+    missing = [case for case in cases if arguments.again or case.key not in rows]
     for done, row in enumerate(all_rows(missing, arguments.jobs), 1):
         rows[row["key"]] = row
         append_row(path, row)

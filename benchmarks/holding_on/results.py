@@ -17,10 +17,12 @@ from benchmarks.harness.tables import new_table
 from benchmarks.holding_on.judgement import Figures
 from benchmarks.holding_on.made_up import BLOCK
 from benchmarks.holding_on.scene import Case
+from orbslam2py._files import atomic_write
 
 Row = dict[str, Any]
 _NAMES = [field.name for field in dataclasses.fields(Figures)]
 COLUMNS = ["key", "situation", "sensor", "features", "seed", *_NAMES, "options"]
+_FIRST_COLUMNS = b"key,situation,sensor,"  # of every version
 #: What is asked for.
 LATE = 2.0  # seconds after enough parallax
 
@@ -39,10 +41,13 @@ def row_of(case: Case, figures: Figures) -> Row:
 def read_rows(path: Path) -> dict[str, Row]:
     """Rows by their keys; none without a file.
 
-    A line that was cut short is left out, and so are those of a version with other figures.
+    A line that was cut short is left out, and so are those of a version with other figures. Of
+    another kind of file the program ends: nothing may be written over it.
     """
-    if not path.is_file():
+    if not path.exists() or (path.is_file() and path.stat().st_size == 0):
         return {}
+    if not path.is_file() or not path.read_bytes().startswith(_FIRST_COLUMNS):
+        raise SystemExit(f"{path} is no file of runs of this benchmark; give another --csv")
     kinds = {field.name: field.type for field in dataclasses.fields(Figures)}
     rows = {}
     with path.open(newline="", encoding="utf-8") as file:
@@ -60,7 +65,7 @@ def read_rows(path: Path) -> dict[str, Row]:
 def write_rows(path: Path, rows: Iterable[Row]) -> None:
     """Write all rows anew: a file that was cut short is whole again."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with atomic_write(path) as file:
         writer = csv.DictWriter(file, COLUMNS)
         writer.writeheader()
         writer.writerows(rows)

@@ -9,7 +9,20 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from orbslam2py._files import atomic_write
+
 Row = dict[str, Any]
+
+
+_BEGIN = '{"key": '
+
+
+def _begins_as_row(line: str) -> bool:
+    return _BEGIN.startswith(line[: len(_BEGIN)])
+
+
+def _is_row(line: str) -> bool:
+    return line.startswith(_BEGIN) and line.endswith("}")
 
 
 class Rows:
@@ -27,10 +40,14 @@ class Rows:
         if path is not None and path.is_file():
             lines = path.read_text(encoding="utf-8").splitlines()
             # The last line of a program that was killed may be cut short.
-            whole = [line for line in lines if line.endswith("}")]
+            whole = lines if not lines or lines[-1].endswith("}") else lines[:-1]
+            if not (all(map(_is_row, whole)) and all(map(_begins_as_row, lines[-1:]))):
+                # Nothing may be written over it.
+                raise SystemExit(f"{path} is no file of runs of this benchmark; give another one")
             self._rows = {row["key"]: row for row in map(json.loads, whole)}
             if len(whole) < len(lines):
-                path.write_text("".join(f"{line}\n" for line in whole), encoding="utf-8")
+                with atomic_write(path) as file:
+                    file.writelines(f"{line}\n" for line in whole)
 
     def get(self, key: str, make: Callable[[], Row]) -> Row:
         """Return the row of a name; it is made and kept if it is not there."""

@@ -9,6 +9,7 @@ from itertools import islice
 import cv2
 import numpy as np
 import pytest
+from benchmarks.holding_on import __main__ as program
 from benchmarks.holding_on.judgement import judge
 from benchmarks.holding_on.made_up import (
     SENSORS,
@@ -212,6 +213,47 @@ def test_an_interrupted_file_is_read_and_made_whole(tmp_path):
     older = path.read_text().replace("path_off", "a_figure_that_went")
     path.write_text(older)
     assert read_rows(path) == {}, "played again"
+
+
+@pytest.mark.parametrize("text", ["root:x:0:0:root", "time,x,y,z\n1,2,3,4\n"])
+def test_another_file_is_not_written_over(tmp_path, monkeypatch, text):
+    path = tmp_path / "precious"
+    path.write_text(text)
+    for again in ([], ["--again"]):
+        monkeypatch.setattr("sys.argv", ["holding_on", "--runs", "1", "--csv", str(path), *again])
+        with pytest.raises(SystemExit, match="no file of runs"):
+            program.main()
+    assert path.read_text() == text
+    with pytest.raises(SystemExit, match="no file of runs"):
+        read_rows(tmp_path)
+
+
+def test_an_empty_file_gets_the_rows(tmp_path):
+    path = tmp_path / "runs.csv"
+    path.touch()
+    assert read_rows(path) == {}
+
+
+def test_what_is_played_again_stands_beside_what_is_not(tmp_path, monkeypatch):
+    first, other = (
+        MadeUpCase(SITUATIONS[0], "rgbd", 400, 3),
+        MadeUpCase(SITUATIONS[0], "mono", 400, 3),
+    )
+    path = tmp_path / "runs.csv"
+    figures = judge(honest_run())
+    write_rows(path, [row_of(case, figures) for case in (first, other)])
+    monkeypatch.setattr(program, "chosen_cases", lambda arguments: [first])
+    monkeypatch.setattr(
+        program,
+        "all_rows",
+        lambda cases, jobs: [row_of(case, figures) | {"wrong": 7} for case in cases],
+    )
+    monkeypatch.setattr("sys.argv", ["holding_on", "--csv", str(path), "--again"])
+    program.main()
+    assert {key: row["wrong"] for key, row in read_rows(path).items()} == {
+        first.key: 7,
+        other.key: 0,
+    }
 
 
 def test_a_run_is_the_same_each_time():
