@@ -38,7 +38,7 @@ class Rows:
         self._path = path
         self._rows: dict[str, Row] = {}
         if path is not None and path.is_file():
-            lines = path.read_text(encoding="utf-8").splitlines()
+            lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
             # The last line of a program that was killed may be cut short.
             whole = lines if not lines or lines[-1].endswith("}") else lines[:-1]
             if not (all(map(_is_row, whole)) and all(map(_begins_as_row, lines[-1:]))):

@@ -81,13 +81,15 @@ def test_what_was_run_is_not_run_again(tmp_path: Path) -> None:
     assert Rows(path).get("b", lambda: pytest.fail("it stands in the file"))["value"] == 2
 
 
-@pytest.mark.parametrize("text", ["root:x:0:0:root\nbin:x:1:1", '{"other": 1}\n', "precious"])
-def test_another_file_is_not_written_over(tmp_path: Path, text: str) -> None:
+@pytest.mark.parametrize(
+    "content", [b"root:x:0:0:root\nbin:x:1:1", b'{"other": 1}\n', b"precious", b"\x89PNG\xff\xfe"]
+)
+def test_another_file_is_not_written_over(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "precious"
-    path.write_text(text)
+    path.write_bytes(content)
     with pytest.raises(SystemExit, match="no file of runs"):
         Rows(path)
-    assert path.read_text() == text
+    assert path.read_bytes() == content
 
 
 @pytest.mark.parametrize("n_pieces", range(draws.FEWEST, draws.MOST + 1))
