@@ -7,6 +7,7 @@
 #include <sstream>
 #include <string>
 
+#include "base/covariance.hpp"
 #include "base/errors.hpp"
 #include "base/pose.hpp"
 #include "base/scale_pyramid.hpp"
@@ -201,6 +202,17 @@ void bind_scale_pyramid(py::module_& module) {
            "Level at which a point is expected that was seen at most `max_distance` away.");
 }
 
+void bind_covariance(py::module_& module) {
+  module.def("position_deviation", &position_deviation, py::arg("covariance"),
+             "Standard deviation of the position by the covariance (6, 6) of a pose, rotation and\n"
+             "translation: all directions together.");
+  module.def(
+      "widened_covariance", &widened_covariance, py::arg("covariance"), py::arg("factor"),
+      py::arg("errors"),
+      "A covariance (6, 6) of `factor` times the variances, and of independent errors along\n"
+      "a list of tangents (6,) as long as their standard deviations.");
+}
+
 void bind_seeds(py::module_& module) {
   module.def(
       "seed_of",
@@ -218,6 +230,7 @@ void bind_seeds(py::module_& module) {
 void bind_base(py::module_& module) {
   register_errors(module);
   bind_pose(module);
+  bind_covariance(module);
   bind_scale_pyramid(module);
   bind_seeds(module);
 }

@@ -22,8 +22,9 @@ double sharpness(const Frame& frame, std::size_t n_usual) {
   }
   if (frame.keypoints.size() > n_usual) {
     const std::size_t n = responses.size() * n_usual / frame.keypoints.size();
-    std::partial_sort(responses.begin(), responses.begin() + static_cast<std::ptrdiff_t>(n),
-                      responses.end(), std::greater<>());
+    // In any order: they are whole numbers, whose sum is exact.
+    std::nth_element(responses.begin(), responses.begin() + static_cast<std::ptrdiff_t>(n),
+                     responses.end(), std::greater<>());
     responses.resize(n);
   }
   return std::accumulate(responses.begin(), responses.end(), 0.0);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "base/errors.hpp"
 
@@ -29,19 +30,17 @@ SmallImage shrink_image(const cv::Mat& grey) {
   const auto area = static_cast<std::uint32_t>(rows_used * small.shrink);
   small.pixels.reserve(static_cast<std::size_t>(small.width) *
                        static_cast<std::size_t>(small.height));
-  std::vector<std::uint32_t> sums(static_cast<std::size_t>(small.width));
+  // Whole rows are added first: that is many columns at once, and no square is that wide.
+  std::vector<std::uint32_t> columns(static_cast<std::size_t>(small.width) *
+                                     static_cast<std::size_t>(small.shrink));
   for (int row = 0; row < small.height; ++row) {
-    std::fill(sums.begin(), sums.end(), 0U);
+    std::fill(columns.begin(), columns.end(), 0U);
     for (int y = 0; y < small.shrink; y += kRowStep) {
-      const std::uint8_t* pixel = grey.ptr<std::uint8_t>(row * small.shrink + y);
-      for (auto& sum : sums) {
-        std::uint32_t part = 0;
-        for (int x = 0; x < small.shrink; ++x) part += pixel[x];
-        sum += part;
-        pixel += small.shrink;
-      }
+      const std::uint8_t* pixels = grey.ptr<std::uint8_t>(row * small.shrink + y);
+      for (std::size_t x = 0; x < columns.size(); ++x) columns[x] += pixels[x];
     }
-    for (const std::uint32_t sum : sums) {
+    for (auto column = columns.begin(); column != columns.end(); column += small.shrink) {
+      const std::uint32_t sum = std::accumulate(column, column + small.shrink, 0U);
       small.pixels.push_back(static_cast<std::uint8_t>((sum + area / 2) / area));
     }
   }

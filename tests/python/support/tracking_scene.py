@@ -148,6 +148,8 @@ class FakeCore:
     """The verbs tracking calls; each takes its next answer from a list, or its usual one."""
 
     Pose = _core.Pose
+    position_deviation = staticmethod(_core.position_deviation)
+    widened_covariance = staticmethod(_core.widened_covariance)
     FIRST_TEMPORARY_POINT = _core.FIRST_TEMPORARY_POINT
     motion: deque[int] = field(default_factory=deque)
     words: deque[int] = field(default_factory=deque)

@@ -86,7 +86,7 @@ class EvidenceJudge:
             What found the pose.
         """
         frame, estimate = refined.frame, refined.estimate
-        spread = core.spread_of_inliers(frame)
+        spread = refined.spread
         figures = _figures(refined)
         usual = self._usual or figures
         turn, move = _changes(frame, motion)
@@ -221,24 +221,21 @@ class EvidenceJudge:
         surprise = min(surprise, limits.largest_surprise)
         looseness = max(1.0, evidence.deviation_to_usual / limits.usual_deviation)
         n_inliers = max(refined.estimate.n_inliers, limits.fewest_inliers)
-        covariance = covariance * (
+        factor = (
             self._error_factor(refined, evidence)
             * (1.0 + (limits.few_inliers / n_inliers) ** 4)
             * (1.0 if self._change.is_known else self._unknown_factor(evidence))
             * (1.0 + surprise**2)
             * looseness
         )
-        way = self._way_while_open(refined.frame, evidence, motion)
-        if way is not None:
-            # The variance of a moment anywhere on it.
-            covariance = covariance + way[:, None] * way / 12
-        move = motion.move_of_map(refined.frame)
-        if move is not None:
-            covariance = covariance + move[:, None] * move
-        beyond = None if change is None else self._change.beyond(change)
-        if beyond is not None:
-            covariance = covariance + limits.mistaken_share * beyond[:, None] * beyond
-        return covariance
+        errors = (
+            self._error_while_open(refined.frame, evidence, motion),
+            motion.move_of_map(refined.frame),
+            self._mistake(change),
+        )
+        known = [error for error in errors if error is not None]
+        # One call: NumPy's take longer than what they do here, and in each frame.
+        return core.widened_covariance(covariance, factor, known)
 
     def _unknown_factor(self, evidence: Evidence) -> float:
         """How many times the variance is while it is not known what is usual.
@@ -254,7 +251,7 @@ class EvidenceJudge:
         """How many times the variance is by how the matches fit, and how many are independent."""
         limits = self.limits
         per_cell = refined.estimate.n_inliers / max(1, evidence.n_cells)
-        spread = core.spread_of_inliers(refined.frame)
+        spread = refined.spread
         # Places anywhere on a smear vary by as much, in terms of what the inliers are taken for.
         smeared = evidence.smear**2 / 12 / spread.variance if spread.variance > 0 else 0.0
         together = max(1.0, spread.correlation, 1.0 + per_cell * smeared)
@@ -266,12 +263,13 @@ class EvidenceJudge:
             factor = max(factor, larger**2 * max(together, per_cell))
         return factor
 
-    def _way_while_open(
+    def _error_while_open(
         self, frame: core.TrackedFrame, evidence: Evidence, motion: MotionModel
     ) -> FloatArray | None:
-        """The part (6,) of the camera's way that a smeared image was taken on; None if sharp.
+        """How far (6,) the camera may be off as a smeared image was taken; None if sharp.
 
-        By how long the smear is beside how far the image moved since the last one.
+        It was taken on a part of its way, told by how long the smear is beside how far the image
+        moved since the last one: the deviation of a moment anywhere on that.
         """
         limits = self.limits
         smear = limits.smear_of_sharpest * (evidence.smear - limits.visible_smear)
@@ -282,8 +280,13 @@ class EvidenceJudge:
         assert T_lw is not None
         moved = core.median_displacement(frame, T_lw)
         share = 1.0 if moved <= smear else smear / moved
-        way: FloatArray = share * T_cl.log()
-        return way
+        error: FloatArray = (share / math.sqrt(12)) * T_cl.log()
+        return error
+
+    def _mistake(self, change: FloatArray | None) -> FloatArray | None:
+        """How far (6,) the pose may be a mistake, by a change of motion that is not usual."""
+        beyond = None if change is None else self._change.beyond(change)
+        return None if beyond is None else math.sqrt(self.limits.mistaken_share) * beyond
 
     def _errs_suddenly(self, error: float) -> bool:
         """Whether a median error is larger than that of images before, and than it varies."""

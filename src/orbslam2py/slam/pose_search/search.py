@@ -6,8 +6,8 @@ Mur-Artal, Montiel and Tardos, 2015, sections V-B to V-D; ``docs/method/tracking
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -34,14 +34,16 @@ class RefinedPose:
     n_predicted: int
     """Points that should be in view."""
 
-    @property
+    @cached_property
     def position_deviation(self) -> float:
         """Standard deviation of the position, all directions together [m]; 0 if not known."""
         covariance = self.estimate.covariance
-        if covariance is None:
-            return 0.0
-        # Three numbers: NumPy's functions take longer than what they do here, and in each frame.
-        return math.sqrt(max(0.0, float(covariance[3, 3] + covariance[4, 4] + covariance[5, 5])))
+        return 0.0 if covariance is None else core.position_deviation(covariance)
+
+    @cached_property
+    def spread(self) -> core.InlierSpread:
+        """How the inliers are spread over image and depth, and how far they are wrong together."""
+        return core.spread_of_inliers(self.frame)
 
 
 class PoseSearch:

@@ -51,12 +51,15 @@ class BlurWatch:
         if sharpness <= 0:
             return False
         detail = core.fine_detail(frame)
-        limits = self._limits
-        usual_sharpness = usual_detail = 0.0
-        if len(self._recent) >= limits.fewest:
-            usual_sharpness, usual_detail = map(statistics.median, zip(*self._recent, strict=True))
+        recent = list(self._recent)
         self._recent.append((sharpness, detail))
+        limits = self._limits
+        if len(recent) < limits.fewest:
+            return False
+        usual_sharpness = statistics.median(known for known, _ in recent)
+        if sharpness >= limits.share * usual_sharpness:
+            return False
         # In a dark image all corners are weak, the coarse ones as much as the fine ones. Without
         # coarse levels nothing is known of that.
-        dark = usual_detail > 0 and detail >= limits.detail_share * usual_detail
-        return sharpness < limits.share * usual_sharpness and not dark
+        usual_detail = statistics.median(known for _, known in recent)
+        return usual_detail <= 0 or detail < limits.detail_share * usual_detail
