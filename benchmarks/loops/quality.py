@@ -7,7 +7,11 @@ Without loop closing a few of the seeds run again, to show the drift there is.
 
     python -m benchmarks.loops.quality                                     all cases, ten seeds
     python -m benchmarks.loops.quality --cases corridor --sensors rgbd --seeds 3
+    python -m benchmarks.loops.quality --cases two-rooms --sensors mono --first-image 196
     python -m benchmarks.loops.quality --list
+
+Versions that begin their maps at another image are compared by the path from the later one on
+(``--first-image``).
 
 Exits with 1 if a row misses its limits.
 """
@@ -66,6 +70,8 @@ class Task:
     seed: int
     loop_closing: bool
     deterministic: bool
+    first_image: int = 0
+    """The ATE is that of the path from here on."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +121,11 @@ def carry_out(task: Task) -> Outcome:
     if result.error is not None:
         outcome.failure = str(result.error)
     _judge_loops(outcome, case, result, truth)
-    _judge_lap(outcome, case, result.tracked_trajectory(), truth, sequence.lap_length)
+    estimate = result.tracked_trajectory()
+    judged = estimate.timestamps >= truth.timestamps[task.first_image]
+    _judge_path(outcome, case, estimate.select(judged), truth)
+    if sequence.lap_length is not None:
+        _judge_lap(outcome, case, estimate, truth, sequence.lap_length)
     return outcome
 
 
@@ -141,18 +151,23 @@ def _pose_at(truth: Trajectory, timestamp: float) -> np.ndarray:
     return truth.T_wc[int(np.argmin(np.abs(truth.timestamps - timestamp)))]
 
 
+def _judge_path(outcome: Outcome, case: Case, estimate: Trajectory, truth: Trajectory) -> None:
+    alignment = Alignment.SIM3 if case.sensor is Sensor.MONOCULAR else Alignment.SE3
+    try:
+        evaluation = evaluate_trajectory(estimate, truth, alignment)
+    except DatasetError as error:
+        outcome.failure = outcome.failure or str(error)
+        return
+    outcome.ate = None if evaluation.ate is None else evaluation.ate.rmse
+
+
 def _judge_lap(
-    outcome: Outcome, case: Case, estimate: Trajectory, truth: Trajectory, lap: float | None
+    outcome: Outcome, case: Case, estimate: Trajectory, truth: Trajectory, lap: float
 ) -> None:
     single = case.sensor is Sensor.MONOCULAR
     try:
-        evaluation = evaluate_trajectory(
-            estimate, truth, Alignment.SIM3 if single else Alignment.SE3
-        )
-        outcome.ate = None if evaluation.ate is None else evaluation.ate.rmse
-        if lap is not None:
-            outcome.lap_percent = lap_error(estimate, truth, lap, with_scale=single).percent
-            outcome.scale_percent = 100 * scale_drift(estimate, truth, lap)
+        outcome.lap_percent = lap_error(estimate, truth, lap, with_scale=single).percent
+        outcome.scale_percent = 100 * scale_drift(estimate, truth, lap)
     except DatasetError as error:
         outcome.failure = outcome.failure or str(error)
 
@@ -273,6 +288,7 @@ def parse() -> argparse.Namespace:
         parser,
         seeds=(10, "runs of every case"),
         first_seed=(0, "seed of the first of them"),
+        first_image=(0, "the ATE is that of the path from here on"),
         without=(1, "of these, again without loops"),
         jobs=(1, "runs at the same time"),
     )
@@ -282,6 +298,8 @@ def parse() -> argparse.Namespace:
     arguments = parser.parse_args()
     if arguments.seeds < 1:
         parser.error("--seeds must be 1 or more")
+    if arguments.first_image < 0:
+        parser.error("--first-image must be 0 or more")
     return arguments
 
 
@@ -290,7 +308,8 @@ def tasks_of(case: Case, arguments: Any) -> list[Task]:
     first, seeds, without = arguments.first_seed, arguments.seeds, arguments.without
     runs = [(seed, True) for seed in range(seeds)]
     runs += [(seed, False) for seed in range(min(without, seeds))]
-    return [Task(case, first + seed, loops, arguments.deterministic) for seed, loops in runs]
+    deterministic, first_image = arguments.deterministic, arguments.first_image
+    return [Task(case, first + seed, loops, deterministic, first_image) for seed, loops in runs]
 
 
 def main() -> None:
@@ -305,6 +324,9 @@ def main() -> None:
         for case in chosen:
             console.print(f"{case}: {case.describe()}", highlight=False)
         return
+    for case in chosen:
+        if arguments.first_image >= len(case.sequence(arguments.first_seed)):
+            sys.exit(f"--first-image {arguments.first_image}: {case} has fewer images")
     tasks = [task for case in chosen for task in tasks_of(case, arguments)]
     outcomes: dict[Case, list[tuple[Task, Outcome]]] = {case: [] for case in chosen}
     for task, outcome in zip(tasks, carry_out_all(tasks, arguments.jobs), strict=True):

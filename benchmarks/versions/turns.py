@@ -5,11 +5,14 @@ The other version is a checkout in which it is installed (``git worktree add ../
 there ``make install``). Each turn plays every sequence with both, one after the other, so that both
 see the same machine. With threads a turn has a seed of its own; deterministic runs differ by
 nothing but their first image, so there each begins one image later. Speed wants a machine on which
-nothing else runs.
+nothing else runs. Where a recording's own calibration is in question, both take another one with
+``--settings``, or right images moved by a part of a pixel with ``--right-moved``.
 
     python -m benchmarks.versions.turns ../before
     python -m benchmarks.versions.turns ../before --turns 10 --deterministic --only stereo
     python -m benchmarks.versions.turns ../before --options "--effort thorough"
+    python -m benchmarks.versions.turns ../before --only redkitchen --settings other.yaml
+    python -m benchmarks.versions.turns ../before --only stereo --right-moved 0.085
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ from __future__ import annotations
 import argparse
 import shlex
 import sys
+import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +28,7 @@ from typing import Any
 
 from benchmarks.harness.arguments import add_counts, add_width, console_of, new_parser
 from benchmarks.harness.folders import needed_shared_folder
+from benchmarks.harness.moved_right import with_moved_right_images
 from benchmarks.harness.runs import median_of, run_report
 from benchmarks.harness.tables import new_table
 
@@ -46,6 +51,8 @@ CASES = (
     Case("KITTI 06, mono", "kitti_06_head51_stereo", "mono"),
     Case("redkitchen, mono", "7scenes_redkitchen_head250", "mono"),
 )
+# Rectification is off by parts of a pixel.
+_MOST_MOVED = 16
 _COLUMNS = (
     "frames/s before",
     "now",
@@ -61,11 +68,10 @@ _COLUMNS = (
 )
 
 
-def options_of_turn(turn: int, *, deterministic: bool) -> list[str]:
-    """What tells the runs of one version apart."""
-    if deterministic:
-        return ["--deterministic", "--start", str(turn)]
-    return ["--seed", str(turn)]
+def options_of_turn(turn: int, *, deterministic: bool, settings: Path | None = None) -> list[str]:
+    """What both versions' runs have in common; what tells the turns apart comes first."""
+    own = ["--deterministic", "--start", str(turn)] if deterministic else ["--seed", str(turn)]
+    return own if settings is None else [*own, "--settings", str(settings.resolve())]
 
 
 def python_of(checkout: Path) -> str:
@@ -103,16 +109,39 @@ def main() -> None:
     parser.add_argument("--only", metavar="TEXT", default="", help="cases with this in their name")
     parser.add_argument("--deterministic", action="store_true", help="[with threads]")
     parser.add_argument("--options", default="", help="of this version's runs alone, one string")
+    parser.add_argument(
+        "--settings", type=Path, metavar="FILE", help="of both versions' runs [each recording's]"
+    )
+    parser.add_argument(
+        "--right-moved",
+        type=float,
+        metavar="PIXELS",
+        help="right images, for both versions, moved left by so much; stereo cases alone",
+    )
     add_counts(parser, turns=(5, "turns"))
     add_width(parser, 170)
     arguments = parser.parse_args()
     folder = needed_shared_folder() / "sequences"
     python = python_of(arguments.before)
-    cases = [case for case in CASES if arguments.only in case.name]
+    moved = arguments.right_moved
+    if moved is not None and not abs(moved) < _MOST_MOVED:
+        parser.error(f"--right-moved {moved}: less than {_MOST_MOVED} pixels to either side")
+    cases = [
+        case
+        for case in CASES
+        if arguments.only in case.name and (moved is None or case.sensor == "stereo")
+    ]
     if not cases or arguments.turns < 1:
         names = "; ".join(case.name for case in CASES)
         parser.error(f"nothing to play: --turns {arguments.turns}, and --only one of: {names}")
-    print_turns(console_of(arguments).print, cases, folder, python, arguments)
+    if arguments.settings is not None and not arguments.settings.is_file():
+        parser.error(f"--settings {arguments.settings}: there is no such file")
+    with tempfile.TemporaryDirectory() as copies:
+        if moved is not None:
+            for case in cases:
+                with_moved_right_images(folder / case.folder, moved, Path(copies) / case.folder)
+            folder = Path(copies)
+        print_turns(console_of(arguments).print, cases, folder, python, arguments)
 
 
 def print_turns(
@@ -130,7 +159,9 @@ def print_turns(
         before: list[Report] = []
         now: list[Report] = []
         for turn in range(arguments.turns):
-            options = options_of_turn(turn, deterministic=arguments.deterministic)
+            options = options_of_turn(
+                turn, deterministic=arguments.deterministic, settings=arguments.settings
+            )
             place = folder / case.folder
             before.append(run_report(place, case.sensor, *options, python=python))
             more = shlex.split(arguments.options)
