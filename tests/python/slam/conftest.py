@@ -11,7 +11,13 @@ from orbslam2py import Sensor, System
 from orbslam2py._worker import Worker
 from orbslam2py.slam import keyframe_decision, tracking
 from orbslam2py.slam.evidence import harder_search, judgement, smear
-from orbslam2py.slam.pose_search import first_estimate, motion_model, search
+from orbslam2py.slam.pose_search import (
+    first_estimate,
+    local_map_search,
+    motion_model,
+    refined_pose,
+    search,
+)
 from orbslam2py.slam.relocalization import blur
 from orbslam2py.slam.thresholds import EvidenceThresholds, TrackingThresholds
 from support.interleaving import LIMIT, Stage
@@ -51,7 +57,8 @@ def core(monkeypatch: pytest.MonkeyPatch) -> FakeCore:
     """Stands in for the verbs that tracking calls."""
     core = FakeCore()
     for module in (
-        *(tracking, first_estimate, motion_model, search, keyframe_decision),
+        *(tracking, keyframe_decision),
+        *(first_estimate, motion_model, search, local_map_search, refined_pose),
         *(harder_search, judgement, smear, blur),
     ):
         monkeypatch.setattr(module, "core", core)

@@ -13,7 +13,7 @@ from orbslam2py import _core as core
 from orbslam2py.slam import frame_recorder
 from orbslam2py.slam.effort import Effort
 from orbslam2py.slam.frame_recorder import FrameRecorder
-from orbslam2py.slam.pose_search import PoseSearch, RefinedPose
+from orbslam2py.slam.pose_search import LocalMapSearch, PoseSearch, RefinedPose
 from orbslam2py.slam.second_look import SecondLook
 from orbslam2py.slam.thresholds import TrackingThresholds
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
@@ -107,12 +107,12 @@ def test_a_look_that_does_not_show_clearly_more_is_not_followed(
     """It may have found other things, and led to where still other ones are found."""
     began: list[core.TrackedFrame] = []
 
-    def remember(_: PoseSearch, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
+    def remember(_: LocalMapSearch, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
         assert in_doubt
         began.append(refined.frame)
         return refined
 
-    monkeypatch.setattr(PoseSearch, "look_afresh", remember)
+    monkeypatch.setattr(LocalMapSearch, "look_afresh", remember)
     aside = walk.put_aside(walk.no_keyframe(), every=1)
     assert way(walk.second_look(aside, in_doubt=True), aside) < 1e-9
     assert way(began[0], aside) < 1e-9
@@ -322,11 +322,11 @@ def test_only_the_last_look_is_matched_from_nothing(
 ) -> None:
     looked: list[tuple[int, bool]] = []
 
-    def note(_: PoseSearch, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
+    def note(_: LocalMapSearch, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
         looked.append((refined.frame.id, in_doubt))
         return refined
 
-    monkeypatch.setattr(PoseSearch, "look_afresh", note)
+    monkeypatch.setattr(LocalMapSearch, "look_afresh", note)
     frame = walk.no_keyframe()
     walk.second_look(frame, finished=False)
     assert looked == []

@@ -18,7 +18,7 @@ from orbslam2py.slam.evidence.belief import Belief
 from orbslam2py.slam.evidence.harder_search import HarderSearch
 from orbslam2py.slam.evidence.judgement import EvidenceJudge
 from orbslam2py.slam.keyframe_decision import KeyframeDecision
-from orbslam2py.slam.pose_search import PoseSearch, RefinedPose
+from orbslam2py.slam.pose_search import LocalMapSearch, PoseSearch, RefinedPose
 from orbslam2py.slam.records import TrackingOutcome
 from orbslam2py.slam.thresholds import EvidenceThresholds, TrackingThresholds
 from orbslam2py.slam.tracking import Tracking
@@ -378,7 +378,7 @@ class NoFurtherSearch:
         return first
 
 
-class NearSearch(PoseSearch):
+class NearSearch(LocalMapSearch):
     """Looks no further around than at first, nor afresh, and notes in which frames it was to."""
 
     def __init__(self, *parts: Any, **limits: Any) -> None:
@@ -414,14 +414,12 @@ class Scene:
         self.localize = False
         fakes: Any = self
         vocabulary: Any = "vocabulary"
-        self.search = search = NearSearch(
-            fakes.map,
-            vocabulary,
-            sensor,
-            MAX_FRAMES,
-            relocalizer=None,
-            thresholds=thresholds or TrackingThresholds(),
+        limits = thresholds or TrackingThresholds()
+        self.search = search = PoseSearch(
+            fakes.map, vocabulary, sensor, MAX_FRAMES, relocalizer=None, thresholds=limits
         )
+        self.around = NearSearch(fakes.map, sensor, search.probation, limits)
+        search.around = self.around
         judge = EvidenceJudge(search.motion_model_window, 500.0, evidence or CREDULOUS)
         again: Any = NoFurtherSearch() if evidence is None else HarderSearch(search, judge)
         self.tracking = Tracking(

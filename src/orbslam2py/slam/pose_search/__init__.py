@@ -6,13 +6,16 @@ from orbslam2py.slam.pose_search.first_estimate import (
     FirstEstimateInFixedMap,
     FirstEstimateInGrowingMap,
 )
+from orbslam2py.slam.pose_search.local_map_search import LocalMapSearch
 from orbslam2py.slam.pose_search.motion_model import MotionModel
-from orbslam2py.slam.pose_search.search import PoseSearch, RefinedPose
+from orbslam2py.slam.pose_search.refined_pose import RefinedPose
+from orbslam2py.slam.pose_search.search import PoseSearch
 
 __all__ = [
     "FirstEstimate",
     "FirstEstimateInFixedMap",
     "FirstEstimateInGrowingMap",
+    "LocalMapSearch",
     "MotionModel",
     "PoseSearch",
     "RefinedPose",

@@ -6,44 +6,19 @@ Mur-Artal, Montiel and Tardos, 2015, sections V-B to V-D; ``docs/method/tracking
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 
 import numpy as np
 
 from orbslam2py import _core as core
-from orbslam2py._arrays import IntArray
 from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.pose_search.local_map_search import LocalMapSearch
 from orbslam2py.slam.pose_search.motion_model import MotionModel
+from orbslam2py.slam.pose_search.probation import Probation
+from orbslam2py.slam.pose_search.refined_pose import RefinedPose
 from orbslam2py.slam.records import PoseEstimate, PoseMethod, Reason
 from orbslam2py.slam.relocalization import PlaceOfLoss, Relocalizer
 from orbslam2py.slam.thresholds import TrackingThresholds
-
-
-@dataclass(frozen=True)
-class RefinedPose:
-    """A pose with all that was found of the map around it."""
-
-    frame: core.TrackedFrame
-    """Holds pose and associations."""
-    estimate: PoseEstimate
-    local_map: core.LocalMap | None
-    """None in visual odometry, which does not look for the map."""
-    visible: IntArray
-    """Ids of the points in view that the first estimate did not hold."""
-    n_predicted: int
-    """Points that should be in view."""
-
-    @cached_property
-    def position_deviation(self) -> float:
-        """Standard deviation of the position, all directions together [m]; 0 if not known."""
-        covariance = self.estimate.covariance
-        return 0.0 if covariance is None else core.position_deviation(covariance)
-
-    @cached_property
-    def spread(self) -> core.InlierSpread:
-        """How the inliers are spread over image and depth, and how far they are wrong together."""
-        return core.spread_of_inliers(self.frame)
 
 
 class PoseSearch:
@@ -58,8 +33,7 @@ class PoseSearch:
     sensor : Sensor
         What the images come from.
     max_keyframe_interval : int
-        Frames of one second, during which a relocalization has to prove itself, unless it was
-        expected there.
+        Frames of one second: see `Probation`.
     relocalizer : Relocalizer, optional
         Finds lost frames in the map; without it none is found there.
     thresholds : TrackingThresholds
@@ -73,9 +47,10 @@ class PoseSearch:
         Shares most points with the last frame that had a pose, -1 before the first.
     local_map : orbslam2py._core.LocalMap or None
         Where the last frame was refined, None before the first.
-    last_relocalization : int
-        Id of the frame in which the camera was last found again, or a map began. 0 at the
-        beginning.
+    around : LocalMapSearch
+        Refines poses with the points around them.
+    probation : Probation
+        What is asked of frames after the camera was found again, or a map began.
     map_is_fixed : bool
         The map is not to change: what is seen of it is not counted.
     searches_loaded_map : bool
@@ -97,9 +72,10 @@ class PoseSearch:
         self._map = slam_map
         self._vocabulary = vocabulary
         self._sensor = sensor
-        self._max_keyframe_interval = max_keyframe_interval
         self._relocalizer = relocalizer
         self.limits = thresholds
+        self.probation = Probation(max_keyframe_interval, thresholds, has_depth=sensor.has_depth)
+        self.around = LocalMapSearch(slam_map, sensor, self.probation, thresholds)
         self.reset()
 
     def reset(self) -> None:
@@ -107,10 +83,7 @@ class PoseSearch:
         self.motion = MotionModel()
         self.reference_keyframe = -1
         self.local_map: core.LocalMap | None = None
-        self.last_relocalization = 0
-        self._was_found_again = False
-        # With depth a map has its points where they are: nothing has to be proven.
-        self._proves_from = self._proves_from_at_loss = None if self._sensor.has_depth else 0
+        self.probation.reset()
         self.initial_pose: core.Pose | None = None
         self.searches_loaded_map = False
         self.map_is_fixed = False
@@ -128,7 +101,7 @@ class PoseSearch:
             tracking was lost before.
         """
         if confirmed:
-            self._proves_from_at_loss = self._proves_from
+            self.probation.lose()
             self._place_of_loss = PlaceOfLoss(
                 self.motion.last, self.motion.velocity, self.reference_keyframe
             )
@@ -157,31 +130,6 @@ class PoseSearch:
         """Bring the last frame and the reference keyframe up to date with the map."""
         self.motion.follow_map(self._map)
         self.reference_keyframe = self._map.living(self.reference_keyframe)
-
-    def found_again(self, frame: core.TrackedFrame, *, where_expected: bool = False) -> None:
-        """The camera was found again in this frame.
-
-        Parameters
-        ----------
-        frame : orbslam2py._core.TrackedFrame
-            The frame.
-        where_expected : bool
-            Where it was just lost, or its motion led from there: it goes on as before the loss.
-            Elsewhere it has to prove itself for a second.
-        """
-        self.last_relocalization = frame.id
-        self._was_found_again = True
-        self._proves_from = self._proves_from_at_loss if where_expected else frame.id
-
-    def map_begun(self, frame_id: int) -> None:
-        """A map beside others, or after one that came to nothing, has begun with this frame."""
-        self.last_relocalization = frame_id
-        if not self._sensor.has_depth:
-            self._proves_from = frame_id
-
-    def just_relocalized(self, frame: core.TrackedFrame) -> bool:
-        """Whether the camera was found again in this frame or right before it."""
-        return frame.id < self.last_relocalization + self.limits.frames_after_relocalization
 
     @property
     def motion_model_window(self) -> float:
@@ -334,126 +282,10 @@ class PoseSearch:
 
         Nothing is remembered of it before `settle`: there may be several ways to a pose.
         """
-        local_map = core.select_local_map(self._map, frame)
-        n_held = frame.n_associated()
-        matches = core.match_local_map(
-            frame, local_map.points, first.discarded, self._local_map_window(frame)
-        )
-        optimized = core.optimize_pose(frame)
-        visible = matches.visible
-        found_again = self._was_found_again and self.just_relocalized(frame)
-        if found_again and optimized.n_inliers >= self.limits.map_matches:
-            # Wide windows find much that is wrong; where the camera is now, narrow ones find more.
-            frame.discard_outliers()
-            core.match_local_map(frame, local_map.points, first.discarded, self._usual_window())
-            optimized = core.optimize_pose(frame)
-        estimate = self._enough_found(frame, first, optimized)
-        if estimate.visual_odometry:
-            return self.beyond_the_map(frame, estimate)
-        return RefinedPose(frame, estimate, local_map, visible, n_held + len(visible))
-
-    def _enough_found(
-        self, frame: core.TrackedFrame, first: PoseEstimate, optimized: core.PoseEstimate
-    ) -> PoseEstimate:
-        """What a pose is by what was found of the local map."""
-        estimate = PoseEstimate(
-            n_matches=frame.n_associated(),
-            n_inliers=optimized.n_inliers,
-            covariance=optimized.covariance,
-            discarded=first.discarded,
-            relocalized=first.relocalized,
-            where_expected=first.where_expected,
-        )
-        if estimate.n_inliers < self._local_map_inliers(frame):
-            return estimate.failed(Reason.FEW_INLIERS_LOCAL_MAP)
-        if frame.n_map_inliers() < self.limits.map_matches:
-            # What the frame before measured speaks for itself, and says nothing of the map.
-            return replace(estimate, visual_odometry=True)
-        return estimate
-
-    def further_look_due(self, frame: core.TrackedFrame) -> bool:
-        """Whether a frame's pose is to be held against what lies further around, doubted or not."""
-        return frame.id % self.limits.further_look_every == 0
-
-    def look_further(self, refined: RefinedPose) -> RefinedPose:
-        """Look further around for the points that a pose should show and does not.
-
-        Where most of what is seen lies in one plane, a pose may be turned about it: the plane fits,
-        and what stands before or behind it is out of the windows, frame after frame.
-
-        Returns
-        -------
-        RefinedPose
-            That of another version of the frame, if more fits it; else the one that was given.
-        """
-        limits, local_map, narrow = self.limits, refined.local_map, self._usual_window()
-        if local_map is None or refined.frame.T_cw is None or narrow >= limits.further_look:
-            return refined
-        frame = core.TrackedFrame(refined.frame.features)
-        frame.copy_associations(refined.frame, ~refined.frame.outlier)
-        frame.T_cw = refined.frame.T_cw
-        frame.share_anchor(refined.frame)
-        # Those thrown out before as well: by a pose that is in question.
-        nothing = np.zeros(0, np.int64)
-        core.match_local_map(frame, local_map.points, nothing, limits.further_look)
-        if core.optimize_pose(frame).n_inliers < limits.map_matches:
-            return refined
-        frame.discard_outliers()
-        n_held = frame.n_associated()
-        visible = core.match_local_map(frame, local_map.points, nothing, narrow).visible
-        optimized = core.optimize_pose(frame)
-        elsewhere = _is_elsewhere(frame, refined, limits.elsewhere)
-        gain = limits.better_look if elsewhere else limits.much_better_look
-        if optimized.n_inliers <= gain * refined.estimate.n_inliers:
-            return refined
-        estimate = self._enough_found(frame, refined.estimate, optimized)
-        if estimate.visual_odometry or not estimate.found:
-            return refined
-        return RefinedPose(frame, estimate, local_map, visible, n_held + len(visible))
-
-    def look_afresh(self, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
-        """Match a frame with the map from nothing, so that its pose does not hang on the way to it.
-
-        What is matched with the frame before stays matched from frame to frame, and holds a pose
-        where it was. In a map that does not change, an image is to be in one place, whatever was
-        seen before it.
-
-        Parameters
-        ----------
-        refined : RefinedPose
-            Where the search begins. It is not changed.
-        in_doubt : bool
-            Whether few points held the pose, or wrong ones: then it is taken from wherever the
-            search leads.
-
-        Returns
-        -------
-        RefinedPose
-            That of another version of the frame, if it lies clearly elsewhere or, in doubt,
-            wherever it lies; the one that was given if too little of it is found.
-        """
-        limits, local_map = self.limits, refined.local_map
-        n_of_map = refined.frame.n_map_inliers()
-        # Depths that the frame before measured hold it as well, and make it steadier.
-        is_steady = n_of_map < refined.estimate.n_inliers and not in_doubt
-        if local_map is None or refined.frame.T_cw is None or is_steady:
-            return refined
-        frame = core.TrackedFrame(refined.frame.features)
-        frame.T_cw = refined.frame.T_cw
-        frame.share_anchor(refined.frame)
-        nothing = np.zeros(0, np.int64)
-        for window in (limits.afresh_window, self._usual_window()):
-            frame.clear_associations()
-            visible = core.match_local_map(frame, local_map.points, nothing, window).visible
-            optimized = core.optimize_pose(frame)
-        share = limits.afresh_share_in_doubt if in_doubt else limits.afresh_share
-        elsewhere = in_doubt or _is_elsewhere(frame, refined, limits.elsewhere)
-        if optimized.n_inliers < share * n_of_map or not elsewhere:
-            return refined
-        estimate = self._enough_found(frame, refined.estimate, optimized)
-        if estimate.visual_odometry or not estimate.found:
-            return refined
-        return RefinedPose(frame, estimate, local_map, visible, len(visible))
+        refined = self.around.refine(frame, first)
+        if refined.estimate.visual_odometry:
+            return self.beyond_the_map(frame, refined.estimate)
+        return refined
 
     def beyond_the_map(self, frame: core.TrackedFrame, odometry: PoseEstimate) -> RefinedPose:
         """Take a pose that hangs on the depths of the frame before; these should be in view."""
@@ -473,26 +305,3 @@ class PoseSearch:
             core.count_sightings(self._map, refined.frame, refined.visible)
         if self._sensor.has_depth:
             refined.frame.discard_outliers()
-
-    def _local_map_inliers(self, frame: core.TrackedFrame) -> int:
-        proves_from = self._proves_from
-        if proves_from is not None and frame.id < proves_from + self._max_keyframe_interval:
-            return self.limits.local_map_inliers_after_relocalization
-        return self.limits.local_map_inliers
-
-    def _local_map_window(self, frame: core.TrackedFrame) -> float:
-        if self.just_relocalized(frame):
-            return self.limits.local_map_window_after_relocalization
-        return self._usual_window()
-
-    def _usual_window(self) -> float:
-        is_rgbd = self._sensor is Sensor.RGBD
-        return self.limits.local_map_window_rgbd if is_rgbd else self.limits.local_map_window
-
-
-def _is_elsewhere(frame: core.TrackedFrame, refined: RefinedPose, deviations: float) -> bool:
-    """Whether another version of a frame lies so many deviations from a refined pose."""
-    T_cw = refined.frame.T_cw
-    assert T_cw is not None and frame.T_cw is not None
-    _, move = frame.T_cw.difference(T_cw)
-    return move > deviations * refined.position_deviation

@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Poses refined with the points of the map around them.
+
+Mur-Artal, Montiel and Tardos, 2015, section V-D; ``docs/method/tracking.md#local-map``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from orbslam2py import _core as core
+from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.pose_search.probation import Probation
+from orbslam2py.slam.pose_search.refined_pose import RefinedPose
+from orbslam2py.slam.records import PoseEstimate, Reason
+from orbslam2py.slam.thresholds import TrackingThresholds
+
+
+class LocalMapSearch:
+    """Matches frames with the points around them, as far around as there is reason to.
+
+    Nothing is remembered of a frame: there may be several ways to its pose.
+
+    Parameters
+    ----------
+    slam_map : orbslam2py._core.Map
+        The map.
+    sensor : Sensor
+        What the images come from.
+    probation : Probation
+        How much is asked of a frame.
+    thresholds : TrackingThresholds
+        Limits.
+    """
+
+    def __init__(
+        self,
+        slam_map: core.Map,
+        sensor: Sensor,
+        probation: Probation,
+        thresholds: TrackingThresholds,
+    ) -> None:
+        self._map = slam_map
+        self._probation = probation
+        self._limits = thresholds
+        is_rgbd = sensor is Sensor.RGBD
+        self._usual_window = (
+            thresholds.local_map_window_rgbd if is_rgbd else thresholds.local_map_window
+        )
+
+    def refine(self, frame: core.TrackedFrame, first: PoseEstimate) -> RefinedPose:
+        """Refine a first estimate with all points around it, and see how many are found.
+
+        Parameters
+        ----------
+        frame : orbslam2py._core.TrackedFrame
+            With the pose and the associations of the first estimate.
+        first : PoseEstimate
+            That.
+        """
+        local_map = core.select_local_map(self._map, frame)
+        n_held = frame.n_associated()
+        matches = core.match_local_map(
+            frame, local_map.points, first.discarded, self._window(frame)
+        )
+        optimized = core.optimize_pose(frame)
+        visible = matches.visible
+        found_again = self._probation.was_just_found(frame)
+        if found_again and optimized.n_inliers >= self._limits.map_matches:
+            # Wide windows find much that is wrong; where the camera is now, narrow ones find more.
+            frame.discard_outliers()
+            core.match_local_map(frame, local_map.points, first.discarded, self._usual_window)
+            optimized = core.optimize_pose(frame)
+        estimate = self._enough_found(frame, first, optimized)
+        return RefinedPose(frame, estimate, local_map, visible, n_held + len(visible))
+
+    def further_look_due(self, frame: core.TrackedFrame) -> bool:
+        """Whether a frame's pose is to be held against what lies further around, doubted or not."""
+        return frame.id % self._limits.further_look_every == 0
+
+    def look_further(self, refined: RefinedPose) -> RefinedPose:
+        """Look further around for the points that a pose should show and does not.
+
+        Where most of what is seen lies in one plane, a pose may be turned about it: the plane fits,
+        and what stands before or behind it is out of the windows, frame after frame.
+
+        Returns
+        -------
+        RefinedPose
+            That of another version of the frame, if more fits it; else the one that was given.
+        """
+        limits, local_map, narrow = self._limits, refined.local_map, self._usual_window
+        if local_map is None or refined.frame.T_cw is None or narrow >= limits.further_look:
+            return refined
+        frame = core.TrackedFrame(refined.frame.features)
+        frame.copy_associations(refined.frame, ~refined.frame.outlier)
+        frame.T_cw = refined.frame.T_cw
+        frame.share_anchor(refined.frame)
+        # Those thrown out before as well: by a pose that is in question.
+        nothing = np.zeros(0, np.int64)
+        core.match_local_map(frame, local_map.points, nothing, limits.further_look)
+        if core.optimize_pose(frame).n_inliers < limits.map_matches:
+            return refined
+        frame.discard_outliers()
+        n_held = frame.n_associated()
+        visible = core.match_local_map(frame, local_map.points, nothing, narrow).visible
+        optimized = core.optimize_pose(frame)
+        elsewhere = _is_elsewhere(frame, refined, limits.elsewhere)
+        gain = limits.better_look if elsewhere else limits.much_better_look
+        if optimized.n_inliers <= gain * refined.estimate.n_inliers:
+            return refined
+        estimate = self._enough_found(frame, refined.estimate, optimized)
+        if estimate.visual_odometry or not estimate.found:
+            return refined
+        return RefinedPose(frame, estimate, local_map, visible, n_held + len(visible))
+
+    def look_afresh(self, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
+        """Match a frame with the map from nothing, so that its pose does not hang on the way to it.
+
+        What is matched with the frame before stays matched from frame to frame, and holds a pose
+        where it was. In a map that does not change, an image is to be in one place, whatever was
+        seen before it.
+
+        Parameters
+        ----------
+        refined : RefinedPose
+            Where the search begins. It is not changed.
+        in_doubt : bool
+            Whether few points held the pose, or wrong ones: then it is taken from wherever the
+            search leads.
+
+        Returns
+        -------
+        RefinedPose
+            That of another version of the frame, if it lies clearly elsewhere or, in doubt,
+            wherever it lies; the one that was given if too little of it is found.
+        """
+        limits, local_map = self._limits, refined.local_map
+        n_of_map = refined.frame.n_map_inliers()
+        # Depths that the frame before measured hold it as well, and make it steadier.
+        is_steady = n_of_map < refined.estimate.n_inliers and not in_doubt
+        if local_map is None or refined.frame.T_cw is None or is_steady:
+            return refined
+        frame = core.TrackedFrame(refined.frame.features)
+        frame.T_cw = refined.frame.T_cw
+        frame.share_anchor(refined.frame)
+        nothing = np.zeros(0, np.int64)
+        for window in (limits.afresh_window, self._usual_window):
+            frame.clear_associations()
+            visible = core.match_local_map(frame, local_map.points, nothing, window).visible
+            optimized = core.optimize_pose(frame)
+        share = limits.afresh_share_in_doubt if in_doubt else limits.afresh_share
+        elsewhere = in_doubt or _is_elsewhere(frame, refined, limits.elsewhere)
+        if optimized.n_inliers < share * n_of_map or not elsewhere:
+            return refined
+        estimate = self._enough_found(frame, refined.estimate, optimized)
+        if estimate.visual_odometry or not estimate.found:
+            return refined
+        return RefinedPose(frame, estimate, local_map, visible, len(visible))
+
+    def _enough_found(
+        self, frame: core.TrackedFrame, first: PoseEstimate, optimized: core.PoseEstimate
+    ) -> PoseEstimate:
+        """What a pose is by what was found of the local map."""
+        estimate = PoseEstimate(
+            n_matches=frame.n_associated(),
+            n_inliers=optimized.n_inliers,
+            covariance=optimized.covariance,
+            discarded=first.discarded,
+            relocalized=first.relocalized,
+            where_expected=first.where_expected,
+        )
+        if estimate.n_inliers < self._probation.inliers_asked(frame):
+            return estimate.failed(Reason.FEW_INLIERS_LOCAL_MAP)
+        if frame.n_map_inliers() < self._limits.map_matches:
+            # What the frame before measured speaks for itself, and says nothing of the map.
+            return replace(estimate, visual_odometry=True)
+        return estimate
+
+    def _window(self, frame: core.TrackedFrame) -> float:
+        if self._probation.has_just_begun(frame):
+            return self._limits.local_map_window_after_relocalization
+        return self._usual_window
+
+
+def _is_elsewhere(frame: core.TrackedFrame, refined: RefinedPose, deviations: float) -> bool:
+    """Whether another version of a frame lies so many deviations from a refined pose."""
+    T_cw = refined.frame.T_cw
+    assert T_cw is not None and frame.T_cw is not None
+    _, move = frame.T_cw.difference(T_cw)
+    return move > deviations * refined.position_deviation
