@@ -472,7 +472,8 @@ class System:
         WorkerError
             If a worker has failed, or does not end in time.
         MapFileError
-            If the last autosave could not be written.
+            If the last autosave could not be written. Of several errors the first is raised, the
+            others are logged.
         """
         timeout = patience_of(timeout)
         self._shut_down = True
@@ -498,6 +499,9 @@ class System:
         # Only now: should a Ctrl-C come before, the threads are still ended with the interpreter.
         if ended:
             self._finalizer.detach()
+        # One error is raised; none of the others is to be lost.
+        for further in errors[1:]:
+            _log.error("%s", further)
         if errors:
             raise errors[0]
 

@@ -18,7 +18,7 @@ from typing import Any
 
 import pytest
 
-from orbslam2py import MapFileError, Sensor, System
+from orbslam2py import MapFileError, Sensor, System, WorkerError
 from orbslam2py.maps import MapContents, load_map, map_keeper, map_writer, verify_map_file
 from orbslam2py.maps.map_keeper import MapKeeper
 from orbslam2py.maps.map_rows import all_rows
@@ -285,6 +285,25 @@ def test_an_error_that_nobody_has_thought_of_is_told_and_saving_goes_on(
     assert text.startswith("autosave failed and will be tried again: ")
     assert type(error).__name__ in text
     assert str(error) in text
+
+
+def test_a_last_save_that_fails_is_told_though_a_worker_failed_as_well(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def unsaved(_: MapKeeper) -> None:
+        raise MapFileError("the disk is full")
+
+    slam = new_system()
+    small_sequences.play(slam, 10)
+    slam.autosave(tmp_path / "map.orbmap", every=1000.0)
+    stopped = WorkerError("local mapping stopped: out of order")
+    with monkeypatch.context() as patch:
+        patch.setattr(slam.pipeline.back_end, "finish", lambda **_: [stopped])
+        patch.setattr(MapKeeper, "stop_autosave", unsaved)
+        with caplog.at_level(logging.ERROR), pytest.raises(WorkerError, match="out of order"):
+            slam.shutdown()
+    assert [record.getMessage() for record in caplog.records] == ["the disk is full"]
+    slam.shutdown()
 
 
 def test_after_a_first_save_that_failed_late_the_next_one_is_whole(
