@@ -2,13 +2,12 @@
 """Stereo recordings whose right images are moved by a part of a pixel.
 
 Rectification that is off by that much makes all disparities too large or too small, which nothing
-but such a move takes out again. Exact for images without detail finer than two pixels (Fourier's
-shift theorem); grey values are rounded to eight bits.
+but such a move takes out. Away from the borders exact for images without detail finer than two
+pixels (Fourier's shift theorem); grey values are rounded to eight bits.
 """
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import cv2
@@ -18,6 +17,8 @@ from orbslam2py._arrays import ByteArray
 
 # Columns mirrored at either border, so that one border does not shine through at the other.
 _MARGIN = 32
+#: Less than so many pixels, of which none comes in from beyond the mirror.
+MOST_MOVED = _MARGIN / 2
 
 
 def moved_left(image: ByteArray, pixels: float) -> ByteArray:
@@ -28,7 +29,7 @@ def moved_left(image: ByteArray, pixels: float) -> ByteArray:
     image : array of uint8, (h, w)
         At least 33 columns.
     pixels : float
-        How far; negative: to the right.
+        How far; negative: to the right. Less than `MOST_MOVED` to either side.
     """
     padded = np.pad(image.astype(np.float64), ((0, 0), (_MARGIN, _MARGIN)), mode="reflect")
     frequencies = np.fft.rfftfreq(padded.shape[1])
@@ -39,16 +40,16 @@ def moved_left(image: ByteArray, pixels: float) -> ByteArray:
 
 
 def with_moved_right_images(folder: Path, pixels: float, copy: Path) -> Path:
-    """Copy a KITTI sequence, its right images (``image_1``) moved left by so many pixels.
+    """A KITTI sequence as it is but for its right images (``image_1``), which are moved left.
 
     Parameters
     ----------
     folder : Path
-        The sequence, which is not changed.
+        The sequence, which is not changed, and has to stay: all else is linked to it.
     pixels : float
         See `moved_left`.
     copy : Path
-        Where the copy goes; must not exist.
+        A folder to be made.
 
     Returns
     -------
@@ -59,14 +60,22 @@ def with_moved_right_images(folder: Path, pixels: float, copy: Path) -> Path:
     ------
     ValueError
         If `folder` has no right images in KITTI's layout.
+    OSError
+        If one cannot be written.
     """
     names = sorted(path.name for path in (folder / "image_1").glob("*.png"))
     if not names:
         raise ValueError(f"{folder} has no right images image_1/*.png")
-    shutil.copytree(folder, copy)
+    # Made, not copied: where the sequence may not be written to, neither may a copy of it.
+    (copy / "image_1").mkdir(parents=True)
+    for entry in folder.iterdir():
+        if entry.name != "image_1":
+            (copy / entry.name).symlink_to(entry.resolve())
     for name in names:
-        image = cv2.imread(str(copy / "image_1" / name), cv2.IMREAD_GRAYSCALE)
+        image = cv2.imread(str(folder / "image_1" / name), cv2.IMREAD_GRAYSCALE)
         if image is None:
             raise ValueError(f"{folder / 'image_1' / name} is no image")
-        cv2.imwrite(str(copy / "image_1" / name), moved_left(image, pixels))
+        moved = copy / "image_1" / name
+        if not cv2.imwrite(str(moved), moved_left(image, pixels)):
+            raise OSError(f"{moved} cannot be written")
     return copy

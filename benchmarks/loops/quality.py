@@ -10,7 +10,7 @@ Without loop closing a few of the seeds run again, to show the drift there is.
     python -m benchmarks.loops.quality --cases two-rooms --sensors mono --first-image 196
     python -m benchmarks.loops.quality --list
 
-Versions that begin their maps at another image are compared by the path from the later one on
+Versions whose maps begin at different images are compared over the images that both track
 (``--first-image``).
 
 Exits with 1 if a row misses its limits.

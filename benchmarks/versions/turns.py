@@ -28,7 +28,7 @@ from typing import Any
 
 from benchmarks.harness.arguments import add_counts, add_width, console_of, new_parser
 from benchmarks.harness.folders import needed_shared_folder
-from benchmarks.harness.moved_right import with_moved_right_images
+from benchmarks.harness.moved_right import MOST_MOVED, with_moved_right_images
 from benchmarks.harness.runs import median_of, run_report
 from benchmarks.harness.tables import new_table
 
@@ -51,8 +51,6 @@ CASES = (
     Case("KITTI 06, mono", "kitti_06_head51_stereo", "mono"),
     Case("redkitchen, mono", "7scenes_redkitchen_head250", "mono"),
 )
-# Rectification is off by parts of a pixel.
-_MOST_MOVED = 16
 _COLUMNS = (
     "frames/s before",
     "now",
@@ -124,15 +122,12 @@ def main() -> None:
     folder = needed_shared_folder() / "sequences"
     python = python_of(arguments.before)
     moved = arguments.right_moved
-    if moved is not None and not abs(moved) < _MOST_MOVED:
-        parser.error(f"--right-moved {moved}: less than {_MOST_MOVED} pixels to either side")
-    cases = [
-        case
-        for case in CASES
-        if arguments.only in case.name and (moved is None or case.sensor == "stereo")
-    ]
+    if moved is not None and not abs(moved) < MOST_MOVED:
+        parser.error(f"--right-moved {moved}: less than {MOST_MOVED:g} pixels to either side")
+    possible = [case for case in CASES if moved is None or case.sensor == "stereo"]
+    cases = [case for case in possible if arguments.only in case.name]
     if not cases or arguments.turns < 1:
-        names = "; ".join(case.name for case in CASES)
+        names = "; ".join(case.name for case in possible)
         parser.error(f"nothing to play: --turns {arguments.turns}, and --only one of: {names}")
     if arguments.settings is not None and not arguments.settings.is_file():
         parser.error(f"--settings {arguments.settings}: there is no such file")

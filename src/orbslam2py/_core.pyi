@@ -3247,7 +3247,8 @@ def poses_of_map(map: Map, which: typing.SupportsInt | typing.SupportsIndex) -> 
 def position_deviation(covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 6]"]) -> float:
     """
     Standard deviation of the position by the covariance (6, 6) of a pose, rotation and
-    translation: all directions together.
+    translation: all directions together. 0 where the sum of its variances is not
+    positive.
     """
 def process_new_keyframe(map: Map, id: int, recent: RecentPoints) -> None:
     """
@@ -3401,7 +3402,7 @@ def verify_loop_candidate(map: Map, current: int, candidate: int, options: LoopV
     """
 def widened_covariance(covariance: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 6]"], factor: typing.SupportsFloat | typing.SupportsIndex, errors: collections.abc.Sequence[typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[6, 1]"]]) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"]:
     """
-    A covariance (6, 6) of `factor` times the variances, and of independent errors along
-    a list of tangents (6,) as long as their standard deviations.
+    `factor` times a covariance (6, 6), plus that of independent errors, each of a list
+    given as a tangent (6,) whose length is its standard deviation.
     """
 FIRST_TEMPORARY_POINT: int = 4611686018427387904

@@ -205,12 +205,12 @@ void bind_scale_pyramid(py::module_& module) {
 void bind_covariance(py::module_& module) {
   module.def("position_deviation", &position_deviation, py::arg("covariance"),
              "Standard deviation of the position by the covariance (6, 6) of a pose, rotation and\n"
-             "translation: all directions together.");
-  module.def(
-      "widened_covariance", &widened_covariance, py::arg("covariance"), py::arg("factor"),
-      py::arg("errors"),
-      "A covariance (6, 6) of `factor` times the variances, and of independent errors along\n"
-      "a list of tangents (6,) as long as their standard deviations.");
+             "translation: all directions together. 0 where the sum of its variances is not\n"
+             "positive.");
+  module.def("widened_covariance", &widened_covariance, py::arg("covariance"), py::arg("factor"),
+             py::arg("errors"),
+             "`factor` times a covariance (6, 6), plus that of independent errors, each of a list\n"
+             "given as a tangent (6,) whose length is its standard deviation.");
 }
 
 void bind_seeds(py::module_& module) {

@@ -8,7 +8,7 @@ namespace orbslam::bindings {
 /// For functions that neither take the GIL nor Python's objects.
 using Release = pybind11::call_guard<pybind11::gil_scoped_release>;
 
-// One function per folder of src/cpp, defined in the file of the same name.
+// One function per folder of src/cpp, or per part of one, defined in the file of the same name.
 void bind_base(pybind11::module_& module);
 void bind_stop_flag(pybind11::module_& module);
 void bind_images(pybind11::module_& module);

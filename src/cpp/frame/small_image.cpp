@@ -30,7 +30,8 @@ SmallImage shrink_image(const cv::Mat& grey) {
   const auto area = static_cast<std::uint32_t>(rows_used * small.shrink);
   small.pixels.reserve(static_cast<std::size_t>(small.width) *
                        static_cast<std::size_t>(small.height));
-  // Whole rows are added first: that is many columns at once, and no square is that wide.
+  // Whole rows are added first, since the compiler adds many columns of them at once: squares are
+  // too narrow for that.
   std::vector<std::uint32_t> columns(static_cast<std::size_t>(small.width) *
                                      static_cast<std::size_t>(small.shrink));
   for (int row = 0; row < small.height; ++row) {

@@ -75,13 +75,13 @@ class SecondLook:
         if refined is None:
             return followed
         if finished:
-            refined = self._search.around.look_afresh(refined, in_doubt=in_doubt)
+            refined = self._search.local_map_search.look_afresh(refined, in_doubt=in_doubt)
         return _without_outliers(refined).frame
 
     def _look(self, frame: core.TrackedFrame, *, wide: bool) -> RefinedPose | None:
         self._search.reset()
         if wide:
-            self._search.probation.found_again(frame)
+            self._search.proving.found_again(frame)
         refined = self._search.in_local_map(_copy_of(frame), PoseEstimate())
         return _without_outliers(refined) if refined.estimate.found else None
 

@@ -455,7 +455,7 @@ class System:
         """Stop the workers and join their threads; idempotent.
 
         To be repeated after a time-out or a Ctrl-C. Results remain available. Also called at the
-        end of a ``with`` block.
+        end of a ``with`` block. Of several errors the first is raised, and the others are logged.
 
         Parameters
         ----------
@@ -472,8 +472,7 @@ class System:
         WorkerError
             If a worker has failed, or does not end in time.
         MapFileError
-            If the last autosave could not be written. Of several errors the first is raised, the
-            others are logged.
+            If the last autosave could not be written.
         """
         timeout = patience_of(timeout)
         self._shut_down = True
@@ -501,7 +500,7 @@ class System:
             self._finalizer.detach()
         # One error is raised; none of the others is to be lost.
         for further in errors[1:]:
-            _log.error("%s", further)
+            _log.error("shutdown failed otherwise as well: %s", further, exc_info=further)
         if errors:
             raise errors[0]
 
@@ -705,8 +704,9 @@ class System:
     ) -> None:
         try:
             self.shutdown(drain=error is None)
-        except Exception:
+        except Exception as another:
             if error is None:
                 raise
-            if not isinstance(error, WorkerError):  # else it is the same one
+            the_same = isinstance(error, WorkerError) and isinstance(another, WorkerError)
+            if not the_same:
                 _log.exception("shutdown after an error failed as well")

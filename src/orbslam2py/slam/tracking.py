@@ -100,7 +100,7 @@ class Tracking:
         self._forget_maps()
         if frames:
             # The count of the frames goes on, and the next map is young as well.
-            self._search.probation.map_begun(frames[-1].id)
+            self._search.proving.map_begun(frames[-1].id)
             # It is the same camera: its sharpest images stay what others are compared with.
             self._belief.see(frames)
         self._initializer.restart(frames)
@@ -297,7 +297,7 @@ class Tracking:
         if lost and not estimate.found:
             return estimate
         if lost or estimate.relocalized:
-            self._search.probation.found_again(frame, where_expected=estimate.where_expected)
+            self._search.proving.found_again(frame, where_expected=estimate.where_expected)
             self._since_keyframe.most_inliers = 0
         with timer("local_map"):
             believed = self._belief.refine(frame, estimate, lost=lost)
@@ -351,7 +351,7 @@ class Tracking:
             return None
         self._leave_map()
         # A young map has to prove itself.
-        self._search.probation.map_begun(frame.id)
+        self._search.proving.map_begun(frame.id)
         self._seeks_map = False
         self._loss.reset()
         return self._map_begun(frame)

@@ -57,6 +57,23 @@ TEST(Sharpness, WithoutCornersItIsZero) {
   EXPECT_EQ(sharpness_of(cv::Mat(240, 320, CV_8UC1, cv::Scalar(90))), 0);
 }
 
+TEST(Sharpness, OfMoreFeaturesTheShareOfTheStrongestFineOnesCounts) {
+  Frame frame;
+  for (const int response : {30, 7, 90, 7, 50, 20, 60, 10}) {
+    frame.keypoints.emplace_back();
+    frame.keypoints.back().level = 1;
+    frame.keypoints.back().response = static_cast<float>(response);
+  }
+  for (int i = 0; i < 4; ++i) {
+    frame.keypoints.emplace_back();
+    frame.keypoints.back().level = 3;
+    frame.keypoints.back().response = 200;
+  }
+  EXPECT_EQ(sharpness(frame, 12), 274);
+  EXPECT_EQ(sharpness(frame, 6), 90 + 60 + 50 + 30) << "four of eight, as six are of twelve";
+  EXPECT_EQ(sharpness(frame, 1), 0) << "less than one";
+}
+
 TEST(Sharpness, MoreFeaturesMakeNoImageSharper) {
   const cv::Mat image = texture();
   constexpr int n_usual = 200;

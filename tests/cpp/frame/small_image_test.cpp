@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "base/errors.hpp"
 
 namespace orbslam {
@@ -32,6 +34,32 @@ TEST(SmallImage, PixelsAreMeansOfSquares) {
   EXPECT_EQ(at(4, 2), 0);
   EXPECT_EQ(at(3, 3), 0);
   EXPECT_NEAR(at(5, 2), 200.0 * (side / 2) / side, 1);
+}
+
+TEST(SmallImage, IsWhatIsMeantOfAnyPartOfAnyImage) {
+  std::mt19937_64 generator(3);
+  cv::Mat1b whole(401, 913);
+  for (std::uint8_t& pixel : whole) pixel = generator() & 255U;
+  for (const cv::Rect part :
+       {cv::Rect{0, 0, 913, 401}, {5, 3, 640, 377}, {1, 0, 99, 101}, {7, 9, 3, 390}}) {
+    const cv::Mat1b image = whole(part);
+    const SmallImage small = shrink_image(image);
+    ASSERT_EQ(small.pixels.size(), static_cast<std::size_t>(small.width * small.height));
+    for (int y = 0; y < small.height; ++y) {
+      for (int x = 0; x < small.width; ++x) {
+        double sum = 0;
+        int n = 0;
+        for (int row = y * small.shrink; row < (y + 1) * small.shrink; ++row) {
+          if ((row - y * small.shrink) % 2 != 0) continue;
+          for (int column = x * small.shrink; column < (x + 1) * small.shrink; ++column) {
+            sum += image(row, column);
+            n += 1;
+          }
+        }
+        ASSERT_NEAR(small.pixels[static_cast<std::size_t>(y * small.width + x)], sum / n, 0.5001);
+      }
+    }
+  }
 }
 
 TEST(SmallImage, OfTheSmallestImages) {

@@ -302,7 +302,9 @@ def test_a_last_save_that_fails_is_told_though_a_worker_failed_as_well(
         patch.setattr(MapKeeper, "stop_autosave", unsaved)
         with caplog.at_level(logging.ERROR), pytest.raises(WorkerError, match="out of order"):
             slam.shutdown()
-    assert [record.getMessage() for record in caplog.records] == ["the disk is full"]
+    (record,) = caplog.records
+    assert record.getMessage() == "shutdown failed otherwise as well: the disk is full"
+    assert record.exc_info is not None, "with what led there"
     slam.shutdown()
 
 

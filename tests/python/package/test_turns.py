@@ -11,6 +11,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from benchmarks.harness.moved_right import with_moved_right_images
 from benchmarks.versions import turns
 
 CASE = turns.Case("made up, mono", "made_up", "mono")
@@ -83,6 +84,22 @@ def test_right_images_are_moved_for_both_versions(
     assert [(sensor, left) for sensor, left, _ in seen] == [("stereo", 0)] * 2
     assert max(right for _, _, right in seen) <= 1
     np.testing.assert_array_equal(cv2.imread(str(folder / "image_1" / "000000.png"), 0), waves(0.0))
+
+
+def test_right_images_that_cannot_be_moved_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(ValueError, match="has no right images"):
+        with_moved_right_images(tmp_path, 0.1, tmp_path / "copy")
+    (tmp_path / "image_1").mkdir()
+    file = tmp_path / "image_1" / "000000.png"
+    file.write_text("no image")
+    with pytest.raises(ValueError, match=r"000000\.png is no image"):
+        with_moved_right_images(tmp_path, 0.1, tmp_path / "copy")
+    cv2.imwrite(str(file), waves(0.0))
+    monkeypatch.setattr(cv2, "imwrite", lambda *_: False)
+    with pytest.raises(OSError, match="cannot be written"):
+        with_moved_right_images(tmp_path, 0.1, tmp_path / "another copy")
 
 
 def waves(by: float) -> np.ndarray:

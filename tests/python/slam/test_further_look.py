@@ -91,7 +91,7 @@ def walk() -> Iterator[Walk]:
 
 def test_what_lies_beyond_the_windows_is_found_and_moves_the_pose(walk: Walk) -> None:
     beside = walk.turned(0.03, n_inliers=40)
-    found = walk.search.around.look_further(beside)
+    found = walk.search.local_map_search.look_further(beside)
     assert found is not beside
     assert found.estimate.found
     assert found.estimate.n_inliers > 100
@@ -105,40 +105,60 @@ def test_the_first_pose_stays_as_it_was(walk: Walk) -> None:
     beside = walk.turned(0.03, n_inliers=40)
     assert beside.frame.T_cw is not None
     T_cw = beside.frame.T_cw.matrix
-    walk.search.around.look_further(beside)
+    walk.search.local_map_search.look_further(beside)
     np.testing.assert_array_equal(beside.frame.T_cw.matrix, T_cw)
     assert beside.frame.n_associated() == 0
 
 
 def test_a_pose_that_fits_is_kept(walk: Walk) -> None:
     refined = walk.refined()
-    assert walk.search.around.look_further(refined) is refined
+    assert walk.search.local_map_search.look_further(refined) is refined
 
 
 def test_a_pose_elsewhere_needs_few_more_inliers_and_the_same_one_many(walk: Walk) -> None:
-    n = walk.search.around.look_further(walk.turned(0.03, n_inliers=40)).estimate.n_inliers
+    n = walk.search.local_map_search.look_further(
+        walk.turned(0.03, n_inliers=40)
+    ).estimate.n_inliers
     # A pose that is told with a metre lies at the same place.
     for metres, gain in ((1e-3, LIMITS.better_look), (1.0, LIMITS.much_better_look)):
         clear = walk.turned(0.03, n_inliers=int(n / gain) - 1, metres=metres)
-        assert walk.search.around.look_further(clear) is not clear
+        assert walk.search.local_map_search.look_further(clear) is not clear
         unclear = walk.turned(0.03, n_inliers=int(n / gain) + 1, metres=metres)
-        assert walk.search.around.look_further(unclear) is unclear
+        assert walk.search.local_map_search.look_further(unclear) is unclear
 
 
 def test_nothing_further_around_changes_nothing(walk: Walk) -> None:
     away = walk.turned(1.5, n_inliers=40)
-    assert walk.search.around.look_further(away) is away
+    assert walk.search.local_map_search.look_further(away) is away
 
 
 def test_without_a_local_map_there_is_nothing_to_look_for(walk: Walk) -> None:
     refined = replace(walk.refined(), local_map=None)
-    assert walk.search.around.look_further(refined) is refined
+    assert walk.search.local_map_search.look_further(refined) is refined
 
 
 def test_more_that_is_not_enough_is_no_pose(walk: Walk, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(walk.search.probation, "inliers_asked", lambda frame: 10_000)
+    monkeypatch.setattr(walk.search.proving, "inliers_asked", lambda frame: 10_000)
     beside = walk.turned(0.03, n_inliers=40)
-    assert walk.search.around.look_further(beside) is beside
+    assert walk.search.local_map_search.look_further(beside) is beside
+
+
+# ---- spread --------------------------------------------------------------------------------------
+def test_the_spread_of_inliers_is_that_of_one_frame_with_and_without_its_outliers(
+    walk: Walk,
+) -> None:
+    def figures(spread: core.InlierSpread) -> tuple[float, ...]:
+        return spread.cells, spread.octaves, spread.correlation, spread.variance
+
+    refined = walk.refined()
+    assert refined.frame.outlier.any()
+    before = figures(refined.spread)
+    refined.frame.discard_outliers()
+    assert figures(replace(refined).spread) == before
+    fewer = walk.held(0.0, 40)
+    assert figures(replace(refined, frame=fewer.frame).spread) != before
+    refined.frame.clear_associations()
+    assert figures(refined.spread) == before, "asked for once"
 
 
 # ---- from nothing --------------------------------------------------------------------------------
@@ -149,7 +169,7 @@ def test_a_pose_matched_from_nothing_does_not_hang_on_where_it_began(
     ends = []
     for radians in (-0.02, -0.005, 0.005, 0.02):
         beside = walk.held(radians, 60)
-        found = walk.search.around.look_afresh(beside, in_doubt=in_doubt)
+        found = walk.search.local_map_search.look_afresh(beside, in_doubt=in_doubt)
         assert found is not beside
         assert found.n_predicted == len(found.visible) > beside.n_predicted - 300
         assert found.n_predicted >= found.estimate.n_inliers > 60
@@ -162,8 +182,8 @@ def test_a_pose_matched_from_nothing_does_not_hang_on_where_it_began(
 
 def test_a_pose_that_lies_at_the_same_place_is_kept_unless_it_was_in_doubt(walk: Walk) -> None:
     vague = walk.held(0.005, 60, metres=1.0)
-    assert walk.search.around.look_afresh(vague, in_doubt=False) is vague
-    assert walk.search.around.look_afresh(vague, in_doubt=True) is not vague
+    assert walk.search.local_map_search.look_afresh(vague, in_doubt=False) is vague
+    assert walk.search.local_map_search.look_afresh(vague, in_doubt=True) is not vague
 
 
 @pytest.mark.parametrize("in_doubt", [False, True])
@@ -171,11 +191,15 @@ def test_a_pose_from_nothing_needs_its_share_of_inliers(
     walk: Walk, in_doubt: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     beside = walk.held(0.01, 60)
-    n = walk.search.around.look_afresh(beside, in_doubt=in_doubt).estimate.n_inliers
+    n = walk.search.local_map_search.look_afresh(beside, in_doubt=in_doubt).estimate.n_inliers
     name = "afresh_share_in_doubt" if in_doubt else "afresh_share"
     for share, is_taken in ((n / 60, True), ((n + 0.5) / 60, False)):
-        monkeypatch.setattr(walk.search.around, "_limits", replace(LIMITS, **{name: share}))
-        assert (walk.search.around.look_afresh(beside, in_doubt=in_doubt) is not beside) == is_taken
+        monkeypatch.setattr(
+            walk.search.local_map_search, "_limits", replace(LIMITS, **{name: share})
+        )
+        assert (
+            walk.search.local_map_search.look_afresh(beside, in_doubt=in_doubt) is not beside
+        ) == is_taken
     assert LIMITS.afresh_share_in_doubt < LIMITS.afresh_share <= 1
 
 
@@ -183,8 +207,8 @@ def test_what_the_frame_before_measured_holds_a_pose_unless_it_was_in_doubt(walk
     """Its points are not of the map, and matching from nothing does not find them."""
     beside = walk.held(0.01, 60)
     beside = replace(beside, estimate=replace(beside.estimate, n_inliers=61))
-    assert walk.search.around.look_afresh(beside, in_doubt=False) is beside
-    assert walk.search.around.look_afresh(beside, in_doubt=True) is not beside
+    assert walk.search.local_map_search.look_afresh(beside, in_doubt=False) is beside
+    assert walk.search.local_map_search.look_afresh(beside, in_doubt=True) is not beside
 
 
 def test_nothing_to_match_from_nothing_changes_nothing(
@@ -194,38 +218,40 @@ def test_nothing_to_match_from_nothing_changes_nothing(
     beyond_the_map = replace(walk.held(0.01, 60), local_map=None)
     for refined in (away, beyond_the_map):
         for in_doubt in (False, True):
-            assert walk.search.around.look_afresh(refined, in_doubt=in_doubt) is refined
-    monkeypatch.setattr(walk.search.probation, "inliers_asked", lambda frame: 10_000)
+            assert walk.search.local_map_search.look_afresh(refined, in_doubt=in_doubt) is refined
+    monkeypatch.setattr(walk.search.proving, "inliers_asked", lambda frame: 10_000)
     beside = walk.held(0.01, 60)
-    assert walk.search.around.look_afresh(beside, in_doubt=True) is beside, "not enough for a pose"
+    assert walk.search.local_map_search.look_afresh(beside, in_doubt=True) is beside, (
+        "not enough for a pose"
+    )
 
 
 # ---- when ----------------------------------------------------------------------------------------
 def test_one_frame_in_five_is_looked_at_further(scene: Scene) -> None:
     scene.run(12)
-    assert scene.around.looked_further == [5, 10]
+    assert scene.local_map_search.looked_further == [5, 10]
 
 
 def test_a_frame_less_certain_than_usual_is_looked_at_further(scene: Scene, core: FakeCore) -> None:
     scene.run(7)
     core.inliers.extend([100, 200])  # the variance of the fake grows with them
     scene.run(2)
-    assert scene.around.looked_further == [5, 7]
+    assert scene.local_map_search.looked_further == [5, 7]
 
 
 def test_a_frame_that_is_not_found_is_not(scene: Scene, core: FakeCore) -> None:
     scene.run(10)
     core.inliers.extend([100, 2])
     scene.track()
-    assert scene.around.looked_further == [5]
+    assert scene.local_map_search.looked_further == [5]
 
 
 def test_poses_are_matched_from_nothing_in_a_map_that_stays_as_it_is(scene: Scene) -> None:
     scene.run(3)
-    assert scene.around.looked_afresh == []
+    assert scene.local_map_search.looked_afresh == []
     scene.localize = True
     scene.run(3)
-    assert scene.around.looked_afresh == [(3, False), (4, False), (5, False)]
+    assert scene.local_map_search.looked_afresh == [(3, False), (4, False), (5, False)]
 
 
 class FromNothing:
@@ -234,7 +260,7 @@ class FromNothing:
     def __init__(self, scene: Scene, metres: float, n_inliers: int) -> None:
         self._metres, self._n_inliers = metres, n_inliers
         self.ends: list[float] = []
-        scene.search.around.look_afresh = self  # type: ignore[method-assign]
+        scene.search.local_map_search.look_afresh = self  # type: ignore[method-assign]
 
     def __call__(self, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
         if not in_doubt:

@@ -13,6 +13,7 @@ import pytest
 from orbslam2py import (
     Callbacks,
     KeyframeAdded,
+    MapFileError,
     Reason,
     Sensor,
     StateError,
@@ -421,6 +422,21 @@ def test_failure_is_raised_at_the_end_of_the_block(monkeypatch: pytest.MonkeyPat
     with pytest.raises(WorkerError, match="out of order"), new_system(Sensor.RGBD) as system:
         track(system, 0)
     assert worker_threads() == []
+
+
+def test_what_fails_after_a_worker_failed_in_the_block_is_logged(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def unsaved(*_: object) -> None:
+        raise MapFileError("the disk is full")
+
+    system = new_system(Sensor.RGBD, deterministic=True)
+    with monkeypatch.context() as patch:
+        patch.setattr(type(system.pipeline.keeper), "stop_autosave", unsaved)
+        with pytest.raises(WorkerError, match="too late"), system:
+            raise WorkerError("too late")
+    assert "the disk is full" in caplog.text
+    system.shutdown()
 
 
 def test_failure_in_the_block_is_reported_once(

@@ -152,7 +152,7 @@ def test_the_search_says_whether_it_was_found_where_it_was_expected(
 def test_a_depth_sensors_other_map_has_nothing_to_prove(scene: Scene) -> None:
     """Its points are where their depths say."""
     scene.run(40)
-    scene.search.probation.map_begun(scene.last.id)
+    scene.search.proving.map_begun(scene.last.id)
     scene.core.inliers.extend([100, 30])
     assert scene.track().state is TrackingState.OK
 

@@ -418,8 +418,8 @@ class Scene:
         self.search = search = PoseSearch(
             fakes.map, vocabulary, sensor, MAX_FRAMES, relocalizer=None, thresholds=limits
         )
-        self.around = NearSearch(fakes.map, sensor, search.probation, limits)
-        search.around = self.around
+        self.local_map_search = NearSearch(fakes.map, sensor, search.proving, limits)
+        search.local_map_search = self.local_map_search
         judge = EvidenceJudge(search.motion_model_window, 500.0, evidence or CREDULOUS)
         again: Any = NoFurtherSearch() if evidence is None else HarderSearch(search, judge)
         self.tracking = Tracking(

@@ -79,7 +79,7 @@ class Belief:
             refined = self._refined(frame, first)
             hypothesis = self._hypothesis(refined, first)
             if hypothesis and self._is_to_look_further(frame, hypothesis.evidence):
-                further = self._search.around.look_further(refined)
+                further = self._search.local_map_search.look_further(refined)
                 if further is not refined:
                     frame.take_over(further.frame)
                     refined = replace(further, frame=frame)
@@ -107,7 +107,7 @@ class Belief:
     def _looked_at_afresh(self, hypothesis: Hypothesis, *, in_doubt: bool) -> Hypothesis:
         """The same frame in the same map is to be in the same place, whatever came before it."""
         refined, evidence = hypothesis.refined, hypothesis.evidence
-        afresh = self._search.around.look_afresh(refined, in_doubt=in_doubt)
+        afresh = self._search.local_map_search.look_afresh(refined, in_doubt=in_doubt)
         if afresh is refined:
             return hypothesis
         if in_doubt:
@@ -127,7 +127,7 @@ class Belief:
         judge = self._judge
         if judge.fell_suddenly(evidence) or judge.is_loose(evidence):
             return True
-        return self._search.around.further_look_due(frame)
+        return self._search.local_map_search.further_look_due(frame)
 
     def _refined(self, frame: core.TrackedFrame, first: PoseEstimate) -> RefinedPose:
         if first.visual_odometry:
@@ -144,7 +144,7 @@ class Belief:
             if refined.estimate.relocalized:
                 # Found without regard to where the camera was: the way from there is no speed.
                 expected = refined.estimate.where_expected
-                self._search.probation.found_again(frame, where_expected=expected)
+                self._search.proving.found_again(frame, where_expected=expected)
                 self._search.motion.jump(None)
         self._search.settle(refined)
         motion = self._search.motion

@@ -68,7 +68,7 @@ class FirstEstimateInGrowingMap:
             if estimate.found:
                 return estimate
         estimate = search.by_reference_keyframe(frame)
-        if not lost and not estimate.found and search.probation.has_just_begun(frame):
+        if not lost and not estimate.found and search.proving.has_just_begun(frame):
             # Found again where the map ends, the frame before shows most of what this one does.
             standing = search.by_motion_model(frame)
             return standing if standing.found else estimate

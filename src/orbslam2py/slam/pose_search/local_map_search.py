@@ -12,7 +12,7 @@ import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.pose_search.probation import Probation
+from orbslam2py.slam.pose_search.proving_period import ProvingPeriod
 from orbslam2py.slam.pose_search.refined_pose import RefinedPose
 from orbslam2py.slam.records import PoseEstimate, Reason
 from orbslam2py.slam.thresholds import TrackingThresholds
@@ -29,7 +29,7 @@ class LocalMapSearch:
         The map.
     sensor : Sensor
         What the images come from.
-    probation : Probation
+    proving : ProvingPeriod
         How much is asked of a frame.
     thresholds : TrackingThresholds
         Limits.
@@ -39,11 +39,11 @@ class LocalMapSearch:
         self,
         slam_map: core.Map,
         sensor: Sensor,
-        probation: Probation,
+        proving: ProvingPeriod,
         thresholds: TrackingThresholds,
     ) -> None:
         self._map = slam_map
-        self._probation = probation
+        self._proving = proving
         self._limits = thresholds
         is_rgbd = sensor is Sensor.RGBD
         self._usual_window = (
@@ -59,6 +59,12 @@ class LocalMapSearch:
             With the pose and the associations of the first estimate.
         first : PoseEstimate
             That.
+
+        Returns
+        -------
+        RefinedPose
+            Whether it was found says its estimate; one in `visual_odometry` hangs on the depths of
+            the frame before, and `PoseSearch.in_local_map` takes it so.
         """
         local_map = core.select_local_map(self._map, frame)
         n_held = frame.n_associated()
@@ -67,7 +73,7 @@ class LocalMapSearch:
         )
         optimized = core.optimize_pose(frame)
         visible = matches.visible
-        found_again = self._probation.was_just_found(frame)
+        found_again = self._proving.was_just_found(frame)
         if found_again and optimized.n_inliers >= self._limits.map_matches:
             # Wide windows find much that is wrong; where the camera is now, narrow ones find more.
             frame.discard_outliers()
@@ -172,7 +178,7 @@ class LocalMapSearch:
             relocalized=first.relocalized,
             where_expected=first.where_expected,
         )
-        if estimate.n_inliers < self._probation.inliers_asked(frame):
+        if estimate.n_inliers < self._proving.inliers_asked(frame):
             return estimate.failed(Reason.FEW_INLIERS_LOCAL_MAP)
         if frame.n_map_inliers() < self._limits.map_matches:
             # What the frame before measured speaks for itself, and says nothing of the map.
@@ -180,7 +186,7 @@ class LocalMapSearch:
         return estimate
 
     def _window(self, frame: core.TrackedFrame) -> float:
-        if self._probation.has_just_begun(frame):
+        if self._proving.has_just_begun(frame):
             return self._limits.local_map_window_after_relocalization
         return self._usual_window
 

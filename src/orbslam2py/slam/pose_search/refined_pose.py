@@ -19,7 +19,7 @@ class RefinedPose:
     """Holds pose and associations."""
     estimate: PoseEstimate
     local_map: core.LocalMap | None
-    """None in visual odometry, which does not look for the map."""
+    """Where it was searched; None where the pose is settled by visual odometry alone."""
     visible: IntArray
     """Ids of the points in view that the first estimate did not hold."""
     n_predicted: int

@@ -14,7 +14,7 @@ from orbslam2py import _core as core
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.pose_search.local_map_search import LocalMapSearch
 from orbslam2py.slam.pose_search.motion_model import MotionModel
-from orbslam2py.slam.pose_search.probation import Probation
+from orbslam2py.slam.pose_search.proving_period import ProvingPeriod
 from orbslam2py.slam.pose_search.refined_pose import RefinedPose
 from orbslam2py.slam.records import PoseEstimate, PoseMethod, Reason
 from orbslam2py.slam.relocalization import PlaceOfLoss, Relocalizer
@@ -33,7 +33,7 @@ class PoseSearch:
     sensor : Sensor
         What the images come from.
     max_keyframe_interval : int
-        Frames of one second: see `Probation`.
+        Frames of one second: see `ProvingPeriod`.
     relocalizer : Relocalizer, optional
         Finds lost frames in the map; without it none is found there.
     thresholds : TrackingThresholds
@@ -47,9 +47,9 @@ class PoseSearch:
         Shares most points with the last frame that had a pose, -1 before the first.
     local_map : orbslam2py._core.LocalMap or None
         Where the last frame was refined, None before the first.
-    around : LocalMapSearch
+    local_map_search : LocalMapSearch
         Refines poses with the points around them.
-    probation : Probation
+    proving : ProvingPeriod
         What is asked of frames after the camera was found again, or a map began.
     map_is_fixed : bool
         The map is not to change: what is seen of it is not counted.
@@ -74,8 +74,8 @@ class PoseSearch:
         self._sensor = sensor
         self._relocalizer = relocalizer
         self.limits = thresholds
-        self.probation = Probation(max_keyframe_interval, thresholds, has_depth=sensor.has_depth)
-        self.around = LocalMapSearch(slam_map, sensor, self.probation, thresholds)
+        self.proving = ProvingPeriod(max_keyframe_interval, thresholds, has_depth=sensor.has_depth)
+        self.local_map_search = LocalMapSearch(slam_map, sensor, self.proving, thresholds)
         self.reset()
 
     def reset(self) -> None:
@@ -83,7 +83,7 @@ class PoseSearch:
         self.motion = MotionModel()
         self.reference_keyframe = -1
         self.local_map: core.LocalMap | None = None
-        self.probation.reset()
+        self.proving.reset()
         self.initial_pose: core.Pose | None = None
         self.searches_loaded_map = False
         self.map_is_fixed = False
@@ -101,7 +101,7 @@ class PoseSearch:
             tracking was lost before.
         """
         if confirmed:
-            self.probation.lose()
+            self.proving.lose()
             self._place_of_loss = PlaceOfLoss(
                 self.motion.last, self.motion.velocity, self.reference_keyframe
             )
@@ -282,7 +282,7 @@ class PoseSearch:
 
         Nothing is remembered of it before `settle`: there may be several ways to a pose.
         """
-        refined = self.around.refine(frame, first)
+        refined = self.local_map_search.refine(frame, first)
         if refined.estimate.visual_odometry:
             return self.beyond_the_map(frame, refined.estimate)
         return refined

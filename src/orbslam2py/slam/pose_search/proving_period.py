@@ -7,7 +7,7 @@ from orbslam2py import _core as core
 from orbslam2py.slam.thresholds import TrackingThresholds
 
 
-class Probation:
+class ProvingPeriod:
     """How long ago the camera was found again, or a map began, and what is asked of frames since.
 
     Parameters
@@ -16,8 +16,8 @@ class Probation:
         Frames of one second, during which a relocalization has to prove itself, unless it was
         expected there.
     has_depth : bool
-        Whether frames measure depths: a map of such has its points where they are, and nothing to
-        prove.
+        Whether frames measure depths: then a new map has nothing to prove, its points lie where
+        they were measured.
     thresholds : TrackingThresholds
         Limits.
     """
@@ -57,6 +57,7 @@ class Probation:
     def map_begun(self, frame_id: int) -> None:
         """A map beside others, or after one that came to nothing, has begun with this frame."""
         self._frame_id = frame_id
+        self._was_found_again = False
         if not self._has_depth:
             self._proves_from = frame_id
 
@@ -65,11 +66,11 @@ class Probation:
         return frame.id < self._frame_id + self._limits.frames_after_relocalization
 
     def was_just_found(self, frame: core.TrackedFrame) -> bool:
-        """The same, but only if the camera was ever found again."""
+        """Whether the camera was found again in this frame or right before it."""
         return self._was_found_again and self.has_just_begun(frame)
 
     def inliers_asked(self, frame: core.TrackedFrame) -> int:
-        """How many points of the local map a frame's pose is to be found with."""
+        """How many inliers a frame's pose is to have when the local map was searched."""
         proves_from = self._proves_from
         if proves_from is not None and frame.id < proves_from + self._n_frames:
             return self._limits.local_map_inliers_after_relocalization
