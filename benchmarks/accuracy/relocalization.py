@@ -36,9 +36,9 @@ from orbslam2py import _core as core
 from orbslam2py._timing import StageTimer
 from orbslam2py.datasets import Images
 from orbslam2py.evaluation import PoseError
+from orbslam2py.slam.config import RelocalizationConfig
 from orbslam2py.slam.front_end import FrontEnd
 from orbslam2py.slam.relocalization import Relocalizer
-from orbslam2py.slam.thresholds import RelocalizationThresholds
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence, SyntheticWorld
 
 #: Both views had enough matches, and a reconstruction was tried.
@@ -299,8 +299,8 @@ def _relocalization_speed(arguments: argparse.Namespace, sensor: str) -> None:
     try:
         core.find_relocalization_candidates = lambda *_: chosen
         for name, enough in limits.items():
-            thresholds = RelocalizationThresholds(enough=enough, word_candidates=n_candidates)
-            relocalizer = Relocalizer(slam_map, index, 0, fix_scale=False, thresholds=thresholds)
+            config = RelocalizationConfig(enough=enough, word_candidates=n_candidates)
+            relocalizer = Relocalizer(slam_map, index, 0, fix_scale=False, config=config)
             candidates = relocalizer._candidates(core.TrackedFrame(frame))
             times_of(
                 f"relocalization, {n_candidates} keyframes, {len(candidates)} of them with enough "

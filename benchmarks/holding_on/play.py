@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,8 +70,8 @@ class Played:
     seconds: float
 
 
-def play(case: Case) -> Played:
-    """Run a case from its first frame to its last; two runs give the same."""
+def play(case: Case, config: Mapping[str, Any] | None = None) -> Played:
+    """Run a case with changes of the configuration; two runs give the same."""
     began = time.perf_counter()
     scene = case.scene()
     n = len(scene)
@@ -77,7 +79,9 @@ def play(case: Case) -> Played:
     changes = np.zeros(n, np.int64)
     nowhere, unknown = np.full((4, 4), np.nan), np.full((6, 6), np.nan)
     motion = np.tile(nowhere, (n, 1, 1))
-    system = orb.System(scene.settings, scene.sensor, deterministic=True, seed=case.seed)
+    system = orb.System(
+        scene.settings, scene.sensor, deterministic=True, seed=case.seed, config=config
+    )
     with system as slam:
         for i, timestamp in enumerate(scene.timestamps):
             records.append(track_images(slam, scene.load(i), float(timestamp)))

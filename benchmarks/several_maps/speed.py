@@ -32,6 +32,7 @@ from orbslam2py import Sensor, System
 from orbslam2py import _core as core
 from orbslam2py._timing import StageTimer
 from orbslam2py.datasets import Images
+from orbslam2py.slam.config import MergingConfig
 from orbslam2py.slam.merging import MapMerging
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.vocabulary import load_vocabulary
@@ -81,7 +82,9 @@ class Rings:
 
 def join(slam_map: core.Map, loop: core.Loop, timer: StageTimer) -> None:
     """Make one map of two, as the system does once it believes the place."""
-    merging = MapMerging(slam_map, lambda *_: None, lambda _: [], fix_scale=True)
+    merging = MapMerging(
+        slam_map, lambda *_: None, lambda _: [], fix_scale=True, config=MergingConfig()
+    )
     if merging.join(loop, timer, core.StopFlag()) is None:
         raise RuntimeError("the maps were not joined")
 

@@ -27,7 +27,7 @@ from orbslam2py.batches.chosen_settings import require_usable, settings_name
 from orbslam2py.batches.job_file import read_document
 from orbslam2py.batches.keys import key_of, label_of, with_labels_of_their_own
 from orbslam2py.batches.remote import is_remote, name_of, require_protocols
-from orbslam2py.batches.sweep import Sweep, read_sweep
+from orbslam2py.batches.sweep import CONFIG_NAMES, Sweep, read_sweep
 from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.settings import Sensor
@@ -110,7 +110,9 @@ class Job:
         """
         given = dict(self.options)
         system = SystemOptions(
-            seed=self.seed, **{name: given[name] for name in SYSTEM_OPTIONS if name in given}
+            seed=self.seed,
+            config={n: v for n, v in (*self.options, *self.parameters) if n in CONFIG_NAMES},
+            **{name: given[name] for name in SYSTEM_OPTIONS if name in given},
         )
         return RunOptions(
             sensor, system, **{name: given[name] for name in RUN_OPTIONS if name in given}
@@ -243,7 +245,7 @@ def _options(values: Any) -> Iterator[tuple[tuple[str, Any], ...]]:
         raise SettingsError(
             f"options are {shown(values)}; give 'NAME: VALUE' in lines of their own"
         )
-    _refuse_unknown(values, (*RUN_OPTIONS, *SYSTEM_OPTIONS), "option")
+    _refuse_unknown(values, (*RUN_OPTIONS, *SYSTEM_OPTIONS, *CONFIG_NAMES), "option")
     names = sorted(values)
     for name in names:
         if _listed(values[name], keep=True) == []:
@@ -261,7 +263,7 @@ def options_of(values: Mapping[str, Any]) -> tuple[tuple[str, Any], ...]:
     SettingsError, DatasetError
         For an unknown one, and for values that would fail in every run.
     """
-    _refuse_unknown(values, (*RUN_OPTIONS, *SYSTEM_OPTIONS), "option")
+    _refuse_unknown(values, (*RUN_OPTIONS, *SYSTEM_OPTIONS, *CONFIG_NAMES), "option")
     given = tuple((name, _plain_value(values[name])) for name in sorted(values))
     Job("", "", options=given).run_options(Sensor.MONOCULAR)
     return given
@@ -305,5 +307,6 @@ def _refuse_unknown(values: Mapping[str, Any], known: Sequence[str], what: str) 
     for name in values:
         if name not in known:
             near = difflib.get_close_matches(str(name), known, 1)
-            hint = f"; did you mean {near[0]}?" if near else f"; there are {', '.join(known)}"
+            plain = [one for one in known if one not in CONFIG_NAMES]
+            hint = f"; did you mean {near[0]}?" if near else f"; there are {', '.join(plain)}"
             raise SettingsError(f"unknown {what} '{name}'{hint}")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Keys of the settings that are varied: all combinations of a grid, or random draws."""
+"""Keys of settings and configuration that vary: all combinations of a grid, or random draws."""
 
 from __future__ import annotations
 
@@ -14,9 +14,17 @@ import numpy as np
 from orbslam2py._arguments import choice_of, is_number, is_whole, seed_of, shown
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import Settings
-from orbslam2py.settings.keys import KEYS, convert, nearest_key
+from orbslam2py.settings.keys import KEYS, Key, Rule, convert, nearest, nearest_key
+from orbslam2py.slam.config import Config, all_values
 
-_KEYS = {key.name: key for key in KEYS}
+_NOT_NEGATIVE = Rule("a number from 0 on", lambda value: value >= 0)
+_CONFIG_KEYS = {
+    name: Key(name, "config", name, type(value), _NOT_NEGATIVE)
+    for name, value in all_values(Config())
+}
+#: Names of the configuration's values.
+CONFIG_NAMES = frozenset(_CONFIG_KEYS)
+_KEYS = {key.name: key for key in KEYS} | _CONFIG_KEYS
 _RANGE_KEYS = ("from", "to", "log")
 #: What a sweep holds beside keys of the settings.
 _OTHER_KEYS = ("random", "seed")
@@ -101,8 +109,8 @@ def read_sweep(values: Any) -> Sweep:
         if name in _OTHER_KEYS:
             continue
         if name not in _KEYS:
-            near = nearest_key(str(name))
-            known = "see 'orbslam2py settings show tum1'"
+            near = nearest(str(name), CONFIG_NAMES) or nearest_key(str(name))
+            known = "see 'orbslam2py settings show tum1' and 'orbslam2py config'"
             hint = f"did you mean {near}?" if near in _KEYS else known
             raise SettingsError(f"sweep: '{name}' is no key of the settings; {hint}")
         if isinstance(value, Mapping):
@@ -129,6 +137,8 @@ def with_parameters(settings: Settings, parameters: tuple[tuple[str, float], ...
     """
     fields: dict[str, dict[str, Any]] = {}
     for name, value in parameters:
+        if name in CONFIG_NAMES:
+            continue  # the run's options have it
         key = _KEYS[name]
         if getattr(settings, key.group) is None:
             raise SettingsError(f"{name} is not used by {settings.sensor}; leave it out of sweep")

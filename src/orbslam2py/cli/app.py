@@ -121,6 +121,9 @@ SUBCOMMANDS = {
         "import_camera",
         "Turn another program's calibration into a settings file.",
     ),
+    "config": Subcommand(
+        "config", "show", "List the thresholds of the method, their defaults and what they mean."
+    ),
     "settings": Subcommand("settings", "app", "Make, show, check and list settings files."),
     "vocabulary": Subcommand("vocabulary", "app", "Train, convert and inspect vocabularies."),
     "map": Subcommand(

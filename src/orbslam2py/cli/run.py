@@ -37,6 +37,7 @@ from orbslam2py.cli.run_options import (
     SeedOption,
     SensorOption,
     SequenceArgument,
+    SetOption,
     SettingsOption,
     SeveralMapsFlag,
     StartOption,
@@ -55,6 +56,7 @@ from orbslam2py.maps.setup_check import check_sensor
 from orbslam2py.runs.input_folders import check_not_among_images
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.settings import Settings
+from orbslam2py.slam.config import read_change
 from orbslam2py.slam.effort import Effort
 from orbslam2py.slam.options import SystemOptions
 
@@ -108,6 +110,7 @@ def run(
     several_maps: SeveralMapsFlag = True,
     new_map_after: NewMapAfterOption = None,
     effort: EffortOption = Effort.NORMAL,
+    set_: SetOption = None,
     seed: SeedOption = 0,
     video: VideoOption = None,
     record: RecordOption = None,
@@ -158,6 +161,7 @@ def run(
             several_maps=several_maps,
             new_map_after=SystemOptions.new_map_after if new_map_after is None else new_map_after,
             effort=effort,
+            config=dict(map(read_change, set_ or ())),
             keyframe_images=save_images,
             seed=seed,
         ),

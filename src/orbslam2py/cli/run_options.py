@@ -119,6 +119,15 @@ EffortOption = Annotated[
         "every frame with the map once more when that has settled."
     ),
 ]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        help="Change a threshold of the method, such as tracking.map_matches=12; may be given "
+        "several times. `orbslam2py config` lists all.",
+        metavar="NAME=VALUE",
+    ),
+]
 SeedOption = Annotated[int, typer.Option(help="Seed of all random draws.", min=0)]
 
 

@@ -203,6 +203,7 @@ def options_entry(options: RunOptions) -> dict[str, Any]:
         "several_maps": options.system.several_maps,
         "new_map_after": options.system.new_map_after,
         "effort": str(options.system.effort),
+        "config": dict(options.system.config),
         "full_adjustment_time_limit": options.system.full_adjustment_time_limit,
     }
 

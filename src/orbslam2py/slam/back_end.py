@@ -16,6 +16,7 @@ from orbslam2py._worker import Worker, take_turns
 from orbslam2py.errors import MapFileError, WorkerError
 from orbslam2py.maps.map_keeper import MapKeeper
 from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.config import Config
 from orbslam2py.slam.events import (
     Callbacks,
     EventDispatcher,
@@ -45,11 +46,15 @@ class BackEnd:
         What the images come from.
     options : SystemOptions
         How to work.
+    config : Config
+        Thresholds.
     callbacks : Callbacks
         Who wants to know what happens.
     """
 
-    def __init__(self, sensor: Sensor, options: SystemOptions, callbacks: Callbacks) -> None:
+    def __init__(
+        self, sensor: Sensor, options: SystemOptions, config: Config, callbacks: Callbacks
+    ) -> None:
         threaded = not options.deterministic
         self.map = core.Map()
         self.keyframe_index = core.KeyFrameIndex()
@@ -60,6 +65,7 @@ class BackEnd:
             self.map,
             sensor,
             self.keyframe_index,
+            config.mapping,
             threaded=threaded,
             adjustment_threads=n_threads(2) if images_wait else 1,
         )
@@ -80,6 +86,7 @@ class BackEnd:
             options,
             on_loop=_announce_loop(self.events),
             on_merge=_announce_merge(self.events),
+            config=config,
         )
         self.mapping.on_done = _pass_on_keyframe(self.map, self.loop_closing, self.events)
         take_turns(self.workers)

@@ -48,10 +48,17 @@ class FrameRecorder:
         Matches frames with the map again.
     every_frame : bool
         `second_look` gets every frame, when many have come after it at the latest.
+    uncertain_frames : bool
+        It gets frames whose pose was uncertain.
     """
 
     def __init__(
-        self, slam_map: core.Map, second_look: SecondLook, *, every_frame: bool = False
+        self,
+        slam_map: core.Map,
+        second_look: SecondLook,
+        *,
+        every_frame: bool = False,
+        uncertain_frames: bool = True,
     ) -> None:
         self._map = slam_map
         self._second_look = second_look
@@ -65,6 +72,7 @@ class FrameRecorder:
         self._young: list[_YoungFrame] | None = None
         self._young_map = -1
         self._every_frame = every_frame
+        self._uncertain_frames = uncertain_frames
         # Frames to be matched again, by id, and whether they were in doubt.
         self._with_keypoints: dict[int, tuple[core.TrackedFrame, bool]] = {}
         # The youngest map that a frame was recorded in.
@@ -152,7 +160,8 @@ class FrameRecorder:
             else:
                 self._append(frame, lost=lost, fixed_map=fixed_map)
             self._doubted = None
-            if (in_doubt or self._every_frame) and not lost and not fixed_map:
+            again = self._every_frame or (in_doubt and self._uncertain_frames)
+            if again and not lost and not fixed_map:
                 self._keep_keypoints(frame, in_doubt=in_doubt)
 
     def _keep_keypoints(self, frame: core.TrackedFrame, *, in_doubt: bool) -> None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from orbslam2py import _core as core
 from orbslam2py._worker import Worker
 from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.thresholds import KeyframeThresholds
+from orbslam2py.slam.config import KeyframeConfig
 
 
 @dataclass
@@ -44,7 +44,7 @@ class KeyframeDecision:
         What the images come from.
     max_keyframe_interval : int
         Frames after which one is wanted even from a busy mapper: one second.
-    thresholds : KeyframeThresholds, optional
+    config : KeyframeConfig
         Limits.
     waits : bool
         Images are recorded ones: a frame that is worth it waits for the mapper.
@@ -56,7 +56,7 @@ class KeyframeDecision:
         mapping: Worker[int],
         sensor: Sensor,
         max_keyframe_interval: int,
-        thresholds: KeyframeThresholds | None = None,
+        config: KeyframeConfig,
         *,
         waits: bool = False,
     ) -> None:
@@ -64,12 +64,14 @@ class KeyframeDecision:
         self._mapping = mapping
         self._has_depth = sensor.has_depth
         self._max_keyframe_interval = max_keyframe_interval
-        self.limits = thresholds or KeyframeThresholds()
+        self.limits = config
+        #: Fewest frames from one keyframe to the next.
+        self.spacing = config.spacing_with_depth if sensor.has_depth else config.spacing
         self._waits = waits
 
     def due(self, frame_id: int, since: SinceKeyframe) -> bool:
         """Whether a frame may become a keyframe, however well it is tracked."""
-        return frame_id >= since.frame_id + self.limits.spacing
+        return frame_id >= since.frame_id + self.spacing
 
     def wanted(
         self,

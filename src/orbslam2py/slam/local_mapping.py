@@ -12,7 +12,7 @@ from orbslam2py import _core as core
 from orbslam2py._timing import StageStatistics, StageTimer
 from orbslam2py._worker import Worker
 from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.thresholds import MappingThresholds
+from orbslam2py.slam.config import MappingConfig
 
 
 class LocalMapping:
@@ -25,14 +25,14 @@ class LocalMapping:
     slam_map : orbslam2py._core.Map
         The map.
     sensor : Sensor
-        Decides thresholds.
+        Decides what is asked of points.
     keyframe_index : orbslam2py._core.KeyFrameIndex
         Forgets the keyframes that are culled.
     threaded : bool
         In a thread of its own, or inline at `start`.
     adjustment_threads : int
         Of local bundle adjustment, 1 or 2; the result is the same.
-    thresholds : MappingThresholds, optional
+    config : MappingConfig
         Limits.
     """
 
@@ -41,12 +41,12 @@ class LocalMapping:
         slam_map: core.Map,
         sensor: Sensor,
         keyframe_index: core.KeyFrameIndex,
+        config: MappingConfig,
         *,
         threaded: bool,
         adjustment_threads: int = 1,
-        thresholds: MappingThresholds | None = None,
     ) -> None:
-        limits = thresholds or MappingThresholds()
+        limits = config
         self._map = slam_map
         self._keyframe_index = keyframe_index
         self._monocular = sensor is Sensor.MONOCULAR

@@ -20,11 +20,11 @@ from orbslam2py._timing import StageStatistics, StageTimer
 from orbslam2py._worker import Worker
 from orbslam2py.errors import StateError
 from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.config import Config
 from orbslam2py.slam.events import LoopClosed, MapsMerged
 from orbslam2py.slam.full_bundle_adjustment import FullBundleAdjustment
 from orbslam2py.slam.merging import MapMerging
 from orbslam2py.slam.options import SystemOptions
-from orbslam2py.slam.thresholds import LoopThresholds
 from orbslam2py.slam.waiting_loop import WaitingLoop
 
 _log = logging.getLogger(__name__)
@@ -64,8 +64,8 @@ class LoopClosing:
         ``on_loop(event)``, after each loop.
     on_merge : callable
         ``on_merge(event)``, after two maps have become one.
-    thresholds : LoopThresholds, optional
-        Limits.
+    config : Config
+        Thresholds of loops and of merging.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class LoopClosing:
         *,
         on_loop: Callable[[LoopClosed], None],
         on_merge: Callable[[MapsMerged], None],
-        thresholds: LoopThresholds | None = None,
+        config: Config,
     ) -> None:
         self._map = slam_map
         self._keyframe_index = keyframe_index
@@ -88,7 +88,7 @@ class LoopClosing:
         self._adjustment = adjustment
         self._enabled = options.loop_closing
         self._adjust = options.full_adjustment
-        self._limits = thresholds or LoopThresholds()
+        self._limits = config.loops
         self._verification = core.LoopVerificationOptions(
             fix_scale=self._fix_scale, seed=options.seed % 2**64
         )
@@ -100,6 +100,7 @@ class LoopClosing:
             self._find_alike,
             self._lease,
             fix_scale=self._fix_scale,
+            config=config.merging,
         )
         self._waiting = WaitingLoop(slam_map, self._confirm, self._release, self._limits)
         self._consistency = core.LoopConsistency()

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy.typing as npt
 
@@ -16,6 +18,7 @@ from orbslam2py.maps.saved_map import SavedMap
 from orbslam2py.maps.setup_check import check_camera, check_sensor, check_vocabulary
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings, resolve_settings
+from orbslam2py.slam.config import PRESETS, Config, value_of
 from orbslam2py.slam.effort import Effort
 from orbslam2py.vocabulary.vocabulary import load_vocabulary, vocabulary_name
 
@@ -48,11 +51,13 @@ class SystemOptions:
     several_maps: bool = True
     new_map_after: float = 2.0
     effort: Effort = Effort.NORMAL
+    config: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "seed", seed_of(self.seed))
         effort = member_of(Effort, self.effort, "effort", SettingsError)
         object.__setattr__(self, "effort", effort)
+        object.__setattr__(self, "config", _changes_of(self.config))
         for name in _SWITCHES:
             object.__setattr__(self, name, choice_of(getattr(self, name), name))
         if not (is_finite(self.new_map_after) and self.new_map_after >= 0):
@@ -62,6 +67,11 @@ class SystemOptions:
                 "several_maps off"
             )
         self._check_time_limit()
+
+    @property
+    def full_config(self) -> Config:
+        """The whole configuration: the preset of the effort, and what was changed of it."""
+        return Config().with_changes({**PRESETS[str(self.effort)], **self.config})
 
     def _check_time_limit(self) -> None:
         seconds = self.full_adjustment_time_limit
@@ -77,6 +87,18 @@ class SystemOptions:
                 "deterministic mode takes no time limit for the full adjustment: what is reached "
                 "in a given time differs from run to run; leave the limit out"
             )
+
+
+def _changes_of(given: Any) -> dict[str, float | int | bool]:
+    """Take changes of the configuration, by names with a dot, or a whole one."""
+    if isinstance(given, Config):
+        return given.changes()
+    if not isinstance(given, Mapping):
+        raise SettingsError(
+            f"config is {shown(given)}; give a dictionary such as {{'tracking.map_matches': 12}}"
+        )
+    changed = Config().with_changes(given)
+    return {str(name): value_of(changed, name) for name in given}
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from orbslam2py.maps.map_keeper import MapKeeper, encode_image
 from orbslam2py.maps.saved_map import VocabularyIdentity
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.back_end import RESET_PATIENCE, BackEnd
+from orbslam2py.slam.config import Config
 from orbslam2py.slam.events import Callbacks, MapStarted, Relocalized, TrackingLost
 from orbslam2py.slam.evidence.belief import Belief
 from orbslam2py.slam.evidence.harder_search import HarderSearch
@@ -44,11 +45,6 @@ from orbslam2py.slam.records import (
 )
 from orbslam2py.slam.relocalization import Relocalizer
 from orbslam2py.slam.second_look import SecondLook
-from orbslam2py.slam.thresholds import (
-    InitializationThresholds,
-    RelocalizationThresholds,
-    TrackingThresholds,
-)
 from orbslam2py.slam.tracking import Tracking
 from orbslam2py.slam.watched_frame import FrameWatcher, WatchedFrame, frame_features
 
@@ -94,27 +90,29 @@ class Pipeline:
     def __init__(self, setup: Setup, options: SystemOptions, callbacks: Callbacks) -> None:
         sensor = setup.sensor
         self._sensor = sensor
+        config = options.full_config.for_features(setup.settings.orb.n_features)
         self._vocabulary = setup.vocabulary
         self._waits_for_mapping = options.wait_for_mapping and not options.deterministic
         self._keeps_images = options.keyframe_images
         self.front_end = FrontEnd(
             setup.settings, sensor, check_calibration=options.check_calibration
         )
-        self.back_end = back_end = BackEnd(sensor, options, callbacks)
-        self.tracking = _make_tracking(setup, back_end, options)
+        self.back_end = back_end = BackEnd(sensor, options, config, callbacks)
+        self.tracking = _make_tracking(setup, back_end, options, config)
         self.localization = LocalizationSwitch(
             back_end.map, 1 if sensor.has_depth else 2, back_end.map_workers
         )
         self.recorder = FrameRecorder(
             back_end.map,
-            SecondLook(back_end.map, _make_search(setup, back_end)),
-            every_frame=options.effort.looks_again,
+            SecondLook(back_end.map, _make_search(setup, back_end, config)),
+            every_frame=config.trajectory.rematch_every_frame,
+            uncertain_frames=config.trajectory.rematch_uncertain,
         )
         self.statistics = StageStatistics()
         self.reset_requested = threading.Event()
         self.frame_watchers: tuple[FrameWatcher, ...] = ()
         self.n_resets = 0
-        self._limits = InitializationThresholds()
+        self._limits = config.initialization
         # The map that came to nothing, and is given up before the next image.
         self._given_up: int | None = None
         self._start_failed = False
@@ -369,7 +367,7 @@ class Pipeline:
 
 
 def _make_search(
-    setup: Setup, back_end: BackEnd, relocalizer: Relocalizer | None = None
+    setup: Setup, back_end: BackEnd, config: Config, relocalizer: Relocalizer | None = None
 ) -> PoseSearch:
     return PoseSearch(
         back_end.map,
@@ -377,11 +375,13 @@ def _make_search(
         setup.sensor,
         setup.settings.max_keyframe_interval,
         relocalizer,
-        TrackingThresholds().for_features(setup.settings.orb.n_features),
+        config.tracking,
     )
 
 
-def _make_tracking(setup: Setup, back_end: BackEnd, options: SystemOptions) -> Tracking:
+def _make_tracking(
+    setup: Setup, back_end: BackEnd, options: SystemOptions, config: Config
+) -> Tracking:
     seed = options.seed
     sensor, vocabulary = setup.sensor, setup.vocabulary
     max_keyframe_interval = setup.settings.max_keyframe_interval
@@ -389,31 +389,37 @@ def _make_tracking(setup: Setup, back_end: BackEnd, options: SystemOptions) -> T
     n_features = setup.settings.orb.n_features
 
     def belief(searching: PoseSearch) -> Belief:
-        judge = EvidenceJudge(searching.motion_model_window, setup.settings.camera.fx)
+        judge = EvidenceJudge(
+            searching.motion_model_window, setup.settings.camera.fx, config.acceptance
+        )
         return Belief(searching, judge, HarderSearch(searching, judge))
 
     initializer: Initializer
     if sensor is Sensor.MONOCULAR:
-        earlier = _make_search(setup, back_end)
+        earlier = _make_search(setup, back_end, config)
         initializer = MonocularInitializer(
             slam_map,
             vocabulary,
             mapping,
             seed,
-            Smear(setup.settings.camera.fx),
+            Smear(setup.settings.camera.fx, config.acceptance),
             EarlierFrames(earlier, belief(earlier)),
+            config=config.initialization,
         )
     else:
-        initializer = DepthInitializer(slam_map, vocabulary, mapping, n_features)
+        initializer = DepthInitializer(
+            slam_map, vocabulary, mapping, n_features, config.initialization
+        )
     searching = _make_search(
         setup,
         back_end,
+        config,
         Relocalizer(
             slam_map,
             back_end.keyframe_index,
             seed,
             fix_scale=sensor.has_depth,
-            thresholds=RelocalizationThresholds().for_features(n_features),
+            config=config.relocalization,
         ),
     )
     return Tracking(
@@ -428,9 +434,10 @@ def _make_tracking(setup: Setup, back_end: BackEnd, options: SystemOptions) -> T
             mapping.worker,
             sensor,
             max_keyframe_interval,
-            options.effort.keyframes(sensor),
+            config.keyframes,
             waits=options.wait_for_mapping and not options.deterministic,
         ),
+        config=config,
         has_depth=sensor.has_depth,
         n_features=n_features,
         new_map_after=options.new_map_after if options.several_maps else None,

@@ -14,6 +14,7 @@ from orbslam2py.maps.edits.parts import put_together
 from orbslam2py.maps.map_copies import restore_contents, take_contents
 from orbslam2py.maps.saved_map import SavedMap
 from orbslam2py.maps.setup_check import check_made_alike, check_vocabulary
+from orbslam2py.slam.config import Config
 from orbslam2py.slam.events import MapsMerged
 from orbslam2py.slam.full_bundle_adjustment import FullBundleAdjustment
 from orbslam2py.slam.loop_closing import LoopClosing
@@ -85,6 +86,7 @@ def merge_maps(
         SystemOptions(deterministic=True, full_adjustment=False, seed=seed),
         on_loop=lambda _: None,
         on_merge=lambda _: None,
+        config=Config(),
     )
     _compare(slam_map, index, closing)
     if full_adjustment:

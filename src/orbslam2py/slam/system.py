@@ -6,8 +6,10 @@ from __future__ import annotations
 import logging
 import threading
 import weakref
+from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -37,6 +39,7 @@ from orbslam2py.maps.snapshot import (
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
 from orbslam2py.slam.back_end import abandon
+from orbslam2py.slam.config import Config
 from orbslam2py.slam.effort import Effort
 from orbslam2py.slam.events import Callbacks, LoopClosed, MapsMerged
 from orbslam2py.slam.frame_source import FrameSource, timed_images, track_images
@@ -100,6 +103,9 @@ class System:
     effort : {"fast", "normal", "thorough"}
         How much work goes into map and path: ``fast`` makes fewer keyframes, ``thorough`` matches
         every frame with the map once more when that has settled, the last thousand in `shutdown`.
+    config : Config or mapping, optional
+        Changes of single thresholds, by names with a dot: ``{"tracking.map_matches": 12}``; see
+        `orbslam2py.slam.config`.
     check_calibration : bool
         Log one warning if the calibration cannot belong to images of the first one's size.
         `orbslam2py.check_calibration` looks into the images, too.
@@ -146,6 +152,7 @@ class System:
         several_maps: bool = True,
         new_map_after: float = 2.0,
         effort: Effort | str = Effort.NORMAL,
+        config: Config | Mapping[str, Any] | None = None,
     ) -> None:
         self.options = SystemOptions(
             deterministic=deterministic,
@@ -159,6 +166,7 @@ class System:
             several_maps=several_maps,
             new_map_after=new_map_after,
             effort=effort,  # type: ignore[arg-type]
+            config={} if config is None else config,  # type: ignore[arg-type]
         )
         setup = Setup.of(settings, sensor, vocabulary, load_map, initial_pose, allow_other_setup)
         self.sensor, self.settings, self.vocabulary = setup.sensor, setup.settings, setup.vocabulary

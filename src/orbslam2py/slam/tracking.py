@@ -16,6 +16,7 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._timing import StageTimer
+from orbslam2py.slam.config import Config
 from orbslam2py.slam.evidence.belief import Belief
 from orbslam2py.slam.initialization import Initializer
 from orbslam2py.slam.keyframe_decision import KeyframeDecision, SinceKeyframe
@@ -29,7 +30,6 @@ from orbslam2py.slam.pose_search import (
 )
 from orbslam2py.slam.records import PoseEstimate, Reason, TrackingOutcome, TrackingState
 from orbslam2py.slam.relocalization import BlurWatch, Confirmation, LossClock
-from orbslam2py.slam.thresholds import TrackingThresholds
 from orbslam2py.slam.watched_frame import accepted_keypoints
 
 _log = logging.getLogger(__name__)
@@ -54,6 +54,8 @@ class Tracking:
         Whether enough speaks for a pose.
     keyframe_decision : KeyframeDecision
         Which frames become keyframes.
+    config : Config
+        Thresholds.
     has_depth : bool
         Whether frames measure depths, which become points of the map with a keyframe.
     n_features : int
@@ -73,6 +75,7 @@ class Tracking:
         search: PoseSearch,
         belief: Belief,
         keyframe_decision: KeyframeDecision,
+        config: Config,
         has_depth: bool,
         n_features: int,
         new_map_after: float | None = None,
@@ -87,8 +90,8 @@ class Tracking:
         self._has_depth = has_depth
         self._in_growing_map = FirstEstimateInGrowingMap(search)
         self._in_fixed_map = FirstEstimateInFixedMap(search, has_depth=has_depth)
-        self._blur_watch = BlurWatch(n_features)
-        self._confirmation = Confirmation()
+        self._blur_watch = BlurWatch(n_features, config.blur)
+        self._confirmation = Confirmation(config.relocalization)
         self._loss = LossClock(new_map_after)
         #: How often tracking was found again, over all maps.
         self.n_relocalizations = 0
@@ -142,7 +145,7 @@ class Tracking:
         self.state = TrackingState.LOST
         self._kept_maps = set(self._map.maps)
         # The map's keyframes are of another run: the first frame found may be one already.
-        self._since_keyframe = SinceKeyframe(-self._keyframe_decision.limits.spacing)
+        self._since_keyframe = SinceKeyframe(-self._keyframe_decision.spacing)
         self._search.initial_pose = initial_pose
         self._search.searches_loaded_map = True
 
@@ -182,7 +185,7 @@ class Tracking:
             more = localize or self._is_scarce
         else:
             more = self._n_lost % 2 == 1
-        return TrackingThresholds().feature_factor if more else 1
+        return self._search.limits.feature_factor if more else 1
 
     @property
     def motion(self) -> MotionModel:

@@ -7,7 +7,7 @@ import contextlib
 from collections.abc import Callable, Iterator
 
 from orbslam2py import _core as core
-from orbslam2py.slam.thresholds import LoopThresholds
+from orbslam2py.slam.config import LoopConfig
 
 
 class WaitingLoop:
@@ -24,7 +24,7 @@ class WaitingLoop:
         ``verify(current, matched)``: the loop between two keyframes, or None.
     release : callable
         ``release(keyframe)`` ends the lease of a keyframe.
-    thresholds : LoopThresholds
+    config : LoopConfig
         Limits.
     """
 
@@ -33,12 +33,12 @@ class WaitingLoop:
         slam_map: core.Map,
         verify: Callable[[int, int], core.Loop | None],
         release: Callable[[int], None],
-        thresholds: LoopThresholds,
+        config: LoopConfig,
     ) -> None:
         self._map = slam_map
         self._verify = verify
         self._release = release
-        self._limits = thresholds
+        self._limits = config
         self._best: core.Loop | None = None
         self._n_waited = 0
         self._big_change = 0

@@ -12,7 +12,8 @@ import pytest
 import orbslam2py as orb
 from orbslam2py.batches import make_jobs, read_jobs
 from orbslam2py.batches.sweep import read_sweep, with_parameters
-from orbslam2py.settings import Settings, builtin_settings
+from orbslam2py.errors import SettingsError
+from orbslam2py.settings import Sensor, Settings, builtin_settings
 
 
 @pytest.fixture
@@ -245,3 +246,40 @@ def test_what_would_fail_in_every_run_is_told_first(
     with pytest.raises((orb.SettingsError, orb.DatasetError), match=said):
         orb.batch({"sequences": [str(tmp_path / "lab")], **more}, tmp_path / "out", workers=0)
     assert not (tmp_path / "out").exists()
+
+
+def test_values_of_the_configuration_are_options_and_are_swept(places: Path) -> None:
+    jobs = make_jobs(
+        {
+            "sequences": [str(places / "a")],
+            "sensors": ["mono"],
+            "options": {"tracking.map_matches": [8, 12], "effort": "fast"},
+            "sweep": {"keyframes.share": [0.5, 0.7], "ORBextractor.nFeatures": [500]},
+        }
+    )
+    configs = [job.run_options(Sensor.MONOCULAR).system.config for job in jobs]
+    assert [tuple(config.values()) for config in configs] == [
+        *((8, 0.5), (8, 0.7)),
+        *((12, 0.5), (12, 0.7)),
+    ]
+    assert "tracking.map_matches=8" in jobs[0].key
+    assert "keyframes.share=0.5" in jobs[0].key
+    changed = with_parameters(builtin_settings("tum1", Sensor.MONOCULAR), jobs[0].parameters)
+    assert changed.orb.n_features == 500
+
+
+@pytest.mark.parametrize(
+    ("document", "message"),
+    [
+        ({"options": {"tracking.map_match": 8}}, "did you mean tracking.map_matches"),
+        ({"options": {"tracking.map_matches": "many"}}, "give a number from 0 on"),
+        ({"options": {"acceptance.search_again": 0}}, "give true or false"),
+        ({"sweep": {"keyframes.shares": [1]}}, "did you mean keyframes.share"),
+        ({"sweep": {"keyframes.share": [-1]}}, "allowed: a number from 0 on"),
+    ],
+)
+def test_wrong_values_of_the_configuration(
+    places: Path, document: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(SettingsError, match=message):
+        make_jobs({"sequences": [str(places / "a")], **document})

@@ -16,6 +16,7 @@ import pytest
 
 import orbslam2py
 from orbslam2py import Sensor, Settings
+from orbslam2py.maps import load_map
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.trajectory import read_tum
 from support.command_line import RUN_FILES, CommandLine, Results
@@ -434,3 +435,21 @@ def test_a_broken_ground_truth_costs_only_the_comparison(command: CommandLine, r
     assert "no comparison with ground truth" in done.err
     assert "ate_rmse_m" not in Results(Path("r")).report
     assert logging.getLogger("orbslam2py").propagate, "the test's own log is as it was"
+
+
+def test_changed_thresholds_are_used_and_kept(command: CommandLine, rgbd: Path) -> None:
+    done = command(
+        *("run", rgbd, "--output", "results", "--save", "map.orbmap"),
+        *("--set", "tracking.map_matches=12", "--set", "acceptance.search_again=false"),
+    )
+    assert done.code == 0, done.err
+    changed = {"tracking.map_matches": 12, "acceptance.search_again": False}
+    assert Results(Path("results")).report["options"]["config"] == changed
+    assert load_map(Path("map.orbmap")).runs[-1].options["config"] == changed
+
+
+def test_config_lists_thresholds(command: CommandLine) -> None:
+    done = command("config", "keyframes")
+    assert done.code == 0
+    assert "keyframes.share" in done.out
+    assert "tracking." not in done.out

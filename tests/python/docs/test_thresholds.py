@@ -3,21 +3,22 @@
 
 from __future__ import annotations
 
-import importlib
 import re
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from types import ModuleType
+from typing import Any
 
 import pytest
 
+from orbslam2py.settings.fit import FitThresholds
+from orbslam2py.slam.config import Config
 from support.documents import ROOT, cells_of, read
 
 HEADER = ("name in the code", "value")
 CHAPTERS = sorted(ROOT.glob("docs/method/*.md"))
 
 _CPP = re.compile(r"^`(?P<name>\w+)` in `(?P<file>[\w/]+\.(?:hpp|cpp))`")
-_PYTHON = re.compile(r"^`(?P<owner>[A-Z]\w*)\.(?P<field>\w+)`$")
+_PYTHON = re.compile(r"^`(?P<owner>[A-Za-z_]\w*)\.(?P<field>\w+)`$")
 _NUMBER = r"[-+]?(?:\d[\d']*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 
 
@@ -76,12 +77,11 @@ def literals_of(text: str, name: str) -> list[float]:
     return found
 
 
-MODULES = ("orbslam2py.slam.thresholds", "orbslam2py.settings.fit")
-
-
 @pytest.fixture(scope="module")
-def thresholds() -> list[ModuleType]:
-    return [importlib.import_module(name) for name in MODULES]
+def thresholds() -> dict[str, Any]:
+    """Sections of the configuration, and other classes of thresholds, by their names."""
+    sections = {field.name: getattr(Config(), field.name) for field in fields(Config)}
+    return {**sections, "FitThresholds": FitThresholds()}
 
 
 @pytest.mark.parametrize("path", CHAPTERS, ids=lambda p: p.stem)
@@ -105,14 +105,14 @@ def test_thresholds_of_the_core(path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", CHAPTERS, ids=lambda p: p.stem)
-def test_thresholds_of_python(path: Path, thresholds: list[ModuleType]) -> None:
+def test_thresholds_of_python(path: Path, thresholds: dict[str, Any]) -> None:
     wrong = []
     for row in rows_of(path):
         named = _PYTHON.match(row.name)
         if named is None:
             continue
-        kind = next(filter(None, (getattr(m, named["owner"], None) for m in thresholds)), None)
-        defaults = {} if kind is None else {f.name: f.default for f in fields(kind)}
+        owner = thresholds.get(named["owner"])
+        defaults = {} if owner is None else asdict(owner)
         if named["field"] not in defaults:
             wrong.append(f"{row.place}: no such field")
         elif number_in(row.value) != pytest.approx(float(defaults[named["field"]])):
@@ -128,7 +128,7 @@ def test_names_of_thresholds_are_of_a_known_form(path: Path) -> None:
         for row in rows_of(path)
         if row.name.startswith("`") and not (_CPP.match(row.name) or _PYTHON.match(row.name))
     ]
-    assert not odd, f"neither a name of C++ in a file nor Class.field: {odd}"
+    assert not odd, f"neither a name of C++ in a file nor section.field: {odd}"
 
 
 def test_numbers_are_read() -> None:

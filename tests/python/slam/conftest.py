@@ -10,6 +10,7 @@ import pytest
 from orbslam2py import Sensor, System
 from orbslam2py._worker import Worker
 from orbslam2py.slam import keyframe_decision, tracking
+from orbslam2py.slam.config import AcceptanceConfig, TrackingConfig
 from orbslam2py.slam.evidence import harder_search, judgement, smear
 from orbslam2py.slam.pose_search import (
     first_estimate,
@@ -19,7 +20,6 @@ from orbslam2py.slam.pose_search import (
     search,
 )
 from orbslam2py.slam.relocalization import blur
-from orbslam2py.slam.thresholds import EvidenceThresholds, TrackingThresholds
 from support.interleaving import LIMIT, Stage
 from support.small_sequences import new_system, play
 from support.tracking_scene import FakeCore, Scene
@@ -98,9 +98,7 @@ def worker(gate: Gate) -> Iterator[Worker[int]]:
 @pytest.fixture
 def careful(core: FakeCore, sensor: Sensor) -> Scene:
     """A tracker that weighs its poses, used to 100 inliers; refuses fewer than 30."""
-    scene = Scene(
-        sensor, core, TrackingThresholds(local_map_inliers=10), evidence=EvidenceThresholds()
-    )
+    scene = Scene(sensor, core, TrackingConfig(local_map_inliers=10), evidence=AcceptanceConfig())
     scene.run(40)  # until the first second, with its own limit of inliers, is over
     core.calls.clear()
     return scene

@@ -9,16 +9,16 @@ from typing import Any
 import pytest
 
 from orbslam2py import Reason, Sensor, TrackingState
+from orbslam2py.slam.config import AcceptanceConfig, InitializationConfig
 from orbslam2py.slam.evidence import smear as smear_module
 from orbslam2py.slam.evidence.smear import Smear
 from orbslam2py.slam.initialization import MonocularInitializer, from_views
 from orbslam2py.slam.records import TrackingOutcome
 from orbslam2py.slam.relocalization import LossClock
-from orbslam2py.slam.thresholds import EvidenceThresholds
 from support.tracking_scene import FakeCore, FakeFrame, Scene, lose
 
 SHARP, BLURRED = 1.4, 0.5  # fine detail; the latter is a smear of 22 pixels
-YOUNG = EvidenceThresholds().young_map
+YOUNG = AcceptanceConfig().young_map
 
 
 def track_blurred(scene: Scene, frame_id: int | None = None) -> TrackingOutcome:
@@ -116,7 +116,14 @@ class Starter(MonocularInitializer):
 
     def __init__(self) -> None:
         nothing: Any = None
-        super().__init__(nothing, nothing, nothing, 0, Smear(500.0))
+        super().__init__(
+            nothing,
+            nothing,
+            nothing,
+            0,
+            Smear(500.0, AcceptanceConfig()),
+            config=InitializationConfig(),
+        )
 
     def _from_best_pair(self, frame: Any) -> Reason:
         return Reason.NONE if self.willing else Reason.LOW_PARALLAX

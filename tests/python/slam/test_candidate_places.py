@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from orbslam2py import _core
+from orbslam2py.slam.config import RelocalizationConfig
 from orbslam2py.slam.relocalization import CandidatePlaces, PlaceOfLoss, candidates, place_of_loss
-from orbslam2py.slam.thresholds import RelocalizationThresholds
 
-LIMITS = RelocalizationThresholds()
+LIMITS = RelocalizationConfig()
 FRAME: Any = SimpleNamespace()
 
 

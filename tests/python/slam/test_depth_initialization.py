@@ -11,6 +11,7 @@ import pytest
 
 from orbslam2py import Reason, _core
 from orbslam2py.slam import initialization
+from orbslam2py.slam.config import InitializationConfig
 from orbslam2py.slam.initialization import from_depth
 from support.tracking_scene import (
     FakeCore,
@@ -57,6 +58,8 @@ def test_depth_initializer(
         FakeMap(),  # type: ignore[arg-type]
         "vocabulary",  # type: ignore[arg-type]
         mapping,  # type: ignore[arg-type]
+        n_features=1000,
+        config=InitializationConfig(),
     )
     assert initializer.try_initialize(frame, blurred=False) is reason  # type: ignore[arg-type]
     if reason is Reason.NONE:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from orbslam2py import Reason, Sensor, TrackingState
+from orbslam2py.slam.config import AcceptanceConfig
 from orbslam2py.slam.records import PoseMethod, Verdict
-from orbslam2py.slam.thresholds import EvidenceThresholds
 from support.tracking_scene import FakeCore, FakeFrame, Scene, every_way_ends_elsewhere, pose
 
 
@@ -44,7 +44,7 @@ def test_an_ordinary_frame_is_searched_once(careful: Scene) -> None:
 
 
 def test_no_evidence_where_the_map_begins_and_where_no_pose_is_found(core: FakeCore) -> None:
-    scene = Scene(Sensor.STEREO, core, evidence=EvidenceThresholds())
+    scene = Scene(Sensor.STEREO, core, evidence=AcceptanceConfig())
     assert scene.track().estimate.evidence is None
     core.motion.extend([0] * 4)
     core.words.extend([0] * 4)
@@ -180,7 +180,7 @@ def test_where_errors_vary_from_image_to_image_a_larger_one_is_not_sudden(carefu
     careful.core.match_error = 1.1
     evidence = careful.track().estimate.evidence
     assert evidence is not None
-    assert evidence.error_to_usual > EvidenceThresholds().weak_error
+    assert evidence.error_to_usual > AcceptanceConfig().weak_error
     assert evidence.verdict is Verdict.STRONG
     careful.core.match_error = 4.0
     evidence = careful.track().estimate.evidence

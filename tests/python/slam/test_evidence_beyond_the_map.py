@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from orbslam2py import Reason, Sensor, TrackingState, _core
+from orbslam2py.slam.config import AcceptanceConfig, TrackingConfig
 from orbslam2py.slam.records import PoseMethod, TrackingOutcome, Verdict
-from orbslam2py.slam.thresholds import EvidenceThresholds, TrackingThresholds
 from support.tracking_scene import FakeCore, FakeFrame, Scene, every_way_ends_elsewhere
 
 USUAL = 100
@@ -25,8 +25,8 @@ def scene(core: FakeCore) -> Scene:
     scene = Scene(
         Sensor.STEREO,
         core,
-        TrackingThresholds(local_map_inliers=10),
-        evidence=EvidenceThresholds(),
+        TrackingConfig(local_map_inliers=10),
+        evidence=AcceptanceConfig(),
     )
     scene.localize = True
     scene.run(_SETTLED)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from orbslam2py import Reason, TrackingState
+from orbslam2py.slam.config import BlurConfig, TrackingConfig
 from orbslam2py.slam.records import TrackingOutcome
-from orbslam2py.slam.thresholds import BlurThresholds, TrackingThresholds
 from support.tracking_scene import Scene, lose
 
 SHARP = 1000.0
@@ -153,7 +153,7 @@ def test_what_stays_as_it_is_counts_as_sharp_after_half_of_the_frames(scene: Sce
     """A wall without texture is no blur."""
     scene.run(40)
     scene.core.n_reference = WANTED
-    n_frames = BlurThresholds().frames
+    n_frames = BlurConfig().frames
     keyframes = [track_blurred(scene).is_keyframe for _ in range(n_frames)]
     assert keyframes.index(True) == n_frames // 2 + 1
 
@@ -189,7 +189,7 @@ def test_more_features_in_localization_mode_and_in_turns_while_lost(scene: Scene
 def test_more_features_after_a_pose_with_few_inliers(scene: Scene) -> None:
     """It is about to be lost."""
     scene.run(40)
-    scarce = TrackingThresholds().scarce_inliers
+    scarce = TrackingConfig().scarce_inliers
     for n_inliers, factor in ((scarce - 1, 2), (scarce, 1), (60, 2), (3 * scarce, 1)):
         scene.core.inliers.extend([n_inliers] * 2)
         assert scene.track().estimate.n_inliers == n_inliers

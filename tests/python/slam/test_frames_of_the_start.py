@@ -14,9 +14,9 @@ from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py._timing import StageTimer
 from orbslam2py.evaluation import match_poses
+from orbslam2py.slam.config import InitializationConfig, TrackingConfig
 from orbslam2py.slam.frame_recorder import FrameRecorder
 from orbslam2py.slam.initialization import MonocularInitializer
-from orbslam2py.slam.thresholds import InitializationThresholds, TrackingThresholds
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.trajectory.rotations import rotation_angles
 from support.moved_frames import MovedByAMetre
@@ -69,7 +69,7 @@ class Corridor:
 
 def test_the_frames_of_the_start_are_looked_at_once_the_map_has_settled() -> None:
     walk = Corridor(60)
-    settled = InitializationThresholds().settled_map
+    settled = InitializationConfig().settled_map
     begun = int(np.argmax(np.array(walk.n_young) > 0))
     looked = next(i for i, n in enumerate(walk.n_keyframes) if n > settled) + 1
     assert walk.n_young[looked - 1] == looked  # from the very first frame on
@@ -175,7 +175,7 @@ def test_views_between_do_not_make_a_young_map_a_firm_one(
     monkeypatch.setattr(MonocularInitializer, "_adds", lambda *_: True)
     with begun(room) as system:
         tracking = system.pipeline.tracking
-        limits = replace(TrackingThresholds(), small_map=2)
+        limits = replace(TrackingConfig(), small_map=2)
         monkeypatch.setattr(tracking._search, "limits", limits)
         assert system.n_keyframes > limits.small_map
         assert tracking._is_small

@@ -13,9 +13,9 @@ import pytest
 
 from orbslam2py import Sensor, System, TrackingState
 from orbslam2py import _core as core
+from orbslam2py.slam.config import AcceptanceConfig, TrackingConfig
 from orbslam2py.slam.pose_search import PoseSearch, RefinedPose
 from orbslam2py.slam.records import PoseEstimate, TrackingOutcome
-from orbslam2py.slam.thresholds import EvidenceThresholds, TrackingThresholds
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.vocabulary import load_vocabulary
 from support.tracking_scene import FakeCore, FakeFrame, Scene, pose
@@ -23,7 +23,7 @@ from support.tracking_scene import FakeCore, FakeFrame, Scene, pose
 pytestmark = pytest.mark.watchdog(120)
 
 N = 12
-LIMITS = TrackingThresholds()
+LIMITS = TrackingConfig()
 
 
 class Walk:
@@ -40,7 +40,7 @@ class Walk:
         self.last = self.system.pipeline.tracking.motion.last
         self.map = self.system.pipeline.back_end.map
         self.search = PoseSearch(
-            self.map, load_vocabulary(), Sensor.STEREO, 20, None, TrackingThresholds()
+            self.map, load_vocabulary(), Sensor.STEREO, 20, None, TrackingConfig()
         )
 
     def version(self) -> core.TrackedFrame:
@@ -278,7 +278,7 @@ def in_doubt(
     core: FakeCore, metres: float, n_inliers: int, *, confirmed: bool
 ) -> tuple[TrackingOutcome, FakeFrame, list[float]]:
     """A frame in a fixed map whose inliers fall; another way leads there as well, or none does."""
-    scene = Scene(Sensor.STEREO, core, evidence=EvidenceThresholds())
+    scene = Scene(Sensor.STEREO, core, evidence=AcceptanceConfig())
     scene.run(12)
     scene.localize = True
     scene.run(3)

@@ -11,8 +11,8 @@ import pytest
 
 from orbslam2py import Sensor, TrackingState
 from orbslam2py._core import Pose
+from orbslam2py.slam.config import TrackingConfig
 from orbslam2py.slam.records import TrackingOutcome
-from orbslam2py.slam.thresholds import TrackingThresholds
 from support.tracking_scene import (
     MAX_FRAMES,
     FakeCore,
@@ -70,7 +70,7 @@ TABLE = [
 @pytest.mark.parametrize("case", TABLE, ids=lambda case: case.why)
 def test_keyframe_decision(sensor: Sensor, core: FakeCore, case: Case) -> None:
     # Too few inliers to go on tracking are enough for a decision.
-    limits = TrackingThresholds(
+    limits = TrackingConfig(
         local_map_inliers=1, local_map_inliers_after_relocalization=1, map_matches=1
     )
     scene = Scene(sensor, core, limits)

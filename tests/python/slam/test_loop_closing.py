@@ -16,6 +16,7 @@ import pytest
 from orbslam2py import LoopClosed, MapsMerged, Sensor, StateError, _core
 from orbslam2py._worker import Worker
 from orbslam2py.slam import loop_closing
+from orbslam2py.slam.config import Config
 from orbslam2py.slam.loop_closing import LoopClosing
 from orbslam2py.slam.options import SystemOptions
 
@@ -135,6 +136,7 @@ class Scene:
             SystemOptions(deterministic=True, loop_closing=enabled, full_adjustment=adjust, seed=5),
             on_loop=self.events.append,
             on_merge=self.merged.append,
+            config=Config(),
         )
 
     def _core(self) -> SimpleNamespace:
@@ -382,7 +384,7 @@ def test_reset_forgets_the_gap(scene: Scene) -> None:
 class FakeMerging:
     """Joins with the first place in another map."""
 
-    def __init__(self, world: FakeMap, *_: object, fix_scale: bool) -> None:
+    def __init__(self, world: FakeMap, *_: object, fix_scale: bool, config: object) -> None:
         self.map = world
 
     def reset(self) -> None:

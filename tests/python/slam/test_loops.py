@@ -20,8 +20,6 @@ from orbslam2py import (
 )
 from orbslam2py.datasets import Images
 from orbslam2py.evaluation import lap_error, scale_drift
-from orbslam2py.slam import loop_closing
-from orbslam2py.slam.thresholds import LoopThresholds
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.feeding import feed
 
@@ -172,14 +170,11 @@ def test_walls_that_repeat_their_pictures_close_true_loops_only() -> None:
     assert result.problems == []
 
 
-def test_a_loop_that_still_waits_is_closed_when_all_is_waited_for(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    never = LoopThresholds(firm_matches=10**6, patience=10**6)
-    monkeypatch.setattr(loop_closing, "LoopThresholds", lambda: never)
+def test_a_loop_that_still_waits_is_closed_when_all_is_waited_for() -> None:
+    never = {"loops.firm_matches": 10**6, "loops.patience": 10**6}
     made = sequence("corridor", Sensor.RGBD)
     settings = replace(made.settings, orb=replace(made.settings.orb, n_features=600))
-    with System(settings, Sensor.RGBD, deterministic=True) as system:
+    with System(settings, Sensor.RGBD, deterministic=True, config=never) as system:
         for index, timestamp in enumerate(made.timestamps):
             feed(system, images("corridor", Sensor.RGBD, 1.4, index), float(timestamp))
         assert system.loops == []

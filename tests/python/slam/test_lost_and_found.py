@@ -14,8 +14,8 @@ from orbslam2py import Reason, Sensor, TrackingRecord, TrackingState
 from orbslam2py import _core as core
 from orbslam2py._timing import StageTimer
 from orbslam2py.datasets import Images
+from orbslam2py.slam.config import RelocalizationConfig
 from orbslam2py.slam.relocalization import PlaceOfLoss, Relocalizer
-from orbslam2py.slam.thresholds import RelocalizationThresholds
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
 pytestmark = pytest.mark.watchdog(120)
@@ -159,11 +159,13 @@ def described(world: MappedWorld, index: int) -> core.TrackedFrame:
 
 
 def relocalizer(
-    world: MappedWorld, limits: RelocalizationThresholds | None = None, *, words: bool = True
+    world: MappedWorld, limits: RelocalizationConfig | None = None, *, words: bool = True
 ) -> Relocalizer:
     back_end = world.system.pipeline.back_end
     index = back_end.keyframe_index if words else core.KeyFrameIndex()
-    return Relocalizer(back_end.map, index, 0, fix_scale=True, thresholds=limits)
+    return Relocalizer(
+        back_end.map, index, 0, fix_scale=True, config=limits or RelocalizationConfig()
+    )
 
 
 def test_near_the_place_of_loss_no_word_is_needed(world: MappedWorld) -> None:
@@ -184,7 +186,7 @@ def test_where_its_motion_led_fewer_inliers_are_enough(
     world: MappedWorld, frames_since: int, found: bool
 ) -> None:
     motion = world.system.pipeline.tracking.motion
-    limits = RelocalizationThresholds(enough=10**6, enough_near=30)
+    limits = RelocalizationConfig(enough=10**6, enough_near=30)
     again = relocalizer(world, limits)
     reference = world.system.pipeline.tracking.reference_keyframe
     again.lose(PlaceOfLoss(motion.last, None, reference))
@@ -210,7 +212,7 @@ def test_found_by_likeness_it_is_not_where_it_was_expected(world: MappedWorld) -
 def test_the_window_grows_with_every_failure(world: MappedWorld) -> None:
     """Beside the path, where the first window does not reach."""
     motion = world.system.pipeline.tracking.motion
-    limits = RelocalizationThresholds(
+    limits = RelocalizationConfig(
         guess_window=0.5, widening=10.0, widest=40.0, near_candidates=0, thorough_keyframes=0
     )
     found = relocalizer(world, limits, words=False)
@@ -223,7 +225,7 @@ def test_the_window_grows_with_every_failure(world: MappedWorld) -> None:
 
 def test_where_no_window_reaches_all_keypoints_are_compared(world: MappedWorld) -> None:
     motion = world.system.pipeline.tracking.motion
-    limits = RelocalizationThresholds(guess_window=0.5, widening=0.0, near_candidates=0)
+    limits = RelocalizationConfig(guess_window=0.5, widening=0.0, near_candidates=0)
     found = relocalizer(world, limits, words=False)
     reference = world.system.pipeline.tracking.reference_keyframe
     found.lose(PlaceOfLoss(motion.last, None, reference))
@@ -233,6 +235,6 @@ def test_where_no_window_reaches_all_keypoints_are_compared(world: MappedWorld) 
 
 
 def test_poses_that_are_verified_are_counted(world: MappedWorld) -> None:
-    limits = RelocalizationThresholds(verified_poses=0)
+    limits = RelocalizationConfig(verified_poses=0)
     assert relocalizer(world).relocalize(described(world, 30)) >= 50
     assert relocalizer(world, limits).relocalize(described(world, 30)) == 0

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from orbslam2py import _core as core
+from orbslam2py.slam.config import MergingConfig
 from orbslam2py.slam.merging import MapMerging, map_merging
 from orbslam2py.slam.merging.explanation import explained_share
 
@@ -72,7 +73,9 @@ def merging(monkeypatch: pytest.MonkeyPatch) -> MapMerging:
     def lease(keyframe: int) -> Iterator[bool]:
         yield maps.has_keyframe(keyframe)
 
-    return MapMerging(maps, verify, lambda keyframe: [], lease, fix_scale=True)  # type: ignore[arg-type]
+    return MapMerging(
+        maps, verify, lambda keyframe: [], lease, fix_scale=True, config=MergingConfig()
+    )  # type: ignore[arg-type]
 
 
 def shown(merging: MapMerging, current: int, matched: int, off: float = 0.0) -> bool:

@@ -10,8 +10,8 @@ import pytest
 
 from orbslam2py import Reason, System, TrackingRecord, TrackingState, Trajectory
 from orbslam2py.evaluation import Alignment, evaluate_trajectory
+from orbslam2py.slam.config import InitializationConfig
 from orbslam2py.slam.initialization.image_motion import ImageMotion
-from orbslam2py.slam.thresholds import InitializationThresholds
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
 pytestmark = pytest.mark.watchdog(120)
@@ -111,7 +111,7 @@ def test_after_a_long_stand_a_map_begins() -> None:
         SyntheticOptions(world="corridor", sensor="mono", size=(320, 240), noise=1, frames=40)
     )
     standing = sequence.load(0).image
-    n_remembered = InitializationThresholds().remembered_frames
+    n_remembered = InitializationConfig().remembered_frames
     with System(sequence.settings, "mono", deterministic=True) as system:
         for i in range(n_remembered + 5):
             record = system.track_monocular(standing, i / 20)

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from orbslam2py.slam.config import TrackingConfig
 from orbslam2py.slam.pose_search.proving_period import ProvingPeriod
-from orbslam2py.slam.thresholds import TrackingThresholds
 from support.tracking_scene import FakeFrame
 
-LIMITS = TrackingThresholds()
+LIMITS = TrackingConfig()
 SECOND = 20
 FEW, MANY = LIMITS.local_map_inliers, LIMITS.local_map_inliers_after_relocalization
 

@@ -20,6 +20,7 @@ from orbslam2py import Reason, Sensor, TrackingState
 from orbslam2py import _core as core
 from orbslam2py._timing import StageTimer
 from orbslam2py.datasets import Images
+from orbslam2py.slam.config import RelocalizationConfig
 from orbslam2py.slam.relocalization import Relocalizer
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
@@ -151,7 +152,11 @@ def described(world: MappedWorld, shown: Images) -> core.TrackedFrame:
 def relocalizer(world: MappedWorld, seed: int = 0) -> Relocalizer:
     back_end = world.system.pipeline.back_end
     return Relocalizer(
-        back_end.map, back_end.keyframe_index, seed, fix_scale=world.sequence.sensor.has_depth
+        back_end.map,
+        back_end.keyframe_index,
+        seed,
+        fix_scale=world.sequence.sensor.has_depth,
+        config=RelocalizationConfig(),
     )
 
 
@@ -186,5 +191,7 @@ def test_same_seed_same_pose(world: MappedWorld) -> None:
 
 def test_an_empty_map_finds_nothing(world: MappedWorld) -> None:
     frame = described(world, world.sequence.load(40))
-    assert Relocalizer(core.Map(), core.KeyFrameIndex(), 0, fix_scale=True).relocalize(frame) == 0
+    nothing = core.Map(), core.KeyFrameIndex()
+    config = RelocalizationConfig()
+    assert Relocalizer(*nothing, 0, fix_scale=True, config=config).relocalize(frame) == 0
     assert frame.T_cw is None

@@ -11,11 +11,11 @@ import pytest
 from orbslam2py import Sensor, System
 from orbslam2py import _core as core
 from orbslam2py.slam import frame_recorder
+from orbslam2py.slam.config import TrackingConfig
 from orbslam2py.slam.effort import Effort
 from orbslam2py.slam.frame_recorder import FrameRecorder
 from orbslam2py.slam.pose_search import LocalMapSearch, PoseSearch, RefinedPose
 from orbslam2py.slam.second_look import SecondLook
-from orbslam2py.slam.thresholds import TrackingThresholds
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.vocabulary import load_vocabulary
 from support.moved_frames import MovedByAMetre
@@ -48,7 +48,7 @@ class Walk:
                 Sensor.RGBD,
                 20,
                 None,
-                TrackingThresholds(),
+                TrackingConfig(),
             ),
         )
 

@@ -13,6 +13,7 @@ from orbslam2py import Sensor
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py._timing import StageTimer
+from orbslam2py.slam.config import InitializationConfig
 from orbslam2py.slam.front_end import FrontEnd, intrinsics
 from orbslam2py.slam.initialization import several_views
 from orbslam2py.slam.initialization.kept_views import KeptViews, View
@@ -24,7 +25,6 @@ from orbslam2py.slam.initialization.third_view import (
     agreeing_motions,
     reconstruct,
 )
-from orbslam2py.slam.thresholds import InitializationThresholds
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
 _N_FRAMES = 17
@@ -47,15 +47,15 @@ class Seen(NamedTuple):
     def best_motion(
         self, *motions: core.TwoViewMotion, **limits: float
     ) -> core.TwoViewMotion | None:
-        chosen = InitializationThresholds(**limits)  # type: ignore[arg-type]
+        chosen = InitializationConfig(**limits)  # type: ignore[arg-type]
         candidate = Candidate(self.view, motions)
         together = SeveralViews(candidate, self.thirds(candidate, chosen), self.last, chosen)
         return together.best_motion(motions, seed=0)
 
     def thirds(
-        self, candidate: Candidate, limits: InitializationThresholds | None = None
+        self, candidate: Candidate, limits: InitializationConfig | None = None
     ) -> ThirdViews:
-        return ThirdViews.of(candidate, self.kept, limits or InitializationThresholds())
+        return ThirdViews.of(candidate, self.kept, limits or InitializationConfig())
 
     def off(self, motion: core.TwoViewMotion) -> float:
         """Degrees between its direction and the true one."""
@@ -77,7 +77,7 @@ def look(world: str) -> Seen:
         SyntheticOptions(world=world, sensor="mono", frames=120, size=(320, 240), noise=1.5)
     )
     front = FrontEnd(sequence.settings, Sensor.MONOCULAR)
-    kept = KeptViews(InitializationThresholds())
+    kept = KeptViews(InitializationConfig())
     for i in range(_N_FRAMES):
         image = sequence.load(i).image
         frame = front.monocular(image, i, float(i), StageTimer(), feature_factor=2)
@@ -147,7 +147,7 @@ def test_a_plane_passed_on_a_straight_way_waits(wall_of_a_room: Seen) -> None:
 def test_two_motions_of_a_plane_are_told_apart_by_all_views() -> None:
     """Third views fit both; once all are adjusted the wrong one costs several times as much."""
     wall = look("wall")
-    limits = InitializationThresholds()
+    limits = InitializationConfig()
     candidate = Candidate.of(wall.view, reconstruct(wall.view, wall.last, seed=0))
     assert candidate is not None and not candidate.is_clear
     left = agreeing_motions(candidate, wall.thirds(candidate), wall.last, limits)
@@ -209,7 +209,7 @@ def test_a_draw_that_leads_elsewhere_and_fits_as_well_lets_the_map_wait(
 def test_adjusted_poses_lead_to_the_views_that_they_are_of(
     seen: Seen, not_known: tuple[int, ...]
 ) -> None:
-    limits = InitializationThresholds()
+    limits = InitializationConfig()
     candidate = Candidate(seen.view, (seen.place(seen.T_21),))
     together = SeveralViews(candidate, seen.thirds(candidate), seen.last, limits)
     placed = together._place(seen.T_21)
@@ -267,7 +267,7 @@ def test_two_motions_to_nearly_the_same_place_are_one(
     seen: Seen, degrees: float, is_one: bool
 ) -> None:
     motions = tuple(seen.place(turned(seen.T_21, turn)) for turn in (0, degrees))
-    limits = InitializationThresholds(clearly_worse=1e9)  # none fits that much worse
+    limits = InitializationConfig(clearly_worse=1e9)  # none fits that much worse
     candidate = Candidate(seen.view, motions)
     left = agreeing_motions(candidate, seen.thirds(candidate, limits), seen.last, limits)
     assert len(left) == (1 if is_one else 2)

@@ -8,10 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from orbslam2py.slam.config import AcceptanceConfig
 from orbslam2py.slam.evidence import judgement
 from orbslam2py.slam.pose_search import MotionModel
 from orbslam2py.slam.records import Verdict
-from orbslam2py.slam.thresholds import EvidenceThresholds
 from support.tracking_scene import FakeFrame, Scene, pose
 
 
@@ -53,7 +53,7 @@ def test_few_inliers_are_less_certain_than_their_number_says(
     assert estimate.covariance is not None
     assert estimate.n_inliers == n_inliers
     larger = estimate.covariance[0, 0] / usual.covariance[0, 0]
-    few = EvidenceThresholds().few_inliers
+    few = AcceptanceConfig().few_inliers
     # What is stated of the keypoints' noise goes by the number, here in proportion.
     by_number = (1 + (few / counted) ** 4) / (1 + (few / 100) ** 4)
     assert larger == pytest.approx(n_inliers / 100 * by_number)
@@ -68,12 +68,12 @@ def test_where_nothing_is_usual_yet_a_pose_is_less_certain(careful: Scene, n_vis
     careful.core.n_visible = n_visible  # beside those held
     first = careful.track().estimate
     careful.core.n_visible = 3
-    careful.run(EvidenceThresholds().changes_seen + 1)
+    careful.run(AcceptanceConfig().changes_seen + 1)
     later = careful.track().estimate
     assert usual.covariance is not None
     assert first.covariance is not None and first.evidence is not None
     assert later.covariance is not None
-    limits = EvidenceThresholds()
+    limits = AcceptanceConfig()
     found = max(first.evidence.found, limits.fewest_found)
     few = 1 + (limits.few_found / found) ** 4
     np.testing.assert_allclose(first.covariance, 2 * few * usual.covariance)
@@ -122,7 +122,7 @@ def test_keypoints_on_a_smear_are_wrong_together(careful: Scene) -> None:
     assert sharp.covariance is not None
     assert usual.evidence is not None
     assert blurred.evidence is not None
-    limits = EvidenceThresholds()
+    limits = AcceptanceConfig()
     assert blurred.evidence.smear == pytest.approx(limits.smear * (2**2 - 1))
     assert usual.evidence.smear == 0
     # 100 inliers in 30 cells, each with a variance of 2.

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from orbslam2py import _core as core
+from orbslam2py.slam.config import InitializationConfig
 from orbslam2py.slam.initialization import kept_views
 from orbslam2py.slam.initialization.kept_views import Indices, KeptViews, View
 from orbslam2py.slam.initialization.third_view import Candidate, Motion, ThirdViews
-from orbslam2py.slam.thresholds import InitializationThresholds
 
-LIMITS = InitializationThresholds()
+LIMITS = InitializationConfig()
 N = 200
 """Keypoints of every frame."""
 

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from orbslam2py import Sensor
+from orbslam2py.slam.config import AcceptanceConfig, TrackingConfig
 from orbslam2py.slam.evidence.usual_change import UsualChange
 from orbslam2py.slam.pose_search import MotionModel
-from orbslam2py.slam.thresholds import EvidenceThresholds, TrackingThresholds
 from support.tracking_scene import FakeCore, FakeFrame, Scene, pose
 
-LIMITS = EvidenceThresholds()
+LIMITS = AcceptanceConfig()
 ORDINARY = np.array([0.01, 0, 0, 0, 0.1, 0])
 
 
@@ -111,7 +111,7 @@ def test_the_change_is_from_the_pose_to_where_the_motion_led() -> None:
 def test_a_pose_far_from_where_the_motion_led_may_be_a_mistake(
     core: FakeCore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scene = Scene(Sensor.STEREO, core, TrackingThresholds(local_map_inliers=10), evidence=LIMITS)
+    scene = Scene(Sensor.STEREO, core, TrackingConfig(local_map_inliers=10), evidence=LIMITS)
     scene.run(40)
     usual = scene.track().estimate.covariance
     optimize = core.optimize_pose

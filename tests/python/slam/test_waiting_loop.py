@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from orbslam2py.slam.thresholds import LoopThresholds
+from orbslam2py.slam.config import LoopConfig
 from orbslam2py.slam.waiting_loop import WaitingLoop
 
-FIRM, PATIENCE = LoopThresholds().firm_matches, LoopThresholds().patience
+FIRM, PATIENCE = LoopConfig().firm_matches, LoopConfig().patience
 
 
 class World:
@@ -25,7 +25,7 @@ class World:
         self.n_verified = 0
         #: Of a loop that is verified again; 0: it is none any more.
         self.matches_now = 77
-        self.waiting = WaitingLoop(slam_map, self.verify, self.leases.remove, LoopThresholds())
+        self.waiting = WaitingLoop(slam_map, self.verify, self.leases.remove, LoopConfig())
 
     def verify(self, current: int, matched: int) -> Any:
         self.n_verified += 1

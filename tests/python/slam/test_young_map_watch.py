@@ -23,9 +23,9 @@ from orbslam2py import (
 from orbslam2py import _core as core
 from orbslam2py._timing import StageTimer
 from orbslam2py.evaluation import Alignment, evaluate_trajectory
+from orbslam2py.slam.config import InitializationConfig
 from orbslam2py.slam.front_end import FrontEnd
 from orbslam2py.slam.initialization.young_map_watch import YoungMapWatch
-from orbslam2py.slam.thresholds import InitializationThresholds
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.cut_sequences import corridor, cut, settings_of
 from support.cut_sequences import track as track_all
@@ -34,7 +34,7 @@ from support.tracking_scene import Scene
 
 pytestmark = pytest.mark.watchdog(120)
 
-LIMITS = InitializationThresholds()
+LIMITS = InitializationConfig()
 _N_FRAMES = 70
 
 
@@ -73,7 +73,7 @@ def walk() -> Walk:
 
 
 def watch_of(frames: list[core.TrackedFrame], **limits: float) -> YoungMapWatch:
-    watch = YoungMapWatch(InitializationThresholds(**limits), seed=0)  # type: ignore[arg-type]
+    watch = YoungMapWatch(InitializationConfig(**limits), seed=0)  # type: ignore[arg-type]
     watch.begin(frames[0])
     return watch
 

@@ -14,13 +14,13 @@ import numpy as np
 
 from orbslam2py import Reason, Sensor, TrackingState, _core
 from orbslam2py._timing import StageTimer
+from orbslam2py.slam.config import AcceptanceConfig, Config, KeyframeConfig, TrackingConfig
 from orbslam2py.slam.evidence.belief import Belief
 from orbslam2py.slam.evidence.harder_search import HarderSearch
 from orbslam2py.slam.evidence.judgement import EvidenceJudge
 from orbslam2py.slam.keyframe_decision import KeyframeDecision
 from orbslam2py.slam.pose_search import LocalMapSearch, PoseSearch, RefinedPose
 from orbslam2py.slam.records import TrackingOutcome
-from orbslam2py.slam.thresholds import EvidenceThresholds, TrackingThresholds
 from orbslam2py.slam.tracking import Tracking
 
 MAX_FRAMES = 30
@@ -359,7 +359,7 @@ class FakeInitializer:
 
 
 #: Whatever is found is believed.
-CREDULOUS = EvidenceThresholds(
+CREDULOUS = AcceptanceConfig(
     sudden_share=0,
     sudden_deviation=math.inf,
     surprise_windows=math.inf,
@@ -403,8 +403,8 @@ class Scene:
         self,
         sensor: Sensor,
         core: FakeCore,
-        thresholds: TrackingThresholds | None = None,
-        evidence: EvidenceThresholds | None = None,
+        config: TrackingConfig | None = None,
+        evidence: AcceptanceConfig | None = None,
     ) -> None:
         self.core = core
         self.map = FakeMap()
@@ -414,9 +414,9 @@ class Scene:
         self.localize = False
         fakes: Any = self
         vocabulary: Any = "vocabulary"
-        limits = thresholds or TrackingThresholds()
+        limits = config or TrackingConfig()
         self.search = search = PoseSearch(
-            fakes.map, vocabulary, sensor, MAX_FRAMES, relocalizer=None, thresholds=limits
+            fakes.map, vocabulary, sensor, MAX_FRAMES, relocalizer=None, config=limits
         )
         self.local_map_search = NearSearch(fakes.map, sensor, search.proving, limits)
         search.local_map_search = self.local_map_search
@@ -429,7 +429,14 @@ class Scene:
             initializer=fakes.initializer,
             search=search,
             belief=Belief(search, judge, again),
-            keyframe_decision=KeyframeDecision(fakes.map, fakes.mapping.worker, sensor, MAX_FRAMES),
+            keyframe_decision=KeyframeDecision(
+                fakes.map,
+                fakes.mapping.worker,
+                sensor,
+                MAX_FRAMES,
+                KeyframeConfig(spacing_with_depth=1),
+            ),
+            config=Config(),
             has_depth=sensor.has_depth,
             n_features=N_FEATURES,
         )

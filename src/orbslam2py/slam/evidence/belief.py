@@ -86,7 +86,7 @@ class Belief:
                     hypothesis = self._hypothesis(refined, first)
             estimate = refined.estimate
         doubted = first.left_map or self._is_doubted(hypothesis)
-        if doubted and not lost:
+        if doubted and not lost and self._judge.limits.search_again:
             hypothesis = self._harder_search.look_again(frame, hypothesis)
         if hypothesis is None:
             if first.found:

@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
+from orbslam2py.slam.config import AcceptanceConfig
 from orbslam2py.slam.evidence.smear import Smear
 from orbslam2py.slam.evidence.usual_change import UsualChange
 from orbslam2py.slam.pose_search import MotionModel, RefinedPose
 from orbslam2py.slam.records import Evidence, PoseMethod, Verdict
-from orbslam2py.slam.thresholds import EvidenceThresholds
 
 
 @dataclass(frozen=True)
@@ -44,14 +44,12 @@ class EvidenceJudge:
         Half width of the motion model's search window, pixels at level 0.
     focal_length : float
         Pixels.
-    thresholds : EvidenceThresholds, optional
+    config : AcceptanceConfig
         Limits.
     """
 
-    def __init__(
-        self, window: float, focal_length: float, thresholds: EvidenceThresholds | None = None
-    ) -> None:
-        self.limits = thresholds or EvidenceThresholds()
+    def __init__(self, window: float, focal_length: float, config: AcceptanceConfig) -> None:
+        self.limits = config
         self._window = window
         self._focal_length = focal_length
         self.reset()
@@ -217,6 +215,8 @@ class EvidenceJudge:
         if covariance is None:
             return None
         limits = self.limits
+        if not limits.inflate_covariance:
+            return covariance
         surprise = self._pixels(evidence.turn_change) / limits.surprise_pixels
         surprise = min(surprise, limits.largest_surprise)
         looseness = max(1.0, evidence.deviation_to_usual / limits.usual_deviation)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from orbslam2py import _core as core
-from orbslam2py.slam.thresholds import EvidenceThresholds
+from orbslam2py.slam.config import AcceptanceConfig
 
 
 class Smear:
@@ -14,12 +14,12 @@ class Smear:
     ----------
     focal_length : float
         Pixels.
-    thresholds : EvidenceThresholds, optional
+    config : AcceptanceConfig
         Limits.
     """
 
-    def __init__(self, focal_length: float, thresholds: EvidenceThresholds | None = None) -> None:
-        self._limits = thresholds or EvidenceThresholds()
+    def __init__(self, focal_length: float, config: AcceptanceConfig) -> None:
+        self._limits = config
         self._longest = self._limits.long_smear * focal_length
         self.reset()
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 
 from orbslam2py._arrays import FloatArray
-from orbslam2py.slam.thresholds import EvidenceThresholds
+from orbslam2py.slam.config import AcceptanceConfig
 
 
 class UsualChange:
@@ -17,12 +17,12 @@ class UsualChange:
 
     Parameters
     ----------
-    thresholds : EvidenceThresholds
+    config : AcceptanceConfig
         Limits.
     """
 
-    def __init__(self, thresholds: EvidenceThresholds) -> None:
-        self._limits = thresholds
+    def __init__(self, config: AcceptanceConfig) -> None:
+        self._limits = config
         self._turn = 0.0
         self._way = 0.0
         self._n_seen = 0

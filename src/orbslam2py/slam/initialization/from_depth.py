@@ -13,9 +13,9 @@ import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
+from orbslam2py.slam.config import InitializationConfig
 from orbslam2py.slam.local_mapping import LocalMapping
 from orbslam2py.slam.records import Reason
-from orbslam2py.slam.thresholds import InitializationThresholds
 
 _log = logging.getLogger(__name__)
 
@@ -33,9 +33,9 @@ class DepthInitializer:
         Describes the first keyframe.
     mapping : LocalMapping
         Takes it.
-    n_features : int, optional
+    n_features : int
         How many are extracted: with few of them, fewer keypoints are enough.
-    thresholds : InitializationThresholds, optional
+    config : InitializationConfig
         Limits.
     """
 
@@ -44,16 +44,16 @@ class DepthInitializer:
         slam_map: core.Map,
         vocabulary: core.Vocabulary,
         mapping: LocalMapping,
-        n_features: int | None = None,
-        thresholds: InitializationThresholds | None = None,
+        n_features: int,
+        config: InitializationConfig,
     ) -> None:
         self._map = slam_map
         self._vocabulary = vocabulary
         self._mapping = mapping
-        self._limits = limits = thresholds or InitializationThresholds()
-        self._least = limits.keypoints_with_depth_sensor
-        if n_features is not None:
-            self._least = min(self._least, int(limits.share_with_depth_sensor * n_features))
+        self._limits = limits = config
+        self._least = min(
+            limits.keypoints_with_depth_sensor, int(limits.share_with_depth_sensor * n_features)
+        )
 
     def reset(self) -> None:
         """Nothing is kept from frame to frame."""

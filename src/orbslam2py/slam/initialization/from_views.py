@@ -13,6 +13,7 @@ import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
+from orbslam2py.slam.config import InitializationConfig
 from orbslam2py.slam.evidence.smear import Smear
 from orbslam2py.slam.initialization.earlier_frames import EarlierFrames
 from orbslam2py.slam.initialization.kept_views import KeptViews, View
@@ -28,7 +29,6 @@ from orbslam2py.slam.initialization.third_view import (
 from orbslam2py.slam.initialization.young_map_watch import YoungMapWatch
 from orbslam2py.slam.local_mapping import LocalMapping
 from orbslam2py.slam.records import Reason
-from orbslam2py.slam.thresholds import InitializationThresholds
 from orbslam2py.slam.watched_frame import pixels_as_given
 
 _log = logging.getLogger(__name__)
@@ -65,7 +65,7 @@ class MonocularInitializer:
         Tells blurred images, with which no map is begun.
     earlier : EarlierFrames, optional
         Tracks the earlier frames in the map; without it they are left out.
-    thresholds : InitializationThresholds, optional
+    config : InitializationConfig
         Limits.
     """
 
@@ -77,14 +77,15 @@ class MonocularInitializer:
         seed: int,
         smear: Smear,
         earlier: EarlierFrames | None = None,
-        thresholds: InitializationThresholds | None = None,
+        *,
+        config: InitializationConfig,
     ) -> None:
         self._map = slam_map
         self._vocabulary = vocabulary
         self._mapping = mapping
         self._seed = seed
         self._smear = smear
-        self._limits = thresholds or InitializationThresholds()
+        self._limits = config
         self._kept = KeptViews(self._limits)
         self._watch = YoungMapWatch(self._limits, seed)
         self._earlier = earlier or EarlierFrames(None, None)
@@ -229,6 +230,8 @@ class MonocularInitializer:
             if not motions:
                 reason = Reason.NO_THIRD_VIEW if candidate.is_clear else reason
                 continue
+            if not self._limits.compare_views:
+                return self._build_map(candidate.view, motions[0], frame)
             together = SeveralViews(candidate, thirds, frame.features, self._limits)
             best = together.best_motion(motions, self._seed)
             if best is not None:

@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
+from orbslam2py.slam.config import InitializationConfig
 from orbslam2py.slam.initialization.image_motion import ImageMotion, Pixels
-from orbslam2py.slam.thresholds import InitializationThresholds
 
 Indices = npt.NDArray[np.int32]
 
@@ -125,7 +125,7 @@ class KeptViews:
         Those that see too little of the last frame for that, but may confirm what is begun.
     """
 
-    def __init__(self, limits: InitializationThresholds) -> None:
+    def __init__(self, limits: InitializationConfig) -> None:
         self._limits = limits
         self.clear()
 

@@ -18,6 +18,7 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py._cores import side_by_side
+from orbslam2py.slam.config import InitializationConfig
 from orbslam2py.slam.front_end import intrinsics
 from orbslam2py.slam.initialization.third_view import (
     INLIER_CHI2,
@@ -30,7 +31,6 @@ from orbslam2py.slam.initialization.third_view import (
     reconstruct,
     squared_errors,
 )
-from orbslam2py.slam.thresholds import InitializationThresholds
 
 _ROUNDS = 2  # of adjustment, each followed by placing all matches anew
 _COLLAPSED = 1e-9  # of the way before the adjustment
@@ -94,7 +94,7 @@ class SeveralViews:
         candidate: Candidate,
         thirds: ThirdViews,
         last: core.Frame,
-        limits: InitializationThresholds,
+        limits: InitializationConfig,
     ) -> None:
         self._view = view = candidate.view
         self._last = last

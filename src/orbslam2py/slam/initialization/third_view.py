@@ -13,10 +13,10 @@ import numpy.typing as npt
 
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
+from orbslam2py.slam.config import InitializationConfig
 from orbslam2py.slam.front_end import intrinsics
 from orbslam2py.slam.initialization.image_motion import Pixels
 from orbslam2py.slam.initialization.kept_views import Indices, KeptViews, View
-from orbslam2py.slam.thresholds import InitializationThresholds
 
 Motion: TypeAlias = core.TwoViewResult | core.TwoViewMotion
 
@@ -113,7 +113,7 @@ class ThirdViews:
     fewest_common: int
 
     @staticmethod
-    def of(candidate: Candidate, kept: KeptViews, limits: InitializationThresholds) -> ThirdViews:
+    def of(candidate: Candidate, kept: KeptViews, limits: InitializationConfig) -> ThirdViews:
         """Those that show most of what the last frame shows; or, if none does, what is left.
 
         A car that has few images a second sees little of a thing in three of them: then views count
@@ -144,13 +144,13 @@ class ThirdViews:
         )
 
 
-def _moved(third: View, view: View, limits: InitializationThresholds) -> bool:
+def _moved(third: View, view: View, limits: InitializationConfig) -> bool:
     """Whether a view has moved enough from another and from the last frame to say something."""
     between = min(third.displacement, abs(view.displacement - third.displacement))
     return between >= limits.third_view_share * view.displacement
 
 
-def _lies_between(third: ThirdView, view: View, limits: InitializationThresholds) -> bool:
+def _lies_between(third: ThirdView, view: View, limits: InitializationConfig) -> bool:
     """The same of what all three see: what lies far away, which is seen for long, moves less."""
     common = np.flatnonzero((view.matches >= 0) & (third.partners >= 0))
     if not len(common):
@@ -166,7 +166,7 @@ def _median_distance(here: Pixels, there: Pixels) -> float:
 
 
 def agreeing_motions(
-    candidate: Candidate, thirds: ThirdViews, last: core.Frame, limits: InitializationThresholds
+    candidate: Candidate, thirds: ThirdViews, last: core.Frame, limits: InitializationConfig
 ) -> tuple[Motion, ...]:
     """The motion that most of the other views agree with, and those that fit them nearly as well.
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
+from orbslam2py.slam.config import InitializationConfig
 from orbslam2py.slam.initialization.kept_views import KeptViews
 from orbslam2py.slam.initialization.several_views import SeveralViews
 from orbslam2py.slam.initialization.third_view import (
@@ -20,7 +21,6 @@ from orbslam2py.slam.initialization.third_view import (
     agreeing_motions,
     reconstruct,
 )
-from orbslam2py.slam.thresholds import InitializationThresholds
 
 
 class YoungMapWatch:
@@ -32,13 +32,13 @@ class YoungMapWatch:
 
     Parameters
     ----------
-    limits : InitializationThresholds
+    limits : InitializationConfig
         Limits.
     seed : int
         Of the draws.
     """
 
-    def __init__(self, limits: InitializationThresholds, seed: int) -> None:
+    def __init__(self, limits: InitializationConfig, seed: int) -> None:
         self._limits = limits
         self._seed = seed
         self._kept = KeptViews(limits)

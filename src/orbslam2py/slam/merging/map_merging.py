@@ -17,9 +17,9 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py._timing import StageTimer
+from orbslam2py.slam.config import MergingConfig
 from orbslam2py.slam.events import MapsMerged
 from orbslam2py.slam.merging.explanation import explained_share
-from orbslam2py.slam.thresholds import MergeThresholds
 
 _log = logging.getLogger(__name__)
 
@@ -46,7 +46,7 @@ class MapMerging:
         Keeps a keyframe alive that mapping might cull.
     fix_scale : bool
         Depth is measured: the maps have one scale.
-    thresholds : MergeThresholds, optional
+    config : MergingConfig
         Limits.
     """
 
@@ -58,14 +58,14 @@ class MapMerging:
         lease: Lease,
         *,
         fix_scale: bool,
-        thresholds: MergeThresholds | None = None,
+        config: MergingConfig,
     ) -> None:
         self._map = slam_map
         self._fix_scale = fix_scale
         self._verify = verify
         self._find_alike = find_alike
         self._lease = lease
-        self._limits = thresholds or MergeThresholds()
+        self._limits = config
         # What keyframes showed that alone were not enough: the far keyframe and S_cm, by keyframe.
         self._shown: dict[int, tuple[int, FloatArray]] = {}
 

@@ -12,10 +12,10 @@ import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.config import TrackingConfig
 from orbslam2py.slam.pose_search.proving_period import ProvingPeriod
 from orbslam2py.slam.pose_search.refined_pose import RefinedPose
 from orbslam2py.slam.records import PoseEstimate, Reason
-from orbslam2py.slam.thresholds import TrackingThresholds
 
 
 class LocalMapSearch:
@@ -31,7 +31,7 @@ class LocalMapSearch:
         What the images come from.
     proving : ProvingPeriod
         How much is asked of a frame.
-    thresholds : TrackingThresholds
+    config : TrackingConfig
         Limits.
     """
 
@@ -40,15 +40,13 @@ class LocalMapSearch:
         slam_map: core.Map,
         sensor: Sensor,
         proving: ProvingPeriod,
-        thresholds: TrackingThresholds,
+        config: TrackingConfig,
     ) -> None:
         self._map = slam_map
         self._proving = proving
-        self._limits = thresholds
+        self._limits = config
         is_rgbd = sensor is Sensor.RGBD
-        self._usual_window = (
-            thresholds.local_map_window_rgbd if is_rgbd else thresholds.local_map_window
-        )
+        self._usual_window = config.local_map_window_rgbd if is_rgbd else config.local_map_window
 
     def refine(self, frame: core.TrackedFrame, first: PoseEstimate) -> RefinedPose:
         """Refine a first estimate with all points around it, and see how many are found.

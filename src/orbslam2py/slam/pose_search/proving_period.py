@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from orbslam2py import _core as core
-from orbslam2py.slam.thresholds import TrackingThresholds
+from orbslam2py.slam.config import TrackingConfig
 
 
 class ProvingPeriod:
@@ -18,13 +18,13 @@ class ProvingPeriod:
     has_depth : bool
         Whether frames measure depths: then a new map has nothing to prove, its points lie where
         they were measured.
-    thresholds : TrackingThresholds
+    config : TrackingConfig
         Limits.
     """
 
-    def __init__(self, n_frames: int, thresholds: TrackingThresholds, *, has_depth: bool) -> None:
+    def __init__(self, n_frames: int, config: TrackingConfig, *, has_depth: bool) -> None:
         self._n_frames = n_frames
-        self._limits = thresholds
+        self._limits = config
         self._has_depth = has_depth
         self.reset()
 

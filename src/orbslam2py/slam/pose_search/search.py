@@ -12,13 +12,13 @@ import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.config import TrackingConfig
 from orbslam2py.slam.pose_search.local_map_search import LocalMapSearch
 from orbslam2py.slam.pose_search.motion_model import MotionModel
 from orbslam2py.slam.pose_search.proving_period import ProvingPeriod
 from orbslam2py.slam.pose_search.refined_pose import RefinedPose
 from orbslam2py.slam.records import PoseEstimate, PoseMethod, Reason
 from orbslam2py.slam.relocalization import PlaceOfLoss, Relocalizer
-from orbslam2py.slam.thresholds import TrackingThresholds
 
 
 class PoseSearch:
@@ -36,7 +36,7 @@ class PoseSearch:
         Frames of one second: see `ProvingPeriod`.
     relocalizer : Relocalizer, optional
         Finds lost frames in the map; without it none is found there.
-    thresholds : TrackingThresholds
+    config : TrackingConfig
         Limits.
 
     Attributes
@@ -67,15 +67,15 @@ class PoseSearch:
         sensor: Sensor,
         max_keyframe_interval: int,
         relocalizer: Relocalizer | None,
-        thresholds: TrackingThresholds,
+        config: TrackingConfig,
     ) -> None:
         self._map = slam_map
         self._vocabulary = vocabulary
         self._sensor = sensor
         self._relocalizer = relocalizer
-        self.limits = thresholds
-        self.proving = ProvingPeriod(max_keyframe_interval, thresholds, has_depth=sensor.has_depth)
-        self.local_map_search = LocalMapSearch(slam_map, sensor, self.proving, thresholds)
+        self.limits = config
+        self.proving = ProvingPeriod(max_keyframe_interval, config, has_depth=sensor.has_depth)
+        self.local_map_search = LocalMapSearch(slam_map, sensor, self.proving, config)
         self.reset()
 
     def reset(self) -> None:

@@ -11,7 +11,7 @@ import statistics
 from collections import deque
 
 from orbslam2py import _core as core
-from orbslam2py.slam.thresholds import BlurThresholds
+from orbslam2py.slam.config import BlurConfig
 
 
 class BlurWatch:
@@ -21,13 +21,13 @@ class BlurWatch:
     ----------
     n_features : int
         How many keypoints a frame usually has; one that was extracted with more is not sharper.
-    thresholds : BlurThresholds, optional
+    config : BlurConfig
         Limits.
     """
 
-    def __init__(self, n_features: int, thresholds: BlurThresholds | None = None) -> None:
+    def __init__(self, n_features: int, config: BlurConfig) -> None:
         self._n_features = n_features
-        self._limits = thresholds or BlurThresholds()
+        self._limits = config
         # Sharpness and fine detail.
         self._recent: deque[tuple[float, float]] = deque(maxlen=self._limits.frames)
 

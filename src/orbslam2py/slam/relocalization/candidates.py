@@ -7,8 +7,8 @@ import itertools
 from collections import deque
 
 from orbslam2py import _core as core
+from orbslam2py.slam.config import RelocalizationConfig
 from orbslam2py.slam.relocalization.place_of_loss import PlaceOfLoss
-from orbslam2py.slam.thresholds import RelocalizationThresholds
 
 
 class CandidatePlaces:
@@ -20,7 +20,7 @@ class CandidatePlaces:
         The map.
     keyframe_index : orbslam2py._core.KeyFrameIndex
         Which keyframes contain which words.
-    thresholds : RelocalizationThresholds
+    config : RelocalizationConfig
         Limits.
     """
 
@@ -28,12 +28,12 @@ class CandidatePlaces:
         self,
         slam_map: core.Map,
         keyframe_index: core.KeyFrameIndex,
-        thresholds: RelocalizationThresholds,
+        config: RelocalizationConfig,
     ) -> None:
         self._map = slam_map
         self._keyframe_index = keyframe_index
-        self._limits = thresholds
-        self._recent: deque[dict[int, float]] = deque(maxlen=thresholds.word_frames)
+        self._limits = config
+        self._recent: deque[dict[int, float]] = deque(maxlen=config.word_frames)
 
     def reset(self) -> None:
         """Forget what the frames before looked like: the camera was found, or lost anew."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py._arrays import IntArray
-from orbslam2py.slam.thresholds import RelocalizationThresholds
+from orbslam2py.slam.config import RelocalizationConfig
 
 
 class Confirmation:
@@ -15,12 +15,12 @@ class Confirmation:
 
     Parameters
     ----------
-    thresholds : RelocalizationThresholds, optional
+    config : RelocalizationConfig
         Limits.
     """
 
-    def __init__(self, thresholds: RelocalizationThresholds | None = None) -> None:
-        self._limits = thresholds or RelocalizationThresholds()
+    def __init__(self, config: RelocalizationConfig) -> None:
+        self._limits = config
         self._waiting: tuple[core.Pose, IntArray] | None = None
 
     @property

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from orbslam2py import _core as core
+from orbslam2py.slam.config import RelocalizationConfig
 from orbslam2py.slam.front_end import intrinsics
-from orbslam2py.slam.thresholds import RelocalizationThresholds
 
 
 def optimize(frame: core.TrackedFrame) -> int:
@@ -47,14 +47,14 @@ class Fitting:
         The map.
     seed : int
         Seed of the draws.
-    thresholds : RelocalizationThresholds
+    config : RelocalizationConfig
         Limits.
     """
 
-    def __init__(self, slam_map: core.Map, seed: int, thresholds: RelocalizationThresholds) -> None:
+    def __init__(self, slam_map: core.Map, seed: int, config: RelocalizationConfig) -> None:
         self._map = slam_map
         self._seed = seed % 2**64
-        self._limits = thresholds
+        self._limits = config
 
     def matched(
         self, frame: core.TrackedFrame, keyframes: list[int], *, thoroughly: bool = False

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from orbslam2py import _core as core
 from orbslam2py._arrays import IntArray
-from orbslam2py.slam.thresholds import RelocalizationThresholds
+from orbslam2py.slam.config import RelocalizationConfig
 
 
 class PlaceOfLoss:
@@ -37,7 +37,7 @@ class PlaceOfLoss:
                 self.velocity.quaternion_xyzw, stretched * self.velocity.translation
             )
 
-    def keyframes(self, slam_map: core.Map, limits: RelocalizationThresholds) -> list[int]:
+    def keyframes(self, slam_map: core.Map, limits: RelocalizationConfig) -> list[int]:
         """The reference keyframe, those that see most of what it sees, and the last ones made.
 
         Each once, the likeliest first.
@@ -50,14 +50,14 @@ class PlaceOfLoss:
         youngest: IntArray = same_map[: -limits.last_keyframes - 1 : -1]
         return list(dict.fromkeys([reference, *covisible.tolist(), *youngest.tolist()]))
 
-    def guesses(self, frame_id: int, limits: RelocalizationThresholds) -> list[core.Pose]:
+    def guesses(self, frame_id: int, limits: RelocalizationConfig) -> list[core.Pose]:
         """Poses ``T_cw`` of a later frame: it went on as before, or stayed.
 
         Parameters
         ----------
         frame_id : int
             The frame that is looked for.
-        limits : RelocalizationThresholds
+        limits : RelocalizationConfig
             For how long a motion is taken to go on.
         """
         T_lw = self.last.T_cw

@@ -11,11 +11,11 @@ import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray, IntArray
+from orbslam2py.slam.config import RelocalizationConfig
 from orbslam2py.slam.relocalization.candidates import CandidatePlaces
 from orbslam2py.slam.relocalization.fitting import Candidate, Fitting, optimize
 from orbslam2py.slam.relocalization.place_of_loss import PlaceOfLoss
 from orbslam2py.slam.relocalization.rival_places import RivalPlaces
-from orbslam2py.slam.thresholds import RelocalizationThresholds
 
 
 class Relocalizer:
@@ -31,7 +31,7 @@ class Relocalizer:
         Seed of the draws.
     fix_scale : bool
         Depth is measured: the map has one scale, which does not drift.
-    thresholds : RelocalizationThresholds, optional
+    config : RelocalizationConfig
         Limits.
     """
 
@@ -42,14 +42,14 @@ class Relocalizer:
         seed: int,
         *,
         fix_scale: bool,
-        thresholds: RelocalizationThresholds | None = None,
+        config: RelocalizationConfig,
     ) -> None:
         self._map = slam_map
-        self._limits = limits = thresholds or RelocalizationThresholds()
+        self._limits = limits = config
         self._places = CandidatePlaces(slam_map, keyframe_index, limits)
         self._fitting = Fitting(slam_map, seed, limits)
         self._rival_places = RivalPlaces(
-            slam_map, self._places, self._fitting, fix_scale=fix_scale, thresholds=limits
+            slam_map, self._places, self._fitting, fix_scale=fix_scale, config=limits
         )
         self.reset()
         #: Whether the last frame fits at several places, of which none is believed.
@@ -155,7 +155,7 @@ class Relocalizer:
         Returns
         -------
         int
-            Number of inliers, at least `RelocalizationThresholds.inliers`; 0 if the frame was not
+            Number of inliers, at least `RelocalizationConfig.inliers`; 0 if the frame was not
             found, and then it has no associations.
         """
         return self._compare_with(frame, keyframes, self._limits.inliers)

@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from orbslam2py import _core as core
+from orbslam2py.slam.config import RelocalizationConfig
 from orbslam2py.slam.relocalization.candidates import CandidatePlaces
 from orbslam2py.slam.relocalization.fitting import Candidate, Fitting
-from orbslam2py.slam.thresholds import RelocalizationThresholds
 
 _log = logging.getLogger(__name__)
 
@@ -41,7 +41,7 @@ class RivalPlaces:
         Fits frames to keyframes.
     fix_scale : bool
         Depth is measured: the map has one scale, which does not drift.
-    thresholds : RelocalizationThresholds
+    config : RelocalizationConfig
         Limits.
     """
 
@@ -52,13 +52,13 @@ class RivalPlaces:
         fitting: Fitting,
         *,
         fix_scale: bool,
-        thresholds: RelocalizationThresholds,
+        config: RelocalizationConfig,
     ) -> None:
         self._map = slam_map
         self._places = places
         self._fitting = fitting
         self._fix_scale = fix_scale
-        self._limits = thresholds
+        self._limits = config
 
     def choose(
         self, frame: core.TrackedFrame, keyframe: int, candidates: Sequence[Candidate]

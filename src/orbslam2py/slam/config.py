@@ -1,14 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The limits of the method that Python decides by; those of single steps stand beside them in C++.
+"""The configuration of the method: one section per stage, one number per threshold.
 
 The defaults are the published system's unless a field says otherwise; ``docs/method`` says chapter
-by chapter where each comes from.
+by chapter where each comes from. Thresholds of single steps stand beside them in C++. Names with a
+dot, as in ``tracking.map_matches``, reach every field from the command line, job files and Python.
 """
 
 from __future__ import annotations
 
+import difflib
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+from orbslam2py._arguments import is_finite, is_whole, shown
+from orbslam2py.errors import SettingsError
 
 #: Features of an image for which numbers of inliers are stated ...
 USUAL_FEATURES = 1000
@@ -26,7 +33,7 @@ def _for_features(n_inliers: int, n_features: int) -> int:
 
 
 @dataclass(frozen=True)
-class InitializationThresholds:
+class InitializationConfig:
     """How a map may begin."""
 
     keypoints_with_depth_sensor: int = 500
@@ -75,6 +82,8 @@ class InitializationThresholds:
     """... or, where they do not, all views together by this one."""
     same_direction: float = 20.0
     """Two that lead to within so many degrees of each other count as one."""
+    compare_views: bool = True
+    """Begin a map only when all kept views together prefer one motion."""
     further_draws: int = 5
     """So many more draws give motions that all views are asked to compare. One whose direction
     differs ..."""
@@ -120,7 +129,7 @@ class InitializationThresholds:
 
 
 @dataclass(frozen=True)
-class TrackingThresholds:
+class TrackingConfig:
     """When a pose is believed, and how far around a prediction is searched."""
 
     motion_model_window: float = 15.0
@@ -177,7 +186,7 @@ class TrackingThresholds:
     scarce_inliers: int = 100
     """... inliers than this, in multiples of the settings' number."""
 
-    def for_features(self, n_features: int) -> TrackingThresholds:
+    def for_features(self, n_features: int) -> TrackingConfig:
         """These limits for images with so many features: of few ones fewer are asked for."""
         after = self.local_map_inliers_after_relocalization
         return replace(
@@ -189,9 +198,13 @@ class TrackingThresholds:
 
 
 @dataclass(frozen=True)
-class EvidenceThresholds:
+class AcceptanceConfig:
     """How much must speak for a pose, and where else it is looked for."""
 
+    search_again: bool = True
+    """Search other hypotheses when the evidence for a pose falls."""
+    inflate_covariance: bool = True
+    """State a larger covariance than that of independent pixel noise."""
     gain: float = 0.25
     """Weight of the newest frame in what is usual."""
     sudden_share: float = 0.6
@@ -290,7 +303,7 @@ class EvidenceThresholds:
 
 
 @dataclass(frozen=True)
-class KeyframeThresholds:
+class KeyframeConfig:
     """Which frames become keyframes."""
 
     few_keyframes: int = 2
@@ -327,13 +340,16 @@ class KeyframeThresholds:
     inliers: int = 15
     """A keyframe needs more inliers than this."""
     spacing: int = 1
-    """Frames from one keyframe to the next, where tracking is not weak."""
+    """Fewest frames from one keyframe to the next with a single camera."""
+    spacing_with_depth: int = 2
+    """Fewest frames from one keyframe to the next with a stereo pair or an RGB-D camera, where
+    tracking is not weak."""
     queue: int = 3
     """A busy mapper is given a keyframe only if fewer than this wait (stereo, RGB-D)."""
 
 
 @dataclass(frozen=True)
-class RelocalizationThresholds:
+class RelocalizationConfig:
     """When a lost frame counts as found."""
 
     ratio: float = 0.75
@@ -403,7 +419,7 @@ class RelocalizationThresholds:
     confirming_cosine: float = 0.87
     """... if the camera turned by no more than this in between: cosine of the angle, 30 degrees."""
 
-    def for_features(self, n_features: int) -> RelocalizationThresholds:
+    def for_features(self, n_features: int) -> RelocalizationConfig:
         """These limits for images with so many features: of few ones fewer are asked for."""
         return replace(
             self,
@@ -414,7 +430,7 @@ class RelocalizationThresholds:
 
 
 @dataclass(frozen=True)
-class BlurThresholds:
+class BlurConfig:
     """When a frame counts as blurred."""
 
     frames: int = 15
@@ -428,7 +444,7 @@ class BlurThresholds:
 
 
 @dataclass(frozen=True)
-class MappingThresholds:
+class MappingConfig:
     """What local mapping looks at around a new keyframe."""
 
     neighbours: int = 10
@@ -444,7 +460,7 @@ class MappingThresholds:
 
 
 @dataclass(frozen=True)
-class LoopThresholds:
+class LoopConfig:
     """Where loops are looked for."""
 
     gap: int = 10
@@ -456,7 +472,7 @@ class LoopThresholds:
 
 
 @dataclass(frozen=True)
-class MergeThresholds:
+class MergingConfig:
     """When two maps are believed to show the same place."""
 
     neighbours: int = 6
@@ -480,3 +496,151 @@ class MergeThresholds:
     """... that are seen from where they were seen before: cosine of the angle, 30 degrees."""
     places: int = 5
     """Places in the other map that are compared with the one that was found there."""
+
+
+@dataclass(frozen=True)
+class TrajectoryConfig:
+    """How the poses of past frames are refined."""
+
+    rematch_every_frame: bool = False
+    """Match every frame with the map once more when that has settled, not only uncertain ones."""
+    rematch_uncertain: bool = True
+    """Match uncertain frames with the map once more when that has settled."""
+
+
+@dataclass(frozen=True)
+class Config:
+    """All sections of the configuration.
+
+    Examples
+    --------
+    >>> config = Config().with_changes({"tracking.map_matches": 12})
+    >>> config.tracking.map_matches
+    12
+    >>> config.changes()
+    {'tracking.map_matches': 12}
+    """
+
+    initialization: InitializationConfig = field(default_factory=InitializationConfig)
+    tracking: TrackingConfig = field(default_factory=TrackingConfig)
+    acceptance: AcceptanceConfig = field(default_factory=AcceptanceConfig)
+    keyframes: KeyframeConfig = field(default_factory=KeyframeConfig)
+    relocalization: RelocalizationConfig = field(default_factory=RelocalizationConfig)
+    blur: BlurConfig = field(default_factory=BlurConfig)
+    mapping: MappingConfig = field(default_factory=MappingConfig)
+    loops: LoopConfig = field(default_factory=LoopConfig)
+    merging: MergingConfig = field(default_factory=MergingConfig)
+    trajectory: TrajectoryConfig = field(default_factory=TrajectoryConfig)
+
+    def with_changes(self, changes: Mapping[str, Any]) -> Config:
+        """Return a configuration with other values.
+
+        Parameters
+        ----------
+        changes : mapping
+            Values by their names with a dot: ``{"tracking.map_matches": 12}``.
+
+        Raises
+        ------
+        SettingsError
+            If a name does not exist, or a value is not of its kind.
+        """
+        sections: dict[str, dict[str, Any]] = {}
+        for name, value in changes.items():
+            default = value_of(self, name)
+            section, _, option = name.partition(".")
+            sections.setdefault(section, {})[option] = _converted(name, value, default)
+        # All of a section at once.
+        changed = {name: replace(getattr(self, name), **new) for name, new in sections.items()}
+        return replace(self, **changed)
+
+    def changes(self) -> dict[str, float | int | bool]:
+        """Return what differs from the defaults, by names with a dot."""
+        usual = Config()
+        return {name: value for name, value in all_values(self) if value != value_of(usual, name)}
+
+    def for_features(self, n_features: int) -> Config:
+        """Return the configuration for images with so many features: fewer inliers of few ones."""
+        return replace(
+            self,
+            tracking=self.tracking.for_features(n_features),
+            relocalization=self.relocalization.for_features(n_features),
+        )
+
+
+#: Named sets of changes to the defaults.
+PRESETS: Mapping[str, Mapping[str, float | int | bool]] = {
+    # Fewer keyframes.
+    "fast": {
+        "keyframes.spacing_with_depth": 4,
+        "keyframes.share": 0.6,
+        "keyframes.share_monocular": 0.8,
+    },
+    "normal": {},
+    "thorough": {"trajectory.rematch_every_frame": True},
+}
+
+
+def all_values(config: Config) -> Iterator[tuple[str, float | int | bool]]:
+    """Yield every value with its name with a dot, in the order of the sections."""
+    for section in fields(config):
+        values = getattr(config, section.name)
+        for option in fields(values):
+            yield f"{section.name}.{option.name}", getattr(values, option.name)
+
+
+def value_of(config: Config, name: str) -> float | int | bool:
+    """Return the value with this name.
+
+    Raises
+    ------
+    SettingsError
+        If there is none; says which name is nearest.
+    """
+    known = dict(all_values(config))
+    if name in known:
+        return known[name]
+    near = difflib.get_close_matches(str(name), known, 1, 0.5)
+    # A field is known by its own name as well, whatever its section.
+    near = near or [full for full in known if full.partition(".")[2] == name]
+    hint = f"did you mean {near[0]}?" if near else "'orbslam2py config' lists all names"
+    raise SettingsError(f"the configuration has no value {shown(name)}; {hint}")
+
+
+def read_change(text: str) -> tuple[str, float | int | bool]:
+    """Read a change as it is written on the command line: ``tracking.map_matches=12``.
+
+    Raises
+    ------
+    SettingsError
+        If it is not written so, or the name or the value is wrong.
+    """
+    name, equals, value = (part.strip() for part in text.partition("="))
+    if not (name and equals and value):
+        raise SettingsError(
+            f"{shown(text)} is no change of the configuration; write NAME=VALUE, such as "
+            "tracking.map_matches=12"
+        )
+    given: Any = {"true": True, "false": False}.get(value.lower(), value)
+    if isinstance(given, str):
+        try:
+            given = int(value) if value.lstrip("+-").isdecimal() else float(value)
+        except ValueError:
+            given = value
+    changed = Config().with_changes({name: given})
+    return name, value_of(changed, name)
+
+
+def _converted(name: str, value: Any, default: float | int | bool) -> float | int | bool:
+    """Check a value against the kind of its default."""
+    if isinstance(default, bool):
+        if isinstance(value, bool):
+            return value
+        raise SettingsError(f"{name} is {shown(value)}; give true or false")
+    if not is_finite(value) or value < 0:
+        raise SettingsError(f"{name} is {shown(value)}; give a number from 0 on, now {default}")
+    if isinstance(default, int):
+        if not (is_whole(value) or float(value).is_integer()):
+            raise SettingsError(f"{name} is {shown(value)}; give a whole number, now {default}")
+        return int(value)
+    return float(value)

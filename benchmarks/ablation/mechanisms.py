@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Mechanisms that the published method does not have, and the changes that switch each off."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+Changes = Mapping[str, float | int | bool]
+
+_NEVER = 1e9
+
+MECHANISMS: dict[str, Changes] = {
+    "search of other hypotheses": {"acceptance.search_again": False},
+    "inflation of the covariance": {"acceptance.inflate_covariance": False},
+    "wider search in the local map": {"tracking.further_look": 0},
+    "uncertain and rejected poses": {
+        "acceptance.weak_share": 0,
+        "acceptance.weak_cells": 0,
+        "acceptance.weak_deviation": _NEVER,
+        "acceptance.weak_error": _NEVER,
+        "acceptance.refused_share": 0,
+    },
+    "blurred frames": {"blur.share": 0},
+    "motion blur in the covariance": {"acceptance.smear": 0},
+    "ambiguous places": {"relocalization.rival_share": _NEVER},
+    "validation of the initial map": {"initialization.watched_frames": 0},
+    "comparison of all views": {"initialization.compare_views": False},
+    "views between the first two": {"initialization.view_between": 0},
+    "matching of uncertain frames again": {"trajectory.rematch_uncertain": False},
+    "keyframes before a turn": {"keyframes.kept_share": 0, "keyframes.staying_share": 0},
+    "keyframes of few inliers": {"keyframes.few_inliers": 0},
+    "more features of few inliers": {"tracking.feature_factor": 1},
+    "all keypoints near a loss": {"relocalization.thorough_keyframes": 0},
+    "more inliers after a loss": {"tracking.local_map_inliers_after_relocalization": 30},
+}
+
+
+def merged(names: list[str]) -> Changes:
+    """Return the changes that switch several mechanisms off."""
+    together: dict[str, float | int | bool] = {}
+    for name in names:
+        together |= MECHANISMS[name]
+    return together
