@@ -12,7 +12,6 @@ _NEVER = 1e9
 MECHANISMS: dict[str, Changes] = {
     "search of other hypotheses": {"acceptance.search_again": False},
     "inflation of the covariance": {"acceptance.inflate_covariance": False},
-    "wider search in the local map": {"tracking.further_look": 0},
     "uncertain and rejected poses": {
         "acceptance.weak_share": 0,
         "acceptance.weak_cells": 0,

@@ -154,17 +154,8 @@ class TrackingConfig:
     """... with an RGB-D camera ..."""
     local_map_window_after_relocalization: float = 5.0
     """... and in the frames right after a relocalization, with any sensor."""
-    further_look: float = 3.0
-    """By this factor, where the usual one is smaller, points that should be in view are looked for
-    once more ..."""
-    further_look_every: int = 5
-    """... in one of so many frames, and where a pose is in doubt or less certain than usual ..."""
-    better_look: float = 1.02
-    """... and another pose is taken from it with so many times the inliers ..."""
     elsewhere: float = 3.0
-    """... if it lies so many standard deviations away ..."""
-    much_better_look: float = 1.1
-    """... and else with so many times."""
+    """A pose lies elsewhere if it is so many standard deviations of the position away."""
     afresh_window: float = 3.0
     """Matched with the local map from nothing, first by this factor on the search radius, a frame
     ..."""

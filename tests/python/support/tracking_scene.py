@@ -379,17 +379,12 @@ class NoFurtherSearch:
 
 
 class NearSearch(LocalMapSearch):
-    """Looks no further around than at first, nor afresh, and notes in which frames it was to."""
+    """Matches no frame afresh, and notes which it was asked to."""
 
     def __init__(self, *parts: Any, **limits: Any) -> None:
         super().__init__(*parts, **limits)
-        self.looked_further: list[int] = []
         #: Ids of frames, and whether they were in doubt.
         self.looked_afresh: list[tuple[int, bool]] = []
-
-    def look_further(self, refined: RefinedPose) -> RefinedPose:
-        self.looked_further.append(refined.frame.id)
-        return refined
 
     def look_afresh(self, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
         self.looked_afresh.append((refined.frame.id, in_doubt))

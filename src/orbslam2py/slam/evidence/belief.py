@@ -78,12 +78,6 @@ class Belief:
         if first.found:
             refined = self._refined(frame, first)
             hypothesis = self._hypothesis(refined, first)
-            if hypothesis and self._is_to_look_further(frame, hypothesis.evidence):
-                further = self._search.local_map_search.look_further(refined)
-                if further is not refined:
-                    frame.take_over(further.frame)
-                    refined = replace(further, frame=frame)
-                    hypothesis = self._hypothesis(refined, first)
             estimate = refined.estimate
         doubted = first.left_map or self._is_doubted(hypothesis)
         if doubted and not lost and self._judge.limits.search_again:
@@ -122,12 +116,6 @@ class Belief:
 
     def _is_doubted(self, hypothesis: Hypothesis | None) -> bool:
         return hypothesis is None or self._judge.fell_suddenly(hypothesis.evidence)
-
-    def _is_to_look_further(self, frame: core.TrackedFrame, evidence: Evidence) -> bool:
-        judge = self._judge
-        if judge.fell_suddenly(evidence) or judge.is_loose(evidence):
-            return True
-        return self._search.local_map_search.further_look_due(frame)
 
     def _refined(self, frame: core.TrackedFrame, first: PoseEstimate) -> RefinedPose:
         if first.visual_odometry:

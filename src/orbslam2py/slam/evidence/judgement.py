@@ -134,10 +134,6 @@ class EvidenceJudge:
             or self._windows(evidence.turn_change) > limits.surprise_windows
         )
 
-    def is_loose(self, evidence: Evidence) -> bool:
-        """Whether the position is less certain than usual."""
-        return evidence.deviation_to_usual > self.limits.usual_deviation
-
     def is_blurred(self, evidence: Evidence) -> bool:
         """Whether the image is smeared too far for a map that is not firm."""
         return self._smear.is_long(evidence.smear)

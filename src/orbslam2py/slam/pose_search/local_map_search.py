@@ -80,46 +80,6 @@ class LocalMapSearch:
         estimate = self._enough_found(frame, first, optimized)
         return RefinedPose(frame, estimate, local_map, visible, n_held + len(visible))
 
-    def further_look_due(self, frame: core.TrackedFrame) -> bool:
-        """Whether a frame's pose is to be held against what lies further around, doubted or not."""
-        return frame.id % self._limits.further_look_every == 0
-
-    def look_further(self, refined: RefinedPose) -> RefinedPose:
-        """Look further around for the points that a pose should show and does not.
-
-        Where most of what is seen lies in one plane, a pose may be turned about it: the plane fits,
-        and what stands before or behind it is out of the windows, frame after frame.
-
-        Returns
-        -------
-        RefinedPose
-            That of another version of the frame, if more fits it; else the one that was given.
-        """
-        limits, local_map, narrow = self._limits, refined.local_map, self._usual_window
-        if local_map is None or refined.frame.T_cw is None or narrow >= limits.further_look:
-            return refined
-        frame = core.TrackedFrame(refined.frame.features)
-        frame.copy_associations(refined.frame, ~refined.frame.outlier)
-        frame.T_cw = refined.frame.T_cw
-        frame.share_anchor(refined.frame)
-        # Those thrown out before as well: by a pose that is in question.
-        nothing = np.zeros(0, np.int64)
-        core.match_local_map(frame, local_map.points, nothing, limits.further_look)
-        if core.optimize_pose(frame).n_inliers < limits.map_matches:
-            return refined
-        frame.discard_outliers()
-        n_held = frame.n_associated()
-        visible = core.match_local_map(frame, local_map.points, nothing, narrow).visible
-        optimized = core.optimize_pose(frame)
-        elsewhere = _is_elsewhere(frame, refined, limits.elsewhere)
-        gain = limits.better_look if elsewhere else limits.much_better_look
-        if optimized.n_inliers <= gain * refined.estimate.n_inliers:
-            return refined
-        estimate = self._enough_found(frame, refined.estimate, optimized)
-        if estimate.visual_odometry or not estimate.found:
-            return refined
-        return RefinedPose(frame, estimate, local_map, visible, n_held + len(visible))
-
     def look_afresh(self, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
         """Match a frame with the map from nothing, so that its pose does not hang on the way to it.
 

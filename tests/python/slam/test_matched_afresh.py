@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A pose is held against what lies further around, and against the map from nothing."""
+"""In a fixed map a pose is estimated again without the matches of the frame before."""
 
 from __future__ import annotations
 
@@ -89,60 +89,6 @@ def walk() -> Iterator[Walk]:
     walk.system.shutdown()
 
 
-def test_what_lies_beyond_the_windows_is_found_and_moves_the_pose(walk: Walk) -> None:
-    beside = walk.turned(0.03, n_inliers=40)
-    found = walk.search.local_map_search.look_further(beside)
-    assert found is not beside
-    assert found.estimate.found
-    assert found.estimate.n_inliers > 100
-    assert found.estimate.n_inliers <= found.n_predicted
-    assert walk.degrees_off(beside.frame) > 1.5
-    assert walk.degrees_off(found.frame) < 0.1
-    assert found.frame.n_associated() == found.estimate.n_matches
-
-
-def test_the_first_pose_stays_as_it_was(walk: Walk) -> None:
-    beside = walk.turned(0.03, n_inliers=40)
-    assert beside.frame.T_cw is not None
-    T_cw = beside.frame.T_cw.matrix
-    walk.search.local_map_search.look_further(beside)
-    np.testing.assert_array_equal(beside.frame.T_cw.matrix, T_cw)
-    assert beside.frame.n_associated() == 0
-
-
-def test_a_pose_that_fits_is_kept(walk: Walk) -> None:
-    refined = walk.refined()
-    assert walk.search.local_map_search.look_further(refined) is refined
-
-
-def test_a_pose_elsewhere_needs_few_more_inliers_and_the_same_one_many(walk: Walk) -> None:
-    n = walk.search.local_map_search.look_further(
-        walk.turned(0.03, n_inliers=40)
-    ).estimate.n_inliers
-    # A pose that is told with a metre lies at the same place.
-    for metres, gain in ((1e-3, LIMITS.better_look), (1.0, LIMITS.much_better_look)):
-        clear = walk.turned(0.03, n_inliers=int(n / gain) - 1, metres=metres)
-        assert walk.search.local_map_search.look_further(clear) is not clear
-        unclear = walk.turned(0.03, n_inliers=int(n / gain) + 1, metres=metres)
-        assert walk.search.local_map_search.look_further(unclear) is unclear
-
-
-def test_nothing_further_around_changes_nothing(walk: Walk) -> None:
-    away = walk.turned(1.5, n_inliers=40)
-    assert walk.search.local_map_search.look_further(away) is away
-
-
-def test_without_a_local_map_there_is_nothing_to_look_for(walk: Walk) -> None:
-    refined = replace(walk.refined(), local_map=None)
-    assert walk.search.local_map_search.look_further(refined) is refined
-
-
-def test_more_that_is_not_enough_is_no_pose(walk: Walk, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(walk.search.proving, "inliers_asked", lambda frame: 10_000)
-    beside = walk.turned(0.03, n_inliers=40)
-    assert walk.search.local_map_search.look_further(beside) is beside
-
-
 # ---- spread --------------------------------------------------------------------------------------
 def test_the_spread_of_inliers_is_that_of_one_frame_with_and_without_its_outliers(
     walk: Walk,
@@ -227,25 +173,6 @@ def test_nothing_to_match_from_nothing_changes_nothing(
 
 
 # ---- when ----------------------------------------------------------------------------------------
-def test_one_frame_in_five_is_looked_at_further(scene: Scene) -> None:
-    scene.run(12)
-    assert scene.local_map_search.looked_further == [5, 10]
-
-
-def test_a_frame_less_certain_than_usual_is_looked_at_further(scene: Scene, core: FakeCore) -> None:
-    scene.run(7)
-    core.inliers.extend([100, 200])  # the variance of the fake grows with them
-    scene.run(2)
-    assert scene.local_map_search.looked_further == [5, 7]
-
-
-def test_a_frame_that_is_not_found_is_not(scene: Scene, core: FakeCore) -> None:
-    scene.run(10)
-    core.inliers.extend([100, 2])
-    scene.track()
-    assert scene.local_map_search.looked_further == [5]
-
-
 def test_poses_are_matched_from_nothing_in_a_map_that_stays_as_it_is(scene: Scene) -> None:
     scene.run(3)
     assert scene.local_map_search.looked_afresh == []
