@@ -19,8 +19,6 @@ MECHANISMS: dict[str, Changes] = {
         "acceptance.weak_error": _NEVER,
         "acceptance.refused_share": 0,
     },
-    "blurred frames": {"blur.share": 0},
-    "motion blur in the covariance": {"acceptance.smear": 0},
     "ambiguous places": {"relocalization.rival_share": _NEVER},
     "validation of the initial map": {"initialization.watched_frames": 0},
     "comparison of all views": {"initialization.compare_views": False},

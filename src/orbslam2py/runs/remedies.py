@@ -39,9 +39,6 @@ _WHAT_HELPS = {
     Reason.NOT_FOUND_IN_MAP: "come back to a place seen before, from a similar direction",
     Reason.SEVERAL_PLACES: "turn to something that is there only once, or stay until several "
     "images have been searched",
-    Reason.BLURRED: "slower motion, more light, a shorter exposure",
-    Reason.TOO_BLURRED_TO_BEGIN: "slower motion, more light, a shorter exposure",
-    Reason.TOO_BLURRED: "begin a map with slow motion; more light, a shorter exposure",
     Reason.NOT_CONFIRMED: "stay at a place seen before for a moment, from a similar direction",
     Reason.SEARCHING_LOADED_MAP: "begin at a place that is in the map, from a similar direction, "
     "or say where the camera is (--initial-pose); without --load a new map is made",

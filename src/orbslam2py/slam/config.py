@@ -37,95 +37,105 @@ class InitializationConfig:
     """How a map may begin."""
 
     keypoints_with_depth_sensor: int = 500
-    """A stereo or RGB-D frame must have more keypoints than this to begin a map ..."""
+    """A stereo or RGB-D frame begins a map only with more keypoints than this (ORB-SLAM2)."""
     share_with_depth_sensor: float = 0.5
-    """... or than this share of the settings' number of features, if that is less ..."""
+    """Upper limit of `keypoints_with_depth_sensor`, as a share of the settings' number of
+    features."""
     depths: int = 100
-    """... and at least this many with depth, or the map would be lost at once."""
+    """Fewest keypoints with a depth in a stereo or RGB-D frame that begins a map."""
     keypoints: int = 100
-    """Each of a single camera's two views must have more keypoints than this."""
+    """Each of the two views of a single camera must have more keypoints than this (ORB-SLAM)."""
     matches: int = 100
-    """Fewest matches between two views of a single camera."""
+    """Fewest matches between the two views of a single camera (ORB-SLAM)."""
     views: int = 6
-    """So many views are kept ..."""
+    """Number of recent views that are kept as a possible first view."""
     new_view: float = 5.0
-    """... each moved by a median of so many pixels against the one before."""
+    """A frame is kept as a view when its keypoints moved by this median since the last view,
+    pixels."""
     distant_views: int = 3
-    """So many views with fewer matches are kept beside them: they may confirm what is begun ..."""
+    """Number of views that are kept although they have too few matches to begin a map; they
+    confirm a motion."""
     distant_matches: int = 30
-    """... as long as they have so many."""
+    """Fewest matches of such a view with the newest frame."""
     window: float = 100.0
-    """Half width of the search window from frame to frame, pixels ..."""
+    """Half width of the search window for matches from frame to frame, pixels."""
     wide_window: float = 200.0
-    """... after that found too little ..."""
+    """Half width of the window of a second search, after the first found too few matches,
+    pixels."""
     narrow_window: float = 25.0
-    """... and the least one, around where a view's keypoints should have moved."""
+    """Smallest half width of the window around the predicted place of a view's keypoints,
+    pixels."""
     displacement: float = 5.0
-    """A view is tried when its keypoints have moved by a median of so many pixels."""
+    """Two views are reconstructed when their keypoints moved by this median, pixels."""
     tried_views: int = 3
-    """So many of the views that have moved so far are tried with a frame, from the furthest on."""
+    """Number of kept views that are reconstructed with each frame."""
     parallax: float = 1.0
-    """Degrees of parallax that a motion chosen by third views must have."""
+    """Smallest median parallax of the points of a first map, degrees (ORB-SLAM)."""
     third_view_share: float = 0.2
-    """A third view says something if it has moved by this share of the way between the two, from
-    both of them ..."""
+    """A third view is used when it moved by this share of the motion between the two views,
+    away from both."""
     third_view_points: int = 30
-    """... sees at least so many of the points that are placed between them ..."""
+    """Fewest points of the two views that a third view must see."""
     fewer_third_view_points: int = 20
-    """... or, where none does, so many ..."""
+    """Fewest points that a third view must see when none sees `third_view_points`."""
     third_view_fits: float = 0.75
-    """... and agrees when it sees this share of the points where they should be."""
+    """A third view confirms a motion when it sees this share of the points where the motion
+    puts them."""
     clearly_worse: float = 2.0
-    """Of motions that two views cannot tell apart, the others must fit third views worse than
-    the right one by this factor ..."""
+    """An ambiguous motion is ruled out when its mean error in third views is this factor
+    larger."""
     clearly_worse_alternative: float = 1.75
-    """... or, where they do not, all views together by this one."""
+    """An ambiguous motion is ruled out when its mean error in all views together is this
+    factor larger."""
     same_direction: float = 20.0
-    """Two that lead to within so many degrees of each other count as one."""
+    """Two motions count as one when their directions differ by less than this, degrees."""
+    direction_deviation: float = 4.0
+    """A map begins only when the standard deviation of the direction of motion is below
+    this, degrees."""
     compare_views: bool = True
     """Begin a map only when all kept views together prefer one motion."""
     further_draws: int = 5
-    """So many more draws give motions that all views are asked to compare. One whose direction
-    differs ..."""
+    """Number of further RANSAC runs whose motions are compared in all views together."""
     other_direction: float = 30.0
-    """... by so many degrees from the best ..."""
+    """A motion of such a run is an alternative when its direction differs by more than this,
+    degrees."""
     clearly_worse_direction: float = 1.1
-    """... must fit worse by this factor, or the map waits for more parallax ..."""
+    """An alternative is ruled out when its mean error in all views is this factor larger."""
     points: int = 100
-    """... as it does as long as fewer points can be placed than a first map must have."""
+    """Fewest points of a single camera's first map."""
     feature_factor: int = 2
-    """Extracted features while a single camera starts, in multiples of the settings' number ..."""
+    """Number of features while a single camera begins a map, as a multiple of the settings'
+    number (ORB-SLAM)."""
     raised_feature_factor: int = 4
-    """... and when it has not started ..."""
+    """The same multiple after a long wait for a first map."""
     patience: int = 10
-    """... after so many frames ..."""
+    """Number of frames after which the raised multiple is used."""
     patience_seconds: float = 1.0
-    """... or so many seconds."""
+    """Seconds after which the raised multiple is used."""
     view_between: float = 0.9
-    """Of the kept views between the two, those that find less than this share of the map's first
-    points become keyframes as well."""
+    """A view between the first two becomes a keyframe when it finds less than this share of
+    the first points."""
     remembered_frames: int = 200
-    """So many frames are remembered, to be tracked in the map once it has begun ..."""
+    """Number of recent frames that are tracked in a new map after it began."""
     followed_again: int = 20
-    """... and so many of the last of them serve a new beginning, if the map came to nothing."""
+    """Number of recent frames that begin the next map after a map was dropped."""
     watched_frames: int = 60
-    """In so many frames after a single camera's map began it is compared with what their matches
-    say without it. If ..."""
+    """Number of frames in which a single camera's first map is compared with independent
+    two-view motions; 0 switches it off."""
     agreements: int = 2
-    """... so many times the camera's way differs ..."""
+    """The map is accepted after this number of agreeing motions."""
     agreeing_direction: float = 15.0
-    """... by less than so many degrees, the map is believed; if it does ..."""
+    """A motion agrees when its direction differs by less than this, degrees."""
     contradictions: int = 3
-    """... so many times ..."""
+    """The map is dropped after this number of contradicting motions."""
     contradicting_direction: float = 35.0
-    """... by more than so many, it is given up."""
+    """A motion contradicts when its direction differs by more than this, degrees."""
     contradicted_maps: int = 3
-    """After so many maps in a row that came to nothing by this, one is not compared."""
+    """After this number of dropped maps in a row the next map is not compared."""
     settled_map: int = 10
-    """With more keyframes than this a map has settled: bundle adjustment has moved its first
-    points, and its first frames are looked at again ..."""
+    """The first frames of a map are estimated again when it has more keyframes than this."""
     young_frames: int = 250
-    """... but no later than after so many of them."""
+    """The first frames of a map are estimated again at the latest after this number of frames."""
 
 
 @dataclass(frozen=True)
@@ -133,49 +143,55 @@ class TrackingConfig:
     """When a pose is believed, and how far around a prediction is searched."""
 
     motion_model_window: float = 15.0
-    """Half width of the search window around a predicted keypoint, pixels at level 0 ..."""
+    """Half width of the search window around predicted keypoints, pixels at level 0
+    (ORB-SLAM)."""
     motion_model_window_stereo: float = 7.0
-    """... and for a stereo pair, whose points are predicted better."""
+    """The same for a stereo pair, whose prediction is more exact (ORB-SLAM2)."""
     motion_model_widening: float = 2.0
-    """Factor on the window when it holds too few matches; it is widened once."""
+    """Factor on that window for a second search, after the first found too few matches
+    (ORB-SLAM)."""
     motion_model_matches: int = 20
-    """Fewest matches with the last frame."""
+    """Fewest matches with the last frame (ORB-SLAM)."""
     reference_ratio: float = 0.7
-    """Best by second best descriptor distance, matching with the reference keyframe by words."""
+    """Largest ratio of best to second best descriptor distance in matching with the
+    reference keyframe (ORB-SLAM)."""
     reference_matches: int = 15
-    """Fewest matches with the reference keyframe."""
+    """Fewest matches with the reference keyframe (ORB-SLAM)."""
     map_matches: int = 10
-    """Fewest inliers of the first pose estimate; in localization mode: of these on map points."""
+    """Fewest inliers of the first pose estimate; in localization mode fewest inliers on map
+    points (ORB-SLAM)."""
     localization_matches: int = 20
-    """In localization mode the motion model needs more inliers than this."""
+    """In localization mode the motion model needs more inliers than this (ORB-SLAM2)."""
     local_map_window: float = 1.0
-    """Factor on the search radius around projected points of the local map ..."""
+    """Factor on the search radius around projected points of the local map (ORB-SLAM)."""
     local_map_window_rgbd: float = 3.0
-    """... with an RGB-D camera ..."""
+    """The same with an RGB-D camera (ORB-SLAM2)."""
     local_map_window_after_relocalization: float = 5.0
-    """... and in the frames right after a relocalization, with any sensor."""
+    """The same in the first frames after a relocalization (ORB-SLAM)."""
     elsewhere: float = 3.0
-    """A pose lies elsewhere if it is so many standard deviations of the position away."""
+    """Two poses differ when their positions are this number of standard deviations apart."""
     afresh_window: float = 3.0
-    """Matched with the local map from nothing, first by this factor on the search radius, a frame
-    ..."""
+    """Factor on the search radius when a frame is matched with a fixed map without the
+    matches of the frame before."""
     afresh_share: float = 0.9
-    """... takes the pose with at least this share of the inliers that is `elsewhere` ..."""
+    """That pose is taken when it keeps this share of the inliers and differs."""
     afresh_share_in_doubt: float = 0.6
-    """... and if it was in doubt, the one with at least this share, wherever it is."""
+    """The same share when the first pose was uncertain."""
     frames_after_relocalization: int = 2
-    """How many frames that is; meanwhile there is no motion model either."""
+    """Number of frames after a relocalization with wide windows and without a motion model
+    (ORB-SLAM)."""
     local_map_inliers: int = 30
-    """Fewest inliers in the local map."""
+    """Fewest inliers in the local map (ORB-SLAM)."""
     local_map_inliers_after_relocalization: int = 50
-    """The same for the first second after a relocalization."""
+    """The same in the first second after a relocalization (ORB-SLAM)."""
     small_map: int = 5
-    """A map with so few keyframes is given up when tracking is lost, and a new one is begun."""
+    """A map with this number of keyframes or fewer is dropped when tracking is lost
+    (ORB-SLAM)."""
     feature_factor: int = 2
-    """Extracted features of a single camera in localization mode, of every second image while it is
-    lost, and after a pose with fewer ..."""
+    """Multiple of the settings' number of features for a single camera that is lost,
+    localizes, or has few inliers."""
     scarce_inliers: int = 100
-    """... inliers than this, in multiples of the settings' number."""
+    """Fewer inliers than this are few."""
 
     def for_features(self, n_features: int) -> TrackingConfig:
         """These limits for images with so many features: of few ones fewer are asked for."""
@@ -197,100 +213,93 @@ class AcceptanceConfig:
     inflate_covariance: bool = True
     """State a larger covariance than that of independent pixel noise."""
     gain: float = 0.25
-    """Weight of the newest frame in what is usual."""
+    """Weight of the newest frame in the running means of inliers, visibility ratio,
+    deviation and error."""
     sudden_share: float = 0.6
-    """Below this share of the usual inliers, or of the usual share of points in view, a pose is
-    not believed before it was searched by other ways ..."""
+    """Other hypotheses are searched below this share of the mean inliers, or of the mean
+    visibility ratio."""
     sudden_deviation: float = 2.5
-    """... nor with a position so many times less certain than usual ..."""
+    """Other hypotheses are searched when the position's deviation is this factor above its
+    mean."""
     surprise_windows: float = 1.0
-    """... nor if the camera turned otherwise than before by more than so many windows of the
-    motion model, in pixels of the image."""
+    """Other hypotheses are searched when the rotation differs from the prediction by this
+    number of search windows."""
     weak_share: float = 0.5
-    """Below this share of both, evidence is weak."""
+    """A pose is uncertain below this share of the mean inliers and of the mean visibility
+    ratio."""
     weak_cells: int = 4
-    """With inliers in so few of the 48 cells of the image or fewer it is weak ..."""
+    """A pose is uncertain when its inliers lie in this number of the 48 cells of the image
+    or fewer."""
     weak_deviation: float = 4.0
-    """... and with a position this much less certain than usual."""
+    """A pose is uncertain when the position's deviation is this factor above its mean."""
     weak_error: float = 1.5
-    """... and with a median reprojection error so many times the usual one: a part of the image
-    moves by itself, or the matches are wrong ..."""
+    """A pose is uncertain when the median reprojection error is this factor above its mean."""
     weak_error_spreads: float = 3.0
-    """... unless errors vary as much from image to image: above the usual by so many times their
-    mean deviation from it, as between images that are far apart."""
+    """A pose is uncertain by its error only if that is also above the mean by this number of
+    mean deviations."""
     honest_error: float = 0.8
-    """Up to this median error, in standard deviations of keypoints, the stated covariance is that
-    of the keypoints' noise; beyond it the standard deviations grow with the error ..."""
+    """Median residual up to which the covariance is that of pixel noise, in standard
+    deviations; beyond it deviations grow with the error."""
     doubtful_error: float = 1.3
-    """... and beyond this with its square: then many matches are accidental ..."""
+    """Median residual beyond which deviations grow with its square: many matches are
+    accidental."""
     largest_error: float = 10.0
-    """... at most so many times, as they do for an error that is not the usual one."""
+    """Largest such factor on the deviations."""
     surprise_pixels: float = 15.0
-    """A camera that turned otherwise than before by so many pixels of the image is told with twice
-    the variance, by twice as many ..."""
+    """An unexpected rotation of this number of pixels doubles the variance."""
     largest_surprise: float = 2.0
-    """... or more with five times; images far apart turn by any angle."""
+    """Largest unexpected rotation that counts, in units of `surprise_pixels`."""
     usual_deviation: float = 1.3
-    """A position beyond so many times the usual deviation is told with as much more variance."""
+    """Beyond this multiple of the mean deviation, the variance grows with the deviation."""
     few_inliers: float = 70.0
-    """So many inliers are told with twice the variance, fewer with more by the fourth power of
-    their number: the fewer there are, the more of them fit by accident ..."""
+    """This number of inliers doubles the variance; it grows with the fourth power of fewer."""
     fewest_inliers: int = 30
-    """... down to this number."""
+    """Fewest inliers that this factor is computed for."""
     unknown_change: float = 2.0
-    """So many times the variance is told where it is not known yet what is usual, as after a loss;
-    then also ..."""
+    """Variance factor until the running statistics have converged, as after a loss."""
     few_found: float = 0.15
-    """... with twice the variance where this share of the points in view is found, and with more by
-    the fourth power where it is less ..."""
+    """Visibility ratio that doubles the variance until then; it grows with the fourth power
+    of a smaller one."""
     fewest_found: float = 0.05
-    """... down to this share."""
-    visible_smear: float = 0.5
-    """Pixels of smear that sharp images seem to have as well; what is beyond ..."""
-    smear_of_sharpest: float = 2.0
-    """... is so many times as long: a camera that goes on and on smears its sharpest images too."""
+    """Smallest visibility ratio that this factor is computed for."""
     usual_changes: float = 1.5
-    """A pose farther from where the motion led than so many times what is usual ..."""
+    """A change of motion is unexpected beyond this multiple of the mean change."""
     mistaken_share: float = 0.06
-    """... is told as one that is off by what is beyond it with this probability: either the camera
-    changed its motion or the pose is mistaken."""
+    """With this probability the pose is assumed wrong by the unexpected motion; the
+    covariance grows accordingly."""
     changes_seen: int = 3
-    """So many changes of motion tell what is usual ..."""
+    """The mean change of motion is known after this number of changes."""
     sudden_change: float = 3.0
-    """... to which one counts as at most so many times the usual."""
+    """One change of motion counts as at most this multiple of the mean."""
     slow_gain: float = 0.02
-    """Weight of a frame with such an error in what error is usual: darkness may stay."""
-    smear: float = 3.2
-    """Pixels that an image is smeared with 0.7 of the fine detail of the sharpest ones ..."""
-    fading: float = 0.995
-    """... whose detail counts so many times with every further frame."""
-    long_smear: float = 0.03
-    """Images smeared by more than this share of the focal length begin no map of a single camera
-    and do not lead back to one, and are not believed ..."""
-    young_map: int = 30
-    """... among so many images after it began."""
+    """Weight of a frame with a sudden error in the mean error."""
     refused_share: float = 0.3
-    """A pose with less than this share of the usual inliers ..."""
+    """A pose is rejected below this share of the mean inliers, unless a second method
+    confirms it."""
     refused_inliers: int = 100
-    """... and fewer than this is not believed at all, unless a second method confirms it."""
+    """Only a pose with fewer inliers than this is rejected."""
     better: float = 1.1
-    """Another way to the pose wins with so many times the inliers."""
+    """Another hypothesis wins with this factor on the inliers."""
     enough_share: float = 0.75
-    """With this share of the usual inliers no further way is tried."""
+    """No further hypothesis is searched with this share of the mean inliers."""
     aligned_correlation: float = 0.6
-    """Least correlation of two small images that tells how the camera turned."""
+    """Smallest correlation of two small images that gives a rotation (Klein and Murray 2008)."""
     aligned_window: float = 15.0
-    """Half width of the search window around points turned so, pixels at level 0."""
+    """Half width of the search window around points turned by that rotation, pixels at level
+    0."""
     wide_window: float = 40.0
-    """The same around points predicted by the motion model, when that is doubted."""
+    """Half width of the window around predicted points when the prediction is in doubt,
+    pixels at level 0."""
     keyframes_around: int = 3
-    """So many neighbours of the reference keyframe are matched by words."""
+    """Number of neighbours of the reference keyframe that are matched by words."""
     same_windows: float = 0.5
-    """Two ways came to the same pose if they differ by fewer windows, in pixels of the image ..."""
+    """Two hypotheses are one pose only when they differ by less than this number of search
+    windows in the image."""
     same_deviations: float = 3.0
-    """... and in position by fewer standard deviations, both added."""
+    """Two hypotheses are one pose only when their positions differ by less than this number
+    of standard deviations."""
     weak_frames: int = 2
-    """After so many weak frames in a row a confirmed one may become a keyframe."""
+    """After this number of uncertain frames in a row a confirmed frame may become a keyframe."""
 
 
 @dataclass(frozen=True)
@@ -298,45 +307,51 @@ class KeyframeConfig:
     """Which frames become keyframes."""
 
     few_keyframes: int = 2
-    """In a map of up to so many keyframes ..."""
+    """A map with this number of keyframes or fewer is new (ORB-SLAM)."""
     observations_of_few: int = 2
-    """... a point of the reference keyframe counts when so many keyframes see it ..."""
+    """In a new map, a point of the reference keyframe counts when this number of keyframes
+    see it (ORB-SLAM)."""
     observations: int = 3
-    """... and so many in a larger one."""
+    """In a larger map, a point of the reference keyframe counts when this number of
+    keyframes see it (ORB-SLAM)."""
     share: float = 0.75
-    """A frame that tracks less than this share of its reference's points sees new things ..."""
+    """A frame sees new things when it tracks less than this share of its reference
+    keyframe's points (ORB-SLAM2)."""
     share_of_first: float = 0.4
-    """... while there is one keyframe only ..."""
+    """The same share while there is one keyframe (ORB-SLAM2)."""
     share_monocular: float = 0.9
-    """... and with a single camera."""
+    """The same share with a single camera (ORB-SLAM)."""
     weak_share: float = 0.25
-    """Below this share tracking is weak, and the mapper is not waited for (stereo, RGB-D)."""
+    """Below this share mapping is not waited for, with stereo and RGB-D (ORB-SLAM2)."""
     few_close_points: int = 100
-    """With fewer close points tracked than this ..."""
+    """Fewer tracked close points than this are few; a keyframe is needed if many others are
+    not in the map (ORB-SLAM2)."""
     many_untracked_close_points: int = 70
-    """... and more close points than this not in the map, a keyframe is needed."""
+    """More close points than this outside the map are many (ORB-SLAM2)."""
     kept_share: float = 0.65
-    """A frame that tracks less than this share of the most that was tracked since the last keyframe
-    leaves what that keyframe saw: another is needed (stereo, RGB-D)."""
+    """A keyframe is needed when a frame tracks less than this share of the most inliers
+    since the last keyframe, with stereo and RGB-D."""
     turn_frames: int = 3
-    """Where the camera will be after so many frames of the present speed ..."""
+    """The view is predicted this number of frames ahead."""
     staying_share: float = 0.65
-    """... less than this share of the inliers would still be in view: a keyframe is needed before
-    the camera has turned away from them (stereo, RGB-D), if many close points are not tracked."""
+    """A keyframe is needed when less than this share of the inliers stays in that view, with
+    stereo and RGB-D."""
     few_inliers: int = 150
-    """A frame with fewer inliers than this hangs on few points, however many its reference keyframe
-    has: another keyframe is made (single camera) ..."""
+    """Fewer inliers than this are few; a single camera then needs a keyframe if the view is
+    new."""
     new_view: float = 5.0
-    """... if their median has moved by so many pixels since the last one, turns left out."""
+    """A view is new when the inliers moved by this median since the last keyframe, rotation
+    excluded, pixels."""
     inliers: int = 15
-    """A keyframe needs more inliers than this."""
+    """A keyframe needs more inliers than this (ORB-SLAM)."""
     spacing: int = 1
     """Fewest frames from one keyframe to the next with a single camera."""
     spacing_with_depth: int = 2
-    """Fewest frames from one keyframe to the next with a stereo pair or an RGB-D camera, where
-    tracking is not weak."""
+    """Fewest frames from one keyframe to the next with stereo and RGB-D, where tracking is
+    not weak."""
     queue: int = 3
-    """A busy mapper is given a keyframe only if fewer than this wait (stereo, RGB-D)."""
+    """A busy mapper gets a keyframe only if fewer than this number wait, with stereo and
+    RGB-D (ORB-SLAM2)."""
 
 
 @dataclass(frozen=True)
@@ -344,71 +359,73 @@ class RelocalizationConfig:
     """When a lost frame counts as found."""
 
     ratio: float = 0.75
-    """Best by second best descriptor distance, matching by words."""
+    """Largest ratio of best to second best descriptor distance in matching by words
+    (ORB-SLAM)."""
     matches: int = 15
-    """Fewest matches by words that make a candidate."""
+    """Fewest matches by words of a candidate keyframe (ORB-SLAM)."""
     thorough_ratio: float = 0.85
-    """Best by second best distance, where each point is compared with every keypoint ..."""
+    """The same ratio when each point is compared with every keypoint."""
     thorough_matches: int = 12
-    """... and fewest such matches."""
+    """Fewest matches when each point is compared with every keypoint."""
     thorough_keyframes: int = 2
-    """So many keyframes near the place of the loss are compared so, for `motion_frames` frames."""
+    """Number of keyframes near the last known pose that are compared so, for `motion_frames`
+    frames."""
     iterations: int = 5
-    """RANSAC iterations that each candidate gets per turn."""
+    """RANSAC iterations of each candidate per turn (ORB-SLAM)."""
     inliers: int = 10
-    """Fewest inliers of the first pose that are worth widening."""
+    """Fewest inliers of a pose that is refined with further matches (ORB-SLAM)."""
     enough: int = 50
-    """Inliers that make a success ..."""
+    """Inliers of a successful relocalization (ORB-SLAM)."""
     enough_near: int = 30
-    """... and where the camera was just lost, or its motion would have led it."""
+    """The same at the pose where tracking was just lost, or where the motion led."""
     narrow: int = 30
-    """More inliers than this, but not enough, are widened once more with a narrow window."""
+    """With more inliers than this, but too few, a narrow window is searched as well
+    (ORB-SLAM)."""
     wide_window: float = 10.0
-    """Search radius of the first widening, pixels at level 0 ..."""
+    """Search radius of the first refinement, pixels at level 0 (ORB-SLAM)."""
     wide_distance: int = 100
-    """... and the most bits in which descriptors may differ there."""
+    """Largest descriptor distance of the first refinement, bits (ORB-SLAM)."""
     narrow_window: float = 3.0
-    """Search radius of the second widening ..."""
+    """Search radius of the second refinement, pixels at level 0 (ORB-SLAM)."""
     narrow_distance: int = 64
-    """... and its most differing bits."""
+    """Largest descriptor distance of the second refinement, bits (ORB-SLAM)."""
     guess_keyframes: int = 5
-    """So many keyframes nearest to a pose given by the user are tried ..."""
+    """Number of keyframes nearest to a guessed pose that are tried."""
     guess_cosine: float = 0.5
-    """... which look in nearly the same direction: least cosine of the angle ..."""
+    """Smallest cosine of the angle between their viewing directions and that of the guess."""
     guess_window: float = 30.0
-    """... their points searched in this radius, pixels at level 0 ..."""
+    """Search radius around their points, pixels at level 0."""
     guess_distance: int = 64
-    """... with at most so many differing bits."""
+    """Largest descriptor distance of these matches, bits."""
     guessed_frames: int = 60
-    """For so many frames after a loss the camera is looked for near the place of the loss ..."""
+    """Number of frames after a loss in which the last known pose is searched."""
     motion_frames: int = 10
-    """... and for so many where its motion would have led it; at first within `guess_window` ..."""
+    """Number of frames after a loss in which the pose predicted by the motion is searched."""
     widening: float = 0.25
-    """... which grows by this share of itself at every failure ..."""
+    """Share by which the search radius grows at every failure."""
     widest: float = 3.0
-    """... up to this multiple."""
+    """Largest multiple of the search radius after failures."""
     word_frames: int = 3
-    """Lost frames, this one included, whose words name candidates."""
+    """Number of lost frames, this one included, whose words name candidates."""
     word_candidates: int = 8
-    """Candidates named by words that are matched with one frame ..."""
+    """Number of candidates named by words that are matched with one frame."""
     near_candidates: int = 4
-    """... and those near the place of the loss: half of each likeliest, the others in turns."""
+    """Number of candidates near the last known pose that are matched with one frame."""
     covisible_keyframes: int = 10
-    """Near the loss: keyframes that see most of what its reference keyframe sees ..."""
+    """Number of keyframes near the last known pose by covisibility."""
     last_keyframes: int = 5
-    """... and the last ones made."""
+    """Number of the newest keyframes that are candidates after a loss."""
     verified_poses: int = 20
-    """Poses of RANSAC that are optimised and widened for one frame."""
+    """Most RANSAC poses that are optimised for one frame."""
     rival_share: float = 0.6
-    """A frame that fits elsewhere as well is believed if no other place shows more than this share
-    of the points ..."""
+    """A place is ambiguous when another place shows more than this share of its points."""
     support_window: float = 5.0
-    """... of the local map that it shows at the best one, searched in this multiple of the usual
-    radius: as right after relocalization."""
+    """Factor on the search radius in counting the points of a place."""
     common_points: int = 15
-    """The frame after one found again confirms it with so many points that both see ..."""
+    """A relocalization is confirmed only when the next frame shares this number of points."""
     confirming_cosine: float = 0.87
-    """... if the camera turned by no more than this in between: cosine of the angle, 30 degrees."""
+    """A relocalization is confirmed only when the cosine of the rotation to the next frame
+    is at least this."""
 
     def for_features(self, n_features: int) -> RelocalizationConfig:
         """These limits for images with so many features: of few ones fewer are asked for."""
@@ -421,33 +438,21 @@ class RelocalizationConfig:
 
 
 @dataclass(frozen=True)
-class BlurConfig:
-    """When a frame counts as blurred."""
-
-    frames: int = 15
-    """Frames before it that it is compared with: half a second ..."""
-    fewest: int = 5
-    """... and how many there must be at least."""
-    share: float = 0.4
-    """Less than this share of their median sharpness is blur ..."""
-    detail_share: float = 0.7
-    """... if their fine corners by coarse ones, too, are below this share: else it is dark."""
-
-
-@dataclass(frozen=True)
 class MappingConfig:
     """What local mapping looks at around a new keyframe."""
 
     neighbours: int = 10
-    """Best covisible keyframes with which points are triangulated and fused ..."""
+    """Number of covisible keyframes with which points are triangulated and fused, with
+    stereo and RGB-D (ORB-SLAM2)."""
     neighbours_monocular: int = 20
-    """... and with a single camera, all of whose points come from there."""
+    """The same with a single camera (ORB-SLAM)."""
     observations: int = 3
-    """A recent point seen by so many keyframes or fewer is dropped two keyframes later ..."""
+    """A recent point seen by this number of keyframes or fewer is dropped two keyframes
+    later (ORB-SLAM2)."""
     observations_monocular: int = 2
-    """... and with a single camera."""
+    """The same with a single camera (ORB-SLAM)."""
     adjusted_keyframes: int = 2
-    """Local bundle adjustment begins with more keyframes than this."""
+    """Local bundle adjustment begins with more keyframes than this (ORB-SLAM)."""
 
 
 @dataclass(frozen=True)
@@ -455,11 +460,11 @@ class LoopConfig:
     """Where loops are looked for."""
 
     gap: int = 10
-    """Keyframes after a loop that are not searched for another one."""
+    """Number of keyframes after a loop that are not searched for another (ORB-SLAM)."""
     firm_matches: int = 100
-    """A loop with fewer matches ..."""
+    """A loop with fewer matches than this waits for a better one."""
     patience: int = 8
-    """... waits so many keyframes for one with more."""
+    """Number of keyframes that such a loop waits."""
 
 
 @dataclass(frozen=True)
@@ -467,26 +472,25 @@ class MergingConfig:
     """When two maps are believed to show the same place."""
 
     neighbours: int = 6
-    """Neighbours of the keyframe that may confirm what it shows ..."""
+    """Number of neighbours of a keyframe that may confirm a place in another map."""
     confirmations: int = 2
-    """... of which so many have to."""
+    """Number of neighbours that must confirm it."""
     far_neighbours: int = 3
-    """Neighbours of the keyframe in the other map that they are compared with as well."""
+    """Number of neighbours of the place that they are compared with."""
     remembered: int = 10
-    """Keyframes whose places in another map are kept until others confirm them."""
+    """Number of keyframes whose places in another map are kept until confirmed."""
     position: float = 0.15
-    """Median depths of the other keyframe by which a neighbour may be elsewhere than it should."""
+    """Largest difference of a neighbour's position, in median depths of the other keyframe."""
     angle: float = 0.1
-    """Radians by which it may be turned otherwise."""
+    """Largest difference of its rotation, radians."""
     log_scale: float = 0.2
-    """Logarithm of the factor by which its scale may differ."""
+    """Largest difference of its scale, as a logarithm."""
     explained: float = 0.17
-    """Of the points that the keyframe should see over there, at least so large a share is found;
-    those count ..."""
+    """Smallest share of visible points of the other map that the keyframe must find."""
     view_cosine: float = 0.87
-    """... that are seen from where they were seen before: cosine of the angle, 30 degrees."""
+    """A point is visible when the cosine of the angle to its earlier views is at least this."""
     places: int = 5
-    """Places in the other map that are compared with the one that was found there."""
+    """Number of places in the other map that are compared with the first."""
 
 
 @dataclass(frozen=True)
@@ -517,7 +521,6 @@ class Config:
     acceptance: AcceptanceConfig = field(default_factory=AcceptanceConfig)
     keyframes: KeyframeConfig = field(default_factory=KeyframeConfig)
     relocalization: RelocalizationConfig = field(default_factory=RelocalizationConfig)
-    blur: BlurConfig = field(default_factory=BlurConfig)
     mapping: MappingConfig = field(default_factory=MappingConfig)
     loops: LoopConfig = field(default_factory=LoopConfig)
     merging: MergingConfig = field(default_factory=MergingConfig)

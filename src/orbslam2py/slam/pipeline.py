@@ -27,7 +27,6 @@ from orbslam2py.slam.events import Callbacks, MapStarted, Relocalized, TrackingL
 from orbslam2py.slam.evidence.belief import Belief
 from orbslam2py.slam.evidence.harder_search import HarderSearch
 from orbslam2py.slam.evidence.judgement import EvidenceJudge
-from orbslam2py.slam.evidence.smear import Smear
 from orbslam2py.slam.frame_recorder import FrameRecorder
 from orbslam2py.slam.front_end import FrontEnd
 from orbslam2py.slam.initialization import DepthInitializer, Initializer, MonocularInitializer
@@ -402,7 +401,6 @@ def _make_tracking(
             vocabulary,
             mapping,
             seed,
-            Smear(setup.settings.camera.fx, config.acceptance),
             EarlierFrames(earlier, belief(earlier)),
             config=config.initialization,
         )
@@ -439,6 +437,5 @@ def _make_tracking(
         ),
         config=config,
         has_depth=sensor.has_depth,
-        n_features=n_features,
         new_map_after=options.new_map_after if options.several_maps else None,
     )

@@ -33,13 +33,10 @@ class Reason(str, enum.Enum):
     LOW_PARALLAX = "low parallax between the two views"
     AMBIGUOUS_MOTION = "ambiguous motion between the two views"
     DEGENERATE_VIEWS = "degenerate views: planar scene, pure rotation or wrong matches"
-    TOO_BLURRED_TO_BEGIN = "blurred image, begins no map"
     NO_THIRD_VIEW = "no third view agrees with the two that were chosen"
     INITIAL_MAP_FAILED = "the first map was too small or had no depth"
     NOT_FOUND_IN_MAP = "not found in the map"
     SEVERAL_PLACES = "looks like several places of the map"
-    BLURRED = "blurred image, not searched"
-    TOO_BLURRED = "blurred image, not believed"
     NOT_CONFIRMED = "found again, but not confirmed by the next image"
     SEARCHING_LOADED_MAP = "searching the loaded map"
     FEW_MATCHES_LAST_FRAME = "too few matches with the last frame"
@@ -117,9 +114,6 @@ class Evidence:
     the keypoints' positions."""
     error_to_usual: float
     """That error by the usual one."""
-    smear: float
-    """How far the image is smeared by motion, pixels: estimated from its fine detail by that of
-    the sharpest images before."""
     turn_change: float
     """Degrees by which the camera turned otherwise than from the frame before the last to the
     last; 0 where the motion is not known."""

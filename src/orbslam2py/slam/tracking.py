@@ -29,7 +29,7 @@ from orbslam2py.slam.pose_search import (
     PoseSearch,
 )
 from orbslam2py.slam.records import PoseEstimate, Reason, TrackingOutcome, TrackingState
-from orbslam2py.slam.relocalization import BlurWatch, Confirmation, LossClock
+from orbslam2py.slam.relocalization import Confirmation, LossClock
 from orbslam2py.slam.watched_frame import accepted_keypoints
 
 _log = logging.getLogger(__name__)
@@ -58,8 +58,6 @@ class Tracking:
         Thresholds.
     has_depth : bool
         Whether frames measure depths, which become points of the map with a keyframe.
-    n_features : int
-        Features of the settings.
     new_map_after : float or None
         Seconds that tracking is lost before another map begins beside those there are; None: only
         the old one is searched, for ever.
@@ -77,7 +75,6 @@ class Tracking:
         keyframe_decision: KeyframeDecision,
         config: Config,
         has_depth: bool,
-        n_features: int,
         new_map_after: float | None = None,
     ) -> None:
         self._map = slam_map
@@ -90,7 +87,6 @@ class Tracking:
         self._has_depth = has_depth
         self._in_growing_map = FirstEstimateInGrowingMap(search)
         self._in_fixed_map = FirstEstimateInFixedMap(search, has_depth=has_depth)
-        self._blur_watch = BlurWatch(n_features, config.blur)
         self._confirmation = Confirmation(config.relocalization)
         self._loss = LossClock(new_map_after)
         #: How often tracking was found again, over all maps.
@@ -104,14 +100,11 @@ class Tracking:
         if frames:
             # The count of the frames goes on, and the next map is young as well.
             self._search.proving.map_begun(frames[-1].id)
-            # It is the same camera: its sharpest images stay what others are compared with.
-            self._belief.see(frames)
         self._initializer.restart(frames)
 
     def reset(self) -> None:
         """Forget the map's past; the map itself is cleared by the pipeline."""
         self._forget_maps()
-        self._blur_watch.reset()
         self._initializer.reset()
 
     def _forget_maps(self) -> None:
@@ -132,7 +125,6 @@ class Tracking:
         self._n_lost = 0
         # Whether the last pose hangs on few points; unknown of a map's first one.
         self._is_scarce = False
-        self._blurred = False
 
     def begin_in_loaded_map(self, initial_pose: core.Pose | None) -> None:
         """Start lost in the map as it is: every image is searched in it, and it is kept.
@@ -233,12 +225,11 @@ class Tracking:
         details : bool
             The outcome is to say which keypoints the pose was accepted with.
         """
-        self._blurred = self._blur_watch.is_blurred(frame.features)
         if self.initializing:
             return self._begin_map(frame, timer)
         young = self._is_small or self._initializer.watches_map
         if young and not self._seeks_map:
-            self._initializer.remember(frame, blurred=self._blurred)
+            self._initializer.remember(frame)
         estimate = self._find_pose(frame, timer, localize)
         if estimate.found:
             estimate = self._confirm(frame, estimate)
@@ -287,8 +278,6 @@ class Tracking:
         self, frame: core.TrackedFrame, timer: StageTimer, localize: bool
     ) -> PoseEstimate:
         lost = self.state is TrackingState.LOST
-        if lost and self._blurred:
-            return PoseEstimate(Reason.BLURRED)
         strategy: FirstEstimate = self._in_growing_map
         if localize:
             self._kept_maps.add(self._map.active_map)
@@ -326,7 +315,7 @@ class Tracking:
     def _begin_map(self, frame: core.TrackedFrame, timer: StageTimer) -> TrackingOutcome:
         self.state = TrackingState.NOT_INITIALIZED
         with timer("keyframe"):
-            reason = self._initializer.try_initialize(frame, blurred=self._blurred)
+            reason = self._initializer.try_initialize(frame)
         if reason is not Reason.NONE:
             spoilt = reason is Reason.INITIAL_MAP_FAILED
             given_up = self._map.active_map if spoilt else None
@@ -346,7 +335,7 @@ class Tracking:
             self._seeks_map = True
         frame.clear_associations()
         with timer("keyframe"):
-            reason = self._initializer.try_initialize(frame, blurred=self._blurred)
+            reason = self._initializer.try_initialize(frame)
         if reason is Reason.INITIAL_MAP_FAILED:
             spoilt = self._map.active_map
             return TrackingOutcome(self.state, PoseEstimate(reason), given_up=spoilt)
@@ -369,10 +358,6 @@ class Tracking:
             self._search.motion.update_velocity(frame)
         self._search.motion.remember(frame)
         self._since_keyframe = SinceKeyframe(frame.id, frame.reference_keyframe)
-        if not self._has_depth:
-            # The images before the first map were not tracked: how sharp they were is known here.
-            self._belief.see(self._initializer.remembered())
-            self._belief.begin_map(frame, self._map.active_map)
         n = frame.n_associated()
         # It is the origin, and yet lies in its map no better than the keypoints that became points.
         covariance = core.pose_covariance(frame)
@@ -408,8 +393,8 @@ class Tracking:
         active = self._map.active_map
         small = self._is_small and active not in self._kept_maps
         # Others are given up for one that begins. Under a hand none does, and the camera may be
-        # found behind it; a blurred frame was not even searched.
-        another = self._initializer.shows_enough(frame) and estimate.reason is not Reason.BLURRED
+        # found behind it.
+        another = self._initializer.shows_enough(frame)
         given_up = wrong_map
         if given_up is None and small and another:
             given_up = active
@@ -450,8 +435,6 @@ class Tracking:
         return True
 
     def _keyframe_wanted(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> bool:
-        if self._blurred:
-            return False
         self._since_keyframe.saw(estimate.n_inliers)
         return self._keyframe_decision.wanted(
             frame,

@@ -32,7 +32,19 @@ RECORDS: dict[str, tuple[Any, dict[str, Any]]] = {
     ),
     "lost": (
         orb.TrackingRecord(
-            *(1, 0.1, 0, orb.TrackingState.LOST, orb.Reason.BLURRED, None, None, 0, 0, False, -1)
+            *(
+                1,
+                0.1,
+                0,
+                orb.TrackingState.LOST,
+                orb.Reason.NOT_FOUND_IN_MAP,
+                None,
+                None,
+                0,
+                0,
+                False,
+                -1,
+            )
         ),
         {"T_cw": T},
     ),

@@ -11,7 +11,7 @@ from orbslam2py import Sensor, System
 from orbslam2py._worker import Worker
 from orbslam2py.slam import keyframe_decision, tracking
 from orbslam2py.slam.config import AcceptanceConfig, TrackingConfig
-from orbslam2py.slam.evidence import harder_search, judgement, smear
+from orbslam2py.slam.evidence import harder_search, judgement
 from orbslam2py.slam.pose_search import (
     first_estimate,
     local_map_search,
@@ -19,7 +19,6 @@ from orbslam2py.slam.pose_search import (
     refined_pose,
     search,
 )
-from orbslam2py.slam.relocalization import blur
 from support.interleaving import LIMIT, Stage
 from support.small_sequences import new_system, play
 from support.tracking_scene import FakeCore, Scene
@@ -59,7 +58,7 @@ def core(monkeypatch: pytest.MonkeyPatch) -> FakeCore:
     for module in (
         *(tracking, keyframe_decision),
         *(first_estimate, motion_model, search, local_map_search, refined_pose),
-        *(harder_search, judgement, smear, blur),
+        *(harder_search, judgement),
     ):
         monkeypatch.setattr(module, "core", core)
     return core

@@ -61,7 +61,7 @@ def test_depth_initializer(
         n_features=1000,
         config=InitializationConfig(),
     )
-    assert initializer.try_initialize(frame, blurred=False) is reason  # type: ignore[arg-type]
+    assert initializer.try_initialize(frame) is reason  # type: ignore[arg-type]
     if reason is Reason.NONE:
         assert mapping.inserted == [0]
         assert frame.T_cw is not None

@@ -188,18 +188,6 @@ def test_where_errors_vary_from_image_to_image_a_larger_one_is_not_sudden(carefu
     assert evidence.verdict is Verdict.WEAK
 
 
-def test_a_lasting_lack_of_detail_is_the_scene(careful: Scene) -> None:
-    careful.core.fine_detail_of_images = 1.2
-    lengths = []
-    for _ in range(80):
-        evidence = careful.track().estimate.evidence
-        assert evidence is not None
-        lengths.append(evidence.smear)
-    assert lengths[0] > 0
-    assert lengths == sorted(lengths, reverse=True)
-    assert lengths[-1] == 0
-
-
 def test_an_error_that_stays_becomes_the_usual_one(careful: Scene) -> None:
     careful.core.match_error = 1.2
     verdicts = []

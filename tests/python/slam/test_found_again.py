@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Blurred frames, and poses found again that wait for the next frame; among fakes."""
+"""Poses found again that wait for the next frame; among fakes."""
 
 from __future__ import annotations
 
@@ -7,28 +7,12 @@ import numpy as np
 import pytest
 
 from orbslam2py import Reason, TrackingState
-from orbslam2py.slam.config import BlurConfig, TrackingConfig
+from orbslam2py.slam.config import TrackingConfig
 from orbslam2py.slam.records import TrackingOutcome
 from support.tracking_scene import Scene, lose
 
-SHARP = 1000.0
 WANTED = 1000
 """Points of a reference keyframe of which so few are seen that a keyframe is wanted."""
-
-
-def track_blurred(scene: Scene, detail: float = 0.5) -> TrackingOutcome:
-    """An image with weak corners, fine ones above all."""
-    scene.core.sharpnesses.append(0.3 * SHARP)
-    usual = scene.core.fine_detail_of_images
-    scene.core.fine_detail_of_images = detail * usual
-    outcome = scene.track()
-    scene.core.fine_detail_of_images = usual
-    return outcome
-
-
-def track_darkened(scene: Scene) -> TrackingOutcome:
-    """An image with weak corners, coarse ones as well."""
-    return track_blurred(scene, detail=0.9)
 
 
 # ---- confirmed by the next frame ---------------------------------------------------------------
@@ -112,59 +96,6 @@ def test_fifteen_points_in_common_confirm(scene: Scene) -> None:
     lose(scene)
     scene.track()
     assert scene.track(map_points=np.arange(85, 185)).state is TrackingState.OK
-
-
-# ---- blur ------------------------------------------------------------------------------------
-def test_a_blurred_frame_is_not_searched_while_lost(scene: Scene) -> None:
-    scene.run(40)
-    lose(scene)
-    scene.core.calls.clear()
-    outcome = track_blurred(scene)
-    assert (outcome.state, outcome.estimate.reason) == (TrackingState.LOST, Reason.BLURRED)
-    assert scene.core.calls == []
-    assert scene.track().state is TrackingState.OK
-
-
-def test_a_blurred_frame_is_tracked_but_no_keyframe(scene: Scene) -> None:
-    scene.run(40)
-    scene.core.n_reference = WANTED
-    assert not track_blurred(scene).is_keyframe
-    assert scene.track().is_keyframe
-
-
-def test_a_dark_frame_is_searched_and_becomes_a_keyframe(scene: Scene) -> None:
-    """All of its corners are weak, as after a sudden change of exposure: that is no blur."""
-    scene.run(40)
-    scene.core.n_reference = WANTED
-    assert track_darkened(scene).is_keyframe
-    lose(scene)
-    assert track_darkened(scene).state is TrackingState.OK
-
-
-def test_without_coarse_levels_weak_corners_are_blur(scene: Scene) -> None:
-    """Nothing is there to compare the fine ones with: `fine_detail` is 0."""
-    scene.core.fine_detail_of_images = 0.0
-    scene.run(40)
-    lose(scene)
-    assert track_blurred(scene).estimate.reason is Reason.BLURRED
-
-
-def test_what_stays_as_it_is_counts_as_sharp_after_half_of_the_frames(scene: Scene) -> None:
-    """A wall without texture is no blur."""
-    scene.run(40)
-    scene.core.n_reference = WANTED
-    n_frames = BlurConfig().frames
-    keyframes = [track_blurred(scene).is_keyframe for _ in range(n_frames)]
-    assert keyframes.index(True) == n_frames // 2 + 1
-
-
-def test_a_black_frame_says_nothing_of_sharpness(scene: Scene) -> None:
-    scene.run(40)
-    scene.core.sharpnesses.extend([0.0] * 21)
-    lose(scene)
-    for _ in range(20):
-        assert lose(scene).estimate.reason is not Reason.BLURRED
-    assert track_blurred(scene).estimate.reason is Reason.BLURRED, "the sharp ones are remembered"
 
 
 # ---- features of a single camera -----------------------------------------------------------------

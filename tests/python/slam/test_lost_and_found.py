@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from benchmarks.accuracy.mapped_world import MappedWorld
 
-from orbslam2py import Reason, Sensor, TrackingRecord, TrackingState
+from orbslam2py import Sensor, TrackingRecord, TrackingState
 from orbslam2py import _core as core
 from orbslam2py._timing import StageTimer
 from orbslam2py.datasets import Images
@@ -71,23 +71,6 @@ def test_a_covered_lens(world: MappedWorld) -> None:
     assert lost[-12:-6].all()
     assert not lost[-6:].any()
     assert world.system.check_map() == []
-
-
-def test_blurred_frames_are_not_searched(world: MappedWorld) -> None:
-    world.lose()
-    for k in range(3):
-        record = world.show(smeared(world.sequence.load(N_MAPPED + k)))
-        assert (record.state, record.reason) == (TrackingState.LOST, Reason.BLURRED)
-    assert world.show(world.sequence.load(N_MAPPED + 4)).state is TrackingState.OK
-
-
-def test_a_blurred_frame_is_never_a_keyframe(world: MappedWorld) -> None:
-    records = []
-    for k in range(0, 24, 3):
-        records.append(world.show(smeared(world.sequence.load(N_MAPPED + k), 15)))
-        records += [world.show(world.sequence.load(N_MAPPED + k + step)) for step in (1, 2)]
-    assert not any(record.is_keyframe for record in records[::3])
-    assert any(record.is_keyframe for record in records)
 
 
 def test_a_dark_frame_becomes_a_keyframe(world: MappedWorld) -> None:

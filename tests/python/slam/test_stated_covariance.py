@@ -10,9 +10,8 @@ import pytest
 
 from orbslam2py.slam.config import AcceptanceConfig
 from orbslam2py.slam.evidence import judgement
-from orbslam2py.slam.pose_search import MotionModel
 from orbslam2py.slam.records import Verdict
-from support.tracking_scene import FakeFrame, Scene, pose
+from support.tracking_scene import FakeFrame, Scene
 
 
 @pytest.mark.parametrize(("error", "factor"), [(0.4, 1.0), (0.85, (0.85 / 0.8) ** 2)])
@@ -80,22 +79,6 @@ def test_where_nothing_is_usual_yet_a_pose_is_less_certain(careful: Scene, n_vis
     np.testing.assert_allclose(later.covariance, usual.covariance)
 
 
-@pytest.mark.parametrize(("displacement", "share"), [(40.0, 18.2 / 40), (5.0, 1.0)])
-def test_a_blurred_image_is_of_any_moment_while_the_shutter_was_open(
-    careful: Scene, monkeypatch: pytest.MonkeyPatch, displacement: float, share: float
-) -> None:
-    careful.core.displacement = displacement
-    monkeypatch.setattr(MotionModel, "way", lambda self, frame: pose(0.4))
-    sharp = careful.track().estimate
-    careful.core.fine_detail_of_images = 0.7  # smeared by 9.6 pixels
-    blurred = careful.track().estimate
-    assert sharp.covariance is not None
-    assert blurred.covariance is not None
-    larger = blurred.covariance[4, 4] / sharp.covariance[4, 4]
-    along = blurred.covariance[3, 3] - larger * sharp.covariance[3, 3]
-    assert along == pytest.approx((share * 0.4) ** 2 / 12)
-
-
 @pytest.mark.parametrize(("correlation", "factor"), [(2.5, 2.5), (0.6, 1.0)])
 def test_neighbours_that_are_wrong_together_count_as_fewer(
     careful: Scene, correlation: float, factor: float
@@ -109,28 +92,6 @@ def test_neighbours_that_are_wrong_together_count_as_fewer(
     assert estimate.evidence is not None
     assert estimate.covariance[0, 0] == pytest.approx(factor * usual.covariance[0, 0])
     assert estimate.evidence.verdict is usual.evidence.verdict
-
-
-def test_keypoints_on_a_smear_are_wrong_together(careful: Scene) -> None:
-    usual = careful.track().estimate
-    careful.core.fine_detail_of_images = 0.7
-    blurred = careful.track().estimate
-    careful.core.fine_detail_of_images = 1.4
-    sharp = careful.track().estimate
-    assert usual.covariance is not None
-    assert blurred.covariance is not None
-    assert sharp.covariance is not None
-    assert usual.evidence is not None
-    assert blurred.evidence is not None
-    limits = AcceptanceConfig()
-    assert blurred.evidence.smear == pytest.approx(limits.smear * (2**2 - 1))
-    assert usual.evidence.smear == 0
-    # 100 inliers in 30 cells, each with a variance of 2.
-    variance = blurred.evidence.smear**2 / 12 / 2
-    larger = blurred.covariance[0, 0] / usual.covariance[0, 0]
-    assert larger == pytest.approx(1 + 100 / 30 * variance)
-    assert blurred.evidence.verdict is Verdict.STRONG
-    assert sharp.covariance[0, 0] == pytest.approx(usual.covariance[0, 0])
 
 
 @pytest.mark.parametrize(("turn", "factor"), [(0.02, 1 + (10 / 15) ** 2), (0.5, 1 + 2**2)])

@@ -78,16 +78,14 @@ def watch_of(frames: list[core.TrackedFrame], **limits: float) -> YoungMapWatch:
     return watch
 
 
-def shown(
-    watch: YoungMapWatch, frames: Iterable[core.TrackedFrame], *, blurred: bool = False
-) -> tuple[int, bool]:
+def shown(watch: YoungMapWatch, frames: Iterable[core.TrackedFrame]) -> tuple[int, bool]:
     """Frames shown until the watch ended, or all of them, and whether the map was contradicted."""
     n = 0
     for frame in frames:
         if not watch.watching:
             break
         n += 1
-        if watch.contradicted(frame, blurred=blurred):
+        if watch.contradicted(frame):
             return n, True
     return n, False
 
@@ -125,11 +123,6 @@ def test_one_odd_frame_is_no_contradiction(walk: Walk) -> None:
     assert shown(watch, [*right[1:12], wrong[12], *right[13:]])[1] is False
 
 
-def test_blurred_images_say_nothing(walk: Walk) -> None:
-    frames = walk.tracked(90)
-    assert shown(watch_of(frames), frames[1:], blurred=True) == (LIMITS.watched_frames, False)
-
-
 def test_a_camera_that_rests_says_nothing(walk: Walk) -> None:
     frames = walk.tracked(90)
     resting = [frames[0]] * (LIMITS.watched_frames + 1)
@@ -140,7 +133,7 @@ def test_another_map_is_not_compared(walk: Walk, monkeypatch: pytest.MonkeyPatch
     frames = walk.tracked(90)
     watch = watch_of(frames)
     monkeypatch.setattr(watch, "_map_index", 1)
-    assert not watch.contradicted(frames[1], blurred=False)
+    assert not watch.contradicted(frames[1])
     assert not watch.watching
 
 

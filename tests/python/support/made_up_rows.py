@@ -71,7 +71,6 @@ def evidence(verdict: Verdict, found: float) -> Evidence:
         deviation_to_usual=2.0,
         match_error=0.6,
         error_to_usual=1.2,
-        smear=0.5,
         turn_change=4.0,
         move_change=0.1,
     )

@@ -315,8 +315,6 @@ class FakeInitializer:
 
     def __init__(self, refusals: int = 0) -> None:
         self.refusals = refusals
-        #: Whether those shown were blurred.
-        self.blurred: list[bool] = []
 
     def contradicts(self, frame: FakeFrame) -> bool:
         return False
@@ -324,7 +322,7 @@ class FakeInitializer:
     def believe_map(self) -> None:
         """No map is doubted."""
 
-    def remember(self, frame: FakeFrame, *, blurred: bool) -> None:
+    def remember(self, frame: FakeFrame) -> None:
         """Frames of a young map are not needed again."""
 
     def remembered(self) -> list[FakeFrame]:
@@ -348,8 +346,7 @@ class FakeInitializer:
     def lines(self) -> None:
         """None: one frame is enough."""
 
-    def try_initialize(self, frame: FakeFrame, *, blurred: bool) -> Reason:
-        self.blurred.append(blurred)
+    def try_initialize(self, frame: FakeFrame) -> Reason:
         if self.refusals:
             self.refusals -= 1
             return Reason.TOO_FEW_KEYPOINTS
@@ -433,7 +430,6 @@ class Scene:
             ),
             config=Config(),
             has_depth=sensor.has_depth,
-            n_features=N_FEATURES,
         )
         self.frames: list[FakeFrame] = []
 

@@ -40,20 +40,6 @@ class Belief:
         """Forget the frames before."""
         self._judge.reset()
         self._n_weak = 0
-        self._young_map = -1
-        self._young_until = -1
-
-    def see(self, frames: list[core.Frame]) -> None:
-        """Let earlier images be those that later ones are compared with, if none is known yet."""
-        if self._judge.knows_images:
-            return
-        for frame in frames:
-            self._judge.see(frame)
-
-    def begin_map(self, frame: core.TrackedFrame, map_index: int) -> None:
-        """Let a single camera's map begin with this frame: for a while blur would bend it."""
-        self._young_map = map_index
-        self._young_until = frame.id + self._judge.limits.young_map
 
     def go_elsewhere(self) -> None:
         """What follows is in another place, or in another map."""
@@ -90,7 +76,7 @@ class Belief:
             hypothesis = self._looked_at_afresh(hypothesis, in_doubt=doubted)
         if doubted:
             hypothesis = replace(hypothesis, evidence=replace(hypothesis.evidence, doubted=True))
-        return self._take(frame, hypothesis, lost=lost)
+        return self._take(frame, hypothesis)
 
     def _hypothesis(self, refined: RefinedPose, first: PoseEstimate) -> Hypothesis | None:
         if not refined.estimate.found:
@@ -122,9 +108,7 @@ class Belief:
             return self._search.beyond_the_map(frame, first)
         return self._search.in_local_map(frame, first)
 
-    def _take(
-        self, frame: core.TrackedFrame, hypothesis: Hypothesis, *, lost: bool
-    ) -> PoseEstimate:
+    def _take(self, frame: core.TrackedFrame, hypothesis: Hypothesis) -> PoseEstimate:
         refined, evidence = hypothesis.refined, hypothesis.evidence
         if refined.frame is not frame:
             frame.take_over(refined.frame)
@@ -143,23 +127,10 @@ class Belief:
         )
         if evidence.verdict is Verdict.REFUSED:
             return estimate.failed(Reason.WEAK_EVIDENCE)
-        if self._bends_with(frame, lost=lost) and self._judge.is_blurred(evidence):
-            self._judge.see(frame.features)
-            return estimate.failed(Reason.TOO_BLURRED)
         self._judge.get_used_to_frame(refined, evidence, change)
         if evidence.verdict is Verdict.STRONG or self._may_count(evidence):
             self._judge.get_used_to(refined)
         return estimate
-
-    def _bends_with(self, frame: core.TrackedFrame, *, lost: bool) -> bool:
-        """Whether a blurred frame would bend the map: one camera's, until it is firm.
-
-        What a camera that only turns adds to it has no depth, and blur looks like parallax. And a
-        frame that nothing leads to is held by nothing else.
-        """
-        if self._young_map < 0:
-            return False
-        return lost or (frame.id <= self._young_until and frame.map_index == self._young_map)
 
     def allows_keyframe(self, evidence: Evidence | None) -> bool:
         """Whether a frame that is believed may become a keyframe; asked once for each frame."""

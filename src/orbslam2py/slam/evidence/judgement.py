@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py.slam.config import AcceptanceConfig
-from orbslam2py.slam.evidence.smear import Smear
 from orbslam2py.slam.evidence.usual_change import UsualChange
 from orbslam2py.slam.pose_search import MotionModel, RefinedPose
 from orbslam2py.slam.records import Evidence, PoseMethod, Verdict
@@ -59,7 +58,6 @@ class EvidenceJudge:
         self._usual: UsualFigures | None = None
         self._usual_error: float | None = None
         self._error_spread = 0.0
-        self._smear = Smear(self._focal_length, self.limits)
         self._change = UsualChange(self.limits)
 
     def go_elsewhere(self) -> None:
@@ -119,7 +117,6 @@ class EvidenceJudge:
             deviation_to_usual=deviation_to_usual,
             match_error=match_error,
             error_to_usual=error_to_usual,
-            smear=self._smear.length(frame.features),
             turn_change=turn,
             move_change=move,
         )
@@ -133,19 +130,6 @@ class EvidenceJudge:
             or evidence.deviation_to_usual > limits.sudden_deviation
             or self._windows(evidence.turn_change) > limits.surprise_windows
         )
-
-    def is_blurred(self, evidence: Evidence) -> bool:
-        """Whether the image is smeared too far for a map that is not firm."""
-        return self._smear.is_long(evidence.smear)
-
-    @property
-    def knows_images(self) -> bool:
-        """Whether there is an image whose sharpness others are compared with."""
-        return self._smear.knows_images
-
-    def see(self, frame: core.Frame) -> None:
-        """Let an image count among those that others are compared with."""
-        self._smear.see(frame)
 
     def is_same(self, first: RefinedPose, second: RefinedPose) -> bool:
         """Whether two poses of a frame are one, as far as can be told."""
@@ -175,7 +159,6 @@ class EvidenceJudge:
         self, refined: RefinedPose, evidence: Evidence, change: FloatArray | None
     ) -> None:
         """Let a frame that is believed, strong or weak, move what is usual of image and motion."""
-        self._smear.see(refined.frame.features)
         if change is not None:
             self._change.see(change)
         error = evidence.match_error
@@ -198,14 +181,14 @@ class EvidenceJudge:
         Keypoints that are off by more than they are taken for make a pose that is less certain, and
         so do few of them, and images of which it is not known what is usual, most where few of the
         points in view were found. Keypoints near each other are wrong together: by a map point in
-        the wrong place, a lens that is not as stated, and on the way that a blurred image is
-        smeared. As far as that shows they count as fewer. Errors far beyond the usual ones are
+        the wrong place, or a lens that is not as stated. As far as that shows they count as fewer.
+        Errors far beyond the usual ones are
         those of whole regions that move: then each cell with inliers counts as one observation, and
         errors as large as they are. A camera that suddenly turns otherwise smears and bends its
         images while they are taken, and matches that hold a pose less firmly than usual let it be
-        pulled further by what is wrong in all of them. A blurred image is of any moment while the
-        shutter was open. Where the map moved since the frame before, it was off by as much. And a
-        pose far from where the motion led may be a mistake, however well it fits.
+        pulled further by what is wrong in all of them. Where the map moved since the frame before,
+        it was off by as much. And a pose far from where the motion led may be a mistake, however
+        well it fits.
         """
         covariance = refined.estimate.covariance
         if covariance is None:
@@ -225,7 +208,6 @@ class EvidenceJudge:
             * looseness
         )
         errors = (
-            self._error_while_open(refined.frame, evidence, motion),
             motion.move_of_map(refined.frame),
             self._mistake(change),
         )
@@ -248,9 +230,7 @@ class EvidenceJudge:
         limits = self.limits
         per_cell = refined.estimate.n_inliers / max(1, evidence.n_cells)
         spread = refined.spread
-        # Places anywhere on a smear vary by as much, in terms of what the inliers are taken for.
-        smeared = evidence.smear**2 / 12 / spread.variance if spread.variance > 0 else 0.0
-        together = max(1.0, spread.correlation, 1.0 + per_cell * smeared)
+        together = max(1.0, spread.correlation)
         larger = max(1.0, evidence.match_error / limits.honest_error)
         larger *= max(1.0, evidence.match_error / limits.doubtful_error)
         factor = min(larger, limits.largest_error) ** 2 * together
@@ -258,26 +238,6 @@ class EvidenceJudge:
             larger = min(evidence.error_to_usual, limits.largest_error)
             factor = max(factor, larger**2 * max(together, per_cell))
         return factor
-
-    def _error_while_open(
-        self, frame: core.TrackedFrame, evidence: Evidence, motion: MotionModel
-    ) -> FloatArray | None:
-        """How far (6,) the camera may be off as a smeared image was taken; None if sharp.
-
-        It was taken on a part of its way, told by how long the smear is beside how far the image
-        moved since the last one: the deviation of a moment anywhere on that.
-        """
-        limits = self.limits
-        smear = limits.smear_of_sharpest * (evidence.smear - limits.visible_smear)
-        T_cl = motion.way(frame)
-        if smear <= 0 or T_cl is None:
-            return None
-        T_lw = motion.last.T_cw
-        assert T_lw is not None
-        moved = core.median_displacement(frame, T_lw)
-        share = 1.0 if moved <= smear else smear / moved
-        error: FloatArray = (share / math.sqrt(12)) * T_cl.log()
-        return error
 
     def _mistake(self, change: FloatArray | None) -> FloatArray | None:
         """How far (6,) the pose may be a mistake, by a change of motion that is not usual."""

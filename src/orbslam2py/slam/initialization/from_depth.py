@@ -72,7 +72,7 @@ class DepthInitializer:
         del map_index
         return 0
 
-    def remember(self, frame: core.TrackedFrame, *, blurred: bool) -> None:
+    def remember(self, frame: core.TrackedFrame) -> None:
         """Nothing: the next frame can begin a map as well."""
 
     def remembered(self) -> list[core.Frame]:
@@ -102,13 +102,8 @@ class DepthInitializer:
         """Whether a frame has the keypoints that a map needs to begin."""
         return frame.features.size > self._least
 
-    def try_initialize(self, frame: core.TrackedFrame, *, blurred: bool) -> Reason:
-        """Make the frame the first keyframe, with a point for every depth; or say why not.
-
-        A blurred one begins none: where its keypoints are is not known well.
-        """
-        if blurred:
-            return Reason.TOO_BLURRED_TO_BEGIN
+    def try_initialize(self, frame: core.TrackedFrame) -> Reason:
+        """Make the frame the first keyframe, with a point for every depth; or say why not."""
         if not self.shows_enough(frame):
             return Reason.TOO_FEW_KEYPOINTS
         if int(np.count_nonzero(frame.features.depth > 0)) < self._limits.depths:

@@ -14,9 +14,9 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py.slam.config import InitializationConfig
-from orbslam2py.slam.evidence.smear import Smear
 from orbslam2py.slam.initialization.earlier_frames import EarlierFrames
 from orbslam2py.slam.initialization.kept_views import KeptViews, View
+from orbslam2py.slam.initialization.motion_uncertainty import direction_deviation
 from orbslam2py.slam.initialization.several_views import SeveralViews
 from orbslam2py.slam.initialization.third_view import (
     Candidate,
@@ -61,8 +61,6 @@ class MonocularInitializer:
         Takes the first keyframes.
     seed : int
         Seed of the draws.
-    smear : Smear
-        Tells blurred images, with which no map is begun.
     earlier : EarlierFrames, optional
         Tracks the earlier frames in the map; without it they are left out.
     config : InitializationConfig
@@ -75,7 +73,6 @@ class MonocularInitializer:
         vocabulary: core.Vocabulary,
         mapping: LocalMapping,
         seed: int,
-        smear: Smear,
         earlier: EarlierFrames | None = None,
         *,
         config: InitializationConfig,
@@ -84,7 +81,6 @@ class MonocularInitializer:
         self._vocabulary = vocabulary
         self._mapping = mapping
         self._seed = seed
-        self._smear = smear
         self._limits = config
         self._kept = KeptViews(self._limits)
         self._watch = YoungMapWatch(self._limits, seed)
@@ -95,10 +91,8 @@ class MonocularInitializer:
         self.reset()
 
     def reset(self) -> None:
-        """Drop all views, how sharp the camera's images were, and what became of earlier maps."""
-        self._smear.reset()
+        """Drop all views, and what became of earlier maps."""
         self._watch.reset()
-        self._blurred: deque[int] = deque(maxlen=self._limits.remembered_frames)
         self._drop_views()
 
     def _drop_views(self) -> None:
@@ -110,11 +104,9 @@ class MonocularInitializer:
         self._last: core.TrackedFrame | None = None
         self._shown: View | None = None
 
-    def remember(self, frame: core.TrackedFrame, *, blurred: bool) -> None:
+    def remember(self, frame: core.TrackedFrame) -> None:
         """A frame that was tracked in a young map, which may yet come to nothing."""
         self._history.append(frame)
-        if blurred:
-            self._blurred.append(frame.id)
 
     def remembered(self) -> list[core.Frame]:
         """The frames from before and after a map began."""
@@ -123,17 +115,13 @@ class MonocularInitializer:
     def restart(self, frames: list[core.Frame]) -> None:
         """Begin anew, with the views of the last moments of an earlier attempt."""
         self._drop_views()
-        # Those that were tracked in a map are not among the images known.
-        for frame in frames:
-            self._smear.see(frame)
         # Their poses were those in the map that is gone.
         self._history.extend(core.TrackedFrame(frame) for frame in frames)
         for frame in frames[-self._limits.followed_again :]:
             if frame.size <= self._limits.keypoints:
                 continue
             self._kept.follow(frame)
-            if not (frame.id in self._blurred or self._smear.is_long(self._smear.length(frame))):
-                self._kept.keep_last()
+            self._kept.keep_last()
 
     def n_between(self, map_index: int) -> int:
         """Living keyframes that a map began with, beyond the two that it needs."""
@@ -152,10 +140,7 @@ class MonocularInitializer:
 
     def contradicts(self, frame: core.TrackedFrame) -> bool:
         """Whether this frame and those before it, tracked in a young map, prove it wrong."""
-        if not self._watch.watching:
-            return False
-        blurred = self._smear.is_long(self._smear.length(frame.features))
-        return self._watch.contradicted(frame, blurred=blurred)
+        return self._watch.contradicted(frame)
 
     @property
     def feature_factor(self) -> int:
@@ -181,11 +166,8 @@ class MonocularInitializer:
         """Whether a frame has the keypoints that a map needs to begin."""
         return frame.features.size > self._limits.keypoints
 
-    def try_initialize(self, frame: core.TrackedFrame, *, blurred: bool) -> Reason:
-        """Begin the map with this frame as second view; or say why not.
-
-        A blurred one is matched, to follow the image, and is no view.
-        """
+    def try_initialize(self, frame: core.TrackedFrame) -> Reason:
+        """Begin the map with this frame as second view; or say why not."""
         if self._n_waiting == 0:
             self._waits_since = frame.timestamp
         self._n_waiting += 1
@@ -198,16 +180,10 @@ class MonocularInitializer:
         self._kept.follow(frame.features)
         self._history.append(frame)
         self._last = frame
-        if blurred:
-            self._blurred.append(frame.id)
-        blurred = blurred or self._smear.is_long(self._smear.length(frame.features))
-        self._smear.see(frame.features)
-        reason = Reason.TOO_BLURRED_TO_BEGIN if blurred else self._from_best_pair(frame)
+        reason = self._from_best_pair(frame)
         if reason is Reason.NONE:
             return reason
         self._shown = self._kept.views[0] if self._kept.views else None
-        if blurred:
-            return reason
         self._kept.keep_last()
         if self._shown is None:
             return Reason.FEW_MATCHES_FIRST_VIEW if had_views else Reason.FIRST_VIEW
@@ -234,9 +210,13 @@ class MonocularInitializer:
                 return self._build_map(candidate.view, motions[0], frame)
             together = SeveralViews(candidate, thirds, frame.features, self._limits)
             best = together.best_motion(motions, self._seed)
-            if best is not None:
+            if best is None:
+                reason = Reason.AMBIGUOUS_MOTION
+                continue
+            deviation = direction_deviation(candidate.view, frame.features, best)
+            if deviation <= self._limits.direction_deviation:
                 return self._build_map(candidate.view, best, frame)
-            reason = Reason.AMBIGUOUS_MOTION
+            reason = Reason.LOW_PARALLAX
         return reason
 
     def _tried_views(self) -> list[View]:

@@ -45,15 +45,13 @@ class Initializer(Protocol):
         """Whether a frame has the keypoints that a map needs to begin."""
         ...
 
-    def try_initialize(self, frame: core.TrackedFrame, *, blurred: bool) -> Reason:
+    def try_initialize(self, frame: core.TrackedFrame) -> Reason:
         """Begin the map with this frame; or say why not (`Reason.NONE`: it has begun).
 
         Parameters
         ----------
         frame : orbslam2py._core.TrackedFrame
             The frame.
-        blurred : bool
-            It has lost the fine detail of those right before it.
         """
         ...
 
@@ -65,16 +63,8 @@ class Initializer(Protocol):
         """Living keyframes that a map began with, beyond those that it needs."""
         ...
 
-    def remember(self, frame: core.TrackedFrame, *, blurred: bool) -> None:
-        """A frame that was tracked in a young map, which may yet come to nothing.
-
-        Parameters
-        ----------
-        frame : orbslam2py._core.TrackedFrame
-            The frame.
-        blurred : bool
-            As of `try_initialize`.
-        """
+    def remember(self, frame: core.TrackedFrame) -> None:
+        """A frame that was tracked in a young map, which may yet come to nothing."""
         ...
 
     def contradicts(self, frame: core.TrackedFrame) -> bool:

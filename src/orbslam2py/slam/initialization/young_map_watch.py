@@ -74,24 +74,21 @@ class YoungMapWatch:
         """Whether the next frame may contradict the map."""
         return self._watching
 
-    def contradicted(self, frame: core.TrackedFrame, *, blurred: bool) -> bool:
+    def contradicted(self, frame: core.TrackedFrame) -> bool:
         """Compare a frame that was tracked in the map; whether the map must be wrong by now.
 
         Parameters
         ----------
         frame
             With its pose.
-        blurred
-            It is matched, to follow the image, but says nothing.
         """
         if self._watching and frame.map_index != self._map_index:
             self.end()
         if not self._watching:
             return False
         self._follow(frame)
-        if not blurred:
-            self._compare(frame)
-            self._kept.keep_last()
+        self._compare(frame)
+        self._kept.keep_last()
         limits = self._limits
         self._n_frames += 1
         contradicted = self._n_contradicting >= limits.contradictions
