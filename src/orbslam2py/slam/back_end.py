@@ -14,7 +14,7 @@ from orbslam2py import _core as core
 from orbslam2py._cores import n_threads
 from orbslam2py._worker import Worker, take_turns
 from orbslam2py.errors import MapFileError, WorkerError
-from orbslam2py.maps.map_keeper import MapKeeper
+from orbslam2py.maps.map_autosave import MapAutosave
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.config import Config
 from orbslam2py.slam.events import (
@@ -215,7 +215,7 @@ class BackEnd:
         }
 
 
-def abandon(back_end: BackEnd, keeper: MapKeeper) -> None:
+def abandon(back_end: BackEnd, keeper: MapAutosave) -> None:
     """End the threads of a system that was dropped without shutdown."""
     if keeper.is_saving_here:
         # What drops things that refer to each other runs in any thread, and this one cannot wait

@@ -237,7 +237,7 @@ class AcceptanceConfig:
     weak_error_spreads: float = 3.0
     """A pose is uncertain by its error only if that is also above the mean by this number of
     mean deviations."""
-    honest_error: float = 0.8
+    expected_error: float = 0.8
     """Median residual up to which the covariance is that of pixel noise, in standard
     deviations; beyond it deviations grow with the error."""
     doubtful_error: float = 1.3

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from orbslam2py import _core as core
 from orbslam2py.maps.saved_map import RecordedFrames
-from orbslam2py.slam.second_look import SecondLook
+from orbslam2py.slam.frame_reestimation import FrameReestimation
 from orbslam2py.trajectory.trajectory import Trajectory
 
 #: So many frames wait for the end, when the map has settled, to be estimated or matched again;
@@ -44,7 +44,7 @@ class FrameRecorder:
     ----------
     slam_map : orbslam2py._core.Map
         The map that the frames were tracked in.
-    second_look : SecondLook
+    second_look : FrameReestimation
         Matches frames with the map again.
     every_frame : bool
         `second_look` gets every frame, when many have come after it at the latest.
@@ -55,7 +55,7 @@ class FrameRecorder:
     def __init__(
         self,
         slam_map: core.Map,
-        second_look: SecondLook,
+        second_look: FrameReestimation,
         *,
         every_frame: bool = False,
         uncertain_frames: bool = True,
@@ -80,11 +80,11 @@ class FrameRecorder:
 
     @property
     def n_young(self) -> int:
-        """Frames that wait for `look_again`."""
+        """Frames that wait for `reestimate_first_frames`."""
         return len(self._young or ())
 
     def begin(self, earlier: Sequence[core.TrackedFrame]) -> None:
-        """Keep the first frames of a map, which `look_again` will give new poses to.
+        """Keep the first frames of a map, which `reestimate_first_frames` will give new poses to.
 
         Those of them that had been recorded as lost have been found.
         """
@@ -95,7 +95,7 @@ class FrameRecorder:
             for frame in earlier:
                 self._append(frame, lost=False)
 
-    def look_again(self) -> None:
+    def reestimate_first_frames(self) -> None:
         """Record the frames since `begin` anew, with their poses in the map as it is now."""
         with self._lock:
             self._record_waiting()

@@ -25,7 +25,7 @@ from orbslam2py.slam.events import LoopClosed, MapsMerged
 from orbslam2py.slam.full_bundle_adjustment import FullBundleAdjustment
 from orbslam2py.slam.merging import MapMerging
 from orbslam2py.slam.options import SystemOptions
-from orbslam2py.slam.waiting_loop import WaitingLoop
+from orbslam2py.slam.pending_loop import PendingLoop
 
 _log = logging.getLogger(__name__)
 
@@ -102,7 +102,7 @@ class LoopClosing:
             fix_scale=self._fix_scale,
             config=config.merging,
         )
-        self._waiting = WaitingLoop(slam_map, self._confirm, self._release, self._limits)
+        self._waiting = PendingLoop(slam_map, self._confirm, self._release, self._limits)
         self._consistency = core.LoopConsistency()
         self._next_search = 1
         # A map with a fresh seam, and the keyframe from which on it is adjusted once more.

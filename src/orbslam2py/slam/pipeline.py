@@ -18,16 +18,17 @@ from orbslam2py._arguments import is_finite, shown
 from orbslam2py._arrays import ByteArray
 from orbslam2py._timing import StageStatistics, StageTimer
 from orbslam2py.errors import ImageError
-from orbslam2py.maps.map_keeper import MapKeeper, encode_image
+from orbslam2py.maps.map_autosave import MapAutosave, encode_image
 from orbslam2py.maps.saved_map import VocabularyIdentity
 from orbslam2py.settings.sensor import Sensor
+from orbslam2py.slam.acceptance.multi_hypothesis_search import MultiHypothesisSearch
+from orbslam2py.slam.acceptance.pose_acceptance import PoseAcceptance
+from orbslam2py.slam.acceptance.pose_validator import PoseValidator
 from orbslam2py.slam.back_end import RESET_PATIENCE, BackEnd
 from orbslam2py.slam.config import Config
 from orbslam2py.slam.events import Callbacks, MapStarted, Relocalized, TrackingLost
-from orbslam2py.slam.evidence.belief import Belief
-from orbslam2py.slam.evidence.harder_search import HarderSearch
-from orbslam2py.slam.evidence.judgement import EvidenceJudge
 from orbslam2py.slam.frame_recorder import FrameRecorder
+from orbslam2py.slam.frame_reestimation import FrameReestimation
 from orbslam2py.slam.front_end import FrontEnd
 from orbslam2py.slam.initialization import DepthInitializer, Initializer, MonocularInitializer
 from orbslam2py.slam.initialization.earlier_frames import EarlierFrames
@@ -37,13 +38,12 @@ from orbslam2py.slam.options import Setup, SystemOptions
 from orbslam2py.slam.pose_search import PoseSearch
 from orbslam2py.slam.records import (
     Reason,
-    TrackingOutcome,
     TrackingRecord,
+    TrackingResult,
     TrackingState,
     Verdict,
 )
 from orbslam2py.slam.relocalization import Relocalizer
-from orbslam2py.slam.second_look import SecondLook
 from orbslam2py.slam.tracking import Tracking
 from orbslam2py.slam.watched_frame import FrameWatcher, WatchedFrame, frame_features
 
@@ -78,7 +78,7 @@ class Pipeline:
         Whether the map stays as it is.
     recorder : FrameRecorder
         Where every frame was.
-    keeper : MapKeeper
+    keeper : MapAutosave
         The map in files.
     reset_requested : threading.Event
         When set, the next image begins a new map, and all before it is forgotten.
@@ -103,7 +103,7 @@ class Pipeline:
         )
         self.recorder = FrameRecorder(
             back_end.map,
-            SecondLook(back_end.map, _make_search(setup, back_end, config)),
+            FrameReestimation(back_end.map, _make_search(setup, back_end, config)),
             every_frame=config.trajectory.rematch_every_frame,
             uncertain_frames=config.trajectory.rematch_uncertain,
         )
@@ -122,7 +122,7 @@ class Pipeline:
             setup.loaded.restore(back_end.map, setup.vocabulary, back_end.keyframe_index)
             self.tracking.begin_in_loaded_map(setup.initial_pose)
         self._last_map = -1 if setup.loaded is None else max(back_end.map.maps)
-        self.keeper = MapKeeper(
+        self.keeper = MapAutosave(
             back_end.map,
             self.recorder.recorded,
             setup.settings,
@@ -237,9 +237,9 @@ class Pipeline:
         slam_map = self.back_end.map
         settled = slam_map.n_keyframes_of(slam_map.active_map) > self._limits.settled_map
         if n_young > 0 and (settled or n_young >= self._limits.young_frames):
-            self.recorder.look_again()
+            self.recorder.reestimate_first_frames()
 
-    def _keep(self, frame: core.TrackedFrame, outcome: TrackingOutcome) -> None:
+    def _keep(self, frame: core.TrackedFrame, outcome: TrackingResult) -> None:
         if outcome.given_up is not None:
             reason = outcome.estimate.reason
             self._start_failed = reason is Reason.INITIAL_MAP_FAILED
@@ -263,7 +263,7 @@ class Pipeline:
     def _record(
         self,
         frame: core.TrackedFrame,
-        outcome: TrackingOutcome,
+        outcome: TrackingResult,
         timer: StageTimer,
         *,
         details: bool,
@@ -387,11 +387,11 @@ def _make_tracking(
     slam_map, mapping = back_end.map, back_end.mapping
     n_features = setup.settings.orb.n_features
 
-    def belief(searching: PoseSearch) -> Belief:
-        judge = EvidenceJudge(
+    def acceptance_of(searching: PoseSearch) -> PoseAcceptance:
+        judge = PoseValidator(
             searching.motion_model_window, setup.settings.camera.fx, config.acceptance
         )
-        return Belief(searching, judge, HarderSearch(searching, judge))
+        return PoseAcceptance(searching, judge, MultiHypothesisSearch(searching, judge))
 
     initializer: Initializer
     if sensor is Sensor.MONOCULAR:
@@ -401,7 +401,7 @@ def _make_tracking(
             vocabulary,
             mapping,
             seed,
-            EarlierFrames(earlier, belief(earlier)),
+            EarlierFrames(earlier, acceptance_of(earlier)),
             config=config.initialization,
         )
     else:
@@ -426,7 +426,7 @@ def _make_tracking(
         mapping,
         initializer=initializer,
         search=searching,
-        belief=belief(searching),
+        acceptance=acceptance_of(searching),
         keyframe_decision=KeyframeDecision(
             slam_map,
             mapping.worker,

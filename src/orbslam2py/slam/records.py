@@ -250,7 +250,7 @@ class PoseEstimate:
 
 
 @dataclass(frozen=True, eq=False)
-class TrackingOutcome:
+class TrackingResult:
     """What tracking one frame gave."""
 
     state: TrackingState

@@ -16,8 +16,8 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._timing import StageTimer
+from orbslam2py.slam.acceptance.pose_acceptance import PoseAcceptance
 from orbslam2py.slam.config import Config
-from orbslam2py.slam.evidence.belief import Belief
 from orbslam2py.slam.initialization import Initializer
 from orbslam2py.slam.keyframe_decision import KeyframeDecision, SinceKeyframe
 from orbslam2py.slam.local_mapping import LocalMapping
@@ -28,8 +28,8 @@ from orbslam2py.slam.pose_search import (
     MotionModel,
     PoseSearch,
 )
-from orbslam2py.slam.records import PoseEstimate, Reason, TrackingOutcome, TrackingState
-from orbslam2py.slam.relocalization import Confirmation, LossClock
+from orbslam2py.slam.records import PoseEstimate, Reason, TrackingResult, TrackingState
+from orbslam2py.slam.relocalization import Confirmation, LostTimer
 from orbslam2py.slam.watched_frame import accepted_keypoints
 
 _log = logging.getLogger(__name__)
@@ -50,7 +50,7 @@ class Tracking:
         How a map begins.
     search : PoseSearch
         The ways to a pose.
-    belief : Belief
+    acceptance : PoseAcceptance
         Whether enough speaks for a pose.
     keyframe_decision : KeyframeDecision
         Which frames become keyframes.
@@ -71,7 +71,7 @@ class Tracking:
         *,
         initializer: Initializer,
         search: PoseSearch,
-        belief: Belief,
+        acceptance: PoseAcceptance,
         keyframe_decision: KeyframeDecision,
         config: Config,
         has_depth: bool,
@@ -82,13 +82,13 @@ class Tracking:
         self._mapping = mapping
         self._initializer = initializer
         self._search = search
-        self._belief = belief
+        self._acceptance = acceptance
         self._keyframe_decision = keyframe_decision
         self._has_depth = has_depth
         self._in_growing_map = FirstEstimateInGrowingMap(search)
         self._in_fixed_map = FirstEstimateInFixedMap(search, has_depth=has_depth)
         self._confirmation = Confirmation(config.relocalization)
-        self._loss = LossClock(new_map_after)
+        self._loss = LostTimer(new_map_after)
         #: How often tracking was found again, over all maps.
         self.n_relocalizations = 0
         self.reset()
@@ -115,7 +115,7 @@ class Tracking:
         # Whether the initializer is shown the frames of a loss.
         self._seeks_map = False
         self._search.reset()
-        self._belief.reset()
+        self._acceptance.reset()
         self._in_fixed_map.reset()
         self._confirmation.reset()
         # A frame found again that becomes a keyframe with the next one.
@@ -154,7 +154,7 @@ class Tracking:
     def _leave_map(self) -> None:
         """Forget the frames before: what follows is in another map."""
         self._search.reset()
-        self._belief.go_elsewhere()
+        self._acceptance.go_elsewhere()
         self._in_fixed_map.reset()
         self._confirmation.reset()
         self._waits_for_confirmation = None
@@ -208,7 +208,7 @@ class Tracking:
         *,
         localize: bool = False,
         details: bool = False,
-    ) -> TrackingOutcome:
+    ) -> TrackingResult:
         """Find the frame's pose; make it a keyframe if the map needs one.
 
         On return the frame holds pose and associations if the outcome's state is OK; otherwise its
@@ -261,7 +261,7 @@ class Tracking:
         # frame must not start from them.
         frame.discard_outliers()
         self._search.motion.remember(frame)
-        return TrackingOutcome(self.state, estimate, is_keyframe, inliers=inliers)
+        return TrackingResult(self.state, estimate, is_keyframe, inliers=inliers)
 
     def _find_pose(
         self, frame: core.TrackedFrame, timer: StageTimer, localize: bool
@@ -292,7 +292,7 @@ class Tracking:
             self._search.proving.found_again(frame, where_expected=estimate.where_expected)
             self._since_keyframe.most_inliers = 0
         with timer("local_map"):
-            believed = self._belief.refine(frame, estimate, lost=lost)
+            believed = self._acceptance.refine(frame, estimate, lost=lost)
         if believed.found:
             strategy.believe(believed)
         return believed
@@ -312,19 +312,19 @@ class Tracking:
             self._search.confirm()
         return estimate
 
-    def _begin_map(self, frame: core.TrackedFrame, timer: StageTimer) -> TrackingOutcome:
+    def _begin_map(self, frame: core.TrackedFrame, timer: StageTimer) -> TrackingResult:
         self.state = TrackingState.NOT_INITIALIZED
         with timer("keyframe"):
             reason = self._initializer.try_initialize(frame)
         if reason is not Reason.NONE:
             spoilt = reason is Reason.INITIAL_MAP_FAILED
             given_up = self._map.active_map if spoilt else None
-            return TrackingOutcome(self.state, PoseEstimate(reason), given_up=given_up)
+            return TrackingResult(self.state, PoseEstimate(reason), given_up=given_up)
         return self._map_begun(frame)
 
     def _begin_map_beside(
         self, frame: core.TrackedFrame, timer: StageTimer, *, localize: bool
-    ) -> TrackingOutcome | None:
+    ) -> TrackingResult | None:
         """Begin another map with a frame that is not found; None if the time has not come."""
         if self.state is not TrackingState.LOST or localize:
             return None
@@ -338,7 +338,7 @@ class Tracking:
             reason = self._initializer.try_initialize(frame)
         if reason is Reason.INITIAL_MAP_FAILED:
             spoilt = self._map.active_map
-            return TrackingOutcome(self.state, PoseEstimate(reason), given_up=spoilt)
+            return TrackingResult(self.state, PoseEstimate(reason), given_up=spoilt)
         if reason is not Reason.NONE:
             return None
         self._leave_map()
@@ -348,7 +348,7 @@ class Tracking:
         self._loss.reset()
         return self._map_begun(frame)
 
-    def _map_begun(self, frame: core.TrackedFrame) -> TrackingOutcome:
+    def _map_begun(self, frame: core.TrackedFrame) -> TrackingResult:
         self.state = TrackingState.OK
         earlier = self._initializer.take_earlier()
         self._search.reference_keyframe = frame.reference_keyframe
@@ -362,7 +362,7 @@ class Tracking:
         # It is the origin, and yet lies in its map no better than the keypoints that became points.
         covariance = core.pose_covariance(frame)
         estimate = PoseEstimate(n_matches=n, n_inliers=n, covariance=covariance)
-        return TrackingOutcome(self.state, estimate, is_keyframe=True, earlier=earlier)
+        return TrackingResult(self.state, estimate, is_keyframe=True, earlier=earlier)
 
     def _wrong_map(self, frame: core.TrackedFrame) -> int | None:
         """The number of a map that the images contradict by now."""
@@ -373,7 +373,7 @@ class Tracking:
 
     def _lose(
         self, frame: core.TrackedFrame, estimate: PoseEstimate, *, wrong_map: int | None = None
-    ) -> TrackingOutcome:
+    ) -> TrackingResult:
         was_ok = self.state is TrackingState.OK
         self._loss.lost(frame.timestamp)
         self._n_lost += 1
@@ -398,7 +398,7 @@ class Tracking:
         given_up = wrong_map
         if given_up is None and small and another:
             given_up = active
-        return TrackingOutcome(self.state, estimate, given_up=given_up)
+        return TrackingResult(self.state, estimate, given_up=given_up)
 
     def _stay(self, frame: core.TrackedFrame) -> None:
         """Go on in the map that a frame was found in, which may have rested."""
@@ -422,7 +422,7 @@ class Tracking:
     def _extend_map(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> bool:
         """Make a tracked frame a keyframe if the map needs one; whether it was made now."""
         self._insert_confirmed()
-        allowed = self._belief.allows_keyframe(estimate.evidence)
+        allowed = self._acceptance.allows_keyframe(estimate.evidence)
         if not (allowed and self._keyframe_wanted(frame, estimate)):
             return False
         if estimate.unconfirmed:

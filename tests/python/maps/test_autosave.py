@@ -20,7 +20,7 @@ import pytest
 
 from orbslam2py import MapFileError, Sensor, System, WorkerError
 from orbslam2py.maps import MapContents, load_map, map_keeper, map_writer, verify_map_file
-from orbslam2py.maps.map_keeper import MapKeeper
+from orbslam2py.maps.map_autosave import MapAutosave
 from orbslam2py.maps.map_rows import all_rows
 from orbslam2py.maps.map_writer import MapWriter
 from support import small_sequences
@@ -263,7 +263,7 @@ def test_an_error_that_nobody_has_thought_of_is_told_and_saving_goes_on(
     error: Exception,
 ) -> None:
     path = tmp_path / "map.orbmap"
-    update = MapKeeper.update
+    update = MapAutosave.update
     failing = threading.Event()
     failing.set()
 
@@ -272,7 +272,7 @@ def test_an_error_that_nobody_has_thought_of_is_told_and_saving_goes_on(
             raise error
         return update(*arguments, **options)
 
-    monkeypatch.setattr(MapKeeper, "update", fails)
+    monkeypatch.setattr(MapAutosave, "update", fails)
     with new_system() as slam, caplog.at_level(logging.WARNING):
         small_sequences.play(slam, 10)
         slam.autosave(path, every=0.01)
@@ -290,7 +290,7 @@ def test_an_error_that_nobody_has_thought_of_is_told_and_saving_goes_on(
 def test_a_last_save_that_fails_is_told_though_a_worker_failed_as_well(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    def unsaved(_: MapKeeper) -> None:
+    def unsaved(_: MapAutosave) -> None:
         raise MapFileError("the disk is full")
 
     slam = new_system()
@@ -299,7 +299,7 @@ def test_a_last_save_that_fails_is_told_though_a_worker_failed_as_well(
     stopped = WorkerError("local mapping stopped: out of order")
     with monkeypatch.context() as patch:
         patch.setattr(slam.pipeline.back_end, "finish", lambda **_: [stopped])
-        patch.setattr(MapKeeper, "stop_autosave", unsaved)
+        patch.setattr(MapAutosave, "stop_autosave", unsaved)
         with caplog.at_level(logging.ERROR), pytest.raises(WorkerError, match="out of order"):
             slam.shutdown()
     (record,) = caplog.records

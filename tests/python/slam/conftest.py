@@ -10,8 +10,8 @@ import pytest
 from orbslam2py import Sensor, System
 from orbslam2py._worker import Worker
 from orbslam2py.slam import keyframe_decision, tracking
+from orbslam2py.slam.acceptance import multi_hypothesis_search, pose_validator
 from orbslam2py.slam.config import AcceptanceConfig, TrackingConfig
-from orbslam2py.slam.evidence import harder_search, judgement
 from orbslam2py.slam.pose_search import (
     first_estimate,
     local_map_search,
@@ -58,7 +58,7 @@ def core(monkeypatch: pytest.MonkeyPatch) -> FakeCore:
     for module in (
         *(tracking, keyframe_decision),
         *(first_estimate, motion_model, search, local_map_search, refined_pose),
-        *(harder_search, judgement),
+        *(multi_hypothesis_search, pose_validator),
     ):
         monkeypatch.setattr(module, "core", core)
     return core

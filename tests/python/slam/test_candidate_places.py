@@ -11,7 +11,7 @@ import pytest
 
 from orbslam2py import _core
 from orbslam2py.slam.config import RelocalizationConfig
-from orbslam2py.slam.relocalization import CandidatePlaces, PlaceOfLoss, candidates, place_of_loss
+from orbslam2py.slam.relocalization import CandidatePlaces, LastKnownPose, candidates, place_of_loss
 
 LIMITS = RelocalizationConfig()
 FRAME: Any = SimpleNamespace()
@@ -72,9 +72,9 @@ def places(slam_map: FakeMap) -> CandidatePlaces:
     return CandidatePlaces(given, index, LIMITS)
 
 
-def lost_at(keyframe: int, velocity: _core.Pose | None = None) -> PlaceOfLoss:
+def lost_at(keyframe: int, velocity: _core.Pose | None = None) -> LastKnownPose:
     last: Any = SimpleNamespace(id=10, T_cw=_core.Pose([0, 0, 0, 1], [5.0, 0, 0]))
-    return PlaceOfLoss(last, velocity, keyframe)
+    return LastKnownPose(last, velocity, keyframe)
 
 
 def test_the_most_similar_come_first(fake: FakeCore) -> None:

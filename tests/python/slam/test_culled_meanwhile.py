@@ -10,7 +10,7 @@ import pytest
 from orbslam2py import Sensor, System
 from orbslam2py import _core as core
 from orbslam2py.slam.config import RelocalizationConfig
-from orbslam2py.slam.relocalization.place_of_loss import PlaceOfLoss
+from orbslam2py.slam.relocalization.last_known_pose import LastKnownPose
 from support.small_sequences import new_system, play
 
 pytestmark = pytest.mark.watchdog(60)
@@ -58,6 +58,6 @@ def test_tracking_goes_on_without_it(
 def test_the_place_of_a_loss_is_its_parent_s(slam: System, culled: int) -> None:
     slam_map = slam.pipeline.back_end.map
     last = slam.pipeline.tracking.motion.last
-    named = PlaceOfLoss(last, None, culled).keyframes(slam_map, RelocalizationConfig())
+    named = LastKnownPose(last, None, culled).keyframes(slam_map, RelocalizationConfig())
     assert named[0] == slam_map.living(culled)
     assert culled not in named

@@ -11,8 +11,8 @@ from benchmarks.accuracy.mapped_world import MappedWorld, beside
 
 from orbslam2py import Reason, Sensor, TrackingState
 from orbslam2py.evaluation import PoseError
+from orbslam2py.slam.relocalization.ambiguity_check import AmbiguityCheck
 from orbslam2py.slam.relocalization.relocalizer import Relocalizer
-from orbslam2py.slam.relocalization.rival_places import RivalPlaces
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
 pytestmark = pytest.mark.watchdog(120)
@@ -52,7 +52,7 @@ def n_wrong(errors: list[PoseError]) -> int:
 
 def test_nobody_is_found_in_the_other_room(monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as patched:
-        patched.setattr(RivalPlaces, "choose", lambda _self, frame, *_: frame)
+        patched.setattr(AmbiguityCheck, "choose", lambda _self, frame, *_: frame)
         assert n_wrong(shown_beside_the_path(0)[0]) > 0, "the first place that fits"
     errors, reasons = shown_beside_the_path(0)
     assert n_wrong(errors) == 0
@@ -62,7 +62,7 @@ def test_nobody_is_found_in_the_other_room(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_what_is_not_decided_has_neither_pose_nor_matches(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(RivalPlaces, "choose", lambda *_: None)
+    monkeypatch.setattr(AmbiguityCheck, "choose", lambda *_: None)
     world = mapped()
     seen = []
     relocalize = Relocalizer.relocalize

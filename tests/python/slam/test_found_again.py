@@ -8,7 +8,7 @@ import pytest
 
 from orbslam2py import Reason, TrackingState
 from orbslam2py.slam.config import TrackingConfig
-from orbslam2py.slam.records import TrackingOutcome
+from orbslam2py.slam.records import TrackingResult
 from support.tracking_scene import Scene, lose
 
 WANTED = 1000
@@ -52,7 +52,7 @@ def test_a_frame_found_where_the_map_needs_none_stays_a_frame(scene: Scene) -> N
     assert scene.core.inserted == [scene.last.id]
 
 
-def not_confirmed(scene: Scene, how: str) -> TrackingOutcome:
+def not_confirmed(scene: Scene, how: str) -> TrackingResult:
     if how == "other points":
         return scene.track(map_points=np.arange(500, 600))
     if how == "few points in common":

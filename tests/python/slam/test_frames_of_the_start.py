@@ -105,7 +105,7 @@ def test_poses_that_are_estimated_again_replace_the_first_ones() -> None:
         recorder.record(frames[2], lost=True)
         assert recorder.n_young == 3
         before = recorder.trajectories()[0]
-        recorder.look_again()
+        recorder.reestimate_first_frames()
         after = recorder.trajectories()[0]
         assert recorder.n_young == 0
         recorder.settle()

@@ -12,7 +12,7 @@ import pytest
 from orbslam2py import Sensor, TrackingState
 from orbslam2py._core import Pose
 from orbslam2py.slam.config import TrackingConfig
-from orbslam2py.slam.records import TrackingOutcome
+from orbslam2py.slam.records import TrackingResult
 from support.tracking_scene import (
     MAX_FRAMES,
     FakeCore,
@@ -114,7 +114,7 @@ def test_the_map_is_extended_as_soon_as_the_camera_was_found(scene: Scene) -> No
     assert scene.core.inserted[n_before:] == [found.id, confirming.id]
 
 
-def track_with(scene: Scene, n_inliers: int) -> TrackingOutcome:
+def track_with(scene: Scene, n_inliers: int) -> TrackingResult:
     """Of the first estimate and in the local map."""
     scene.core.inliers.extend([n_inliers, n_inliers])
     return scene.track()

@@ -15,7 +15,7 @@ from orbslam2py import _core as core
 from orbslam2py._timing import StageTimer
 from orbslam2py.datasets import Images
 from orbslam2py.slam.config import RelocalizationConfig
-from orbslam2py.slam.relocalization import PlaceOfLoss, Relocalizer
+from orbslam2py.slam.relocalization import LastKnownPose, Relocalizer
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
 pytestmark = pytest.mark.watchdog(120)
@@ -156,7 +156,7 @@ def test_near_the_place_of_loss_no_word_is_needed(world: MappedWorld) -> None:
     found = relocalizer(world, words=False)
     assert found.relocalize(described(world, N_MAPPED + 5)) == 0
     reference = world.system.pipeline.tracking.reference_keyframe
-    found.lose(PlaceOfLoss(motion.last, motion.velocity, reference))
+    found.lose(LastKnownPose(motion.last, motion.velocity, reference))
     frame = described(world, N_MAPPED + 5)
     assert found.relocalize(frame) >= 50
     assert frame.T_cw is not None
@@ -172,7 +172,7 @@ def test_where_its_motion_led_fewer_inliers_are_enough(
     limits = RelocalizationConfig(enough=10**6, enough_near=30)
     again = relocalizer(world, limits)
     reference = world.system.pipeline.tracking.reference_keyframe
-    again.lose(PlaceOfLoss(motion.last, None, reference))
+    again.lose(LastKnownPose(motion.last, None, reference))
     frame = described(world, motion.last.id + frames_since)
     assert (again.relocalize(frame) >= 30) == found
     assert again.where_expected == found
@@ -181,7 +181,7 @@ def test_where_its_motion_led_fewer_inliers_are_enough(
 def test_later_it_is_found_there_but_was_not_expected(world: MappedWorld) -> None:
     motion = world.system.pipeline.tracking.motion
     again = relocalizer(world, words=False)
-    again.lose(PlaceOfLoss(motion.last, None, world.system.pipeline.tracking.reference_keyframe))
+    again.lose(LastKnownPose(motion.last, None, world.system.pipeline.tracking.reference_keyframe))
     assert again.relocalize(described(world, motion.last.id + 11)) >= 50
     assert not again.where_expected
 
@@ -200,7 +200,7 @@ def test_the_window_grows_with_every_failure(world: MappedWorld) -> None:
     )
     found = relocalizer(world, limits, words=False)
     reference = world.system.pipeline.tracking.reference_keyframe
-    found.lose(PlaceOfLoss(motion.last, None, reference))
+    found.lose(LastKnownPose(motion.last, None, reference))
     tries = [found.relocalize(described(world, N_MAPPED + 6)) for _ in range(6)]
     assert tries[0] == 0
     assert tries[-1] >= 50
@@ -211,7 +211,7 @@ def test_where_no_window_reaches_all_keypoints_are_compared(world: MappedWorld) 
     limits = RelocalizationConfig(guess_window=0.5, widening=0.0, near_candidates=0)
     found = relocalizer(world, limits, words=False)
     reference = world.system.pipeline.tracking.reference_keyframe
-    found.lose(PlaceOfLoss(motion.last, None, reference))
+    found.lose(LastKnownPose(motion.last, None, reference))
     frame = described(world, N_MAPPED + 6)
     assert found.relocalize(frame) >= limits.enough
     assert frame.T_cw is not None

@@ -15,7 +15,7 @@ from orbslam2py import Sensor, System, TrackingState
 from orbslam2py import _core as core
 from orbslam2py.slam.config import AcceptanceConfig, TrackingConfig
 from orbslam2py.slam.pose_search import PoseSearch, RefinedPose
-from orbslam2py.slam.records import PoseEstimate, TrackingOutcome
+from orbslam2py.slam.records import PoseEstimate, TrackingResult
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.vocabulary import load_vocabulary
 from support.tracking_scene import FakeCore, FakeFrame, Scene, pose
@@ -115,7 +115,7 @@ def test_a_pose_matched_from_nothing_does_not_hang_on_where_it_began(
     ends = []
     for radians in (-0.02, -0.005, 0.005, 0.02):
         beside = walk.held(radians, 60)
-        found = walk.search.local_map_search.look_afresh(beside, in_doubt=in_doubt)
+        found = walk.search.local_map_search.rematch(beside, in_doubt=in_doubt)
         assert found is not beside
         assert found.n_predicted == len(found.visible) > beside.n_predicted - 300
         assert found.n_predicted >= found.estimate.n_inliers > 60
@@ -128,8 +128,8 @@ def test_a_pose_matched_from_nothing_does_not_hang_on_where_it_began(
 
 def test_a_pose_that_lies_at_the_same_place_is_kept_unless_it_was_in_doubt(walk: Walk) -> None:
     vague = walk.held(0.005, 60, metres=1.0)
-    assert walk.search.local_map_search.look_afresh(vague, in_doubt=False) is vague
-    assert walk.search.local_map_search.look_afresh(vague, in_doubt=True) is not vague
+    assert walk.search.local_map_search.rematch(vague, in_doubt=False) is vague
+    assert walk.search.local_map_search.rematch(vague, in_doubt=True) is not vague
 
 
 @pytest.mark.parametrize("in_doubt", [False, True])
@@ -137,14 +137,14 @@ def test_a_pose_from_nothing_needs_its_share_of_inliers(
     walk: Walk, in_doubt: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     beside = walk.held(0.01, 60)
-    n = walk.search.local_map_search.look_afresh(beside, in_doubt=in_doubt).estimate.n_inliers
+    n = walk.search.local_map_search.rematch(beside, in_doubt=in_doubt).estimate.n_inliers
     name = "afresh_share_in_doubt" if in_doubt else "afresh_share"
     for share, is_taken in ((n / 60, True), ((n + 0.5) / 60, False)):
         monkeypatch.setattr(
             walk.search.local_map_search, "_limits", replace(LIMITS, **{name: share})
         )
         assert (
-            walk.search.local_map_search.look_afresh(beside, in_doubt=in_doubt) is not beside
+            walk.search.local_map_search.rematch(beside, in_doubt=in_doubt) is not beside
         ) == is_taken
     assert LIMITS.afresh_share_in_doubt < LIMITS.afresh_share <= 1
 
@@ -153,8 +153,8 @@ def test_what_the_frame_before_measured_holds_a_pose_unless_it_was_in_doubt(walk
     """Its points are not of the map, and matching from nothing does not find them."""
     beside = walk.held(0.01, 60)
     beside = replace(beside, estimate=replace(beside.estimate, n_inliers=61))
-    assert walk.search.local_map_search.look_afresh(beside, in_doubt=False) is beside
-    assert walk.search.local_map_search.look_afresh(beside, in_doubt=True) is not beside
+    assert walk.search.local_map_search.rematch(beside, in_doubt=False) is beside
+    assert walk.search.local_map_search.rematch(beside, in_doubt=True) is not beside
 
 
 def test_nothing_to_match_from_nothing_changes_nothing(
@@ -164,10 +164,10 @@ def test_nothing_to_match_from_nothing_changes_nothing(
     beyond_the_map = replace(walk.held(0.01, 60), local_map=None)
     for refined in (away, beyond_the_map):
         for in_doubt in (False, True):
-            assert walk.search.local_map_search.look_afresh(refined, in_doubt=in_doubt) is refined
+            assert walk.search.local_map_search.rematch(refined, in_doubt=in_doubt) is refined
     monkeypatch.setattr(walk.search.proving, "inliers_asked", lambda frame: 10_000)
     beside = walk.held(0.01, 60)
-    assert walk.search.local_map_search.look_afresh(beside, in_doubt=True) is beside, (
+    assert walk.search.local_map_search.rematch(beside, in_doubt=True) is beside, (
         "not enough for a pose"
     )
 
@@ -187,7 +187,7 @@ class FromNothing:
     def __init__(self, scene: Scene, metres: float, n_inliers: int) -> None:
         self._metres, self._n_inliers = metres, n_inliers
         self.ends: list[float] = []
-        scene.search.local_map_search.look_afresh = self  # type: ignore[method-assign]
+        scene.search.local_map_search.rematch = self  # type: ignore[method-assign]
 
     def __call__(self, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
         if not in_doubt:
@@ -203,7 +203,7 @@ class FromNothing:
 
 def in_doubt(
     core: FakeCore, metres: float, n_inliers: int, *, confirmed: bool
-) -> tuple[TrackingOutcome, FakeFrame, list[float]]:
+) -> tuple[TrackingResult, FakeFrame, list[float]]:
     """A frame in a fixed map whose inliers fall; another way leads there as well, or none does."""
     scene = Scene(Sensor.STEREO, core, evidence=AcceptanceConfig())
     scene.run(12)

@@ -12,7 +12,7 @@ import pytest
 from orbslam2py import _core as core
 from orbslam2py.slam.config import InitializationConfig
 from orbslam2py.slam.initialization import kept_views
-from orbslam2py.slam.initialization.kept_views import Indices, KeptViews, View
+from orbslam2py.slam.initialization.initial_views import Indices, InitialViews, View
 from orbslam2py.slam.initialization.third_view import Candidate, Motion, ThirdViews
 
 LIMITS = InitializationConfig()
@@ -50,8 +50,8 @@ def candidate(of: View, placed: Indices) -> Candidate:
     return Candidate(of, (cast(Motion, motion),))
 
 
-def kept(views: list[View], distant: list[View]) -> KeptViews:
-    made = KeptViews(LIMITS)
+def kept(views: list[View], distant: list[View]) -> InitialViews:
+    made = InitialViews(LIMITS)
     made.views, made.distant = views, distant
     return made
 
@@ -165,14 +165,14 @@ def matcher(monkeypatch: pytest.MonkeyPatch) -> FakeCore:
     return fake
 
 
-def follow(views: KeptViews, n_frames: int, first: int = 0) -> None:
+def follow(views: InitialViews, n_frames: int, first: int = 0) -> None:
     for i in range(first, first + n_frames):
         views.follow(frame(i, 10.0 * i))
         views.keep_last()
 
 
 def test_a_view_with_few_matches_stays_to_confirm(matcher: FakeCore) -> None:
-    views = KeptViews(LIMITS)
+    views = InitialViews(LIMITS)
     follow(views, 3)
     matcher.n_matched = {0: 99, 1: 30}
     follow(views, 1, first=3)
@@ -188,7 +188,7 @@ def test_a_view_with_few_matches_stays_to_confirm(matcher: FakeCore) -> None:
 
 
 def test_the_last_few_of_them_stay(matcher: FakeCore) -> None:
-    views = KeptViews(LIMITS)
+    views = InitialViews(LIMITS)
     follow(views, 6)
     matcher.n_matched = dict.fromkeys(range(5), 50)
     follow(views, 1, first=6)
@@ -203,7 +203,7 @@ def test_the_last_few_of_them_stay(matcher: FakeCore) -> None:
 
 
 def test_what_was_noted_of_views_that_are_gone_is_forgotten(matcher: FakeCore) -> None:
-    views = KeptViews(LIMITS)
+    views = InitialViews(LIMITS)
     follow(views, 100)
     kept = {view.frame.id for view in (*views.views, *views.distant)}
     assert all(set(view._linked) <= kept for view in views.views)

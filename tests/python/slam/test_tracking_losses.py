@@ -9,7 +9,7 @@ import pytest
 
 from orbslam2py import Reason, TrackingState
 from orbslam2py.slam.records import PoseEstimate
-from orbslam2py.slam.tracking import TrackingOutcome
+from orbslam2py.slam.tracking import TrackingResult
 from support.tracking_scene import MAX_FRAMES, FakeFrame, Scene, lose, pose
 
 
@@ -43,7 +43,7 @@ def test_a_small_map_is_kept_in_the_dark_and_given_up_in_the_light(scene: Scene)
     scene.run(3)
     scene.map.n_keyframes = 3
 
-    def look(n_keypoints: int) -> TrackingOutcome:
+    def look(n_keypoints: int) -> TrackingResult:
         scene.core.motion.extend([0, 0])
         scene.core.words.append(0)
         features = FakeFrame(len(scene.frames)).features

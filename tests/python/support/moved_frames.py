@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 
 from orbslam2py import _core as core
-from orbslam2py.slam.second_look import SecondLook
+from orbslam2py.slam.frame_reestimation import FrameReestimation
 
 
-class MovedByAMetre(SecondLook):
+class MovedByAMetre(FrameReestimation):
     """Finds every frame a metre ahead, and remembers which were asked for and how."""
 
     def __init__(self) -> None:

@@ -14,13 +14,13 @@ import numpy as np
 
 from orbslam2py import Reason, Sensor, TrackingState, _core
 from orbslam2py._timing import StageTimer
+from orbslam2py.slam.acceptance.multi_hypothesis_search import MultiHypothesisSearch
+from orbslam2py.slam.acceptance.pose_acceptance import PoseAcceptance
+from orbslam2py.slam.acceptance.pose_validator import PoseValidator
 from orbslam2py.slam.config import AcceptanceConfig, Config, KeyframeConfig, TrackingConfig
-from orbslam2py.slam.evidence.belief import Belief
-from orbslam2py.slam.evidence.harder_search import HarderSearch
-from orbslam2py.slam.evidence.judgement import EvidenceJudge
 from orbslam2py.slam.keyframe_decision import KeyframeDecision
 from orbslam2py.slam.pose_search import LocalMapSearch, PoseSearch, RefinedPose
-from orbslam2py.slam.records import TrackingOutcome
+from orbslam2py.slam.records import TrackingResult
 from orbslam2py.slam.tracking import Tracking
 
 MAX_FRAMES = 30
@@ -371,7 +371,7 @@ CREDULOUS = AcceptanceConfig(
 class NoFurtherSearch:
     """What was not found at first is not found."""
 
-    def look_again(self, frame: FakeFrame, first: Any) -> Any:
+    def search_again(self, frame: FakeFrame, first: Any) -> Any:
         return first
 
 
@@ -383,7 +383,7 @@ class NearSearch(LocalMapSearch):
         #: Ids of frames, and whether they were in doubt.
         self.looked_afresh: list[tuple[int, bool]] = []
 
-    def look_afresh(self, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
+    def rematch(self, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
         self.looked_afresh.append((refined.frame.id, in_doubt))
         return refined
 
@@ -412,15 +412,15 @@ class Scene:
         )
         self.local_map_search = NearSearch(fakes.map, sensor, search.proving, limits)
         search.local_map_search = self.local_map_search
-        judge = EvidenceJudge(search.motion_model_window, 500.0, evidence or CREDULOUS)
-        again: Any = NoFurtherSearch() if evidence is None else HarderSearch(search, judge)
+        judge = PoseValidator(search.motion_model_window, 500.0, evidence or CREDULOUS)
+        again: Any = NoFurtherSearch() if evidence is None else MultiHypothesisSearch(search, judge)
         self.tracking = Tracking(
             fakes.map,
             vocabulary,
             fakes.mapping,
             initializer=fakes.initializer,
             search=search,
-            belief=Belief(search, judge, again),
+            acceptance=PoseAcceptance(search, judge, again),
             keyframe_decision=KeyframeDecision(
                 fakes.map,
                 fakes.mapping.worker,
@@ -433,7 +433,7 @@ class Scene:
         )
         self.frames: list[FakeFrame] = []
 
-    def track(self, frame_id: int | None = None, **attributes: Any) -> TrackingOutcome:
+    def track(self, frame_id: int | None = None, **attributes: Any) -> TrackingResult:
         frame = FakeFrame(len(self.frames) if frame_id is None else frame_id)
         for name, value in attributes.items():
             setattr(frame, name, value)
@@ -453,7 +453,7 @@ class Scene:
         return self.frames[-1]
 
 
-def lose(scene: Scene) -> TrackingOutcome:
+def lose(scene: Scene) -> TrackingResult:
     scene.core.motion.extend([0, 0])
     scene.core.words.append(0)
     return scene.track()

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable
 
 from orbslam2py import _core as core
-from orbslam2py.slam.evidence.belief import Belief
+from orbslam2py.slam.acceptance.pose_acceptance import PoseAcceptance
 from orbslam2py.slam.pose_search import PoseSearch
 from orbslam2py.slam.records import PoseEstimate, Verdict
 
@@ -25,13 +25,13 @@ class EarlierFrames:
     ----------
     search : PoseSearch, optional
         The ways to a pose; its own, not the tracker's. Without one no frame is tracked.
-    belief : Belief, optional
+    acceptance : PoseAcceptance, optional
         Whether enough speaks for a pose; of the same search, and there whenever that is.
     """
 
-    def __init__(self, search: PoseSearch | None, belief: Belief | None) -> None:
+    def __init__(self, search: PoseSearch | None, acceptance: PoseAcceptance | None) -> None:
         self._search = search
-        self._belief = belief
+        self._acceptance = acceptance
         self._tracked: tuple[core.TrackedFrame, ...] = ()
 
     def take(self) -> tuple[core.TrackedFrame, ...]:
@@ -68,16 +68,16 @@ class EarlierFrames:
         self, first: core.TrackedFrame, frames: Iterable[core.TrackedFrame]
     ) -> list[core.TrackedFrame]:
         """Track one frame after the other until several are not found."""
-        search, belief = self._search, self._belief
-        assert search is not None and belief is not None
+        search, acceptance = self._search, self._acceptance
+        assert search is not None and acceptance is not None
         search.reset()
-        belief.reset()
+        acceptance.reset()
         search.reference_keyframe = first.reference_keyframe
         search.motion.remember(first)
         tracked: list[core.TrackedFrame] = []
         missed = 0
         for frame in frames:
-            if self._found(search, belief, frame):
+            if self._found(search, acceptance, frame):
                 tracked.append(frame)
                 missed = 0
                 continue
@@ -89,13 +89,15 @@ class EarlierFrames:
             frame.T_cw = None
         return tracked
 
-    def _found(self, search: PoseSearch, belief: Belief, frame: core.TrackedFrame) -> bool:
+    def _found(
+        self, search: PoseSearch, acceptance: PoseAcceptance, frame: core.TrackedFrame
+    ) -> bool:
         search.follow_map()
         estimate = search.by_motion_model(frame)
         if not estimate.found:
             frame.clear_associations()
             estimate = search.by_reference_keyframe(frame)
-        estimate = belief.refine(frame, estimate, lost=False)
+        estimate = acceptance.refine(frame, estimate, lost=False)
         if not (estimate.found and _is_strong(estimate) and _is_exact(estimate)):
             return False
         frame.discard_outliers()

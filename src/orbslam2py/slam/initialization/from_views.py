@@ -15,18 +15,18 @@ from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py.slam.config import InitializationConfig
 from orbslam2py.slam.initialization.earlier_frames import EarlierFrames
-from orbslam2py.slam.initialization.kept_views import KeptViews, View
+from orbslam2py.slam.initialization.initial_map_validation import InitialMapValidation
+from orbslam2py.slam.initialization.initial_views import InitialViews, View
 from orbslam2py.slam.initialization.motion_uncertainty import direction_deviation
-from orbslam2py.slam.initialization.several_views import SeveralViews
+from orbslam2py.slam.initialization.multi_view_model_selection import MultiViewModelSelection
 from orbslam2py.slam.initialization.third_view import (
     Candidate,
     Motion,
     ThirdViews,
-    agreeing_motions,
     placed_matches,
     reconstruct,
+    three_view_consistency,
 )
-from orbslam2py.slam.initialization.young_map_watch import YoungMapWatch
 from orbslam2py.slam.local_mapping import LocalMapping
 from orbslam2py.slam.records import Reason
 from orbslam2py.slam.watched_frame import pixels_as_given
@@ -82,8 +82,8 @@ class MonocularInitializer:
         self._mapping = mapping
         self._seed = seed
         self._limits = config
-        self._kept = KeptViews(self._limits)
-        self._watch = YoungMapWatch(self._limits, seed)
+        self._kept = InitialViews(self._limits)
+        self._watch = InitialMapValidation(self._limits, seed)
         self._earlier = earlier or EarlierFrames(None, None)
         # The last map's number, and the keyframes between the two that it began from.
         self._begun_map = -1
@@ -202,13 +202,13 @@ class MonocularInitializer:
                 reason = _REASONS[result.outcome.name]
         for candidate in sorted(candidates, key=lambda candidate: -candidate.worth):
             thirds = ThirdViews.of(candidate, self._kept, self._limits)
-            motions = agreeing_motions(candidate, thirds, frame.features, self._limits)
+            motions = three_view_consistency(candidate, thirds, frame.features, self._limits)
             if not motions:
                 reason = Reason.NO_THIRD_VIEW if candidate.is_clear else reason
                 continue
             if not self._limits.compare_views:
                 return self._build_map(candidate.view, motions[0], frame)
-            together = SeveralViews(candidate, thirds, frame.features, self._limits)
+            together = MultiViewModelSelection(candidate, thirds, frame.features, self._limits)
             best = together.best_motion(motions, self._seed)
             if best is None:
                 reason = Reason.AMBIGUOUS_MOTION

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py.slam.front_end import intrinsics
-from orbslam2py.slam.initialization.kept_views import View
+from orbslam2py.slam.initialization.initial_views import View
 from orbslam2py.slam.initialization.third_view import Motion, placed_matches
 
 _UNKNOWNS = 5

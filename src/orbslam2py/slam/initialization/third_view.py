@@ -16,7 +16,7 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py.slam.config import InitializationConfig
 from orbslam2py.slam.front_end import intrinsics
 from orbslam2py.slam.initialization.image_motion import Pixels
-from orbslam2py.slam.initialization.kept_views import Indices, KeptViews, View
+from orbslam2py.slam.initialization.initial_views import Indices, InitialViews, View
 
 Motion: TypeAlias = core.TwoViewResult | core.TwoViewMotion
 
@@ -113,7 +113,7 @@ class ThirdViews:
     fewest_common: int
 
     @staticmethod
-    def of(candidate: Candidate, kept: KeptViews, limits: InitializationConfig) -> ThirdViews:
+    def of(candidate: Candidate, kept: InitialViews, limits: InitializationConfig) -> ThirdViews:
         """Those that show most of what the last frame shows; or, if none does, what is left.
 
         A car that has few images a second sees little of a thing in three of them: then views count
@@ -165,7 +165,7 @@ def _median_distance(here: Pixels, there: Pixels) -> float:
     return float(np.median(np.linalg.norm(there - here, axis=1)))
 
 
-def agreeing_motions(
+def three_view_consistency(
     candidate: Candidate, thirds: ThirdViews, last: core.Frame, limits: InitializationConfig
 ) -> tuple[Motion, ...]:
     """The motion that most of the other views agree with, and those that fit them nearly as well.

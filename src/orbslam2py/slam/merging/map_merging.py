@@ -19,7 +19,7 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py._timing import StageTimer
 from orbslam2py.slam.config import MergingConfig
 from orbslam2py.slam.events import MapsMerged
-from orbslam2py.slam.merging.explanation import explained_share
+from orbslam2py.slam.merging.visibility_ratio import explained_share
 
 _log = logging.getLogger(__name__)
 

@@ -13,7 +13,7 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.config import TrackingConfig
-from orbslam2py.slam.pose_search.proving_period import ProvingPeriod
+from orbslam2py.slam.pose_search.probation_period import ProbationPeriod
 from orbslam2py.slam.pose_search.refined_pose import RefinedPose
 from orbslam2py.slam.records import PoseEstimate, Reason
 
@@ -29,7 +29,7 @@ class LocalMapSearch:
         The map.
     sensor : Sensor
         What the images come from.
-    proving : ProvingPeriod
+    proving : ProbationPeriod
         How much is asked of a frame.
     config : TrackingConfig
         Limits.
@@ -39,7 +39,7 @@ class LocalMapSearch:
         self,
         slam_map: core.Map,
         sensor: Sensor,
-        proving: ProvingPeriod,
+        proving: ProbationPeriod,
         config: TrackingConfig,
     ) -> None:
         self._map = slam_map
@@ -80,7 +80,7 @@ class LocalMapSearch:
         estimate = self._enough_found(frame, first, optimized)
         return RefinedPose(frame, estimate, local_map, visible, n_held + len(visible))
 
-    def look_afresh(self, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
+    def rematch(self, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
         """Match a frame with the map from nothing, so that its pose does not hang on the way to it.
 
         What is matched with the frame before stays matched from frame to frame, and holds a pose

@@ -15,10 +15,10 @@ from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.config import TrackingConfig
 from orbslam2py.slam.pose_search.local_map_search import LocalMapSearch
 from orbslam2py.slam.pose_search.motion_model import MotionModel
-from orbslam2py.slam.pose_search.proving_period import ProvingPeriod
+from orbslam2py.slam.pose_search.probation_period import ProbationPeriod
 from orbslam2py.slam.pose_search.refined_pose import RefinedPose
 from orbslam2py.slam.records import PoseEstimate, PoseMethod, Reason
-from orbslam2py.slam.relocalization import PlaceOfLoss, Relocalizer
+from orbslam2py.slam.relocalization import LastKnownPose, Relocalizer
 
 
 class PoseSearch:
@@ -33,7 +33,7 @@ class PoseSearch:
     sensor : Sensor
         What the images come from.
     max_keyframe_interval : int
-        Frames of one second: see `ProvingPeriod`.
+        Frames of one second: see `ProbationPeriod`.
     relocalizer : Relocalizer, optional
         Finds lost frames in the map; without it none is found there.
     config : TrackingConfig
@@ -49,7 +49,7 @@ class PoseSearch:
         Where the last frame was refined, None before the first.
     local_map_search : LocalMapSearch
         Refines poses with the points around them.
-    proving : ProvingPeriod
+    proving : ProbationPeriod
         What is asked of frames after the camera was found again, or a map began.
     map_is_fixed : bool
         The map is not to change: what is seen of it is not counted.
@@ -74,7 +74,7 @@ class PoseSearch:
         self._sensor = sensor
         self._relocalizer = relocalizer
         self.limits = config
-        self.proving = ProvingPeriod(max_keyframe_interval, config, has_depth=sensor.has_depth)
+        self.proving = ProbationPeriod(max_keyframe_interval, config, has_depth=sensor.has_depth)
         self.local_map_search = LocalMapSearch(slam_map, sensor, self.proving, config)
         self.reset()
 
@@ -87,7 +87,7 @@ class PoseSearch:
         self.initial_pose: core.Pose | None = None
         self.searches_loaded_map = False
         self.map_is_fixed = False
-        self._place_of_loss: PlaceOfLoss | None = None
+        self._place_of_loss: LastKnownPose | None = None
         if self._relocalizer is not None:
             self._relocalizer.reset()
 
@@ -102,7 +102,7 @@ class PoseSearch:
         """
         if confirmed:
             self.proving.lose()
-            self._place_of_loss = PlaceOfLoss(
+            self._place_of_loss = LastKnownPose(
                 self.motion.last, self.motion.velocity, self.reference_keyframe
             )
             if self._relocalizer is not None:

@@ -3,14 +3,14 @@
 
 from orbslam2py.slam.relocalization.candidates import CandidatePlaces
 from orbslam2py.slam.relocalization.confirmation import Confirmation
-from orbslam2py.slam.relocalization.loss_clock import LossClock
-from orbslam2py.slam.relocalization.place_of_loss import PlaceOfLoss
+from orbslam2py.slam.relocalization.last_known_pose import LastKnownPose
+from orbslam2py.slam.relocalization.lost_timer import LostTimer
 from orbslam2py.slam.relocalization.relocalizer import Relocalizer
 
 __all__ = [
     "CandidatePlaces",
     "Confirmation",
-    "LossClock",
-    "PlaceOfLoss",
+    "LastKnownPose",
+    "LostTimer",
     "Relocalizer",
 ]

@@ -8,7 +8,7 @@ from collections import deque
 
 from orbslam2py import _core as core
 from orbslam2py.slam.config import RelocalizationConfig
-from orbslam2py.slam.relocalization.place_of_loss import PlaceOfLoss
+from orbslam2py.slam.relocalization.last_known_pose import LastKnownPose
 
 
 class CandidatePlaces:
@@ -39,14 +39,14 @@ class CandidatePlaces:
         """Forget what the frames before looked like: the camera was found, or lost anew."""
         self._recent.clear()
 
-    def of(self, frame: core.Frame, place: PlaceOfLoss | None, failures: int) -> list[int]:
+    def of(self, frame: core.Frame, place: LastKnownPose | None, failures: int) -> list[int]:
         """Choose keyframes for a described frame.
 
         Parameters
         ----------
         frame : orbslam2py._core.Frame
             With its words.
-        place : PlaceOfLoss or None
+        place : LastKnownPose or None
             Where tracking was lost.
         failures : int
             Frames that were searched in vain since.

@@ -12,10 +12,10 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.slam.config import RelocalizationConfig
+from orbslam2py.slam.relocalization.ambiguity_check import AmbiguityCheck
 from orbslam2py.slam.relocalization.candidates import CandidatePlaces
-from orbslam2py.slam.relocalization.fitting import Candidate, Fitting, optimize
-from orbslam2py.slam.relocalization.place_of_loss import PlaceOfLoss
-from orbslam2py.slam.relocalization.rival_places import RivalPlaces
+from orbslam2py.slam.relocalization.last_known_pose import LastKnownPose
+from orbslam2py.slam.relocalization.pnp_verification import Candidate, PnPVerification, optimize
 
 
 class Relocalizer:
@@ -47,8 +47,8 @@ class Relocalizer:
         self._map = slam_map
         self._limits = limits = config
         self._places = CandidatePlaces(slam_map, keyframe_index, limits)
-        self._fitting = Fitting(slam_map, seed, limits)
-        self._rival_places = RivalPlaces(
+        self._fitting = PnPVerification(slam_map, seed, limits)
+        self._rival_places = AmbiguityCheck(
             slam_map, self._places, self._fitting, fix_scale=fix_scale, config=limits
         )
         self.reset()
@@ -59,11 +59,11 @@ class Relocalizer:
 
     def reset(self) -> None:
         """Forget where tracking was lost: it was found, or the map is another one."""
-        self._place: PlaceOfLoss | None = None
+        self._place: LastKnownPose | None = None
         self._failures = 0
         self._places.reset()
 
-    def lose(self, place: PlaceOfLoss) -> None:
+    def lose(self, place: LastKnownPose) -> None:
         """Take where tracking was lost; it is searched from there, wider at every failure."""
         self.reset()
         self._place = place

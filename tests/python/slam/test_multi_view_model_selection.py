@@ -16,14 +16,14 @@ from orbslam2py._timing import StageTimer
 from orbslam2py.slam.config import InitializationConfig
 from orbslam2py.slam.front_end import FrontEnd, intrinsics
 from orbslam2py.slam.initialization import several_views
-from orbslam2py.slam.initialization.kept_views import KeptViews, View
-from orbslam2py.slam.initialization.several_views import SeveralViews
+from orbslam2py.slam.initialization.initial_views import InitialViews, View
+from orbslam2py.slam.initialization.multi_view_model_selection import MultiViewModelSelection
 from orbslam2py.slam.initialization.third_view import (
     Candidate,
     Motion,
     ThirdViews,
-    agreeing_motions,
     reconstruct,
+    three_view_consistency,
 )
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
@@ -33,7 +33,7 @@ _N_FRAMES = 17
 class Seen(NamedTuple):
     """A camera that has moved sideways a little."""
 
-    kept: KeptViews
+    kept: InitialViews
     view: View
     last: core.Frame
     T_21: core.Pose
@@ -49,7 +49,9 @@ class Seen(NamedTuple):
     ) -> core.TwoViewMotion | None:
         chosen = InitializationConfig(**limits)  # type: ignore[arg-type]
         candidate = Candidate(self.view, motions)
-        together = SeveralViews(candidate, self.thirds(candidate, chosen), self.last, chosen)
+        together = MultiViewModelSelection(
+            candidate, self.thirds(candidate, chosen), self.last, chosen
+        )
         return together.best_motion(motions, seed=0)
 
     def thirds(
@@ -77,7 +79,7 @@ def look(world: str) -> Seen:
         SyntheticOptions(world=world, sensor="mono", frames=120, size=(320, 240), noise=1.5)
     )
     front = FrontEnd(sequence.settings, Sensor.MONOCULAR)
-    kept = KeptViews(InitializationConfig())
+    kept = InitialViews(InitializationConfig())
     for i in range(_N_FRAMES):
         image = sequence.load(i).image
         frame = front.monocular(image, i, float(i), StageTimer(), feature_factor=2)
@@ -150,7 +152,7 @@ def test_two_motions_of_a_plane_are_told_apart_by_all_views() -> None:
     limits = InitializationConfig()
     candidate = Candidate.of(wall.view, reconstruct(wall.view, wall.last, seed=0))
     assert candidate is not None and not candidate.is_clear
-    left = agreeing_motions(candidate, wall.thirds(candidate), wall.last, limits)
+    left = three_view_consistency(candidate, wall.thirds(candidate), wall.last, limits)
     assert len(left) == 2
     assert max(wall.off(motion) for motion in left) > 60
     best = wall.best_motion(*left)
@@ -191,16 +193,16 @@ def test_a_draw_that_leads_elsewhere_and_fits_as_well_lets_the_map_wait(
     candidate = Candidate.of(wall.view, reconstruct(wall.view, wall.last, seed=0))
     assert candidate is not None
     assert wall.best_motion(*candidate.motions) is not None
-    refined = SeveralViews._refined
+    refined = MultiViewModelSelection._refined
     elsewhere = turned(wall.T_21, 25)  # of one motion it would count as the same
 
-    def cheap(self: SeveralViews, motion: Motion) -> tuple[object, float]:
+    def cheap(self: MultiViewModelSelection, motion: Motion) -> tuple[object, float]:
         placed, cost = refined(self, motion)
         if motion in candidate.motions:
             return placed, cost
         return self._place(elsewhere), 1.3 * 0.174
 
-    monkeypatch.setattr(SeveralViews, "_refined", cheap)
+    monkeypatch.setattr(MultiViewModelSelection, "_refined", cheap)
     assert wall.best_motion(*candidate.motions) is None
     assert wall.best_motion(*candidate.motions, clearly_worse_alternative=1.01) is not None
 
@@ -211,7 +213,7 @@ def test_adjusted_poses_lead_to_the_views_that_they_are_of(
 ) -> None:
     limits = InitializationConfig()
     candidate = Candidate(seen.view, (seen.place(seen.T_21),))
-    together = SeveralViews(candidate, seen.thirds(candidate), seen.last, limits)
+    together = MultiViewModelSelection(candidate, seen.thirds(candidate), seen.last, limits)
     placed = together._place(seen.T_21)
     assert len(placed.poses) == 4
     for number in not_known:
@@ -269,7 +271,7 @@ def test_two_motions_to_nearly_the_same_place_are_one(
     motions = tuple(seen.place(turned(seen.T_21, turn)) for turn in (0, degrees))
     limits = InitializationConfig(clearly_worse=1e9)  # none fits that much worse
     candidate = Candidate(seen.view, motions)
-    left = agreeing_motions(candidate, seen.thirds(candidate, limits), seen.last, limits)
+    left = three_view_consistency(candidate, seen.thirds(candidate, limits), seen.last, limits)
     assert len(left) == (1 if is_one else 2)
     assert set(left) <= set(motions)
 

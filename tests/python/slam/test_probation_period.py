@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import Any
 
 from orbslam2py.slam.config import TrackingConfig
-from orbslam2py.slam.pose_search.proving_period import ProvingPeriod
+from orbslam2py.slam.pose_search.probation_period import ProbationPeriod
 from support.tracking_scene import FakeFrame
 
 LIMITS = TrackingConfig()
@@ -18,11 +18,11 @@ def frame(frame_id: int) -> Any:
     return FakeFrame(frame_id)
 
 
-def period(*, has_depth: bool) -> ProvingPeriod:
-    return ProvingPeriod(SECOND, LIMITS, has_depth=has_depth)
+def period(*, has_depth: bool) -> ProbationPeriod:
+    return ProbationPeriod(SECOND, LIMITS, has_depth=has_depth)
 
 
-def asked(proving: ProvingPeriod, *ids: int) -> list[int]:
+def asked(proving: ProbationPeriod, *ids: int) -> list[int]:
     return [proving.inliers_asked(frame(number)) for number in ids]
 
 

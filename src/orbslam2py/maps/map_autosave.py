@@ -43,7 +43,7 @@ _FEW_IMAGES = 100
 Recorded = Callable[[int, IntArray], RecordedFrames]
 
 
-class MapKeeper:
+class MapAutosave:
     """Writes the map of a system, with all that must be known to use it.
 
     May be used from any thread, while images are tracked.
@@ -246,7 +246,7 @@ class _Autosave:
     A new map after a reset goes into a file of its own: the old one's stays as it is.
     """
 
-    def __init__(self, keeper: MapKeeper, path: str | os.PathLike[str], every: float) -> None:
+    def __init__(self, keeper: MapAutosave, path: str | os.PathLike[str], every: float) -> None:
         self.path = Path(path)
         self._keeper = keeper
         self._every = every

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from orbslam2py import Sensor
+from orbslam2py.slam.acceptance.motion_innovation import MotionInnovation
 from orbslam2py.slam.config import AcceptanceConfig, TrackingConfig
-from orbslam2py.slam.evidence.usual_change import UsualChange
 from orbslam2py.slam.pose_search import MotionModel
 from support.tracking_scene import FakeCore, FakeFrame, Scene, pose
 
@@ -21,8 +21,8 @@ LIMITS = AcceptanceConfig()
 ORDINARY = np.array([0.01, 0, 0, 0, 0.1, 0])
 
 
-def used_to(change: np.ndarray, times: int = 10) -> UsualChange:
-    usual = UsualChange(LIMITS)
+def used_to(change: np.ndarray, times: int = 10) -> MotionInnovation:
+    usual = MotionInnovation(LIMITS)
     for _ in range(times):
         usual.see(change)
     return usual
@@ -83,7 +83,7 @@ _CHANGES = arrays(np.float64, 6, elements=st.floats(-10, 10))
 def test_what_is_beyond_points_along_the_change_and_is_no_longer(
     seen: list[np.ndarray], change: np.ndarray
 ) -> None:
-    usual = UsualChange(LIMITS)
+    usual = MotionInnovation(LIMITS)
     for one in seen:
         usual.see(one)
     beyond = usual.beyond(change)

@@ -38,7 +38,7 @@ class Candidate:
         )
 
 
-class Fitting:
+class PnPVerification:
     """Fits frames to keyframes.
 
     Parameters

@@ -15,7 +15,7 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py.slam.config import RelocalizationConfig
 from orbslam2py.slam.relocalization.candidates import CandidatePlaces
-from orbslam2py.slam.relocalization.fitting import Candidate, Fitting
+from orbslam2py.slam.relocalization.pnp_verification import Candidate, PnPVerification
 
 _log = logging.getLogger(__name__)
 
@@ -28,7 +28,7 @@ class _Place(NamedTuple):
     """Of the frame, with its pose there."""
 
 
-class RivalPlaces:
+class AmbiguityCheck:
     """Chooses among all places of one map that a frame fits.
 
     Parameters
@@ -37,7 +37,7 @@ class RivalPlaces:
         The map.
     places : CandidatePlaces
         Knows which keyframes look alike.
-    fitting : Fitting
+    fitting : PnPVerification
         Fits frames to keyframes.
     fix_scale : bool
         Depth is measured: the map has one scale, which does not drift.
@@ -49,7 +49,7 @@ class RivalPlaces:
         self,
         slam_map: core.Map,
         places: CandidatePlaces,
-        fitting: Fitting,
+        fitting: PnPVerification,
         *,
         fix_scale: bool,
         config: RelocalizationConfig,

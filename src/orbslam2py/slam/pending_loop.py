@@ -10,7 +10,7 @@ from orbslam2py import _core as core
 from orbslam2py.slam.config import LoopConfig
 
 
-class WaitingLoop:
+class PendingLoop:
     """Chooses among the loops of a few keyframes the one with most matches.
 
     A place is first recognised from afar, where its points lie close together in the image and a

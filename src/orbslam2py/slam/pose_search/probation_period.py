@@ -7,7 +7,7 @@ from orbslam2py import _core as core
 from orbslam2py.slam.config import TrackingConfig
 
 
-class ProvingPeriod:
+class ProbationPeriod:
     """How long ago the camera was found again, or a map began, and what is asked of frames since.
 
     Parameters

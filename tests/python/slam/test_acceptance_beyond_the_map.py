@@ -10,7 +10,7 @@ import pytest
 
 from orbslam2py import Reason, Sensor, TrackingState, _core
 from orbslam2py.slam.config import AcceptanceConfig, TrackingConfig
-from orbslam2py.slam.records import PoseMethod, TrackingOutcome, Verdict
+from orbslam2py.slam.records import PoseMethod, TrackingResult, Verdict
 from support.tracking_scene import FakeCore, FakeFrame, Scene, every_way_ends_elsewhere
 
 USUAL = 100
@@ -36,11 +36,11 @@ def scene(core: FakeCore) -> Scene:
 
 
 @pytest.fixture
-def apart(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> Callable[..., TrackingOutcome]:
+def apart(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> Callable[..., TrackingResult]:
     """Track a frame whose pose every way finds somewhere else, with so many inliers in turn."""
     elsewhere = every_way_ends_elsewhere(scene.core)
 
-    def track(*inliers: int) -> TrackingOutcome:
+    def track(*inliers: int) -> TrackingResult:
         scene.core.inliers.extend(inliers)
         with monkeypatch.context() as patched:
             patched.setattr(scene.core, "optimize_pose", elsewhere)
@@ -52,17 +52,17 @@ def apart(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Tracki
 
 
 @pytest.fixture
-def leave(scene: Scene, apart: Callable[..., TrackingOutcome]) -> Callable[..., TrackingOutcome]:
+def leave(scene: Scene, apart: Callable[..., TrackingResult]) -> Callable[..., TrackingResult]:
     """Track a frame that finds few points of the map; what each way ends with."""
 
-    def track(odometry: int, by_words: int = 0, wide: int = 0) -> TrackingOutcome:
+    def track(odometry: int, by_words: int = 0, wide: int = 0) -> TrackingResult:
         scene.core.n_map_points = 9
         return apart(odometry, 50, by_words, 50, wide)
 
     return track
 
 
-def test_a_sudden_fall_is_not_believed(scene: Scene, leave: Callable[..., TrackingOutcome]) -> None:
+def test_a_sudden_fall_is_not_believed(scene: Scene, leave: Callable[..., TrackingResult]) -> None:
     """More than 20 inliers, but chance finds as many at the edges of the windows."""
     outcome = leave(29)
     assert outcome.state is TrackingState.LOST
@@ -74,7 +74,7 @@ def test_a_sudden_fall_is_not_believed(scene: Scene, leave: Callable[..., Tracki
 
 
 def test_odometry_is_weighed_by_what_the_last_frame_saw(
-    scene: Scene, leave: Callable[..., TrackingOutcome]
+    scene: Scene, leave: Callable[..., TrackingResult]
 ) -> None:
     outcome = leave(90)
     assert outcome.state is TrackingState.OK
@@ -87,7 +87,7 @@ def test_odometry_is_weighed_by_what_the_last_frame_saw(
 
 
 def test_when_the_map_vanishes_it_is_searched(
-    scene: Scene, leave: Callable[..., TrackingOutcome]
+    scene: Scene, leave: Callable[..., TrackingResult]
 ) -> None:
     """A wrong motion leaves the map from one frame to the next as well."""
     outcome = leave(80, by_words=95)
@@ -101,7 +101,7 @@ def test_when_the_map_vanishes_it_is_searched(
 
 
 def test_beyond_the_map_odometry_goes_on_without_doubt(
-    scene: Scene, leave: Callable[..., TrackingOutcome]
+    scene: Scene, leave: Callable[..., TrackingResult]
 ) -> None:
     assert leave(90).estimate.visual_odometry
     scene.core.calls.clear()
@@ -129,7 +129,7 @@ def test_outliers_of_the_map_do_not_count(scene: Scene) -> None:
 
 
 def test_a_weak_pose_is_searched_in_the_whole_map(
-    scene: Scene, apart: Callable[..., TrackingOutcome], monkeypatch: pytest.MonkeyPatch
+    scene: Scene, apart: Callable[..., TrackingResult], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Not only one that is refused: nothing else finds the way out of a wrong one."""
     searched: list[int] = []

@@ -9,7 +9,7 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py.slam.config import AcceptanceConfig
 
 
-class UsualChange:
+class MotionInnovation:
     """How far poses usually lie from where the motion before them led.
 
     A change is the tangent (6,), rotation [rad] and translation, from a frame's pose to the one

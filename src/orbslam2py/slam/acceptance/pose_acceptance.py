@@ -9,27 +9,27 @@ from __future__ import annotations
 from dataclasses import replace
 
 from orbslam2py import _core as core
-from orbslam2py.slam.evidence.harder_search import HarderSearch, Hypothesis
-from orbslam2py.slam.evidence.judgement import EvidenceJudge
+from orbslam2py.slam.acceptance.multi_hypothesis_search import Hypothesis, MultiHypothesisSearch
+from orbslam2py.slam.acceptance.pose_validator import PoseValidator
 from orbslam2py.slam.pose_search import PoseSearch, RefinedPose
 from orbslam2py.slam.records import Evidence, PoseEstimate, Reason, Verdict
 
 
-class Belief:
+class PoseAcceptance:
     """Refines poses in the local map, weighs them, and has them searched again when in doubt.
 
     Parameters
     ----------
     search : PoseSearch
         The ways to a pose.
-    judge : EvidenceJudge
+    judge : PoseValidator
         Says how much speaks for one.
-    harder_search : HarderSearch
+    harder_search : MultiHypothesisSearch
         Looks again.
     """
 
     def __init__(
-        self, search: PoseSearch, judge: EvidenceJudge, harder_search: HarderSearch
+        self, search: PoseSearch, judge: PoseValidator, harder_search: MultiHypothesisSearch
     ) -> None:
         self._search = search
         self._judge = judge
@@ -67,7 +67,7 @@ class Belief:
             estimate = refined.estimate
         doubted = first.left_map or self._is_doubted(hypothesis)
         if doubted and not lost and self._judge.limits.search_again:
-            hypothesis = self._harder_search.look_again(frame, hypothesis)
+            hypothesis = self._harder_search.search_again(frame, hypothesis)
         if hypothesis is None:
             if first.found:
                 self._search.settle(refined)
@@ -81,18 +81,18 @@ class Belief:
     def _hypothesis(self, refined: RefinedPose, first: PoseEstimate) -> Hypothesis | None:
         if not refined.estimate.found:
             return None
-        evidence = self._judge.weigh(refined, self._search.motion, first.method)
+        evidence = self._judge.assess(refined, self._search.motion, first.method)
         return Hypothesis(refined, first.method, evidence)
 
     def _looked_at_afresh(self, hypothesis: Hypothesis, *, in_doubt: bool) -> Hypothesis:
         """The same frame in the same map is to be in the same place, whatever came before it."""
         refined, evidence = hypothesis.refined, hypothesis.evidence
-        afresh = self._search.local_map_search.look_afresh(refined, in_doubt=in_doubt)
+        afresh = self._search.local_map_search.rematch(refined, in_doubt=in_doubt)
         if afresh is refined:
             return hypothesis
         if in_doubt:
             # Much of what held the old pose was not found again.
-            evidence = self._judge.weigh(afresh, self._search.motion, hypothesis.method)
+            evidence = self._judge.assess(afresh, self._search.motion, hypothesis.method)
             if hypothesis.evidence.confirmed and self._judge.is_same(refined, afresh):
                 evidence = self._judge.confirm(evidence)
             if evidence.verdict is Verdict.REFUSED:
@@ -101,7 +101,7 @@ class Belief:
         return replace(hypothesis, refined=replace(afresh, frame=refined.frame), evidence=evidence)
 
     def _is_doubted(self, hypothesis: Hypothesis | None) -> bool:
-        return hypothesis is None or self._judge.fell_suddenly(hypothesis.evidence)
+        return hypothesis is None or self._judge.needs_reestimation(hypothesis.evidence)
 
     def _refined(self, frame: core.TrackedFrame, first: PoseEstimate) -> RefinedPose:
         if first.visual_odometry:
@@ -121,7 +121,7 @@ class Belief:
         self._search.settle(refined)
         motion = self._search.motion
         change = motion.change(frame)
-        covariance = self._judge.stated_covariance(refined, evidence, motion, change)
+        covariance = self._judge.inflated_covariance(refined, evidence, motion, change)
         estimate = replace(
             refined.estimate, evidence=evidence, method=hypothesis.method, covariance=covariance
         )

@@ -74,7 +74,7 @@ class _Placed:
     poses: list[core.Pose | None]
 
 
-class SeveralViews:
+class MultiViewModelSelection:
     """A view that a map may begin from, the last frame, and the other views of the same things.
 
     Parameters

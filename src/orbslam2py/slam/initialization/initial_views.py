@@ -109,7 +109,7 @@ def _one_per_place(keypoints: Pixels, matches: Indices) -> npt.NDArray[np.int64]
     return np.asarray(found[np.sort(first)])
 
 
-class KeptViews:
+class InitialViews:
     """Follows the image from frame to frame and keeps a few views, thinned by parallax.
 
     Parameters

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from orbslam2py.slam.acceptance import pose_validator
 from orbslam2py.slam.config import AcceptanceConfig
-from orbslam2py.slam.evidence import judgement
 from orbslam2py.slam.records import Verdict
 from support.tracking_scene import FakeFrame, Scene
 
@@ -100,7 +100,7 @@ def test_a_turn_that_nobody_expected_makes_a_pose_less_certain(
 ) -> None:
     # Radians; the scene's focal length is 500 pixels.
     usual = careful.track().estimate
-    monkeypatch.setattr(judgement, "_changes", lambda frame, motion: (np.degrees(turn), 0.0))
+    monkeypatch.setattr(pose_validator, "_changes", lambda frame, motion: (np.degrees(turn), 0.0))
     turned_otherwise = careful.track().estimate
     assert usual.covariance is not None
     assert turned_otherwise.covariance is not None

@@ -13,17 +13,17 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py.slam.config import InitializationConfig
-from orbslam2py.slam.initialization.kept_views import KeptViews
-from orbslam2py.slam.initialization.several_views import SeveralViews
+from orbslam2py.slam.initialization.initial_views import InitialViews
+from orbslam2py.slam.initialization.multi_view_model_selection import MultiViewModelSelection
 from orbslam2py.slam.initialization.third_view import (
     Candidate,
     ThirdViews,
-    agreeing_motions,
     reconstruct,
+    three_view_consistency,
 )
 
 
-class YoungMapWatch:
+class InitialMapValidation:
     """Finds the motion between views of a young map once more, without the map, and compares.
 
     What a map begins with may be wrong, or be bent by the first adjustments, and yet explain its
@@ -41,7 +41,7 @@ class YoungMapWatch:
     def __init__(self, limits: InitializationConfig, seed: int) -> None:
         self._limits = limits
         self._seed = seed
-        self._kept = KeptViews(limits)
+        self._kept = InitialViews(limits)
         self.reset()
 
     def reset(self) -> None:
@@ -128,14 +128,14 @@ class YoungMapWatch:
         if candidate is None:
             return None
         thirds = ThirdViews.of(candidate, self._kept, limits)
-        motions = agreeing_motions(candidate, thirds, last, limits)
+        motions = three_view_consistency(candidate, thirds, last, limits)
         if len(motions) != 1:
             return None
         apart = _degrees_between(by_map, motions[0].T_21.translation)
         if apart < limits.agreeing_direction:
             return apart
         # To speak against a map takes more than a draw that a third view agrees with.
-        together = SeveralViews(candidate, thirds, last, limits)
+        together = MultiViewModelSelection(candidate, thirds, last, limits)
         best = together.best_motion(motions, self._seed)
         return None if best is None else _degrees_between(by_map, best.T_21.translation)
 

@@ -11,30 +11,30 @@ from dataclasses import dataclass, replace
 
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
+from orbslam2py.slam.acceptance.motion_innovation import MotionInnovation
 from orbslam2py.slam.config import AcceptanceConfig
-from orbslam2py.slam.evidence.usual_change import UsualChange
 from orbslam2py.slam.pose_search import MotionModel, RefinedPose
 from orbslam2py.slam.records import Evidence, PoseMethod, Verdict
 
 
 @dataclass(frozen=True)
-class UsualFigures:
+class RunningMeans:
     """Running means over frames with strong evidence."""
 
     n_inliers: float
     found: float
     deviation: float
 
-    def moved_to(self, other: UsualFigures, gain: float) -> UsualFigures:
+    def moved_to(self, other: RunningMeans, gain: float) -> RunningMeans:
         """A step towards the figures of a newer frame."""
-        return UsualFigures(
+        return RunningMeans(
             self.n_inliers + gain * (other.n_inliers - self.n_inliers),
             self.found + gain * (other.found - self.found),
             self.deviation + gain * (other.deviation - self.deviation),
         )
 
 
-class EvidenceJudge:
+class PoseValidator:
     """Knows what is usual, and says how far a pose is from it.
 
     Parameters
@@ -55,10 +55,10 @@ class EvidenceJudge:
 
     def reset(self) -> None:
         """Nothing is usual yet."""
-        self._usual: UsualFigures | None = None
+        self._usual: RunningMeans | None = None
         self._usual_error: float | None = None
         self._error_spread = 0.0
-        self._change = UsualChange(self.limits)
+        self._change = MotionInnovation(self.limits)
 
     def go_elsewhere(self) -> None:
         """What is seen is not usual any more: the place is another one.
@@ -67,9 +67,9 @@ class EvidenceJudge:
         """
         self._usual = None
         # Another map of a single camera has another scale.
-        self._change = UsualChange(self.limits)
+        self._change = MotionInnovation(self.limits)
 
-    def weigh(self, refined: RefinedPose, motion: MotionModel, method: PoseMethod) -> Evidence:
+    def assess(self, refined: RefinedPose, motion: MotionModel, method: PoseMethod) -> Evidence:
         """Weigh a refined pose.
 
         Parameters
@@ -121,7 +121,7 @@ class EvidenceJudge:
             move_change=move,
         )
 
-    def fell_suddenly(self, evidence: Evidence) -> bool:
+    def needs_reestimation(self, evidence: Evidence) -> bool:
         """Whether the pose has to be searched by other ways before it is believed."""
         limits = self.limits
         return (
@@ -169,7 +169,7 @@ class EvidenceJudge:
         self._usual_error = usual + gain * (error - usual)
         self._error_spread += gain * (abs(error - usual) - self._error_spread)
 
-    def stated_covariance(
+    def inflated_covariance(
         self,
         refined: RefinedPose,
         evidence: Evidence,
@@ -231,7 +231,7 @@ class EvidenceJudge:
         per_cell = refined.estimate.n_inliers / max(1, evidence.n_cells)
         spread = refined.spread
         together = max(1.0, spread.correlation)
-        larger = max(1.0, evidence.match_error / limits.honest_error)
+        larger = max(1.0, evidence.match_error / limits.expected_error)
         larger *= max(1.0, evidence.match_error / limits.doubtful_error)
         factor = min(larger, limits.largest_error) ** 2 * together
         if self._errs_suddenly(evidence.match_error):
@@ -263,10 +263,10 @@ class EvidenceJudge:
         return self._focal_length * math.radians(degrees)
 
 
-def _figures(refined: RefinedPose) -> UsualFigures:
+def _figures(refined: RefinedPose) -> RunningMeans:
     estimate = refined.estimate
     n_inliers = estimate.n_inliers
-    return UsualFigures(
+    return RunningMeans(
         float(n_inliers),
         min(1.0, n_inliers / max(1, refined.n_predicted)),
         refined.position_deviation,

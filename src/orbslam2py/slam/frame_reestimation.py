@@ -22,7 +22,7 @@ _MOST_LOOKS = 6
 _MORE_INLIERS = 1.1
 
 
-class SecondLook:
+class FrameReestimation:
     """Gives frames that were tracked long ago new poses; the map is only read.
 
     Parameters
@@ -75,7 +75,7 @@ class SecondLook:
         if refined is None:
             return followed
         if finished:
-            refined = self._search.local_map_search.look_afresh(refined, in_doubt=in_doubt)
+            refined = self._search.local_map_search.rematch(refined, in_doubt=in_doubt)
         return _without_outliers(refined).frame
 
     def _look(self, frame: core.TrackedFrame, *, wide: bool) -> RefinedPose | None:

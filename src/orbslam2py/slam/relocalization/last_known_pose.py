@@ -8,7 +8,7 @@ from orbslam2py._arrays import IntArray
 from orbslam2py.slam.config import RelocalizationConfig
 
 
-class PlaceOfLoss:
+class LastKnownPose:
     """The last frame that was believed.
 
     Parameters

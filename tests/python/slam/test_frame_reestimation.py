@@ -14,8 +14,8 @@ from orbslam2py.slam import frame_recorder
 from orbslam2py.slam.config import TrackingConfig
 from orbslam2py.slam.effort import Effort
 from orbslam2py.slam.frame_recorder import FrameRecorder
+from orbslam2py.slam.frame_reestimation import FrameReestimation
 from orbslam2py.slam.pose_search import LocalMapSearch, PoseSearch, RefinedPose
-from orbslam2py.slam.second_look import SecondLook
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.vocabulary import load_vocabulary
 from support.moved_frames import MovedByAMetre
@@ -40,7 +40,7 @@ class Walk:
             self.system.track_rgbd(images.image, images.depth, i / 20)
             self.frames.append(self.system.pipeline.tracking.motion.last)
         self.map = self.system.pipeline.back_end.map
-        self.second_look = SecondLook(
+        self.second_look = FrameReestimation(
             self.map,
             PoseSearch(
                 self.map,
@@ -112,7 +112,7 @@ def test_a_look_that_does_not_show_clearly_more_is_not_followed(
         began.append(refined.frame)
         return refined
 
-    monkeypatch.setattr(LocalMapSearch, "look_afresh", remember)
+    monkeypatch.setattr(LocalMapSearch, "rematch", remember)
     aside = walk.put_aside(walk.no_keyframe(), every=1)
     assert way(walk.second_look(aside, in_doubt=True), aside) < 1e-9
     assert way(began[0], aside) < 1e-9
@@ -201,13 +201,15 @@ def test_every_frame_is_looked_at_where_that_is_asked_for(
 @pytest.mark.parametrize("effort", list(Effort))
 def test_thorough_looks_at_every_frame(effort: Effort, monkeypatch: pytest.MonkeyPatch) -> None:
     looked: list[int] = []
-    original = SecondLook.__call__
+    original = FrameReestimation.__call__
 
-    def note(self: SecondLook, frame: core.TrackedFrame, **options: bool) -> core.TrackedFrame:
+    def note(
+        self: FrameReestimation, frame: core.TrackedFrame, **options: bool
+    ) -> core.TrackedFrame:
         looked.append(frame.id)
         return original(self, frame, **options)
 
-    monkeypatch.setattr(SecondLook, "__call__", note)
+    monkeypatch.setattr(FrameReestimation, "__call__", note)
     sequence = SyntheticSequence(
         SyntheticOptions(world="corridor", sensor="rgbd", size=(320, 240), frames=6)
     )
@@ -229,7 +231,7 @@ def young(
     recorder.begin(frames[:1])
     for frame in frames[1:]:
         recorder.record(frame, lost=False, in_doubt=frame.id in in_doubt)
-    recorder.look_again()
+    recorder.reestimate_first_frames()
     moved.seen.clear()
     return recorder
 
@@ -277,7 +279,7 @@ def test_frames_that_were_localised_while_a_map_was_young_stay(walk: Walk) -> No
     recorder.begin(walk.frames[:1])
     recorder.record(walk.frames[1], lost=False, fixed_map=True)
     recorder.record(walk.frames[2], lost=True)
-    recorder.look_again()
+    recorder.reestimate_first_frames()
     moved.seen.clear()
     recorder.settle()
     assert moved.seen == [(0, False)]
@@ -326,7 +328,7 @@ def test_only_the_last_look_is_matched_from_nothing(
         looked.append((refined.frame.id, in_doubt))
         return refined
 
-    monkeypatch.setattr(LocalMapSearch, "look_afresh", note)
+    monkeypatch.setattr(LocalMapSearch, "rematch", note)
     frame = walk.no_keyframe()
     walk.second_look(frame, finished=False)
     assert looked == []

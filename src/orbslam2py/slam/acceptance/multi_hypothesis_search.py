@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 from orbslam2py import _core as core
-from orbslam2py.slam.evidence.judgement import EvidenceJudge
+from orbslam2py.slam.acceptance.pose_validator import PoseValidator
 from orbslam2py.slam.pose_search import PoseSearch, RefinedPose
 from orbslam2py.slam.records import Evidence, PoseEstimate, PoseMethod, Reason, Verdict
 
@@ -31,22 +31,22 @@ class Hypothesis:
         return self.refined.estimate.n_inliers
 
 
-class HarderSearch:
+class MultiHypothesisSearch:
     """Tries ways that do not hang on the speed.
 
     Parameters
     ----------
     search : PoseSearch
         The ways to a pose.
-    judge : EvidenceJudge
+    judge : PoseValidator
         Weighs what they find.
     """
 
-    def __init__(self, search: PoseSearch, judge: EvidenceJudge) -> None:
+    def __init__(self, search: PoseSearch, judge: PoseValidator) -> None:
         self._search = search
         self._judge = judge
 
-    def look_again(self, frame: core.TrackedFrame, first: Hypothesis | None) -> Hypothesis | None:
+    def search_again(self, frame: core.TrackedFrame, first: Hypothesis | None) -> Hypothesis | None:
         """Find the pose for which most speaks, and whether two ways lead there.
 
         Parameters
@@ -71,7 +71,7 @@ class HarderSearch:
             refined = self._search.in_local_map(version, estimate)
             if not refined.estimate.found:
                 continue
-            evidence = self._judge.weigh(refined, self._search.motion, method)
+            evidence = self._judge.assess(refined, self._search.motion, method)
             hypothesis = Hypothesis(refined, method, evidence)
             enough = self._has_enough(hypothesis, found)
             found.append(hypothesis)

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from orbslam2py.slam.config import LoopConfig
-from orbslam2py.slam.waiting_loop import WaitingLoop
+from orbslam2py.slam.pending_loop import PendingLoop
 
 FIRM, PATIENCE = LoopConfig().firm_matches, LoopConfig().patience
 
@@ -25,7 +25,7 @@ class World:
         self.n_verified = 0
         #: Of a loop that is verified again; 0: it is none any more.
         self.matches_now = 77
-        self.waiting = WaitingLoop(slam_map, self.verify, self.leases.remove, LoopConfig())
+        self.waiting = PendingLoop(slam_map, self.verify, self.leases.remove, LoopConfig())
 
     def verify(self, current: int, matched: int) -> Any:
         self.n_verified += 1

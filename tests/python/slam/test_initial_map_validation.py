@@ -25,7 +25,7 @@ from orbslam2py._timing import StageTimer
 from orbslam2py.evaluation import Alignment, evaluate_trajectory
 from orbslam2py.slam.config import InitializationConfig
 from orbslam2py.slam.front_end import FrontEnd
-from orbslam2py.slam.initialization.young_map_watch import YoungMapWatch
+from orbslam2py.slam.initialization.initial_map_validation import InitialMapValidation
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.cut_sequences import corridor, cut, settings_of
 from support.cut_sequences import track as track_all
@@ -72,13 +72,13 @@ def walk() -> Walk:
     return Walk()
 
 
-def watch_of(frames: list[core.TrackedFrame], **limits: float) -> YoungMapWatch:
-    watch = YoungMapWatch(InitializationConfig(**limits), seed=0)  # type: ignore[arg-type]
+def watch_of(frames: list[core.TrackedFrame], **limits: float) -> InitialMapValidation:
+    watch = InitialMapValidation(InitializationConfig(**limits), seed=0)  # type: ignore[arg-type]
     watch.begin(frames[0])
     return watch
 
 
-def shown(watch: YoungMapWatch, frames: Iterable[core.TrackedFrame]) -> tuple[int, bool]:
+def shown(watch: InitialMapValidation, frames: Iterable[core.TrackedFrame]) -> tuple[int, bool]:
     """Frames shown until the watch ended, or all of them, and whether the map was contradicted."""
     n = 0
     for frame in frames:
@@ -164,7 +164,7 @@ def test_where_every_map_is_contradicted_one_is_kept_in_the_end(walk: Walk) -> N
 def ways_apart(monkeypatch: pytest.MonkeyPatch, *degrees: float | None) -> None:
     """The watch finds the ways of map and images so far apart, one after the other."""
     left = iter(degrees)
-    monkeypatch.setattr(YoungMapWatch, "_degrees_apart", lambda *_: next(left, 0.0))
+    monkeypatch.setattr(InitialMapValidation, "_degrees_apart", lambda *_: next(left, 0.0))
 
 
 def test_a_contradicted_map_is_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -262,10 +262,10 @@ def test_a_real_camera_that_takes_off_ends_with_a_right_map(seed: int, shared_da
 def test_one_that_began_beside_another_leaves_that_as_it_was(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def apart(watch: YoungMapWatch, frame: core.TrackedFrame) -> float:
+    def apart(watch: InitialMapValidation, frame: core.TrackedFrame) -> float:
         return 90.0 if frame.map_index == 1 else 0.0
 
-    monkeypatch.setattr(YoungMapWatch, "_degrees_apart", apart)
+    monkeypatch.setattr(InitialMapValidation, "_degrees_apart", apart)
     sequence = cut(corridor("mono"), range(80), 60, range(200, 300))
     with System(settings_of(sequence), "mono", deterministic=True) as system:
         records = track_all(system, sequence)

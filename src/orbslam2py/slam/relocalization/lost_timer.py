@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 
 
-class LossClock:
+class LostTimer:
     """Tells by time stamps when a loss has lasted so long that another map may begin.
 
     Parameters
