@@ -11,7 +11,6 @@ import numpy as np
 from orbslam2py import Sensor, System, TrackingRecord, TrackingState
 from orbslam2py.datasets import Images
 from orbslam2py.evaluation import PoseError, align, errors_through_keyframes
-from orbslam2py.slam.frame_source import track_images
 from orbslam2py.synthetic import SyntheticSequence
 
 SECONDS_PER_FRAME = 0.05
@@ -48,7 +47,7 @@ class MappedWorld:
         """Track the images, 50 ms after the last ones."""
         seconds = self._n_shown * SECONDS_PER_FRAME
         self._n_shown += 1
-        return track_images(self.system, images, seconds)
+        return self.system.track(images, seconds)
 
     def black(self) -> Images:
         """Images in which nothing can be seen."""

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 import orbslam2py as orb
 from benchmarks.holding_on.scene import Case, Floats, Integers, Scene
-from orbslam2py.slam.frame_source import track_images
 from orbslam2py.slam.records import TrackingRecord
 from orbslam2py.trajectory.rotations import inverse_poses
 
@@ -84,7 +83,7 @@ def play(case: Case, config: Mapping[str, Any] | None = None) -> Played:
     )
     with system as slam:
         for i, timestamp in enumerate(scene.timestamps):
-            records.append(track_images(slam, scene.load(i), float(timestamp)))
+            records.append(slam.track(scene.load(i), float(timestamp)))
             changes[i] = slam.pipeline.back_end.map.big_change_index
             velocity = slam.pipeline.tracking.motion.velocity
             if velocity is not None:

@@ -24,7 +24,6 @@ from benchmarks.harness.arguments import new_parser
 from orbslam2py import OrbSlamError, Sensor, System, TrackingState, open_sequence
 from orbslam2py.datasets import Sequence
 from orbslam2py.evaluation import Alignment, evaluate_trajectory
-from orbslam2py.slam.frame_source import track_images
 from orbslam2py.trajectory import Trajectory
 from orbslam2py.trajectory.rotations import rotation_angles
 
@@ -33,7 +32,7 @@ def run(sequence: Sequence, first: int, last: int, **options: object) -> System:
     """Track some frames; the system has been shut down, with all results."""
     with System(sensor=sequence.sensor, deterministic=True, **options) as slam:  # type: ignore[arg-type]
         for frame in islice(iter(sequence), first, last):
-            track_images(slam, frame.images, frame.timestamp)
+            slam.track(frame.images, frame.timestamp)
     return slam
 
 
@@ -74,7 +73,7 @@ def localised(sequence: Sequence, n: int, path: Path, mapped: list[Trajectory]) 
     with System(load_map=path, deterministic=True) as slam:
         slam.localization_mode = True
         for frame in islice(iter(sequence), n):
-            records.append(track_images(slam, frame.images, frame.timestamp))
+            records.append(slam.track(frame.images, frame.timestamp))
     ok = {r.timestamp: r for r in records if r.state is TrackingState.OK}
     known = {
         t: (number, T_wc)

@@ -26,7 +26,6 @@ from benchmarks.harness.arguments import add_counts, add_sensors, add_width, con
 from benchmarks.harness.process_memory import resident_mb
 from benchmarks.harness.tables import in_words, new_table
 from orbslam2py import System
-from orbslam2py.slam.frame_source import track_images
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
 SIZE = (620, 188)
@@ -79,7 +78,7 @@ def drive(sensor: str, metres: float, seed: int, *, autosave: bool) -> list[Stre
         for number in range(len(sequence)):
             images = sequence.load(number)
             begin = time.process_time()
-            record = track_images(slam, images, float(sequence.nanoseconds[number]) / 1e9)
+            record = slam.track(images, float(sequence.nanoseconds[number]) / 1e9)
             spent.append(time.process_time() - begin)
             lost += record.T_cw is None
             driven = (number + 1) * SPEED / FPS

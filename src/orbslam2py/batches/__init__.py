@@ -2,7 +2,8 @@
 """Many sequences, settings and seeds: one command, one table."""
 
 from orbslam2py.batches.batch import BatchResult, batch
-from orbslam2py.batches.jobs import Job, make_jobs, read_jobs
+from orbslam2py.batches.job import Job
+from orbslam2py.batches.jobs import make_jobs, read_jobs
 from orbslam2py.batches.standard_sets import BenchmarkResult, Entry, StandardSet, benchmark
 from orbslam2py.batches.summary import Group, Spread, summarise
 

@@ -13,7 +13,8 @@ from typing import Any
 from orbslam2py._arguments import path_of
 from orbslam2py.batches.cache import DEFAULT_SIZE, Cache, cache_size_of, default_folder
 from orbslam2py.batches.engine import Watch, open_workers, require_dask, run_on
-from orbslam2py.batches.jobs import Job, make_jobs, read_jobs
+from orbslam2py.batches.job import Job
+from orbslam2py.batches.jobs import make_jobs, read_jobs
 from orbslam2py.batches.results import Results
 from orbslam2py.batches.summary import Group, summarise
 from orbslam2py.batches.sweep_picture import write_sweep_picture

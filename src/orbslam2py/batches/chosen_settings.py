@@ -5,17 +5,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from orbslam2py._arguments import path_of
+from orbslam2py.batches.job import Job
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import BUILTIN_NAMES, Sensor, Settings, builtin_settings
 from orbslam2py.settings.builtin import is_builtin_name
 from orbslam2py.settings.reader import read_groups
 from orbslam2py.settings.settings import looks_like_path
-
-if TYPE_CHECKING:
-    from orbslam2py.batches.jobs import Job
 
 
 def settings_name(choice: Any, folder: Path, *, elsewhere: bool) -> str:

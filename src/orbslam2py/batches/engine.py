@@ -19,7 +19,7 @@ from typing import Any
 from orbslam2py._cores import n_cores
 from orbslam2py._version import __version__
 from orbslam2py.batches.cache import Cache
-from orbslam2py.batches.jobs import Job
+from orbslam2py.batches.job import Job
 from orbslam2py.batches.results import Results
 from orbslam2py.batches.work import failed_row, run_job
 from orbslam2py.batches.workers import Workers

@@ -6,11 +6,8 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import glob
-import hashlib
 import itertools
-import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,99 +21,18 @@ from orbslam2py._arguments import (
     shown,
 )
 from orbslam2py.batches.chosen_settings import require_usable, settings_name
+from orbslam2py.batches.job import RUN_OPTIONS, SYSTEM_OPTIONS, Job
 from orbslam2py.batches.job_file import read_document
-from orbslam2py.batches.keys import key_of, label_of, with_labels_of_their_own
+from orbslam2py.batches.keys import with_labels_of_their_own
 from orbslam2py.batches.remote import is_remote, name_of, require_protocols
 from orbslam2py.batches.sweep import CONFIG_NAMES, Sweep, read_sweep
 from orbslam2py.errors import DatasetError, SettingsError
-from orbslam2py.runs.options import RunOptions
 from orbslam2py.settings import Sensor
-from orbslam2py.slam.options import SystemOptions
 
 _KEYS = ("sequences", "sensors", "settings", "options", "seeds", "sweep", "output")
 _SEQUENCE_KEYS = ("path", "name", "sensor", "settings", "topics")
 #: A table of so many rows says nothing to anybody, and each job takes memory.
 _MOST_RUNS = 100_000
-#: Options of a run that a batch may have.
-RUN_OPTIONS = ("start", "stride", "max_frames", "realtime", "final_adjustment")
-SYSTEM_OPTIONS = (
-    *("deterministic", "loop_closing", "full_adjustment"),
-    *("full_adjustment_time_limit", "check_calibration", "several_maps", "new_map_after", "effort"),
-)
-
-
-@dataclass(frozen=True)
-class Job:
-    """One run of a batch.
-
-    Attributes
-    ----------
-    path
-        The sequence: a folder or a file, an archive, or an address such as ``s3://bucket/desk``.
-    name
-        Its name in the table.
-    sensor
-        ``mono``, ``stereo`` or ``rgbd``; None for the richest there are images for.
-    settings
-        A file or a built-in name; None for what the sequence tells.
-    topics
-        Of a bag.
-    options
-        Options of the run that are not the usual ones.
-    parameters
-        Keys of the settings that are swept, and their values in this run.
-    seed
-        Seed of the run.
-    label
-        What its folder is called, but for the seed, where the plain name is that of other runs of
-        the batch as well; else empty.
-    """
-
-    path: str
-    name: str
-    sensor: str | None = None
-    settings: str | None = None
-    topics: str | None = None
-    options: tuple[tuple[str, Any], ...] = ()
-    parameters: tuple[tuple[str, float], ...] = ()
-    seed: int = 0
-    label: str = ""
-
-    @property
-    def key(self) -> str:
-        """Name of its folder."""
-        return key_of(self.setting, self.seed)
-
-    @property
-    def setting(self) -> str:
-        """What the runs with other seeds have in common."""
-        return self.label or label_of(self)
-
-    @property
-    def fingerprint(self) -> str:
-        """Tells this job from another one in the same folder."""
-        told = dataclasses.asdict(self)
-        del told["label"]  # it says nothing new, and earlier versions had none
-        text = json.dumps(told, sort_keys=True, default=str)
-        return hashlib.sha256(text.encode()).hexdigest()[:16]
-
-    def run_options(self, sensor: Sensor) -> RunOptions:
-        """Return the options of the run.
-
-        Raises
-        ------
-        SettingsError, DatasetError
-            If they make no sense.
-        """
-        given = dict(self.options)
-        system = SystemOptions(
-            seed=self.seed,
-            config={n: v for n, v in (*self.options, *self.parameters) if n in CONFIG_NAMES},
-            **{name: given[name] for name in SYSTEM_OPTIONS if name in given},
-        )
-        return RunOptions(
-            sensor, system, **{name: given[name] for name in RUN_OPTIONS if name in given}
-        )
 
 
 def read_jobs(path: Path, *, elsewhere: bool = False) -> tuple[list[Job], Path | str | None]:

@@ -14,7 +14,7 @@ from typing import Any
 
 from orbslam2py._arguments import path_of
 from orbslam2py._files import atomic_write, reason_of
-from orbslam2py.batches.jobs import Job
+from orbslam2py.batches.job import Job
 from orbslam2py.batches.remote import is_remote, require_protocols
 from orbslam2py.errors import DatasetError, OrbSlamError
 

@@ -16,7 +16,7 @@ import cv2
 from orbslam2py._files import describe_error
 from orbslam2py._version import __version__
 from orbslam2py.batches.cache import DEFAULT_SIZE, Cache, cache_size_of, default_folder
-from orbslam2py.batches.jobs import Job
+from orbslam2py.batches.job import Job
 from orbslam2py.batches.remote import here
 from orbslam2py.batches.results import Results
 from orbslam2py.batches.sweep import with_parameters

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,15 +12,13 @@ from orbslam2py._arrays import IntArray
 from orbslam2py.datasets.base import Source
 from orbslam2py.maps.map_arrays import MapArrays
 from orbslam2py.maps.snapshot import MapSnapshot
+from orbslam2py.runs.kept_images import KeptImages
 from orbslam2py.runs.options import RunOptions
 from orbslam2py.settings.settings import Settings
 from orbslam2py.slam.events import LoopClosed, MapsMerged
 from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
 from orbslam2py.slam.records import MapSummary, TrackingRecord, TrackingState
 from orbslam2py.trajectory.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    from orbslam2py.runs.report_page.kept_images import KeptImages
 
 
 @dataclass(frozen=True)

@@ -24,13 +24,12 @@ from orbslam2py.maps.map_arrays import MapArrays
 from orbslam2py.runs.calibration_watch import CalibrationWatch, settings_beside
 from orbslam2py.runs.control import RunControl
 from orbslam2py.runs.feeds import FedFrame, LiveFeed, RecordedFeed, is_sequence
+from orbslam2py.runs.kept_images import KeptImages
 from orbslam2py.runs.options import RunOptions
-from orbslam2py.runs.report_page.kept_images import KeptImages
 from orbslam2py.runs.result import DROPPED, FrameRow, RunResult
 from orbslam2py.settings.depth_check import doubt_of_tum_factor
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
-from orbslam2py.slam.frame_source import track_images
 from orbslam2py.slam.records import TrackingRecord
 from orbslam2py.slam.system import System
 from orbslam2py.trajectory.trajectory import Trajectory
@@ -240,7 +239,7 @@ class SequenceRunner:
         if second is None and sensor is not Sensor.MONOCULAR:
             # Not a spoilt frame, which is skipped: all others lack it, too.
             raise DatasetError("the sequence delivers no second image for this sensor")
-        return track_images(system, images, timestamp)
+        return system.track(images, timestamp)
 
     def _skip(self, frame: FedFrame, error: Exception, file: str = "") -> FrameRow:
         reason = describe_error(error)

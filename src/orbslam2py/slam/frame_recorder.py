@@ -44,10 +44,10 @@ class FrameRecorder:
     ----------
     slam_map : orbslam2py._core.Map
         The map that the frames were tracked in.
-    second_look : FrameReestimation
+    reestimation : FrameReestimation
         Matches frames with the map again.
     every_frame : bool
-        `second_look` gets every frame, when many have come after it at the latest.
+        `reestimation` gets every frame, when many have come after it at the latest.
     uncertain_frames : bool
         It gets frames whose pose was uncertain.
     """
@@ -55,13 +55,13 @@ class FrameRecorder:
     def __init__(
         self,
         slam_map: core.Map,
-        second_look: FrameReestimation,
+        reestimation: FrameReestimation,
         *,
         every_frame: bool = False,
         uncertain_frames: bool = True,
     ) -> None:
         self._map = slam_map
-        self._second_look = second_look
+        self._second_look = reestimation
         self._recorder = core.TrajectoryRecorder()
         self._sightings = core.FrameSightings()
         self._ended: dict[int, Trajectory] = {}

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -12,10 +12,7 @@ import numpy.typing as npt
 from orbslam2py._arguments import shown
 from orbslam2py.errors import DatasetError, ImageError, StateError
 from orbslam2py.settings.sensor import Sensor
-from orbslam2py.slam.records import TrackingRecord
-
-if TYPE_CHECKING:
-    from orbslam2py.slam.system import System
+from orbslam2py.slam.front_end import PairMask
 
 _Array = TypeVar("_Array", npt.NDArray[np.uint8], npt.NDArray[np.generic])
 
@@ -121,28 +118,50 @@ def check_images(images: object, giver: str) -> None:
         )
 
 
-def track_images(
-    system: System, images: SomeImages, timestamp: float, *, details: bool = False
-) -> TrackingRecord:
-    """Track the images of one moment, by the call for the system's sensor.
+def arrays_of(
+    images: SomeImages | npt.NDArray[np.uint8] | Sequence[npt.NDArray[np.generic]],
+    sensor: Sensor,
+    timestamp: float,
+) -> tuple[npt.NDArray[np.uint8], npt.NDArray[Any] | None, PairMask | None]:
+    """Take the arrays that a sensor needs of the images of one moment.
+
+    Returns
+    -------
+    first, second, mask
+        The image; the right image or the depth, None for a single camera; the mask that came with
+        the images.
 
     Raises
     ------
     ImageError
-        If the image that the sensor needs beside the first is missing.
-    StateError, ImageError, WorkerError
-        As for `System.track_stereo`.
+        If the image that the sensor needs beside the first is missing, or one is too much.
     """
-    mask = images.mask
-    if system.sensor is Sensor.MONOCULAR:
-        return system.track_monocular(images.image, timestamp, mask=mask, details=details)
-    if system.sensor is Sensor.RGBD:
-        depth = _present(getattr(images, "depth", None), "depth image", timestamp)
-        return system.track_rgbd(images.image, depth, timestamp, mask=mask, details=details)
-    right = _present(getattr(images, "right", None), "right image", timestamp)
-    # The mask is the left image's; what it hides there needs no partner.
-    pair = None if mask is None else (mask, None)
-    return system.track_stereo(images.image, right, timestamp, mask=pair, details=details)
+    if hasattr(images, "image"):
+        some: Any = images
+        mask = getattr(some, "mask", None)
+        if sensor is Sensor.MONOCULAR:
+            return some.image, None, mask
+        if sensor is Sensor.RGBD:
+            return (
+                some.image,
+                _present(getattr(some, "depth", None), "depth image", timestamp),
+                mask,
+            )
+        right = _present(getattr(some, "right", None), "right image", timestamp)
+        # The mask is the left image's; what it hides there needs no partner.
+        return some.image, right, None if mask is None else (mask, None)
+    several: Any = images if isinstance(images, tuple | list) else (images,)
+    wanted = 1 if sensor is Sensor.MONOCULAR else 2
+    if len(several) != wanted:
+        needs = {
+            Sensor.MONOCULAR: "one image",
+            Sensor.STEREO: "the left and the right image",
+            Sensor.RGBD: "an image and its depth",
+        }[sensor]
+        raise ImageError(
+            f"the frame of {timestamp} s has {len(several)} images; sensor '{sensor}' needs {needs}"
+        )
+    return several[0], several[1] if wanted == 2 else None, None
 
 
 def _present(array: _Array | None, what: str, timestamp: float) -> _Array:

@@ -12,6 +12,9 @@ import math
 import threading
 from collections.abc import Callable
 from dataclasses import asdict
+from typing import Any
+
+import numpy.typing as npt
 
 from orbslam2py import _core as core
 from orbslam2py._arguments import is_finite, shown
@@ -142,6 +145,26 @@ class Pipeline:
     def feature_factor(self) -> int:
         """Features that a single camera's next image needs, in multiples of the settings'."""
         return self.tracking.feature_factor(localize=self.localization.on)
+
+    def build_frame(
+        self,
+        image: ByteArray,
+        second: npt.NDArray[Any] | None,
+        frame_id: int,
+        timestamp: float,
+        timer: StageTimer,
+        mask: Any,
+    ) -> core.Frame:
+        """Make a frame of the images of one moment; see `System.track`."""
+        front_end = self.front_end
+        if self._sensor is Sensor.STEREO:
+            assert second is not None
+            return front_end.stereo(image, second, frame_id, timestamp, timer, mask)
+        if self._sensor is Sensor.RGBD:
+            assert second is not None
+            return front_end.rgbd(image, second, frame_id, timestamp, timer, mask)
+        factor = self.feature_factor
+        return front_end.monocular(image, frame_id, timestamp, timer, mask, feature_factor=factor)
 
     def process(
         self, timestamp: float, build: BuildFrame, image: ByteArray, *, details: bool

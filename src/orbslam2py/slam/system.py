@@ -6,7 +6,7 @@ from __future__ import annotations
 import logging
 import threading
 import weakref
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -24,6 +24,7 @@ from orbslam2py._arguments import (
     shown,
 )
 from orbslam2py._call_guard import CallGuard
+from orbslam2py._timing import StageTimer
 from orbslam2py.errors import MapFileError, StateError, WorkerError
 from orbslam2py.maps.contents import MapContents
 from orbslam2py.maps.map_copies import take_contents
@@ -42,11 +43,11 @@ from orbslam2py.slam.back_end import abandon
 from orbslam2py.slam.config import Config
 from orbslam2py.slam.effort import Effort
 from orbslam2py.slam.events import Callbacks, LoopClosed, MapsMerged
-from orbslam2py.slam.frame_source import FrameSource, timed_images, track_images
+from orbslam2py.slam.frame_source import FrameSource, SomeImages, arrays_of, timed_images
 from orbslam2py.slam.front_end import Mask, PairMask
 from orbslam2py.slam.full_bundle_adjustment import FullAdjustmentRecord
 from orbslam2py.slam.options import Setup, SystemOptions
-from orbslam2py.slam.pipeline import BuildFrame, Pipeline
+from orbslam2py.slam.pipeline import Pipeline
 from orbslam2py.slam.records import MapSummary, TrackingRecord, TrackingState
 from orbslam2py.trajectory.trajectory import Trajectory
 
@@ -179,6 +180,60 @@ class System:
         )
 
     # ---- tracking --------------------------------------------------------------------------------
+    def track(
+        self,
+        images: SomeImages | npt.NDArray[np.uint8] | Sequence[npt.NDArray[np.generic]],
+        timestamp: float,
+        *,
+        mask: PairMask | None = None,
+        details: bool = False,
+    ) -> TrackingRecord:
+        """Track the images of one moment.
+
+        Parameters
+        ----------
+        images : array, sequence of two arrays, or images
+            One camera: the image. Stereo: left and right, rectified and synchronised. RGB-D: image
+            and registered depth. Or what a sequence loads, `orbslam2py.datasets.Images`.
+
+            Images are uint8 (h, w), (h, w, 3) or (h, w, 4), grey or colour (order by ``Camera.RGB``
+            of the settings). Depth is (h, w) of any kind of number: divided by ``DepthMapFactor``
+            it is metres. 0, negative, NaN, or hidden in a masked array: unknown.
+        timestamp : float
+            Seconds; must grow from call to call.
+        mask : array of uint8 (h, w), or two of them (left, right), optional
+            No keypoint lies where it is 0; one array serves both images of a pair.
+        details : bool
+            Also return the frame's keypoints and matches.
+
+        Returns
+        -------
+        TrackingRecord
+            State and, if it is OK, the pose of the left or only camera. With one camera the unit of
+            length is the median depth of the first view; until the map begins,
+            `TrackingRecord.reason` tells what it waits for.
+
+        Raises
+        ------
+        StateError
+            After shutdown, or while another call runs.
+        ImageError
+            For bad or missing images and for bad time stamps; the frame is not counted and nothing
+            has changed, but for a reset that had been asked for.
+        WorkerError
+            If a worker has failed; the original exception is its cause.
+        """
+        first, second, own_mask = arrays_of(images, self.sensor, timestamp)
+        chosen = own_mask if mask is None else mask
+
+        def build(frame_id: int, timer: StageTimer) -> core.Frame:
+            return self.pipeline.build_frame(first, second, frame_id, timestamp, timer, chosen)
+
+        with self._guard():
+            if self._shut_down:
+                raise StateError("the system has been shut down; make a new one")
+            return self.pipeline.process(timestamp, build, first, details=details)
+
     def track_stereo(
         self,
         left: npt.NDArray[np.uint8],
@@ -188,41 +243,15 @@ class System:
         mask: PairMask | None = None,
         details: bool = False,
     ) -> TrackingRecord:
-        """Track one rectified, synchronised stereo pair.
-
-        Parameters
-        ----------
-        left, right : array of uint8, (h, w) or (h, w, 3) or (h, w, 4)
-            Grey or colour (order by ``Camera.RGB`` of the settings), equal size.
-        timestamp : float
-            Seconds; must grow from call to call.
-        mask : array of uint8 (h, w), or two of them (left, right), optional
-            No keypoint lies where it is 0; one array serves both images.
-        details : bool
-            Also return the frame's keypoints and matches.
-
-        Returns
-        -------
-        TrackingRecord
-            State and, if it is OK, the pose of the left camera.
+        """Track one rectified, synchronised stereo pair: `track` of ``(left, right)``.
 
         Raises
         ------
         StateError
-            For another sensor, after shutdown, or while another call runs.
-        ImageError
-            For bad images or time stamps; the frame is not counted and nothing has changed, but
-            for a reset that had been asked for.
-        WorkerError
-            If a worker has failed; the original exception is its cause.
+            For another sensor as well.
         """
         self._require(Sensor.STEREO, "track_stereo")
-        return self._track(
-            timestamp,
-            left,
-            details,
-            lambda i, timer: self.pipeline.front_end.stereo(left, right, i, timestamp, timer, mask),
-        )
+        return self.track((left, right), timestamp, mask=mask, details=details)
 
     def track_rgbd(
         self,
@@ -233,39 +262,15 @@ class System:
         mask: Mask | None = None,
         details: bool = False,
     ) -> TrackingRecord:
-        """Track one image with registered depth.
-
-        Parameters
-        ----------
-        image : array of uint8, (h, w) or (h, w, 3) or (h, w, 4)
-            Grey or colour (order by ``Camera.RGB`` of the settings).
-        depth : array, (h, w)
-            Raw depth; divided by ``DepthMapFactor`` it is metres. 0, negative, NaN or hidden in a
-            masked array: unknown.
-        timestamp : float
-            Seconds; must grow from call to call.
-        mask : array of uint8 (h, w), optional
-            No keypoint lies where it is 0.
-        details : bool
-            Also return the frame's keypoints and matches.
-
-        Returns
-        -------
-        TrackingRecord
-            State and, if it is OK, the pose of the colour camera.
+        """Track one image with registered depth: `track` of ``(image, depth)``.
 
         Raises
         ------
-        StateError, ImageError, WorkerError
-            As for `track_stereo`.
+        StateError
+            For another sensor as well.
         """
         self._require(Sensor.RGBD, "track_rgbd")
-        return self._track(
-            timestamp,
-            image,
-            details,
-            lambda i, timer: self.pipeline.front_end.rgbd(image, depth, i, timestamp, timer, mask),
-        )
+        return self.track((image, depth), timestamp, mask=mask, details=details)
 
     def track_monocular(
         self,
@@ -275,45 +280,15 @@ class System:
         mask: Mask | None = None,
         details: bool = False,
     ) -> TrackingRecord:
-        """Track one image of a single camera.
-
-        Parameters
-        ----------
-        image : array of uint8, (h, w) or (h, w, 3) or (h, w, 4)
-            Grey or colour (order by ``Camera.RGB`` of the settings).
-        timestamp : float
-            Seconds; must grow from call to call.
-        mask : array of uint8 (h, w), optional
-            No keypoint lies where it is 0.
-        details : bool
-            Also return the frame's keypoints and matches.
-
-        Returns
-        -------
-        TrackingRecord
-            State and, if it is OK, the pose of the camera. The unit of length is the median depth
-            of the first view; until the map begins, `TrackingRecord.reason` tells what it waits
-            for.
+        """Track one image of a single camera: `track` of the image.
 
         Raises
         ------
-        StateError, ImageError, WorkerError
-            As for `track_stereo`.
+        StateError
+            For another sensor as well.
         """
         self._require(Sensor.MONOCULAR, "track_monocular")
-        return self._track(
-            timestamp,
-            image,
-            details,
-            lambda i, timer: self.pipeline.front_end.monocular(
-                image,
-                i,
-                timestamp,
-                timer,
-                mask,
-                feature_factor=self.pipeline.feature_factor,
-            ),
-        )
+        return self.track(image, timestamp, mask=mask, details=details)
 
     def run(self, source: FrameSource, *, details: bool = False) -> list[TrackingRecord]:
         """Track all images of a sequence, and wait until their keyframes have been processed.
@@ -345,7 +320,7 @@ class System:
             If a file is missing.
         """
         images_in_time = timed_images(source, self.sensor)
-        records = [track_images(self, images, t, details=details) for t, images in images_in_time]
+        records = [self.track(images, t, details=details) for t, images in images_in_time]
         self.wait_until_idle()
         return records
 
@@ -355,14 +330,6 @@ class System:
                 f"{call} needs a system built for sensor '{sensor.value}', "
                 f"this one is for '{self.sensor.value}'"
             )
-
-    def _track(
-        self, timestamp: float, image: npt.NDArray[np.uint8], details: bool, build: BuildFrame
-    ) -> TrackingRecord:
-        with self._guard():
-            if self._shut_down:
-                raise StateError("the system has been shut down; make a new one")
-            return self.pipeline.process(timestamp, build, image, details=details)
 
     # ---- control ---------------------------------------------------------------------------------
     @property

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -13,8 +13,14 @@ from orbslam2py import _core as core
 from orbslam2py._arrays import ByteArray, FloatArray, IntArray
 from orbslam2py.slam.records import FrameFeatures, TrackingRecord
 
-if TYPE_CHECKING:
-    from orbslam2py.slam.tracking import Tracking
+
+class Tracker(Protocol):
+    """What a watched frame asks of tracking."""
+
+    @property
+    def local_points(self) -> IntArray: ...  # noqa: D102
+    @property
+    def start_lines(self) -> FloatArray | None: ...  # noqa: D102
 
 
 class WatchedFrame:
@@ -32,7 +38,7 @@ class WatchedFrame:
         Keypoints and what they are matched with.
     inliers : array of bool, (n,), optional
         See `FrameFeatures.inliers`.
-    tracking : Tracking
+    tracking : Tracker
         The state machine, as the frame left it.
     """
 
@@ -42,7 +48,7 @@ class WatchedFrame:
         record: TrackingRecord,
         frame: core.TrackedFrame,
         inliers: npt.NDArray[np.bool_] | None,
-        tracking: Tracking,
+        tracking: Tracker,
     ) -> None:
         self.image = image
         self.record = record

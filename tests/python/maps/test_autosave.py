@@ -19,7 +19,7 @@ from typing import Any
 import pytest
 
 from orbslam2py import MapFileError, Sensor, System, WorkerError
-from orbslam2py.maps import MapContents, load_map, map_keeper, map_writer, verify_map_file
+from orbslam2py.maps import MapContents, load_map, map_autosave, map_writer, verify_map_file
 from orbslam2py.maps.map_autosave import MapAutosave
 from orbslam2py.maps.map_rows import all_rows
 from orbslam2py.maps.map_writer import MapWriter
@@ -83,15 +83,15 @@ def test_a_reset_in_the_moment_of_a_save(tmp_path: Path, monkeypatch: pytest.Mon
         small_sequences.play(slam, 30)
         slam.save_map(path)
         old = slam.map_contents()
-        take_changes = map_keeper.take_changes
+        take_changes = map_autosave.take_changes
 
         def reset_first(*arguments: Any) -> Any:
-            monkeypatch.setattr(map_keeper, "take_changes", take_changes)
+            monkeypatch.setattr(map_autosave, "take_changes", take_changes)
             slam.reset()
             small_sequences.play(slam, 6)
             return take_changes(*arguments)
 
-        monkeypatch.setattr(map_keeper, "take_changes", reset_first)
+        monkeypatch.setattr(map_autosave, "take_changes", reset_first)
         slam.save_map(path)
         new = slam.map_contents()
     assert_holds(path, old)
@@ -355,7 +355,7 @@ def test_images_of_keyframes_that_went_are_dropped_with_the_next_save(tmp_path: 
 def test_images_of_keyframes_that_went_are_dropped_without_a_save(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(map_keeper, "_FEW_IMAGES", 10)
+    monkeypatch.setattr(map_autosave, "_FEW_IMAGES", 10)
     with new_system(keyframe_images=True) as slam:
         small_sequences.play(slam, 20)
         alive = kept_images(slam)
@@ -428,7 +428,7 @@ def test_a_system_that_is_dropped_in_the_thread_that_saves(
     """What drops things that refer to each other runs in any thread; none waits for its own end."""
     path = tmp_path / "m.orbmap"
     small_sequences.play(system := new_system(), 5)
-    taken, dropped = map_keeper.take_changes, threading.Event()
+    taken, dropped = map_autosave.take_changes, threading.Event()
 
     def take_and_drop(*arguments: Any) -> Any:
         if threading.current_thread().name == "autosave" and not dropped.is_set():
@@ -436,7 +436,7 @@ def test_a_system_that_is_dropped_in_the_thread_that_saves(
             system._finalizer()
         return taken(*arguments)
 
-    monkeypatch.setattr(map_keeper, "take_changes", take_and_drop)
+    monkeypatch.setattr(map_autosave, "take_changes", take_and_drop)
     system.autosave(path, every=0.01)
     assert dropped.wait(10)
     eventually(lambda: not {"autosave", "abandon"} & {t.name for t in threading.enumerate()})

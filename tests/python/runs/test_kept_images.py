@@ -13,7 +13,7 @@ import pytest
 
 from orbslam2py import Sensor, TrackingState, run_sequence
 from orbslam2py.runs import RunOptions
-from orbslam2py.runs.report_page.kept_images import WIDTH, KeptImages, shrink
+from orbslam2py.runs.kept_images import WIDTH, KeptImages, shrink
 from orbslam2py.slam.records import Reason, TrackingRecord
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.cameras import Camera

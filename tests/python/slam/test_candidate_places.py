@@ -11,7 +11,12 @@ import pytest
 
 from orbslam2py import _core
 from orbslam2py.slam.config import RelocalizationConfig
-from orbslam2py.slam.relocalization import CandidatePlaces, LastKnownPose, candidates, place_of_loss
+from orbslam2py.slam.relocalization import (
+    CandidatePlaces,
+    LastKnownPose,
+    candidates,
+    last_known_pose,
+)
 
 LIMITS = RelocalizationConfig()
 FRAME: Any = SimpleNamespace()
@@ -61,7 +66,7 @@ class FakeCore:
 @pytest.fixture
 def fake(monkeypatch: pytest.MonkeyPatch) -> FakeCore:
     fake = FakeCore()
-    for module in (candidates, place_of_loss):
+    for module in (candidates, last_known_pose):
         monkeypatch.setattr(module, "core", fake)
     return fake
 

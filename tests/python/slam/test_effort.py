@@ -10,7 +10,6 @@ import pytest
 
 import orbslam2py as orb
 from orbslam2py.slam.effort import Effort
-from orbslam2py.slam.frame_source import track_images
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
 SENSORS = ("mono", "stereo", "rgbd")
@@ -30,7 +29,7 @@ def run(sensor: str, effort: Effort | str, *, noisy: bool = False, **options: bo
     sequence = corridor(sensor, noisy=noisy)
     with orb.System(sequence.settings, sensor, effort=effort, **options) as slam:  # type: ignore[arg-type]
         for frame in sequence:
-            track_images(slam, frame.images, frame.timestamp)
+            slam.track(frame.images, frame.timestamp)
         assert slam.wait_until_idle(20)
     return slam
 

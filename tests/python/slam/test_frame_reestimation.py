@@ -40,7 +40,7 @@ class Walk:
             self.system.track_rgbd(images.image, images.depth, i / 20)
             self.frames.append(self.system.pipeline.tracking.motion.last)
         self.map = self.system.pipeline.back_end.map
-        self.second_look = FrameReestimation(
+        self.reestimation = FrameReestimation(
             self.map,
             PoseSearch(
                 self.map,
@@ -84,10 +84,10 @@ def test_a_frame_in_doubt_is_found_where_it_was(walk: Walk) -> None:
     frame = walk.no_keyframe()
     aside = walk.put_aside(frame)
     assert way(aside, frame) > 0.1
-    found = walk.second_look(aside, in_doubt=True)
+    found = walk.reestimation(aside, in_doubt=True)
     assert way(found, frame) < 0.01
     assert way(aside, frame) > 0.1, "what was tracked stays as it is"
-    again = walk.second_look(aside, in_doubt=True)
+    again = walk.reestimation(aside, in_doubt=True)
     assert again.T_cw is not None and found.T_cw is not None
     np.testing.assert_array_equal(again.T_cw.matrix, found.T_cw.matrix)
 
@@ -97,7 +97,7 @@ def test_a_frame_that_holds_all_of_its_points_is_found_where_it_was(
     walk: Walk, in_doubt: bool
 ) -> None:
     frame = walk.no_keyframe()
-    found = walk.second_look(walk.put_aside(frame, every=1), in_doubt=in_doubt)
+    found = walk.reestimation(walk.put_aside(frame, every=1), in_doubt=in_doubt)
     assert way(found, frame) < 0.01
 
 
@@ -114,7 +114,7 @@ def test_a_look_that_does_not_show_clearly_more_is_not_followed(
 
     monkeypatch.setattr(LocalMapSearch, "rematch", remember)
     aside = walk.put_aside(walk.no_keyframe(), every=1)
-    assert way(walk.second_look(aside, in_doubt=True), aside) < 1e-9
+    assert way(walk.reestimation(aside, in_doubt=True), aside) < 1e-9
     assert way(began[0], aside) < 1e-9
 
 
@@ -125,13 +125,13 @@ def test_a_frame_that_sees_nothing_of_the_map_keeps_its_pose(walk: Walk) -> None
     behind = core.Pose(np.array([0.0, 1, 0, 0]), np.zeros(3))
     blind.T_cw = behind @ frame.T_cw
     core.anchor_frame(walk.map, blind, frame.reference_keyframe)
-    found = walk.second_look(blind, in_doubt=True)
+    found = walk.reestimation(blind, in_doubt=True)
     assert way(found, blind) < 1e-9
 
 
 def test_a_keyframe_keeps_its_pose(walk: Walk) -> None:
     first = walk.frames[0]
-    assert way(walk.second_look(first, in_doubt=True), first) < 1e-9
+    assert way(walk.reestimation(first, in_doubt=True), first) < 1e-9
 
 
 def test_only_those_in_doubt_are_looked_at_and_only_at_the_end(walk: Walk) -> None:
@@ -330,8 +330,8 @@ def test_only_the_last_look_is_matched_from_nothing(
 
     monkeypatch.setattr(LocalMapSearch, "rematch", note)
     frame = walk.no_keyframe()
-    walk.second_look(frame, finished=False)
+    walk.reestimation(frame, finished=False)
     assert looked == []
-    walk.second_look(frame)
-    walk.second_look(frame, in_doubt=True)
+    walk.reestimation(frame)
+    walk.reestimation(frame, in_doubt=True)
     assert looked == [(frame.id, False), (frame.id, True)]

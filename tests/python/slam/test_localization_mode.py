@@ -14,7 +14,6 @@ from orbslam2py import Sensor, System, TrackingRecord, TrackingState
 from orbslam2py import _core as core
 from orbslam2py._worker import PauseTicket
 from orbslam2py.evaluation import pose_error
-from orbslam2py.slam.frame_source import track_images
 from orbslam2py.slam.local_mapping import LocalMapping
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.small_sequences import black, images, new_system, play, track
@@ -152,7 +151,7 @@ def test_a_single_camera_takes_more_features_in_localization_mode() -> None:
     counts = []
     for seconds, mode in ((10.0, False), (10.1, True), (10.2, False)):
         world.system.localization_mode = mode
-        record = track_images(world.system, shown, seconds, details=True)
+        record = world.system.track(shown, seconds, details=True)
         assert record.features is not None
         counts.append(len(record.features.keypoints))
     assert 1.5 * counts[0] < counts[1] <= 2.02 * counts[0]

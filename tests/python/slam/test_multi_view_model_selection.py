@@ -15,7 +15,7 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py._timing import StageTimer
 from orbslam2py.slam.config import InitializationConfig
 from orbslam2py.slam.front_end import FrontEnd, intrinsics
-from orbslam2py.slam.initialization import several_views
+from orbslam2py.slam.initialization import multi_view_model_selection
 from orbslam2py.slam.initialization.initial_views import InitialViews, View
 from orbslam2py.slam.initialization.multi_view_model_selection import MultiViewModelSelection
 from orbslam2py.slam.initialization.third_view import (
@@ -176,7 +176,7 @@ def test_motions_that_are_not_told_apart_take_no_further_draws(
         draws.append(seed)
         return reconstruct(view, last, seed)
 
-    monkeypatch.setattr(several_views, "reconstruct", counted)
+    monkeypatch.setattr(multi_view_model_selection, "reconstruct", counted)
     assert wall.best_motion(*candidate.motions) is None
     assert not draws
     # Were they told apart, the draws would have their say, and be held to the same limit.

@@ -11,7 +11,6 @@ import pytest
 
 from orbslam2py import System, TrackingRecord, TrackingState, Trajectory
 from orbslam2py.evaluation import Alignment, evaluate_trajectory
-from orbslam2py.slam.frame_source import track_images
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
 pytestmark = pytest.mark.watchdog(120)
@@ -28,7 +27,7 @@ def sequence_of(
 
 
 def track(system: System, sequence: SyntheticSequence, indices: range) -> list[TrackingRecord]:
-    return [track_images(system, sequence.load(i), float(sequence.timestamps[i])) for i in indices]
+    return [system.track(sequence.load(i), float(sequence.timestamps[i])) for i in indices]
 
 
 def error_of(path: Trajectory, sequence: SyntheticSequence) -> float:

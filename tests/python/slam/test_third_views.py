@@ -11,7 +11,7 @@ import pytest
 
 from orbslam2py import _core as core
 from orbslam2py.slam.config import InitializationConfig
-from orbslam2py.slam.initialization import kept_views
+from orbslam2py.slam.initialization import initial_views
 from orbslam2py.slam.initialization.initial_views import Indices, InitialViews, View
 from orbslam2py.slam.initialization.third_view import Candidate, Motion, ThirdViews
 
@@ -161,7 +161,7 @@ class FakeCore:
 @pytest.fixture
 def matcher(monkeypatch: pytest.MonkeyPatch) -> FakeCore:
     fake = FakeCore()
-    monkeypatch.setattr(kept_views, "core", fake)
+    monkeypatch.setattr(initial_views, "core", fake)
     return fake
 
 

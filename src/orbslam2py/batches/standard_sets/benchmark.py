@@ -13,7 +13,8 @@ from orbslam2py._arguments import is_whole, path_of, shown
 from orbslam2py._files import atomic_write
 from orbslam2py.batches.batch import BatchResult, Progress, run_jobs
 from orbslam2py.batches.engine import Watch
-from orbslam2py.batches.jobs import Job, options_of
+from orbslam2py.batches.job import Job
+from orbslam2py.batches.jobs import options_of
 from orbslam2py.batches.results import Results
 from orbslam2py.batches.standard_sets.entries import Entry, entries_of
 from orbslam2py.batches.standard_sets.find import StandardSet, find_sequences

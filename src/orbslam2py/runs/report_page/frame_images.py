@@ -16,7 +16,7 @@ from orbslam2py._files import atomic_write, describe_error
 from orbslam2py.datasets.base import LiveSource, Sequence, Source
 from orbslam2py.errors import OrbSlamError
 from orbslam2py.runs.feeds import is_sequence
-from orbslam2py.runs.report_page.kept_images import SmallImage, shrink
+from orbslam2py.runs.kept_images import SmallImage, shrink
 from orbslam2py.runs.result import RunResult
 from orbslam2py.settings.settings import Settings
 from orbslam2py.trajectory.rotations import inverse_poses
