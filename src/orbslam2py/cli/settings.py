@@ -89,7 +89,7 @@ def new(
     with atomic_write(output) as stream:
         stream.write(settings.to_yaml())
     log_to(Console(stderr=True), quiet=quiet)
-    warn_of_doubts(settings, output, of_file=True)
+    warn_of_doubts(settings, output)
     console = Console(quiet=quiet, highlight=False, soft_wrap=True)
     _describe(console, settings)
     if sensor is Sensor.RGBD and depth_factor is None:
@@ -109,7 +109,7 @@ def check(choice: Choice, sensor: OfSensor = None) -> None:
     log_to(Console(stderr=True), quiet=False)
     chosen = read_choice(choice)
     settings = chosen.load(sensor or chosen.likely_sensor)
-    warn_of_doubts(settings, choice, of_file=False)  # of others it has warned
+    warn_of_doubts(settings, choice)
     console = Console(highlight=False, soft_wrap=True)
     _describe(console, settings)
     # What is asked for is loaded, as a run does it: it is complete for that, too.

@@ -161,6 +161,15 @@ class OrbSettings:
         raise_if_any(problems)
 
 
+#: Pixels of images that are large.
+_LARGE = 600_000
+
+
+def usual_n_features(width: int | None, height: int | None) -> int:
+    """Features per image: 1000, or 2000 above 0.6 megapixels; 1000 if the size is unknown."""
+    return 2000 if (width or 0) * (height or 0) > _LARGE else 1000
+
+
 def thresholds_swapped(min_th_fast: int, ini_th_fast: int) -> str:
     """Say that the second FAST threshold lies above the first."""
     return (
