@@ -65,7 +65,8 @@ def _doubts_of_depth(camera: CameraSettings, depth: DepthSettings | None) -> lis
     baseline = camera.bf / camera.fx
     if not _LEAST_BASELINE <= baseline <= _MOST_BASELINE:
         likely = (
-            "is the calibration in millimetres? Then all lengths become 1000 times too long"
+            "is the calibration in millimetres? Then all lengths become 1000 times too long; "
+            "divide its translation, or bf, by 1000"
             if baseline > _MOST_BASELINE
             else "bf is in pixel metres, the baseline in metres times fx"
         )

@@ -60,7 +60,7 @@ def refuse_other_lenses(entries: Mapping[str, Entry], path: Path, sensor: Sensor
             text = (
                 f"{key} is {entry.value}: the file is for {what}, and orbslam2py tracks images of "
                 "a pinhole camera; allowed: PinHole, Rectified, perspective. Make pinhole images "
-                "with the program that the file is from, and settings of theirs:\n"
+                "of them first (undistorted, or cut out), and settings of these:\n"
                 f"    {new_line(sensor)}"
             )
             raise SettingsError(Problem(entry.line, text).located(path))

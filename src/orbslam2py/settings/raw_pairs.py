@@ -87,7 +87,7 @@ def rectified_pair(
     K = cameras[0].matrix, cameras[1].matrix
     D = cameras[0].distortion, cameras[1].distortion
     pose_line = second[RELATIVE_POSE].line
-    T_right_left: FloatArray = np.linalg.inv(pose)
+    T_right_left = np.asarray(np.linalg.inv(pose), dtype=np.float64)
     try:
         rectification = rectification_of_pair(K, D, T_right_left, size)
     except (SettingsError, cv2.error) as error:
@@ -146,6 +146,31 @@ def stella_pair(
         return None
     numbers = {name: float(getattr(camera, name)) for name in _INTRINSICS}
     return RawPair(StereoRectification(*cameras), numbers | {"bf": bf})
+
+
+def stella_raw_camera(
+    given: Mapping[str, Entry], problems: list[Problem]
+) -> dict[str, float] | None:
+    """Read fx, fy, cx, cy and the distortion of the raw left camera of a ``StereoRectifier``."""
+    names = ("StereoRectifier.K_left", "StereoRectifier.D_left")
+    missing = [name for name in names if name not in given]
+    if missing:
+        line = min(entry.line for name, entry in given.items() if name in RECTIFIER_KEYS)
+        text = f"{', '.join(missing)} missing: images of one camera alone are not rectified"
+        problems.append(Problem(line, text))
+        return None
+    try:
+        K, D = _square(_numbers(given[names[0]]), "K_left"), _numbers(given[names[1]])
+    except ValueError as error:
+        problems.append(Problem(given[names[0]].line, str(error)))
+        return None
+    if D.size not in (4, 5, 8):
+        text = f"{names[1]} must have 4, 5 or 8 coefficients, not {D.size}"
+        problems.append(Problem(given[names[1]].line, text))
+        return None
+    intrinsics = (K[0, 0], K[1, 1], K[0, 2], K[1, 2])
+    values = dict(zip(_INTRINSICS, map(float, intrinsics), strict=True))
+    return values | dict(zip(DISTORTION_FIELDS, D.tolist(), strict=False))
 
 
 def _camera(

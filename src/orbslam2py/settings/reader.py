@@ -128,7 +128,7 @@ def groups_of_text(
             f"{path} holds no settings, not a line 'key: value'; make a file with "
             f"{new_line(sensor)}"
         )
-    _check_names(document, path, warn, allow_unknown=allow_unknown)
+    notes = _check_names(document, path, allow_unknown=allow_unknown)
     values = _read_values(document, sensor)
     missing = sum(" is missing; " in problem.text for problem in problems)
     rectification = _read_rectification(document) if sensor is Sensor.STEREO else None
@@ -143,6 +143,8 @@ def groups_of_text(
     if missing > 1:
         advice.append(f"A complete file is written by\n    {new_line(sensor)}")
     _raise_if_any(path, problems, advice)
+    for note in notes:
+        warn(note)
 
     return SettingsGroups(
         camera=CameraSettings(**values["camera"]),
@@ -185,10 +187,9 @@ def _refuse_camera_file(path: Path, text: str, sensor: Sensor) -> None:
         )
 
 
-def _check_names(
-    document: Document, path: Path, warn: Callable[[str], None], *, allow_unknown: bool
-) -> None:
-    unused = []
+def _check_names(document: Document, path: Path, *, allow_unknown: bool) -> list[str]:
+    """Find keys that must not be read past; what is to be said of the others."""
+    unused, notes = [], []
     for name, entry in document.entries.items():
         if schema.is_known(name):
             continue
@@ -196,12 +197,11 @@ def _check_names(
         if text is None:
             unused.append(entry)
         elif allow_unknown:
-            warn(Problem(entry.line, text).located(path))
+            notes.append(Problem(entry.line, text).located(path))
         else:
             document.problems.append(Problem(entry.line, text))
     note = unused_keys(unused)
-    if note is not None:
-        warn(f"{path}: {note}")
+    return notes if note is None else [*notes, f"{path}: {note}"]
 
 
 def _read_values(document: Translated, sensor: Sensor) -> dict[str, dict[str, Any]]:

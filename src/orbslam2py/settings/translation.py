@@ -16,6 +16,7 @@ from orbslam2py.settings.raw_pairs import (
     RawPair,
     rectified_pair,
     stella_pair,
+    stella_raw_camera,
 )
 from orbslam2py.settings.sensor import Sensor
 
@@ -99,6 +100,8 @@ def translate(document: Document, sensor: Sensor) -> Translated:
         _translate_baseline(result, given[_BASELINE], sensor)
     if sensor is Sensor.STEREO:
         _translate_pair(result, given)
+    elif any(name in RECTIFIER_KEYS for name in given):
+        _take_raw_camera(result, given)
     if "Camera.model" in given or any(name.startswith("Feature.") for name in given):
         _add_usual_features(result)
     return result
@@ -199,6 +202,18 @@ def _translate_pair(result: Translated, given: Mapping[str, Entry]) -> None:
     for name in LENS_NUMBERS:
         result.entries.pop(f"Camera.{name}", None)
     for name, value in pair.camera.items():
+        result.entries[f"Camera.{name}"] = Entry(f"Camera.{name}", line, repr(value))
+
+
+def _take_raw_camera(result: Translated, given: Mapping[str, Entry]) -> None:
+    """Take the raw left camera, whose images one camera alone delivers, for the rectified one."""
+    values = stella_raw_camera(given, result.problems)
+    if values is None:
+        return
+    for name in LENS_NUMBERS:
+        result.entries.pop(f"Camera.{name}", None)
+    line = given["StereoRectifier.K_left"].line
+    for name, value in values.items():
         result.entries[f"Camera.{name}"] = Entry(f"Camera.{name}", line, repr(value))
 
 

@@ -89,8 +89,9 @@ def _meant(name: str, *, of_camera: bool) -> str | None:
         return _most_alike(last, _in_group("camera"), _ALIKE_OF_CAMERA)
     if group and of_ours:
         return _most_alike(last, _in_group(group.lower()), _ALIKE)
-    whole = {ours.lower(): ours for ours in _OURS}
-    return _most_alike(name, whole, _ALIKE)
+    groups = {group: group for group in _OUR_GROUPS}
+    nearest_group = _most_alike(group, groups, _ALIKE)
+    return None if nearest_group is None else _most_alike(last, _in_group(nearest_group), _ALIKE)
 
 
 def _in_group(group: str) -> dict[str, str]:
