@@ -33,8 +33,7 @@ WHAT_HELPS = "orbslam2py settings new --sensor"
 class Case:
     """A wrong file, what is said, and the file when the message has been followed.
 
-    Without `right` the message asks for other images: there is no such file. With `next` the file
-    that follows is refused for the next reason.
+    Without `right` the message asks for other images, or for numbers that the file does not have.
     """
 
     text: str
@@ -42,7 +41,6 @@ class Case:
     right: Callable[[str], str] | None = None
     check: Callable[[Settings], bool] | None = None
     sensor: str = "mono"
-    next: str = ""
 
 
 def without(pattern: str) -> Callable[[str], str]:
