@@ -16,6 +16,10 @@ import numpy as np
 from orbslam2py._arrays import FloatArray
 
 
+#: Largest square of a radius on the plane at distance 1 that matters.
+_FARTHEST = 1e4
+
+
 def on_image_plane(points: FloatArray, distortion: FloatArray | None) -> FloatArray:
     """Project points onto the plane at distance 1 before the camera.
 
@@ -95,6 +99,8 @@ def _radial_polynomials(distortion: FloatArray) -> tuple[FloatArray, FloatArray]
 
 
 def _positive_roots(polynomial: FloatArray) -> FloatArray:
-    roots = np.roots(polynomial)
+    # What changes nothing within 89 degrees of the axis would overflow where it is divided by.
+    power = np.arange(len(polynomial))[::-1]
+    roots = np.roots(np.where(np.abs(polynomial) * _FARTHEST**power < 1e-12, 0.0, polynomial))
     real = (np.abs(roots.imag) < 1e-9 * np.abs(roots)) & (roots.real > 0)
     return np.asarray(roots.real[real], dtype=np.float64)

@@ -143,6 +143,12 @@ def groups_of_text(
     if missing > 1:
         advice.append(f"A complete file is written by\n    {new_line(sensor)}")
     _raise_if_any(path, problems, advice)
+    if sensor is not Sensor.STEREO and "LEFT.K" in document.entries:
+        notes.append(
+            f"{path}: LEFT.* and RIGHT.* are for stereo and not used for {sensor}: Camera.* must "
+            "describe the images as they come, so for raw images it must have the numbers of "
+            "LEFT.K and LEFT.D"
+        )
     for note in notes:
         warn(note)
 

@@ -156,7 +156,7 @@ class Settings:
     def load(
         cls, path: str | PathLike[str], sensor: Sensor | str, *, allow_unknown: bool = False
     ) -> Settings:
-        """Read an ORB-SLAM settings file, or take built-in settings by name.
+        """Read a settings file of ORB-SLAM2, 3 or stella_vslam, or take built-in ones by name.
 
         Logs the `doubts` of a file as warnings.
 

@@ -17,6 +17,7 @@ from orbslam2py.settings.opencv_yaml import Entry, parse_number
 
 #: Groups of keys that describe a camera or how two of them stand.
 _CAMERA_GROUP = re.compile(r"(camera|cam)\d*|left|right|stereo|rgbd|stereorectifier", re.IGNORECASE)
+_ONE_OF_SEVERAL = re.compile(r".*\d|left|right", re.IGNORECASE)
 #: Names in groups of their own that describe one all the same.
 _CAMERA_WORD = re.compile(
     r"[fc][xy]|k\d|p\d|bf|baseline|[KDRP]|T_?c\d\w*|Tlr|T_?(lr|rl|cn_cnm1|left_right|right_left)"
@@ -79,6 +80,8 @@ def unused_keys(entries: Iterable[Entry]) -> str | None:
 
 def _meant(name: str, *, of_camera: bool) -> str | None:
     group, _, last = name.rpartition(".")
+    if _ONE_OF_SEVERAL.fullmatch(group):
+        return None  # our name would be that of the first camera
     if _plain(last) == "baseline":
         return "Stereo.b"
     of_ours = group.lower() in _OUR_GROUPS  # also without a group

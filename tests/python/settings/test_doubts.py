@@ -73,6 +73,7 @@ def test_a_lens_that_folds_the_image_over(values: dict[str, float], pixels: int)
             "fx": 160,
             "fy": 160,
         },
+        {"k4": 1e-300, "k5": 1e-310, "k6": 1e-300},
         {"k1": -0.12},  # folds over, but beyond the corners
     ],
 )

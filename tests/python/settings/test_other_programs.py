@@ -12,7 +12,7 @@ import pytest
 from orbslam2py.settings import CameraSettings, OrbSettings, Sensor, Settings
 from orbslam2py.settings.check import read_choice
 from support import other_settings as texts
-from support.settings_files import DEPTH, MONO, write
+from support.settings_files import DEPTH, MATRIX, MONO, write
 
 DISTORTION = [-0.28, 0.07, 0.0002, 0.0001]
 
@@ -99,6 +99,20 @@ def test_keys_of_older_versions_and_forks(tmp_path: Path, caplog: pytest.LogCapt
     (warning,) = caplog.messages
     assert "InsertKFsWhenLost, Viewer.on, PointCloudMapping.*, LoopClosing.*" in warning
     assert "sensor_processor/type, loopClosing and 1 more" in warning
+
+
+def test_a_fourth_coefficient_of_0_beside_tangential_ones_is_no_fisheye(tmp_path: Path) -> None:
+    more = {"Camera.k1": "0.1", "Camera.p1": "0", "Camera.p2": "0", "Camera.k4": "0.0"}
+    path = write(tmp_path / "a.yaml", {**MONO, **more})
+    assert Settings.load(path, Sensor.MONOCULAR).camera.distortion.tolist() == [0.1, 0, 0, 0]
+
+
+def test_a_rectification_is_not_used_for_one_camera(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    pair = MATRIX + MATRIX.replace("LEFT", "RIGHT")
+    Settings.load(write(tmp_path / "a.yaml", MONO, pair), Sensor.MONOCULAR)
+    assert "it must have the numbers of LEFT.K and LEFT.D" in caplog.text
 
 
 def test_stella_vslam(tmp_path: Path) -> None:

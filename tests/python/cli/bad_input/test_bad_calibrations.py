@@ -111,7 +111,8 @@ CASES = {
         lambda settings: settings.camera.k1 == -0.28,
     ),
     "distortion of a third camera": Case(
-        OURS + "Camera3.k1: -0.28\n", ("unknown key Camera3.k1; did you mean Camera.k1?",)
+        OURS + "Camera3.k1: -0.28\n",
+        ("unknown key Camera3.k1, which by its name describes the camera",),
     ),
     "baseline": Case(
         OURS.replace("Camera.fx: 517.3", "Camera.fx: 500") + "ThDepth: 40\nbaseline: 0.12\n",
