@@ -15,7 +15,6 @@ import numpy as np
 
 from orbslam2py._arrays import FloatArray
 
-
 #: Largest square of a radius on the plane at distance 1 that matters.
 _FARTHEST = 1e4
 
