@@ -178,7 +178,6 @@ def _translate_pair(result: Translated, given: Mapping[str, Entry]) -> None:
     second = {name: entry for name, entry in given.items() if name in _SECOND_CAMERA}
     if not second:
         return
-    n_problems = len(result.problems)
     line = min(entry.line for entry in second.values())
     pair: RawPair | None
     if any(name.startswith("LEFT.") or name.startswith("RIGHT.") for name in given):
@@ -195,8 +194,7 @@ def _translate_pair(result: Translated, given: Mapping[str, Entry]) -> None:
     else:
         pair = rectified_pair(result.entries, second, result.problems)
     if pair is None:
-        if len(result.problems) > n_problems:
-            result.unreadable.add("Camera.bf")
+        result.unreadable.add("Camera.bf")
         return
     result.rectification = pair.rectification
     for name in LENS_NUMBERS:

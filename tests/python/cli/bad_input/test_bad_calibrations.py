@@ -215,6 +215,15 @@ CASES = {
         ),
         "stereo",
     ),
+    "first camera that is no camera": Case(
+        PAIR.replace("Camera1.fy: 459.5", "Camera1.fy: wide"),
+        ("Error: a.yaml:9: Camera1.fy: 'wide' is not a number; allowed: greater than 0",),
+        instead("wide", "459.5"),
+        lambda settings: (
+            settings.rectification is not None and settings.rectification.left.K[1, 1] == 459.5
+        ),
+        "stereo",
+    ),
     "pose the other way": Case(
         PAIR.replace(texts.pose_text(texts.T_C1_C2), T_INVERSE),
         ("does not put camera 2 to the right of camera 1", "take the inverse"),
