@@ -20,7 +20,7 @@ _CAMERA_GROUP = re.compile(r"(camera|cam)\d*|left|right|stereo|rgbd|stereorectif
 _ONE_OF_SEVERAL = re.compile(r".*\d|left|right", re.IGNORECASE)
 #: Names in groups of their own that describe one all the same.
 _CAMERA_WORD = re.compile(
-    r"[fc][xy]|k\d|p\d|bf|baseline|[KDRP]|T_?c\d\w*|Tlr|T_?(lr|rl|cn_cnm1|left_right|right_left)"
+    r"[fc][xy]|k\d|p\d|bf|baseline|(?-i:[KDRP])|T_?c\d\w*|Tlr|T_?(lr|rl|cn_cnm1|left_right|right_left)"
     r"|cameras?\d*|(camera_?)?(intrinsics|matrix)|dist(ortion)?(_?(coeffs?|coefficients|model))?",
     re.IGNORECASE,
 )
