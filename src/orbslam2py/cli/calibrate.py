@@ -174,7 +174,7 @@ def import_camera(
     )
     settings.save(output)
     log_to(Console(stderr=True), quiet=quiet)
-    warn_of_doubts(settings, output, of_file=True)
+    warn_of_doubts(settings, output)
     console = Console(quiet=quiet, highlight=False, soft_wrap=True)
     for line in settings.describe():
         console.print(line, markup=False)

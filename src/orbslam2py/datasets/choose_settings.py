@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from orbslam2py.errors import DatasetError
-from orbslam2py.settings import Sensor, Settings, builtin_settings
+from orbslam2py.settings import Sensor, Settings, builtin_settings, resolve_settings
 
 #: What a caller may give: settings, a file, a built-in name, or None to let the folder decide.
 SettingsChoice = Settings | str | Path | None
@@ -51,7 +51,7 @@ def choose_settings(
     for folder in folders:
         path = folder / _SETTINGS_FILE
         if path.is_file():
-            return Settings.load(path, sensor)
+            return resolve_settings(path, sensor)
     settings = from_calibration()
     if settings is not None:
         return settings

@@ -22,6 +22,7 @@ from orbslam2py.settings.settings import (
     looks_like_path,
     resolve_settings,
 )
+from orbslam2py.settings.translation import translate
 
 _log = logging.getLogger(__name__)
 
@@ -52,7 +53,7 @@ class ChosenSettings:
         """What they were made for, as the keys of a file tell."""
         if self.text is None:
             return builtin_sensors(self.choice)[0]
-        keys = scan(self.text).entries
+        keys = translate(scan(self.text), Sensor.MONOCULAR).entries
         if "DepthMapFactor" in keys:
             return Sensor.RGBD
         return Sensor.STEREO if {"Camera.bf", "ThDepth"} & set(keys) else Sensor.MONOCULAR
@@ -98,7 +99,7 @@ def doubts_of_size(settings: Settings) -> list[str]:
     return found or ([] if _is_published(settings) else _misfits("", settings))
 
 
-def warn_of_doubts(settings: Settings, source: str | PathLike[str], *, of_file: bool) -> None:
+def warn_of_doubts(settings: Settings, source: str | PathLike[str]) -> None:
     """Log what is allowed, but probably a mistake.
 
     Parameters
@@ -107,12 +108,8 @@ def warn_of_doubts(settings: Settings, source: str | PathLike[str], *, of_file: 
         The settings.
     source
         Where they are from, or where they were written, for the messages.
-    of_file
-        Also what is told whenever a file of these settings is read.
     """
-    if of_file:
-        Settings.from_yaml(settings.to_yaml(), settings.sensor, source=str(source))
-    for doubt in doubts_of_size(settings):
+    for doubt in (*settings.doubts(), *doubts_of_size(settings)):
         _log.warning("%s: %s", source, doubt)
 
 

@@ -7,9 +7,16 @@ from dataclasses import replace
 
 from orbslam2py._arguments import finite_number, shown
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings.groups import CameraSettings, DepthSettings, OrbSettings
+from orbslam2py.settings.groups import (
+    CameraSettings,
+    DepthSettings,
+    OrbSettings,
+    usual_n_features,
+)
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
+
+__all__ = ["settings_for_camera", "usual_n_features"]
 
 #: Of the pair that an RGB-D camera counts as, though it has none [m]: as in the files for TUM.
 USUAL_BASELINE = 0.075
@@ -17,12 +24,6 @@ USUAL_BASELINE = 0.075
 USUAL_CLOSE_FACTOR = 40.0
 #: Raw units per metre: millimetres.
 USUAL_DEPTH_FACTOR = 1000.0
-_LARGE = 600_000
-
-
-def usual_n_features(width: int | None, height: int | None) -> int:
-    """Features per image: 1000, or 2000 above 0.6 megapixels; 1000 if the size is unknown."""
-    return 2000 if (width or 0) * (height or 0) > _LARGE else 1000
 
 
 def settings_for_camera(

@@ -105,6 +105,9 @@ KEYS: tuple[Key, ...] = (
     Key("Camera.p1", "camera", "p1", float, _COEFFICIENT),
     Key("Camera.p2", "camera", "p2", float, _COEFFICIENT),
     Key("Camera.k3", "camera", "k3", float, _COEFFICIENT),
+    Key("Camera.k4", "camera", "k4", float, _COEFFICIENT),
+    Key("Camera.k5", "camera", "k5", float, _COEFFICIENT),
+    Key("Camera.k6", "camera", "k6", float, _COEFFICIENT),
     Key("Camera.width", "camera", "width", int, _SIZE),
     Key("Camera.height", "camera", "height", int, _SIZE),
     Key("Camera.fps", "camera", "fps", float, _above_zero(1e5, "Hz")),
@@ -179,33 +182,12 @@ RECTIFICATION_KEYS: tuple[str, ...] = tuple(
     for name in ("K", "D", "R", "P", "width", "height")
 )
 
-# Keys of ORB-SLAM3 files (and of the live camera examples) that we read past. Its `Camera.type`
-# is looked at: another lens than a pinhole would give wrong results silently.
-CAMERA_TYPE_KEY = "Camera.type"
-_IGNORED = frozenset(
-    {
-        CAMERA_TYPE_KEY,
-        "Camera.k4",
-        "Camera.newWidth",
-        "Camera.newHeight",
-        "Camera.imageScale",
-        "Camera.lappingBegin",
-        "Camera.lappingEnd",
-        "Viewer.imageViewScale",
-        "loopClosing",
-        "thFarPoints",
-        "Tbc",
-        "Tlr",
-    }
-)
-_IGNORED_PREFIXES = ("Camera1.", "Camera2.", "File.", "IMU.", "RGBD.", "Stereo.", "System.")
-
-_KNOWN = frozenset(key.name for key in KEYS) | frozenset(RECTIFICATION_KEYS) | _IGNORED
+_NAMES = (*(key.name for key in KEYS), *RECTIFICATION_KEYS)
 
 
 def is_known(name: str) -> bool:
-    """Whether a settings file may hold this key."""
-    return name in _KNOWN or name.startswith(_IGNORED_PREFIXES)
+    """Whether a key is one of ours."""
+    return name in _NAMES
 
 
 #: What others call a key, without the signs between words.
@@ -221,13 +203,21 @@ _OTHER_NAMES = {
 } | {key.name.rpartition(".")[2].lower(): key.name for key in KEYS}
 
 
-def nearest_key(name: str) -> str | None:
-    """Find the key that was meant: ``fx`` is ``Camera.fx``; None if nothing comes close."""
+def nearest_key(name: str, *, spelling: bool = True) -> str | None:
+    """Find the key that was meant: ``fx`` is ``Camera.fx``; None if nothing comes close.
+
+    Parameters
+    ----------
+    name
+        As somebody wrote it.
+    spelling
+        Also take what is only spelt alike.
+    """
     plain = name.rpartition(".")[2].replace("_", "").replace("-", "").lower()
-    return _OTHER_NAMES.get(plain) or nearest(name)
+    return _OTHER_NAMES.get(plain) or (nearest(name, _NAMES) if spelling else None)
 
 
-def nearest(name: str, candidates: Iterable[str] = _KNOWN) -> str | None:
+def nearest(name: str, candidates: Iterable[str]) -> str | None:
     """Find the candidate spelt most alike, whatever the case; None if nothing comes close."""
     by_lower = {candidate.lower(): candidate for candidate in sorted(candidates)}
     matches = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=0.6)

@@ -17,7 +17,8 @@ import numpy as np
 
 from orbslam2py._arrays import FloatArray
 
-_KEY = re.compile(r"^(?P<key>[A-Za-z_][\w.\-]*)\s*:(?P<value>.*)$")
+_KEY = re.compile(r"^(?P<key>[A-Za-z_][\w./\-]*)\s*:(?P<value>.*)$")
+_ITEM = re.compile(r"^-(\s|$)")
 _NUMBER = re.compile(r"^[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?$")
 _NOT_FINITE = re.compile(r"^[+-]?\.?(nan|inf|infinity)$", re.IGNORECASE)
 
@@ -145,6 +146,35 @@ def read_matrix(entry: Entry) -> FloatArray:
         raise ValueError(f"{entry.key}: {error}") from None
 
 
+def flat(document: Document) -> dict[str, Entry]:
+    """Name nested entries by their path (``Camera.fx``), as files without blocks do.
+
+    Matrices stay as they are. Entries that are given both ways are added to the problems of the
+    document.
+    """
+    found: dict[str, Entry] = {}
+    _flatten(document.entries, "", found, document.problems)
+    return found
+
+
+def _flatten(
+    entries: Mapping[str, Entry], above: str, found: dict[str, Entry], problems: list[Problem]
+) -> None:
+    for entry in entries.values():
+        name = above + entry.key
+        if isinstance(entry.value, Mapping) and "data" not in entry.value:
+            _flatten(entry.value, f"{name}.", found, problems)
+        elif name in found:
+            problems.append(
+                Problem(
+                    entry.line,
+                    f"{name} is given twice (first on line {found[name].line}); keep one",
+                )
+            )
+        else:
+            found[name] = Entry(name, entry.line, entry.value)
+
+
 def _content_lines(text: str) -> list[_Line]:
     lines = []
     for number, raw in enumerate(text.lstrip("\ufeff").splitlines(), start=1):
@@ -205,6 +235,15 @@ def _scan_block(
 def _scan_nested(
     key: str, line: _Line, lines: list[_Line], position: int, problems: list[Problem]
 ) -> tuple[Entry, int]:
+    items: list[str] = []
+    while position < len(lines) and lines[position].indent >= line.indent:
+        text = lines[position].text
+        if not _ITEM.match(text) and (not items or lines[position].indent == line.indent):
+            break
+        items.append(_unquoted(text.removeprefix("-").strip()))
+        position += 1
+    if items:
+        return Entry(key, line.number, tuple(items)), position
     if position < len(lines) and lines[position].indent > line.indent:
         nested, position = _scan_block(lines, position, lines[position].indent, problems)
         return Entry(key, line.number, nested), position

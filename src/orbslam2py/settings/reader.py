@@ -9,10 +9,9 @@ from __future__ import annotations
 import logging
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from orbslam2py._arguments import cannot_open
 from orbslam2py.errors import SettingsError
@@ -33,20 +32,22 @@ from orbslam2py.settings.groups import (
     ViewerSettings,
     thresholds_swapped,
 )
+from orbslam2py.settings.lens_model import refuse_other_lenses
 from orbslam2py.settings.opencv_yaml import (
     Document,
     Entry,
     Problem,
+    flat,
     read_matrix,
     read_number,
     scan,
 )
 from orbslam2py.settings.sensor import Sensor
+from orbslam2py.settings.translation import Translated, is_translated, translate
+from orbslam2py.settings.unknown_keys import problem_of_unknown_key, unused_keys
 
 _log = logging.getLogger(__name__)
 _MOST_PROBLEMS = 30
-#: Baselines of pairs, also of those that a depth camera counts as, beyond which one is doubted [m].
-_LEAST_BASELINE, _MOST_BASELINE = 1e-3, 10.0
 
 
 #: What text files do not hold: control characters.
@@ -85,7 +86,7 @@ def read_groups(
 ) -> SettingsGroups:
     """Read a settings file for a sensor.
 
-    What is allowed but probably a mistake is a warning.
+    What is allowed but probably a mistake is not looked at here: see `Settings.doubts`.
 
     Parameters
     ----------
@@ -116,17 +117,18 @@ def groups_of_text(
     warn: Callable[[str], None] = _log.warning,
 ) -> SettingsGroups:
     """Read the text of a settings file; the path says where it is from. See `read_groups`."""
-    document = scan(text)
-    if not any(map(schema.is_known, document.entries)):
+    document = translate(scan(text), sensor)
+    given = flat(scan(text))
+    if not any(schema.is_known(name) or is_translated(name) for name in given):
         _refuse_camera_file(path, text, sensor)
+    refuse_other_lenses(given, path, sensor)
     problems = document.problems
     if not document.entries:
         raise SettingsError(
             f"{path} holds no settings, not a line 'key: value'; make a file with "
             f"{new_line(sensor)}"
         )
-    _check_names(document, path, warn if allow_unknown else None)
-    _check_camera_type(document)
+    notes = _check_names(document, path, allow_unknown=allow_unknown)
     values = _read_values(document, sensor)
     missing = sum(" is missing; " in problem.text for problem in problems)
     rectification = _read_rectification(document) if sensor is Sensor.STEREO else None
@@ -141,17 +143,22 @@ def groups_of_text(
     if missing > 1:
         advice.append(f"A complete file is written by\n    {new_line(sensor)}")
     _raise_if_any(path, problems, advice)
+    if sensor is not Sensor.STEREO and "LEFT.K" in document.entries:
+        notes.append(
+            f"{path}: LEFT.* and RIGHT.* are for stereo and not used for {sensor}: Camera.* must "
+            "describe the images as they come, so for raw images it must have the numbers of "
+            "LEFT.K and LEFT.D"
+        )
+    for note in notes:
+        warn(note)
 
-    groups = SettingsGroups(
+    return SettingsGroups(
         camera=CameraSettings(**values["camera"]),
         orb=OrbSettings(**values["orb"]),
         depth=DepthSettings(**values["depth"]) if sensor.has_depth else None,
         rectification=rectification,
         viewer=ViewerSettings(**values["viewer"]),
     )
-    for warning in _doubts(sensor, groups):
-        warn(f"{path}: {warning}")
-    return groups
 
 
 def _served_by(document: Document) -> list[Sensor]:
@@ -186,28 +193,24 @@ def _refuse_camera_file(path: Path, text: str, sensor: Sensor) -> None:
         )
 
 
-def _check_names(document: Document, path: Path, warn: Callable[[str], None] | None) -> None:
-    for entry in document.entries.values():
-        if schema.is_known(entry.key):
+def _check_names(document: Document, path: Path, *, allow_unknown: bool) -> list[str]:
+    """Find keys that must not be read past; what is to be said of the others."""
+    unused, notes = [], []
+    for name, entry in document.entries.items():
+        if schema.is_known(name):
             continue
-        nearest = schema.nearest_key(entry.key)
-        advice = f"did you mean {nearest}?" if nearest else "remove it or allow unknown keys"
-        problem = Problem(entry.line, f"unknown key {entry.key}; {advice}")
-        if warn is not None:
-            warn(problem.located(path))
+        text = problem_of_unknown_key(entry)
+        if text is None:
+            unused.append(entry)
+        elif allow_unknown:
+            notes.append(Problem(entry.line, text).located(path))
         else:
-            document.problems.append(problem)
+            document.problems.append(Problem(entry.line, text))
+    note = unused_keys(unused)
+    return notes if note is None else [*notes, f"{path}: {note}"]
 
 
-def _check_camera_type(document: Document) -> None:
-    entry = document.entries.get(schema.CAMERA_TYPE_KEY)
-    if entry is not None and str(entry.value).lower() not in ("pinhole", "rectified"):
-        document.problems.append(
-            Problem(entry.line, f"{entry.key} is {entry.value}; allowed: PinHole, Rectified")
-        )
-
-
-def _read_values(document: Document, sensor: Sensor) -> dict[str, dict[str, Any]]:
+def _read_values(document: Translated, sensor: Sensor) -> dict[str, dict[str, Any]]:
     """Read the checked values of the scalar keys by group and field."""
     values: dict[str, dict[str, Any]] = {key.group: {} for key in schema.KEYS}
     for key in schema.KEYS:
@@ -215,14 +218,15 @@ def _read_values(document: Document, sensor: Sensor) -> dict[str, dict[str, Any]
             continue
         entry = document.entries.get(key.name)
         if entry is None:
-            if key.required:
-                document.problems.append(_missing(document, key, sensor))
+            if key.required and key.name not in document.unreadable:
+                document.problems.append(_missing(key, sensor))
             continue
         try:
             number = _number(key, entry)
             # ORB-SLAM's files may say 0 for "unknown rate".
             if not (key.name == "Camera.fps" and number == 0):
-                values[key.group][key.field] = schema.convert(key, number)
+                named = replace(key, name=entry.key)
+                values[key.group][key.field] = schema.convert(named, number)
         except ValueError as error:
             document.problems.append(Problem(entry.line, str(error)))
     orb = values["orb"]
@@ -233,12 +237,8 @@ def _read_values(document: Document, sensor: Sensor) -> dict[str, dict[str, Any]
     return values
 
 
-def _missing(document: Document, key: schema.Key, sensor: Sensor) -> Problem:
-    text = f"{key.name} is missing; {sensor} needs it: {key.allowed}"
-    successor = key.name.replace("Camera.", "Camera1.")
-    if successor != key.name and successor in document.entries:
-        text += f" (rename {successor}, the name of ORB-SLAM3)"
-    return Problem(None, text)
+def _missing(key: schema.Key, sensor: Sensor) -> Problem:
+    return Problem(None, f"{key.name} is missing; {sensor} needs it: {key.allowed}")
 
 
 def _number(key: schema.Key, entry: Entry) -> float:
@@ -248,7 +248,9 @@ def _number(key: schema.Key, entry: Entry) -> float:
         raise ValueError(f"{error}; allowed: {key.allowed}") from None
 
 
-def _read_rectification(document: Document) -> StereoRectification | None:
+def _read_rectification(document: Translated) -> StereoRectification | None:
+    if document.rectification is not None:
+        return document.rectification
     present = [name for name in schema.RECTIFICATION_KEYS if name in document.entries]
     if not present:
         return None
@@ -286,41 +288,3 @@ def _read_camera_rectification(document: Document, side: str) -> CameraRectifica
     except SettingsError as error:
         document.problems.append(Problem(first_line, f"{side}: {error}"))
         return None
-
-
-def _doubts(sensor: Sensor, groups: SettingsGroups) -> list[str]:
-    """Say what is allowed but probably a mistake."""
-    camera, orb, rectification = groups["camera"], groups["orb"], groups["rectification"]
-    found = []
-    if camera.width is not None and not 0 <= camera.cx < camera.width:
-        found.append(f"Camera.cx {camera.cx:g} lies outside the image ({camera.width} wide)")
-    if camera.height is not None and not 0 <= camera.cy < camera.height:
-        found.append(f"Camera.cy {camera.cy:g} lies outside the image ({camera.height} high)")
-    if orb.n_features < 200:
-        found.append(f"ORBextractor.nFeatures {orb.n_features} is very few")
-    if sensor is Sensor.STEREO and camera.is_distorted:
-        found.append("stereo input must be rectified; distortion must be zero")
-    if sensor.has_depth:
-        found += _doubts_of_depth(camera, groups["depth"])
-    if rectification is not None:
-        P = rectification.left.P
-        expected = np.array([P[0, 0], P[1, 1], P[0, 2], P[1, 2]])
-        given = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
-        if np.abs(expected - given).max() > 1e-3:
-            found.append("Camera.fx, fy, cx, cy differ from LEFT.P")
-        if abs(camera.bf + rectification.right.P[0, 3]) > 1e-3:
-            found.append("Camera.bf differs from -RIGHT.P[0,3]")
-    return found
-
-
-def _doubts_of_depth(camera: CameraSettings, depth: DepthSettings | None) -> list[str]:
-    found = []
-    baseline = camera.bf / camera.fx
-    if not _LEAST_BASELINE <= baseline <= _MOST_BASELINE:
-        found.append(
-            f"Camera.bf {camera.bf:g} by Camera.fx is a baseline of {baseline:.3g} m; bf is in "
-            "pixel metres"
-        )
-    if depth is not None and depth.close_factor < 1:
-        found.append(f"ThDepth {depth.close_factor:g} is very little; it counts baselines")
-    return found

@@ -8,6 +8,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from dataclasses import dataclass, field, replace
 from os import PathLike
@@ -18,7 +19,9 @@ from orbslam2py._arguments import path_of, shown
 from orbslam2py._files import atomic_write
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings.builtin import BUILTIN_NAMES, builtin_file, is_builtin_name
+from orbslam2py.settings.doubts import find_doubts
 from orbslam2py.settings.groups import (
+    DISTORTION_FIELDS,
     CameraSettings,
     DepthSettings,
     OrbSettings,
@@ -30,6 +33,8 @@ from orbslam2py.settings.groups import (
 from orbslam2py.settings.reader import groups_of_text, read_groups
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.writer import format_settings
+
+_log = logging.getLogger(__name__)
 
 _GROUPS = {
     "camera": CameraSettings,
@@ -134,6 +139,10 @@ class Settings:
             return 1.0
         return self.depth.raw_per_metre
 
+    def doubts(self) -> list[str]:
+        """Say what is allowed but probably a mistake, such as a baseline in millimetres."""
+        return find_doubts(self.sensor, self._groups())
+
     def check_for(self, sensor: Sensor | str) -> None:
         """Raise `SettingsError` unless these settings were made for the sensor."""
         sensor = Sensor(sensor)
@@ -147,7 +156,9 @@ class Settings:
     def load(
         cls, path: str | PathLike[str], sensor: Sensor | str, *, allow_unknown: bool = False
     ) -> Settings:
-        """Read an ORB-SLAM settings file, or take built-in settings by name.
+        """Read a settings file of ORB-SLAM2, 3 or stella_vslam, or take built-in ones by name.
+
+        Logs the `doubts` of a file as warnings.
 
         Parameters
         ----------
@@ -164,7 +175,11 @@ class Settings:
         SettingsError
             Listing everything that is wrong: file, line, key, allowed values, nearest key.
         """
-        return resolve_settings(path, sensor, allow_unknown=allow_unknown)
+        settings = resolve_settings(path, sensor, allow_unknown=allow_unknown)
+        if not is_builtin_name(str(path)):
+            for doubt in settings.doubts():
+                _log.warning("%s: %s", path, doubt)
+        return settings
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write an ORB-SLAM settings file that `load` turns into equal settings.
@@ -184,14 +199,16 @@ class Settings:
 
     def to_yaml(self) -> str:
         """Return the text of the settings file that `save` writes."""
-        groups = SettingsGroups(
+        return format_settings(self.sensor, self._groups())
+
+    def _groups(self) -> SettingsGroups:
+        return SettingsGroups(
             camera=self.camera,
             orb=self.orb,
             depth=self.depth,
             rectification=self.rectification,
             viewer=self.viewer,
         )
-        return format_settings(self.sensor, groups)
 
     @classmethod
     def from_yaml(cls, text: str, sensor: Sensor | str, *, source: str = "settings") -> Settings:
@@ -209,7 +226,7 @@ class Settings:
         Raises
         ------
         SettingsError
-            As for `load`.
+            As for `load`; doubts are not logged.
         """
         sensor = Sensor(sensor)
         groups = groups_of_text(text, Path(source), sensor, allow_unknown=False)
@@ -218,13 +235,13 @@ class Settings:
     def describe(self) -> list[str]:
         """Say line by line what a log should hold about these settings."""
         camera, orb = self.camera, self.orb
-        distortion = ", ".join(f"{value:g}" for value in camera.distortion)
+        distortion = camera.distortion
+        names = ", ".join(DISTORTION_FIELDS[: len(distortion)])
+        values = ", ".join(f"{value:g}" for value in distortion)
         lines = [
             f"camera ({self.sensor}): fx {camera.fx:g}, fy {camera.fy:g}, cx {camera.cx:g}, "
             f"cy {camera.cy:g}, {camera.fps:g} fps, colour order {'RGB' if camera.rgb else 'BGR'}",
-            f"distortion (k1, k2, p1, p2[, k3]): {distortion}"
-            if camera.is_distorted
-            else "no distortion",
+            f"distortion ({names}): {values}" if camera.is_distorted else "no distortion",
             f"ORB: {orb.n_features} features, {orb.n_levels} levels, factor {orb.scale_factor:g}, "
             f"FAST thresholds {orb.ini_th_fast} and {orb.min_th_fast}"
             + (", coordinates of the original" if orb.original_coordinates else ""),
@@ -263,6 +280,8 @@ def resolve_settings(
     choice: str | PathLike[str] | Settings, sensor: Sensor | str, *, allow_unknown: bool = False
 ) -> Settings:
     """Make settings of what a user gave: a built-in name, a file, or finished settings.
+
+    Their doubts are not logged: the system that is made with them does.
 
     A name of built-in settings wins over a file of that name; anything else that looks like a
     path (it exists, has a suffix or a folder) is read as a file.

@@ -171,6 +171,8 @@ class System:
         )
         setup = Setup.of(settings, sensor, vocabulary, load_map, initial_pose, allow_other_setup)
         self.sensor, self.settings, self.vocabulary = setup.sensor, setup.settings, setup.vocabulary
+        for doubt in self.settings.doubts():
+            _log.warning("%s", doubt)
         self.pipeline = Pipeline(setup, self.options, Callbacks.of(callbacks))
         self._guard = CallGuard("tracking")
         self._shut_down = False

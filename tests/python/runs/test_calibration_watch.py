@@ -230,7 +230,7 @@ def test_doubts_about_the_file_beside_the_images_are_told_once(
     path = folder / "settings.yaml"
     path.write_text(path.read_text().replace("nFeatures: 1000", "nFeatures: 150"))
     finished = run_sequence(orb.open_sequence(folder, "mono"))
-    assert finished.report["warnings"] == []
+    assert finished.report["warnings"] == ["ORBextractor.nFeatures 150 is very few"]
     assert sum("is very few" in record.getMessage() for record in caplog.records) == 1
 
 

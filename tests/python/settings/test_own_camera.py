@@ -95,7 +95,6 @@ def test_a_pair_must_be_rectified() -> None:
         ("image_height", "Camera.height"),
         ("fps", "Camera.fps"),
         ("bf", "Camera.bf"),
-        ("baseline", "Camera.bf"),
         ("k1", "Camera.k1"),
         ("rgb", "Camera.RGB"),
         ("nFeatures", "ORBextractor.nFeatures"),
@@ -108,6 +107,18 @@ def test_a_pair_must_be_rectified() -> None:
 def test_short_names_are_understood(tmp_path: Path, key: str, meant: str) -> None:
     path = write(tmp_path / "a.yaml", MONO, f"{key}: 1\n")
     assert refusal(path) == f"{path}:13: unknown key {key}; did you mean {meant}?"
+
+
+@pytest.mark.parametrize("key", ["baseline", "Camera.baseline"])
+def test_a_baseline_in_metres_gets_the_name_that_counts_metres(tmp_path: Path, key: str) -> None:
+    path = write(tmp_path / "a.yaml", MONO, f"{key}: 1\n")
+    told = f"{path}:13: unknown key {key}; did you mean Stereo.b (the baseline in metres)?"
+    assert refusal(path) == told
+
+
+def test_metres_per_unit_become_units_per_metre(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.yaml", MONO, "depth_scale: 0.001\n")
+    assert "did you mean DepthMapFactor: 1000 (units per metre)?" in refusal(path)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What settings allow, but is probably a mistake, wherever their numbers are from."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from orbslam2py._arrays import FloatArray
+from orbslam2py.settings.groups import CameraSettings, DepthSettings, SettingsGroups
+from orbslam2py.settings.projection import distorted, largest_radius
+from orbslam2py.settings.sensor import Sensor
+
+#: Baselines of pairs, also of those that a depth camera counts as, beyond which one is doubted [m].
+_LEAST_BASELINE, _MOST_BASELINE = 1e-4, 10.0
+#: Most tangential distortion. Lenses have up to some 0.005.
+_MOST_TANGENTIAL = 0.015
+_INTRINSICS = ((0, 0), (1, 1), (0, 2), (1, 2))
+
+
+def find_doubts(sensor: Sensor, groups: SettingsGroups) -> list[str]:
+    """Say what is allowed but probably a mistake, one sentence each.
+
+    Parameters
+    ----------
+    sensor
+        What the settings are for.
+    groups
+        The settings.
+    """
+    camera, orb = groups["camera"], groups["orb"]
+    found = []
+    if camera.width is not None and not 0 <= camera.cx < camera.width:
+        found.append(f"Camera.cx {camera.cx:g} lies outside the image ({camera.width} wide)")
+    if camera.height is not None and not 0 <= camera.cy < camera.height:
+        found.append(f"Camera.cy {camera.cy:g} lies outside the image ({camera.height} high)")
+    if orb.n_features < 200:
+        found.append(f"ORBextractor.nFeatures {orb.n_features} is very few")
+    if sensor is Sensor.STEREO and camera.is_distorted:
+        found.append("stereo input must be rectified; distortion must be zero")
+    size = camera.width, camera.height
+    found += _doubts_of_lens("Camera", camera.matrix, camera.distortion, size)
+    if sensor.has_depth:
+        found += _doubts_of_depth(camera, groups["depth"])
+    return found + _doubts_of_rectification(groups)
+
+
+def _doubts_of_rectification(groups: SettingsGroups) -> list[str]:
+    camera, rectification = groups["camera"], groups["rectification"]
+    if rectification is None:
+        return []
+    found = []
+    expected = np.array([rectification.left.P[place] for place in _INTRINSICS])
+    given = np.array([camera.matrix[place] for place in _INTRINSICS])
+    if np.abs(expected - given).max() > 1e-3:
+        found.append("Camera.fx, fy, cx, cy differ from LEFT.P")
+    if abs(camera.bf + rectification.right.P[0, 3]) > 1e-3:
+        found.append("Camera.bf differs from -RIGHT.P[0,3]")
+    for name, raw in (("LEFT", rectification.left), ("RIGHT", rectification.right)):
+        found += _doubts_of_lens(name, raw.K, raw.D, (raw.width, raw.height))
+    return found
+
+
+def _doubts_of_depth(camera: CameraSettings, depth: DepthSettings | None) -> list[str]:
+    found = []
+    baseline = camera.bf / camera.fx
+    if not _LEAST_BASELINE <= baseline <= _MOST_BASELINE:
+        likely = (
+            "is the calibration in millimetres? Then all lengths become 1000 times too long; "
+            "divide its translation, or bf, by 1000"
+            if baseline > _MOST_BASELINE
+            else "bf is in pixel metres, the baseline in metres times fx"
+        )
+        found.append(
+            f"Camera.bf {camera.bf:g} by Camera.fx is a baseline of {baseline:.3g} m, usual are "
+            f"0.1 mm to 10 m; {likely}"
+        )
+    if depth is not None and depth.close_factor < 1:
+        found.append(f"ThDepth {depth.close_factor:g} is very little; it counts baselines")
+    return found
+
+
+def _doubts_of_lens(
+    name: str, K: FloatArray, D: FloatArray, size: tuple[int | None, int | None]
+) -> list[str]:
+    """Judge a distortion; an image of unknown size is taken to be twice the principal point."""
+    found = []
+    p1, p2 = D[2:4]
+    if max(abs(p1), abs(p2)) > _MOST_TANGENTIAL:
+        found.append(
+            f"{name}: the tangential distortion p1 {p1:g}, p2 {p2:g} is more than any lens has "
+            f"(at most some {_MOST_TANGENTIAL:g}): are these k3, k4 of a fisheye lens, or "
+            "coefficients in another order than OpenCV's k1, k2, p1, p2, k3?"
+        )
+    fx, fy, cx, cy = (float(K[place]) for place in _INTRINSICS)
+    fold = _fold_of(D)
+    width, height = size[0] or 2 * cx, size[1] or 2 * cy
+    corner = np.hypot(max(cx, width - 1 - cx) / fx, max(cy, height - 1 - cy) / fy)
+    if fold < corner:
+        found.append(
+            f"{name}: the radial distortion folds the image over: from {fold * fx:.0f} pixels "
+            f"beside the principal point on it draws what is farther outside farther inside, and "
+            f"the image reaches to {corner * fx:.0f}; look at order, signs and size of the "
+            "coefficients (OpenCV's k1, k2, p1, p2, k3), or calibrate with views that reach into "
+            "the corners"
+        )
+    return found
+
+
+def _fold_of(D: FloatArray) -> float:
+    """Largest distance from the centre to which a lens draws, on the plane at distance 1."""
+    radius = largest_radius(D)
+    if not np.isfinite(radius):
+        return float("inf")
+    radial = np.array(D, dtype=np.float64)
+    radial[2:4] = 0
+    # A pole is not reached, and before it the distance grows without limit.
+    with np.errstate(all="ignore"):
+        return float(distorted(np.array([[radius * (1 - 1e-6), 0.0]]), radial)[0, 0])

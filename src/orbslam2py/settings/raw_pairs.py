@@ -1,0 +1,238 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Raw stereo pairs as ORB-SLAM3 and stella_vslam describe them, and their rectification."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from orbslam2py._arrays import FloatArray
+from orbslam2py.errors import SettingsError
+from orbslam2py.settings.groups import (
+    DISTORTION_FIELDS,
+    CameraRectification,
+    CameraSettings,
+    StereoRectification,
+)
+from orbslam2py.settings.opencv_yaml import Entry, Problem, parse_number, read_matrix, read_number
+from orbslam2py.settings.rectify import rectification_of_pair
+
+_INTRINSICS = ("fx", "fy", "cx", "cy")
+#: Numbers that describe one camera, after ``Camera1.`` or ``Camera2.``.
+LENS_NUMBERS = (*_INTRINSICS, *DISTORTION_FIELDS)
+#: Camera 2 to camera 1, in metres.
+RELATIVE_POSE = "Stereo.T_c1_c2"
+RECTIFIER_KEYS = tuple(
+    f"StereoRectifier.{name}_{side}" for side in ("left", "right") for name in "KDR"
+)
+
+
+@dataclass(frozen=True)
+class RawPair:
+    """How a raw pair is rectified, and what the rectified cameras are.
+
+    Attributes
+    ----------
+    rectification
+        Of both cameras.
+    camera
+        fx, fy, cx, cy [pixels] and bf [pixel metres] of the rectified images.
+    """
+
+    rectification: StereoRectification
+    camera: dict[str, float]
+
+
+def rectified_pair(
+    entries: Mapping[str, Entry], second: Mapping[str, Entry], problems: list[Problem]
+) -> RawPair | None:
+    """Find the rectification of a pair with its pose, as ORB-SLAM3 1.0 tells it.
+
+    Parameters
+    ----------
+    entries
+        Those of the file by our names: the first camera and the size of the images.
+    second
+        ``Camera2.*`` and ``Stereo.T_c1_c2``.
+    problems
+        Takes what is wrong, except with the first camera, which is read elsewhere.
+
+    Returns
+    -------
+    RawPair or None
+        None if something is wrong.
+    """
+    line = min(entry.line for entry in second.values())
+    wanted = (*(f"Camera2.{name}" for name in _INTRINSICS), RELATIVE_POSE)
+    missing = [name for name in wanted if name not in second]
+    missing += [name for name in ("Camera.width", "Camera.height") if name not in entries]
+    if missing:
+        text = (
+            f"{', '.join(missing)} missing: a raw pair needs Camera1.* and Camera2.* with fx, fy, "
+            f"cx, cy, Camera.width, Camera.height and {RELATIVE_POSE} (camera 2 to camera 1, in "
+            "metres)"
+        )
+        problems.append(Problem(line, text))
+        return None
+    first_camera = _camera(entries, "Camera", [])
+    second_camera = _camera(second, "Camera2", problems)
+    pose = _pose(second[RELATIVE_POSE], problems)
+    size = _size(entries)
+    if first_camera is None or second_camera is None or pose is None or size is None:
+        return None
+    cameras = first_camera, second_camera
+    K = cameras[0].matrix, cameras[1].matrix
+    D = cameras[0].distortion, cameras[1].distortion
+    pose_line = second[RELATIVE_POSE].line
+    T_right_left = np.asarray(np.linalg.inv(pose), dtype=np.float64)
+    try:
+        rectification = rectification_of_pair(K, D, T_right_left, size)
+    except (SettingsError, cv2.error) as error:
+        text = f"{RELATIVE_POSE} and the two cameras cannot be rectified: {error}"
+        problems.append(Problem(pose_line, text))
+        return None
+    P, P_right = rectification.left.P, rectification.right.P
+    bf = -float(P_right[0, 3])
+    if bf <= 0 or abs(float(P_right[1, 3])) > 1e-3 * bf:
+        text = (
+            f"{RELATIVE_POSE} does not put camera 2 to the right of camera 1 (its translation is "
+            f"{', '.join(f'{value:g}' for value in pose[:3, 3])}); it must map points of camera 2 "
+            "into camera 1: take the inverse, if it maps from camera 1 to camera 2"
+        )
+        problems.append(Problem(pose_line, text))
+        return None
+    numbers = [P[0, 0], P[1, 1], P[0, 2], P[1, 2]]
+    camera = dict(zip(_INTRINSICS, map(float, numbers), strict=True))
+    return RawPair(rectification, camera | {"bf": bf})
+
+
+def stella_pair(
+    entries: Mapping[str, Entry], given: Mapping[str, Entry], problems: list[Problem]
+) -> RawPair | None:
+    """Read the rectification that stella_vslam's ``StereoRectifier`` tells; see `rectified_pair`.
+
+    The first camera is the rectified one there.
+    """
+    line = min(entry.line for entry in given.values())
+    missing = [name for name in RECTIFIER_KEYS if name not in given]
+    missing += [
+        f"Camera.{name}" for name in ("width", "height", "bf") if f"Camera.{name}" not in entries
+    ]
+    if missing:
+        text = f"{', '.join(missing)} missing: the rectification of a pair needs them all"
+        problems.append(Problem(line, text))
+        return None
+    camera = _camera(entries, "Camera", [])
+    size = _size(entries)
+    bf = _read(entries["Camera.bf"], [])
+    if camera is None or size is None or bf is None:
+        return None  # told where these are read
+    cameras = []
+    for side, shift in (("left", 0.0), ("right", -bf)):
+        try:
+            K, D, R = (_numbers(given[f"StereoRectifier.{name}_{side}"]) for name in "KDR")
+            P = np.column_stack([camera.matrix, [shift, 0.0, 0.0]])
+            cameras.append(
+                CameraRectification(
+                    K=_square(K, "K"), D=D, R=_square(R, "R"), P=P, width=size[0], height=size[1]
+                )
+            )
+        except (SettingsError, ValueError) as error:
+            problems.append(Problem(given[f"StereoRectifier.K_{side}"].line, f"{side}: {error}"))
+    if len(cameras) < 2:
+        return None
+    numbers = {name: float(getattr(camera, name)) for name in _INTRINSICS}
+    return RawPair(StereoRectification(*cameras), numbers | {"bf": bf})
+
+
+def stella_raw_camera(
+    given: Mapping[str, Entry], problems: list[Problem]
+) -> dict[str, float] | None:
+    """Read fx, fy, cx, cy and the distortion of the raw left camera of a ``StereoRectifier``."""
+    names = ("StereoRectifier.K_left", "StereoRectifier.D_left")
+    missing = [name for name in names if name not in given]
+    if missing:
+        line = min(entry.line for name, entry in given.items() if name in RECTIFIER_KEYS)
+        text = f"{', '.join(missing)} missing: images of one camera alone are not rectified"
+        problems.append(Problem(line, text))
+        return None
+    try:
+        K, D = _square(_numbers(given[names[0]]), "K_left"), _numbers(given[names[1]])
+    except ValueError as error:
+        problems.append(Problem(given[names[0]].line, str(error)))
+        return None
+    if D.size not in (4, 5, 8):
+        text = f"{names[1]} must have 4, 5 or 8 coefficients, not {D.size}"
+        problems.append(Problem(given[names[1]].line, text))
+        return None
+    intrinsics = (K[0, 0], K[1, 1], K[0, 2], K[1, 2])
+    values = dict(zip(_INTRINSICS, map(float, intrinsics), strict=True))
+    return values | dict(zip(DISTORTION_FIELDS, D.tolist(), strict=False))
+
+
+def _camera(
+    entries: Mapping[str, Entry], prefix: str, problems: list[Problem]
+) -> CameraSettings | None:
+    values: dict[str, float] = {}
+    for name in LENS_NUMBERS:
+        entry = entries.get(f"{prefix}.{name}")
+        number = None if entry is None else _read(entry, problems)
+        if number is not None:
+            values[name] = number
+        elif entry is not None or name in _INTRINSICS:
+            return None
+    try:
+        return CameraSettings(**values)  # type: ignore[arg-type]
+    except SettingsError as error:
+        line = entries[f"{prefix}.fx"].line
+        problems.append(Problem(line, str(error).replace("Camera.", f"{prefix}.")))
+        return None
+
+
+def _read(entry: Entry, problems: list[Problem]) -> float | None:
+    try:
+        return read_number(entry)
+    except ValueError as error:
+        problems.append(Problem(entry.line, str(error)))
+        return None
+
+
+def _size(entries: Mapping[str, Entry]) -> tuple[int, int] | None:
+    sides = [_read(entries[name], []) for name in ("Camera.width", "Camera.height")]
+    whole = [int(side) for side in sides if side is not None and side >= 1 and side.is_integer()]
+    return (whole[0], whole[1]) if len(whole) == 2 else None
+
+
+def _pose(entry: Entry, problems: list[Problem]) -> FloatArray | None:
+    try:
+        T = read_matrix(entry)
+    except ValueError as error:
+        problems.append(Problem(entry.line, str(error)))
+        return None
+    rigid = T.shape == (4, 4) and np.abs(T[:3, :3] @ T[:3, :3].T - np.eye(3)).max() < 1e-3
+    if not rigid or np.linalg.det(T[:3, :3]) < 0 or np.abs(T[3] - (0, 0, 0, 1)).max() > 1e-6:
+        text = (
+            f"{entry.key} is no rigid transform: give 4 x 4 numbers, a rotation and a translation "
+            "in metres, with the last row 0, 0, 0, 1"
+        )
+        problems.append(Problem(entry.line, text))
+        return None
+    return T
+
+
+def _numbers(entry: Entry) -> FloatArray:
+    if not isinstance(entry.value, tuple):
+        raise ValueError(f"{entry.key} must be a list [...]")
+    try:
+        return np.array([parse_number(item) for item in entry.value])
+    except ValueError as error:
+        raise ValueError(f"{entry.key}: {error}") from None
+
+
+def _square(values: FloatArray, name: str) -> FloatArray:
+    if values.size != 9:
+        raise ValueError(f"{name} must have 9 numbers, not {values.size}")
+    return values.reshape(3, 3)
