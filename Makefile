@@ -39,7 +39,7 @@ python:
 
 # Made anew where it does not work: Python was upgraded, the checkout was moved.
 $(VENV)/pyvenv.cfg: always | python packages-package
-	@$(PYTHON) scripts/make_venv.py $(VENV)
+	@$(PYTHON) scripts/make_venv.py $(VENV) $(if $(filter-out file,$(origin PYTHON)),--this-python)
 
 $(VENV)/.%-requirements: pyproject.toml $(VENV)/pyvenv.cfg
 	@$(BIN)/python scripts/install_requirements.py $*
@@ -75,9 +75,8 @@ test-demo: | packages-bare-tree
 	@$(PYTHON) scripts/test_demo.py || [ $$? -eq 77 ] # 77: not possible here
 
 # ---- tests ---------------------------------------------------------------------------------------
-# All packages at once: each of these installs its own if it is called alone.
-test: | packages-package+cpp-tests+lint+docs+browser
-test: lint test-cpp test-python types stubs docs
+# All packages at once; each of the others installs its own if it is called alone.
+test: packages-package+cpp-tests+lint+docs+browser lint test-cpp test-python types stubs docs
 	@echo "All tests passed."
 
 test-cpp: | packages-package+cpp-tests

@@ -32,15 +32,18 @@ def start() -> None:
     parser.add_argument("--jobs", type=int, help="sources compiled at the same time")
     count = parser.parse_args().jobs or jobs()
     pip = [sys.executable, "-m", "pip", "install", "--verbose", "--disable-pip-version-check"]
-    options = ["--no-build-isolation", "--no-deps", "-C", "build-dir=build/python"]
-    options += ["-C", "editable.mode=redirect", "-C", "cmake.define.ORBSLAM2PY_WERROR=ON"]
+    options = ["--no-build-isolation", "--no-deps"]
     environment = {
+        # Of scikit-build-core; as options of pip they need pip 23.1, which Debian 12 does not have.
+        "SKBUILD_BUILD_DIR": "build/python",
+        "SKBUILD_EDITABLE_MODE": "redirect",
+        "SKBUILD_CMAKE_DEFINE": "ORBSLAM2PY_WERROR=ON",
         # The name that CMake gives the compiler elsewhere: the compiler cache tells names apart.
         "CXX": os.environ.get("CXX") or "c++",
         "CMAKE_BUILD_PARALLEL_LEVEL": str(count),
     }
     build = Step([*pip, *options, "-e", "."], LOGS / "build.log", ninja_position, environment)
-    run("Compiling the package", build, pip_step("demo"))
+    run("Compiling the package", build, pip_step("demo")._replace(name="Python packages"))
 
 
 if __name__ == "__main__":

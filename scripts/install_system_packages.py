@@ -102,8 +102,8 @@ def apt_get(display: Display, prefix: list[str], *arguments: str) -> int:
         waits = f"waits for {holder}, which uses the package manager"
         if holder != said:
             display.show(waits)
-        display.update(waits)
         said = holder
+        display.update(waits)
         time.sleep(TRY_AGAIN)
 
 

@@ -32,8 +32,8 @@ def check_python() -> None:
         )
 
 
-def fault(folder: Path) -> str | None:
-    """Say what is wrong with a virtual environment; None if it works."""
+def fault(folder: Path, wanted: str | None = None) -> str | None:
+    """Say what is wrong with a virtual environment; None if it works and has the wanted version."""
     try:
         command = [str(folder / "bin/python"), "-c", QUESTION]
         answer = subprocess.run(command, capture_output=True, check=True, text=True)
@@ -44,6 +44,8 @@ def fault(folder: Path) -> str | None:
     made_for = _version_of_settings((folder / "pyvenv.cfg").read_text())
     if made_for != version:
         return f"was made for Python {made_for}, and its Python is {version} now"
+    if wanted is not None and version != wanted:
+        return f"has Python {version}, and you named Python {wanted}"
     if tuple(map(int, version.split("."))) < OLDEST_PYTHON:
         return f"was made with Python {version}, which is too old"
     interpreter = Path(pip.partition("\n")[0][2:].strip())
@@ -81,6 +83,7 @@ def start() -> None:
     parser = argparse.ArgumentParser(description="Make the virtual environment of the checkout.")
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only-check-python", action="store_true")
+    parser.add_argument("--this-python", action="store_true", help="no other version will do")
     arguments = parser.parse_args()
     check_python()
     if arguments.only_check_python:
@@ -92,7 +95,8 @@ def start() -> None:
                 f"{folder} is not a virtual environment: it has no pyvenv.cfg. "
                 "It is left as it is. Move it away, then try again."
             )
-        wrong = fault(folder)
+        this = ".".join(map(str, sys.version_info[:2]))
+        wrong = fault(folder, this if arguments.this_python else None)
         if wrong is None:
             return
         print(

@@ -69,6 +69,7 @@ class Step(NamedTuple):
     log: Path
     position: Callable[[str], str | None]
     environment: dict[str, str] | None = None
+    name: str = ""  # where it is one of several
 
 
 class FailedError(Exception):
@@ -80,6 +81,7 @@ class Display:
 
     def __init__(self, doing: str) -> None:
         self.doing = doing
+        self.position = ""
         self.began = self.said = time.monotonic()
         self.moves = sys.stdout.isatty()
         self.show("...")
@@ -93,7 +95,8 @@ class Display:
         print(f"{beginning}{self.doing}{separator}{position}", end=ending, flush=True)
 
     def update(self, position: str) -> None:
-        """Write if it is time."""
+        """Write if it is time; an empty position is that of before."""
+        position = self.position = position or self.position
         if self.moves or time.monotonic() - self.said >= QUIET_SECONDS:
             passed = f"{self.seconds()} s"
             self.show(f"{position}, {passed}" if position else passed)
@@ -138,7 +141,8 @@ def follow(display: Display, *steps: Step) -> list[int]:
             running = [process.poll() is None for process in processes]
             for index, step in enumerate(steps):
                 read[index], found = _newest(step, read[index])
-                positions[index] = found or positions[index]
+                if found:
+                    positions[index] = f"{step.name} {found}".strip()
             if not any(running):
                 return [process.returncode for process in processes]
             shown = [positions[i] for i, runs in enumerate(running) if runs and positions[i]]

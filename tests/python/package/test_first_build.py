@@ -126,6 +126,16 @@ def test_the_demo_installs_no_package_for_developers(scripts: ModuleType) -> Non
     assert purposes == ["build"]
 
 
+def test_the_tests_install_all_they_need_at_once_and_first() -> None:
+    dry = subprocess.run(
+        ["make", "-n", "-B", "test"], cwd=CHECKOUT, capture_output=True, text=True, check=True
+    )
+    installed = re.findall(r"install_system_packages\.sh (.*)", dry.stdout)
+    assert set(installed[0].split()) == {section for call in installed for section in call.split()}
+    assert set(installed[0].split()) == {"package", "cpp-tests", "lint", "docs", "browser"}
+    assert "install_requirements.py developer" in dry.stdout
+
+
 def test_the_demo_installs_what_it_imports_and_the_viewer(scripts: ModuleType) -> None:
     pyproject = scripts.install_requirements.tomllib.loads(
         (CHECKOUT / "pyproject.toml").read_text()
@@ -400,8 +410,8 @@ def test_fewer_sources_at_once_where_memory_is_short(
 # ---- the virtual environment ---------------------------------------------------------------------
 
 
-def make_venv(scripts: ModuleType, folder: Path) -> int:
-    sys.argv[1:] = [str(folder)]
+def make_venv(scripts: ModuleType, folder: Path, *options: str) -> int:
+    sys.argv[1:] = [str(folder), *options]
     try:
         scripts.steps.main(scripts.make_venv.start)
     except SystemExit as end:
@@ -448,6 +458,23 @@ def test_an_environment_of_another_python_is_made_anew(
     said = capsys.readouterr().out
     assert "was made for Python 3.2" in said
     assert "installed again" in said
+
+
+def test_a_python_that_is_named_is_taken(
+    scripts: ModuleType,
+    environment: Path,
+    remade: list[Path],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert make_venv(scripts, environment, "--this-python") == 0
+    assert remade == []
+    monkeypatch.setattr(sys, "version_info", (3, 77, 0))
+    assert make_venv(scripts, environment) == 0
+    assert remade == []
+    assert make_venv(scripts, environment, "--this-python") == 0
+    assert remade == [environment]
+    assert "you named Python 3.77" in capsys.readouterr().out
 
 
 def test_an_environment_of_a_moved_checkout_is_made_anew(
