@@ -6,6 +6,7 @@ Runs with the system's Python, which may be older than the package allows.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import subprocess
@@ -151,7 +152,8 @@ def follow(display: Display, *steps: Step) -> list[int]:
     except BaseException:  # an interrupt reaches the commands as well: let them end
         display.leave()
         for process in processes:
-            process.terminate()
+            with contextlib.suppress(PermissionError):  # sudo's; it was interrupted itself
+                process.terminate()
             process.wait()
         raise
 
