@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 JOBS ?= $(shell nproc)
 
 .PHONY: demo test bench lint types stubs docs format sanitize stress fuzz-maps tidy wheel test-wheel compare-wheel test-arm \
-  install clean test-cpp test-python help
+  test-demo install developer python clean test-cpp test-python help always
 
 help:
 	@echo "make demo      install what is needed, run the demonstration"
@@ -16,6 +16,7 @@ help:
 	@echo "make sanitize  C++ tests under the address, undefined-behaviour and thread sanitizers"
 	@echo "make stress    ten minutes of all threads at random under the thread sanitizer"
 	@echo "make fuzz-maps 20 000 spoilt map files under the address and undefined-behaviour sanitizers"
+	@echo "make test-demo make demo on a bare Debian (chroot, needs root)"
 	@echo "make wheel     build dist/*.whl, which needs nothing of the system, and check it"
 	@echo "make test-wheel  install the wheel on a bare Debian (chroot, needs root) and use it"
 	@echo "make compare-wheel  the wheel's results beside those of the package built from source"
@@ -23,74 +24,98 @@ help:
 	@echo "make format    apply clang-format and ruff"
 
 # ---- environment ---------------------------------------------------------------------------------
-build/.system-packages: scripts/system_packages.txt scripts/install_system_packages.sh
-	@mkdir -p build
-	@scripts/install_system_packages.sh
+# Each job uses all processors by itself, and two must not install into the same place.
+.NOTPARALLEL:
+# Packages of the shell's environment (ROS sets it) would be taken for those of ours.
+unexport PYTHONPATH PYTHONHOME
+
+# Sections of scripts/system_packages.txt; looked at every time, which takes a moment.
+packages-%: ; @scripts/install_system_packages.sh $(subst +, ,$*)
+
+python:
+	@command -v $(PYTHON) >/dev/null || { echo "There is no $(PYTHON): install Python 3.10 or later," \
+	  "or name one: make demo PYTHON=python3.11" >&2; exit 1; }
+	@$(PYTHON) scripts/make_venv.py $(VENV) --only-check-python
+
+# Made anew where it does not work: Python was upgraded, the checkout was moved.
+$(VENV)/pyvenv.cfg: always | python packages-package
+	@$(PYTHON) scripts/make_venv.py $(VENV) $(if $(filter-out file,$(origin PYTHON)),--this-python)
+
+$(VENV)/.%-requirements: pyproject.toml $(VENV)/pyvenv.cfg
+	@$(BIN)/python scripts/install_requirements.py $*
 	@touch $@
 
-$(VENV)/.requirements: pyproject.toml build/.system-packages
-	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	@$(BIN)/python scripts/install_requirements.py
-	@touch $@
-
-PYTHON_SOURCES := $(shell find src/orbslam2py -name '*.py' -o -name '*.pyx' -o -name 'py.typed' \
-  -o -name '*.pyi' -o -name '*.bvoc')
 CPP_SOURCES := $(shell find src/cpp cmake -name '*.cpp' -o -name '*.hpp' -o -name '*.cmake' \
   -o -name CMakeLists.txt) CMakeLists.txt
+CYTHON_SOURCES := $(shell find src/orbslam2py -name '*.pyx')
 
-# The package, installed for development: Python files are used from src, extensions from build. The
-# compiler goes by the name that CMake gives it elsewhere: the compiler cache tells names apart.
-$(VENV)/.installed: $(VENV)/.requirements $(CPP_SOURCES) $(PYTHON_SOURCES)
-	@echo "Building the package"
-	@CXX=$${CXX:-c++} $(BIN)/pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps \
-	  -C build-dir=build/python -C editable.mode=redirect -C cmake.define.ORBSLAM2PY_WERROR=ON -e .
+# The names of the package's files: an installation for development knows them.
+build/.names: always
+	@mkdir -p build
+	@find src/orbslam2py -name __pycache__ -prune -o -type f ! -name '*.so' -print | sort >$@.new
+	@if cmp -s $@.new $@; then rm $@.new; else mv $@.new $@; fi
+
+# The package, installed for development: Python files are used from src, extensions from build.
+$(VENV)/.installed: $(VENV)/.build-requirements build/.names $(CPP_SOURCES) $(CYTHON_SOURCES)
+	@$(BIN)/python scripts/build_package.py $(if $(filter-out file,$(origin JOBS)),--jobs $(JOBS))
 	@touch $@
 
+always:
+
 install: $(VENV)/.installed
+
+developer: $(VENV)/.developer-requirements
 
 # ---- the main job --------------------------------------------------------------------------------
 demo: install
 	@$(BIN)/orbslam2py demo
 
+# On a bare Debian (chroot, needs root).
+test-demo: | packages-bare-tree
+	@$(PYTHON) scripts/test_demo.py || [ $$? -eq 77 ] # 77: not possible here
+
 # ---- tests ---------------------------------------------------------------------------------------
-test: lint test-cpp test-python types stubs docs
+# All packages at once; each of the others installs its own if it is called alone.
+test: packages-package+cpp-tests+lint+docs+browser lint test-cpp test-python types stubs docs
 	@echo "All tests passed."
 
-test-cpp: build/.system-packages
+test-cpp: | packages-package+cpp-tests
+	@mkdir -p build
 	@cmake --preset release >build/configure.log || { cat build/configure.log; exit 1; }
 	@cmake --build build/release -j $(JOBS)
 	@ctest --test-dir build/release --output-on-failure -j $(JOBS)
 
-test-python: install
+test-python: install developer | packages-package+browser+docs
 	@$(BIN)/python -m pytest -q -n $(JOBS) --dist loadfile --no-loadscope-reorder
 
-lint: $(VENV)/.requirements
+lint: developer | packages-lint
+	@mkdir -p build
 	@$(BIN)/ruff check src tests examples benchmarks scripts
 	@$(BIN)/ruff format --check src tests examples benchmarks scripts
 	@PYTHONPATH=src $(BIN)/lint-imports --no-cache >build/lint-imports.log || { cat build/lint-imports.log; exit 1; }
 	@find src/cpp tests/cpp benchmarks -name '*.cpp' -o -name '*.hpp' | xargs clang-format --dry-run -Werror
 
-types: install
+types: install developer
 	@$(BIN)/mypy
 
 # The stubs of the C++ extension are part of the source; they must say what the build says.
-stubs: install
+stubs: install developer
 	@$(BIN)/python scripts/generate_stubs.py --check
 
 # The documentation site; a warning fails.
-docs: install
+docs: install developer | packages-docs
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 	@echo "The documentation is in build/site/index.html."
 
 # Slow (minutes), so not part of `make test`. clang cannot read the headers that GCC has compiled, and knows not all
 # of its options; each source is looked at by itself. TIDY names a folder or a source where not all are wanted.
 TIDY ?= src/cpp
-tidy: build/.system-packages
+tidy: | packages-package+cpp-tests+tidy
 	@cmake --preset release -B build/tidy -DORBSLAM2PY_UNITY=OFF -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON >/dev/null
 	@find $(TIDY) -name '*.cpp' -not -path '*/bindings/*' | xargs -P $(JOBS) -n 1 \
 	  clang-tidy -p build/tidy --quiet --extra-arg=-Wno-unused-command-line-argument
 
-sanitize: build/.system-packages
+sanitize: | packages-package+cpp-tests
 	@cmake --preset asan >/dev/null && cmake --build build/asan -j $(JOBS)
 	@ctest --test-dir build/asan --output-on-failure -j $(JOBS)
 	@cmake --preset tsan >/dev/null && cmake --build build/tsan -j $(JOBS) --target thread_driver
@@ -98,7 +123,7 @@ sanitize: build/.system-packages
 
 # The whole system in threads, disturbed at random, under the thread sanitizer.
 STRESS_SECONDS ?= 600
-stress: build/.system-packages
+stress: | packages-package+cpp-tests
 	@cmake --preset tsan >/dev/null && cmake --build build/tsan -j $(JOBS) --target thread_driver
 	@build/tsan/tests/cpp/thread_driver --seconds $(STRESS_SECONDS)
 
@@ -107,7 +132,7 @@ stress: build/.system-packages
 FUZZ_RUNS ?= 20000
 FUZZ_FIRST ?= 0
 SANITIZED := build/asan-ext
-fuzz-maps: install
+fuzz-maps: install developer
 	@cmake --preset asan -B $(SANITIZED) -DORBSLAM2PY_TESTS=OFF -DORBSLAM2PY_PYTHON=ON \
 	  -DPython_EXECUTABLE=$(CURDIR)/$(BIN)/python \
 	  -Dpybind11_DIR=$$($(BIN)/python -m pybind11 --cmakedir) >$(SANITIZED).log || { cat $(SANITIZED).log; exit 1; }
@@ -121,35 +146,31 @@ fuzz-maps: install
 
 # ---- the rest ------------------------------------------------------------------------------------
 # BEFORE names a commit: it is built as well, and its kernels run in turns with ours.
-bench: install
+bench: install developer | packages-package+cpp-tests
 	@cmake --preset release >/dev/null && cmake --build build/release -j $(JOBS) --target benchmarks
 	@$(BIN)/python -m benchmarks.speed.compare
 	@$(BIN)/python -m benchmarks.versions $(if $(BEFORE),--before $(BEFORE))
 
 # A wheel for the Python that is named, with all libraries inside: minutes the first time, as it builds
 # Ceres and OpenCV. `make test-wheel` tries it on a bare Debian, which needs root.
-WHEEL_PACKAGES := mmdebstrap dpkg-dev libeigen3-dev cmake ninja-build
-wheel:
-	@dpkg-query -W $(WHEEL_PACKAGES) >/dev/null || { echo "apt-get install $(WHEEL_PACKAGES)" >&2; exit 1; }
+wheel: | packages-wheel
 	@$(PYTHON) scripts/wheel/build_wheel.py --jobs $(JOBS)
 
 WHEEL_SUITE ?= bookworm
-test-wheel:
+test-wheel: | packages-bare-tree
 	@$(PYTHON) scripts/wheel/test_wheel.py dist --suite $(WHEEL_SUITE) || [ $$? -eq 77 ] # 77: not possible here
 
-compare-wheel: install
+compare-wheel: install developer
 	@$(BIN)/python scripts/wheel/compare_builds.py dist
 
 # The core for another processor: libraries are unpacked into build/arm, nothing of arm64 is installed. With
 # ARM_TESTS=all also the tests that take the emulator long.
-ARM_PACKAGES := g++-aarch64-linux-gnu qemu-user-static mmdebstrap dpkg-dev
 ARM_TESTS ?= chosen
-test-arm: build/.system-packages
-	@dpkg-query -W $(ARM_PACKAGES) >/dev/null || { echo "apt-get install $(ARM_PACKAGES)" >&2; exit 1; }
+test-arm: | packages-package+cpp-tests+arm
 	@mkdir -p build/arm
 	@scripts/arm/test_arm.sh build/arm $(JOBS) $(ARM_TESTS)
 
-format: $(VENV)/.requirements
+format: developer | packages-lint
 	@$(BIN)/ruff check --fix-only src tests examples benchmarks scripts
 	@$(BIN)/ruff format src tests examples benchmarks scripts
 	@find src/cpp tests/cpp benchmarks -name '*.cpp' -o -name '*.hpp' | xargs clang-format -i

@@ -38,7 +38,7 @@ def on_files(files: Files, config: Any) -> Files:
     if not KATEX.is_dir():
         raise PluginError(
             f"{KATEX} does not exist: install the Debian package libjs-katex "
-            "(scripts/install_system_packages.sh)"
+            "(scripts/install_system_packages.sh docs)"
         )
     sources = [KATEX / "katex.min.css", KATEX / "katex.js", *sorted(KATEX.glob("fonts/*.woff2"))]
     for source in sources:

@@ -9,7 +9,6 @@ with 77.
 from __future__ import annotations
 
 import argparse
-import os
 import shutil
 import subprocess
 import sys
@@ -17,12 +16,13 @@ from pathlib import Path
 
 from environments import environments
 
-HERE = Path(__file__).resolve().parent
-PROJECT = HERE.parent.parent
+PROJECT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(PROJECT / "scripts"))
+
+from bare_tree import enter, make_tree  # noqa: E402  # a folder above
 
 #: Debian's releases and their Python.
 SUITES = {"bookworm": "3.11", "trixie": "3.13"}
-SKIPPED = 77
 
 #: Other packages with OpenCV, each used in one process with ours. Those without "headless" need
 #: libraries of a desktop, which a bare tree has not.
@@ -33,39 +33,6 @@ OTHER_OPENCV = [
 ]
 #: For the Python tests inside.
 TEST_PACKAGES = ["pytest", "pytest-benchmark", "pytest-xdist", "hypothesis", "scipy", "rosbags"]
-
-
-def skip(reason: str) -> None:
-    """End without having tested, and say why."""
-    print(f"SKIPPED: {reason}.\nThe wheel was not tried on a bare machine.")
-    sys.exit(SKIPPED)
-
-
-def enter(tree: Path, *command: str) -> int:
-    """Run a command inside the tree; what is mounted for it goes with it."""
-    mounts = f"mount -t proc proc {tree}/proc && mount --bind /dev {tree}/dev"
-    inside = ["env", "-i", "PATH=/usr/bin:/bin:/usr/sbin:/sbin", "HOME=/root", "LANG=C.UTF-8"]
-    script = f'{mounts} && exec chroot {tree} "$@"'
-    unshare = ["unshare", "--mount", "--net", "sh", "-c", script, "sh"]
-    return subprocess.run([*unshare, *inside, *command], check=False).returncode
-
-
-def make_tree(suite: str, tree: Path) -> None:
-    """Make a minimal tree with Python and pip, once."""
-    if os.geteuid() != 0:
-        skip("chroot needs root")
-    if not (tree / "complete").exists():
-        if shutil.which("mmdebstrap") is None:
-            skip("mmdebstrap is missing (apt-get install mmdebstrap)")
-        shutil.rmtree(tree, ignore_errors=True)
-        mirror = os.environ.get("ORBSLAM2PY_DEBIAN_MIRROR", "http://deb.debian.org/debian")
-        packages = "--include=python3,python3-pip,python3-venv"
-        command = ["mmdebstrap", "--quiet", "--variant=minbase", packages, suite, tree, mirror]
-        if subprocess.run(command, check=False).returncode != 0:
-            skip(f"mmdebstrap could not make a tree of {suite}")
-        (tree / "complete").touch()
-    if enter(tree, "true") != 0:
-        skip("this machine does not allow mounts and chroot")
 
 
 def download(wheel: Path, suite: str, folder: Path) -> None:
@@ -123,7 +90,7 @@ def main() -> None:
             sys.exit(f"{wheel} has no wheel for {tag}.\nBuild it: make wheel PYTHON={python}")
         wheel = found[-1]
     tree = arguments.folder.resolve() / f"bare-{arguments.suite}"
-    make_tree(arguments.suite, tree)
+    make_tree(arguments.suite, tree, "python3,python3-pip,python3-venv")
     download(wheel, arguments.suite, tree / "srv/wheels")
     copy_tests(tree / "srv/checkout")
     sys.exit(enter(tree, "sh", "/srv/checkout/scripts/wheel/bare_tree_tests.sh"))

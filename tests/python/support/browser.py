@@ -48,7 +48,7 @@ def find_chromium() -> str:
         program = shutil.which(name)
         if program is not None:
             return program
-    pytest.skip("no chromium: scripts/install_system_packages.sh installs it")
+    pytest.skip("no chromium: scripts/install_system_packages.sh browser installs it")
 
 
 class BrowserError(Exception):
