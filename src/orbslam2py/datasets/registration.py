@@ -130,7 +130,7 @@ class DepthRegistration:
         if self._D.any():
             inside = x * x + y * y < self._reach
             raw, x, y, Z = raw[inside], x[inside], y[inside], Z[inside]
-            x, y = _distort(x, y, self._D)
+            x, y = distort_points(x, y, self._D)
         width, height = self._colour.size
         fx, fy, cx, cy = self._pinhole
         scale = raw / Z
@@ -186,15 +186,23 @@ def _rays_of(lens: Lens, *, corners: bool = False) -> FloatArray:
     D[: len(lens.D)] = lens.D
     x, y = seen_x, seen_y
     for _ in range(_STEPS if D.any() else 0):
-        found_x, found_y = _distort(x, y, D)
+        found_x, found_y = distort_points(x, y, D)
         x, y = x + seen_x - found_x, y + seen_y - found_y
     return np.stack([x, y, np.ones_like(x)])
 
 
-def _distort(
+def distort_points(
     x: NDArray[np.floating], y: NDArray[np.floating], D: NDArray[np.floating]
 ) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
-    """Apply OpenCV's distortion k1, k2, p1, p2, k3, k4, k5, k6 to points of the image plane."""
+    """Apply a distortion to points of the image plane at z = 1.
+
+    Parameters
+    ----------
+    x, y
+        Coordinates of the points (n,).
+    D
+        k1, k2, p1, p2, k3, k4, k5, k6 as in OpenCV (8,).
+    """
     k1, k2, p1, p2, k3, k4, k5, k6 = D
     r2 = x * x + y * y
     radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
