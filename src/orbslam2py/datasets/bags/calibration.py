@@ -29,6 +29,7 @@ _INVERSE = "inverse_brown_conrady"
 _AS_RECTIFIED = 1e-3
 #: So many points in a row and in a column of the image stand for all of it.
 _SAMPLES = 25
+_COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 _ADVICE = "give the calibration with --settings"
 
 
@@ -96,7 +97,7 @@ class CameraInfo:
         return self.P[:, :3] if self.P[0, 0] > 0 else self.K
 
     def distortion(self) -> FloatArray:
-        """Return k1, k2, p1, p2, k3.
+        """Return k1, k2, p1, p2, k3, k4, k5, k6.
 
         Raises
         ------
@@ -108,25 +109,14 @@ class CameraInfo:
                 f"{self.what}: the distortion model {self.model} is not supported; record "
                 f"rectified images (image_proc), or {_ADVICE} of undistorted ones"
             )
-        if self.D[5:].any():
+        if self.D[8:].any():
             raise DatasetError(
-                f"{self.what}: distortion with {self.D.size} coefficients is not supported for "
-                f"one camera; record rectified images (image_proc), or {_ADVICE} of such"
+                f"{self.what}: distortion with {self.D.size} coefficients is not supported, at "
+                f"most 8 are; record rectified images (image_proc), or {_ADVICE} of such"
             )
-        five = np.zeros(5)
-        five[: min(5, self.D.size)] = self.D[:5]
-        return five
-
-    def all_coefficients(self) -> FloatArray:
-        """Return the distortion for OpenCV: four, five or eight coefficients.
-
-        Raises
-        ------
-        DatasetError
-            If the model has other coefficients.
-        """
-        fits = self.model in _MODELS and self.D.size in (4, 5, 8)
-        return self.D if fits else self.distortion()
+        eight = np.zeros(8)
+        eight[: min(8, self.D.size)] = self.D[:8]
+        return eight
 
 
 def settings_of_camera(
@@ -153,8 +143,8 @@ def settings_of_camera(
         If the calibration cannot be used.
     """
     K = info.rectified_K if rectified else info.K
-    k1, k2, p1, p2, k3 = (np.zeros(5) if rectified else info.distortion()).tolist()
-    lens = {"k1": k1, "k2": k2, "p1": p1, "p2": p2, "k3": k3}
+    coefficients = np.zeros(8) if rectified else info.distortion()
+    lens = dict(zip(_COEFFICIENTS, coefficients.tolist(), strict=True))
     try:
         camera = CameraSettings(**_pinhole(K, info.size), **lens, fps=fps, rgb=True)
         return settings_for_camera(camera, sensor, depth_factor=depth_factor)
@@ -233,7 +223,7 @@ def _settings_by_transform(
     if at[0] < 0:
         raise _exchanged("the transform between the two cameras", right.what)
     K = (left.rectified_K, right.rectified_K) if rectified else (left.K, right.K)
-    D = [np.zeros(5) if rectified else info.all_coefficients() for info in (left, right)]
+    D = [np.zeros(8) if rectified else info.distortion() for info in (left, right)]
     same_K = np.abs(K[0] - K[1]).max() <= 1e-3
     parallel = np.allclose(T[:3, :3], np.eye(3), rtol=0, atol=_AS_RECTIFIED)
     level = np.linalg.norm(at[1:]) <= _AS_RECTIFIED * distance
@@ -316,7 +306,7 @@ def _inverted(K: FloatArray, D: FloatArray, size: tuple[int, int]) -> FloatArray
 
 
 def _rectification(info: CameraInfo) -> CameraRectification:
-    D = info.all_coefficients()
+    D = info.D if info.model in _MODELS and info.D.size in (4, 5, 8) else info.distortion()
     width, height = info.size
     try:
         return CameraRectification(K=info.K, D=D, R=info.R, P=info.P, width=width, height=height)

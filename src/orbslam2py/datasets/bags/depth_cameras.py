@@ -128,7 +128,7 @@ def find_depth_camera(
 def _lens_of(image: ImageTopic, info: CameraInfo) -> Lens:
     if image.is_rectified or info.is_undistorted:
         return Lens(info.rectified_K, np.zeros(8), info.size)
-    return Lens(info.K, info.all_coefficients(), info.size)
+    return Lens(info.K, info.distortion(), info.size)
 
 
 def _difference(
