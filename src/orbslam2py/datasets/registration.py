@@ -13,7 +13,7 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import ImageError
 
 #: A hole of one pixel is filled if so many of the eight pixels around it have depth ...
-_NEIGHBOURS = 5
+_NEIGHBOURS = 4
 #: ... and differ by no more than this part of it: edges of things stay open.
 _SAME_SURFACE = 0.05
 #: Points are projected up to this much beyond the corners of the image: a distortion polynomial
