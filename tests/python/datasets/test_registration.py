@@ -100,9 +100,9 @@ def test_nearest_wins(shift: float) -> None:
     assert np.abs(wrong[:, 1] - edge[wrong[:, 0]]).max(initial=0) <= 3  # only beside the edge
     # To the right of the depth camera, the colour camera sees a strip of wall behind the board.
     strip = (~known[20:-20, 20:-20]).sum(axis=1)
-    assert (1 <= strip.min() and strip.max() <= 5) if shift < 0 else not strip.any()
+    assert (strip.min() >= 1 and strip.max() <= 5) if shift < 0 else not strip.any()
     on_board = true < 1.2
-    assert (found[on_board & known] < 1.2).mean() > 0.99
+    assert (found[on_board & known] < 1.2).mean() > 0.98  # all but a pixel at the edge
 
 
 def test_what_is_no_depth() -> None:
