@@ -94,35 +94,49 @@ def find_depth_camera(
     colour_info = info_if_any(bag, images, topics.left_info)
     depth_info = info_if_any(bag, depth, topics.depth_info)
     how = _difference(images, depth, colour_info, depth_info, chosen)
+    names = [
+        names_of_coordinates(one, frame) for one, frame in zip((images, depth), frames, strict=True)
+    ]
     one_info = topics.left_info is not None and topics.left_info == topics.depth_info
-    T = None
-    if not one_info:
-        names = (
-            names_of_coordinates(one, frame)
-            for one, frame in zip((images, depth), frames, strict=True)
-        )
-        T = Transforms(bag).between(*names)
-    if not how and (one_info or T is None or depth_info is None or says_registered(depth)):
-        _warn_of_frames(bag, depth, frames)
+    T = None if one_info else Transforms(bag).between(*names)
+    if how and T is None and colour_info is None and chosen and images.size == depth.size:
+        _warn(bag, depth, f"is of another camera than that of the settings ({how})")
         return None
-    if not how and T is not None and depth_info is not None and _in_one_place(T, depth_info):
+    known = depth_info is not None and (colour_info or chosen) is not None
+    if not how and (one_info or T is None or not known or says_registered(depth)):
+        if frames[0] != frames[1]:
+            where = f"is in the coordinates '{frames[1]}', the images are in '{frames[0]}'"
+            _warn(bag, depth, where)
         return None
-    known = depth_info is not None and (colour_info is not None or chosen is not None)
-    if T is None or not known or depth_info is None:
-        raise _cannot_be_registered(bag, topics, how, T, colour_info, depth_info)
+    missing = [
+        f"a CameraInfo for {one.topic.name} of its size"
+        for one, told in ((depth, depth_info), (images, colour_info or chosen))
+        if told is None
+    ]
+    if T is None or depth_info is None or missing:
+        raise _cannot_be_registered(bag, topics, depth, how, missing, T)
+    if not how and _in_one_place(T, depth_info):
+        return None
     _log.info(
         "%s: depth of %s is of another camera than %s (%s); it is registered with the calibrations "
         "of both and the transform between them (%.1f mm apart)",
         *(bag.path, depth.topic.name, images.topic.name, how or "another place"),
         np.linalg.norm(T[:3, 3]) * 1e3,
     )
-    if frames[0] == frames[1] and not T[:3, 3].any():
+    if set(names[0]) & set(names[1]):
         _log.warning(
             "%s: images and depth are both in the coordinates '%s', so the two cameras are taken "
             "to stand in one place; if they do not, depth is some pixels off",
             *(bag.path, frames[0]),
         )
     return DepthCamera(_lens_of(depth, depth_info), T)
+
+
+def _warn(bag: Bag, depth: ImageTopic, told: str) -> None:
+    _log.warning(
+        "%s: depth of %s %s: if it is not registered to the images, the result is wrong",
+        *(bag.path, depth.topic.name, told),
+    )
 
 
 def _lens_of(image: ImageTopic, info: CameraInfo) -> Lens:
@@ -164,30 +178,15 @@ def _in_one_place(T: FloatArray, info: CameraInfo) -> bool:
     return bool(fx * (apart + turned) < _HALF_A_PIXEL)
 
 
-def _warn_of_frames(bag: Bag, depth: ImageTopic, frames: tuple[str, str]) -> None:
-    if frames[0] != frames[1]:
-        _log.warning(
-            "%s: depth of %s is in the coordinates '%s', the images are in '%s': if it is not "
-            "registered to them, the result is wrong",
-            *(bag.path, depth.topic.name, frames[1], frames[0]),
-        )
-
-
 def _cannot_be_registered(
     bag: Bag,
     topics: Chosen,
+    depth: ImageTopic,
     how: str,
+    missing: list[str],
     T: FloatArray | None,
-    colour_info: CameraInfo | None,
-    depth_info: CameraInfo | None,
 ) -> DatasetError:
-    images, depth = topics.left, topics.depth
-    assert depth is not None
-    missing = [
-        f"a CameraInfo for {one.topic.name} of its size"
-        for one, info in ((depth, depth_info), (images, colour_info))
-        if info is None
-    ]
+    images = topics.left
     if T is None:
         where = "/tf_static" if stream_of(depth) is None else "/tf_static, or /tf of the stream"
         missing.append(f"the transform between the two cameras ({where})")

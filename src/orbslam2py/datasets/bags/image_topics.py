@@ -73,7 +73,8 @@ class ImageTopic:
         return "rect" in self.base.rpartition("/")[2]
 
     def __str__(self) -> str:
-        size = ", not readable" if self.size is None else f", {self.size[0]} x {self.size[1]}"
+        unread = f", not readable: {self.problem}" if self.problem else ", not readable"
+        size = unread if self.size is None else f", {self.size[0]} x {self.size[1]}"
         return f"{self.topic.name} ({self.topic.kind}, {self.encoding}{size}, {self.topic.n})"
 
 
