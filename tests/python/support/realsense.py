@@ -132,4 +132,6 @@ def _sdk_image(
 def write_sdk(path: Path, messages: Sequence[bags.Made]) -> Path:
     """Write a lone .db3 without metadata.yaml."""
     folder = bags.write(path.with_suffix(""), "rosbag2", messages)
-    return Path(shutil.move(bags.file_of(folder), path.with_suffix(".db3")))
+    shutil.move(bags.file_of(folder), path.with_suffix(".db3"))
+    shutil.rmtree(folder)
+    return path.with_suffix(".db3")
