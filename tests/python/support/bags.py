@@ -23,6 +23,7 @@ KINDS = ("rosbag1", "rosbag2", "mcap")
 IMAGE = "sensor_msgs/msg/Image"
 COMPRESSED = "sensor_msgs/msg/CompressedImage"
 INFO = "sensor_msgs/msg/CameraInfo"
+FLOAT = "std_msgs/msg/Float32"
 STRING = "std_msgs/msg/String"
 TRANSFORM = "geometry_msgs/msg/Transform"
 TF = "tf2_msgs/msg/TFMessage"
@@ -150,8 +151,8 @@ def file_of(path: Path) -> Path:
 def message_of(store: Any, made: Made, *, ros1: bool) -> Any:
     """The message as an object of rosbags."""
     types = store.types
-    if made.kind == STRING:
-        return types[STRING](*made.fields)
+    if made.kind in (STRING, FLOAT):
+        return types[made.kind](*made.fields)
     if made.kind == TRANSFORM:
         return _transform_of(types, made.fields[0])
     if made.kind == TF:

@@ -91,7 +91,9 @@ class Transforms:
         return [
             topic
             for topic in self._bag.topics
-            if topic.name == name and topic.kind in TRANSFORMS and topic.encoding in ENCODINGS
+            if topic.name.endswith(name)
+            and topic.kind in TRANSFORMS
+            and topic.encoding in ENCODINGS
         ]
 
     def _read(self, topic: Topic) -> Iterator[tuple[str, str, FloatArray]]:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -168,6 +169,32 @@ def test_units_of_depth(tmp_path: Path, units: float, factor: float) -> None:
     assert sequence.sensor is Sensor.RGBD
     assert sequence.settings.depth is not None
     assert sequence.settings.depth.raw_per_metre == factor
+
+
+def test_units_of_depth_of_the_viewer(tmp_path: Path) -> None:
+    name = "/device_0/sensor_0/option/Depth Units/value"
+    made = [
+        *realsense.viewer_stream("Depth_0", DEPTH, 60, T_stream_reference=np.eye(4)),
+        *realsense.viewer_stream("Color_0", GREY, 60, T_stream_reference=np.eye(4)),
+        bags.Made(name, bags.FLOAT, bags.START, (0.00025,)),
+    ]
+    settings = BagSequence(bags.write(tmp_path / "rgbd", "rosbag1", made)).settings
+    assert settings.depth is not None
+    assert settings.depth.raw_per_metre == 4000
+
+
+def test_yuyv(tmp_path: Path) -> None:
+    """The SDK writes this encoding in capitals: brightness is every other byte."""
+    packed = np.full((72, 96, 2), 128, np.uint8)
+    packed[:, :, 0] = 90
+    topic = "/device_0/sensor_1/Color_0/image/data"
+    made = bags.raw_image(topic, bags.START, packed.reshape(72, 192), "YUYV", frame="0")
+    height, _, *rest = made.fields
+    bag = bags.write(tmp_path / "c", "rosbag1", [replace(made, fields=(height, 96, *rest))])
+    image = BagSequence(bag, settings="tum1").load(0).image
+    assert image.shape == (72, 96, 3)
+    assert np.ptp(image) == 0
+    assert image[0, 0, 0] == round((90 - 16) * 255 / 219)
 
 
 @pytest.mark.parametrize("layout", ["viewer", "sdk"])
