@@ -26,7 +26,7 @@ _MODELS = ("plumb_bob", "rational_polynomial", "radtan", "brown_conrady", "")
 _NONE_IF_ZERO = ("none", "modified_brown_conrady")
 _INVERSE = "inverse_brown_conrady"
 #: Transforms of a rectified pair are off by no more than this (part of the distance, or radians).
-_AS_RECTIFIED = 1e-3
+_AS_RECTIFIED = 2e-4
 #: So many points in a row and in a column of the image stand for all of it.
 _SAMPLES = 25
 _COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
@@ -204,7 +204,10 @@ def _settings_by_transform(
     rectified: bool,
 ) -> Settings:
     """Make settings for two cameras that were each calibrated alone, by where they stand."""
-    T = np.eye(4) if T_right_left is None else T_right_left
+    T = np.eye(4) if T_right_left is None else T_right_left.copy()
+    if rectified:  # images of one camera may have been turned when they were rectified
+        T[:3, 3] = right.R @ T[:3, 3]
+        T[:3, :3] = right.R @ T[:3, :3] @ left.R.T
     at = -T[:3, :3].T @ T[:3, 3]  # the right camera in the coordinates of the left one
     distance = float(np.linalg.norm(at))
     if distance < 1e-6:
@@ -217,21 +220,17 @@ def _settings_by_transform(
     if abs(at[0]) < np.linalg.norm(at[1:]):
         raise DatasetError(
             f"{names}: by the transform between them the cameras do not stand side by side (the "
-            f"right one is at {_metres(at)} from the left one); turn their images before they are "
-            "recorded, or use one of them (--sensor mono)"
+            f"right one is at {_metres(at)} from the left one), as a pair must; use one of them "
+            "(--sensor mono)"
         )
     if at[0] < 0:
-        raise _exchanged("the transform between the two cameras", right.what)
+        raise _exchanged("the transform between the two cameras", f"that of {right.what}")
     K = (left.rectified_K, right.rectified_K) if rectified else (left.K, right.K)
     D = [np.zeros(8) if rectified else info.distortion() for info in (left, right)]
     same_K = np.abs(K[0] - K[1]).max() <= 1e-3
     parallel = np.allclose(T[:3, :3], np.eye(3), rtol=0, atol=_AS_RECTIFIED)
     level = np.linalg.norm(at[1:]) <= _AS_RECTIFIED * distance
-    if rectified and not same_K:
-        raise DatasetError(
-            f"{names} are no rectified pair: their P differ; calibrate them as a pair, or {_ADVICE}"
-        )
-    if rectified or (same_K and parallel and level and not np.any(D)):
+    if same_K and parallel and level and not np.any(D):
         return _settings(left, K[0], fps, float(K[0][0, 0]) * distance, None)
     if left.size != right.size:
         raise DatasetError(f"{names} are for images of different sizes; {_ADVICE}")

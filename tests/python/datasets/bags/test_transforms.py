@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -125,11 +126,14 @@ def test_transforms_that_do_not_tell(
         _ = sequence.settings
 
 
-def test_a_turned_camera_is_rectified(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["image_raw", "image_rect"])
+def test_a_turned_camera_is_rectified(tmp_path: Path, name: str) -> None:
+    """Also if the images were rectified: each camera for itself, that takes out the lens alone."""
     T = TRUE.copy()
     T[:3, :3] = cv2.Rodrigues(np.array([0.01, 0.03, 0.0]))[0]
     edge = bags.frames("/tf_static", ("left_optical", "right_optical", T))
-    settings = BagSequence(bags.write(tmp_path / "b", "mcap", pair(edge))).settings
+    made = [replace(m, topic=m.topic.replace("image_raw", name)) for m in pair(edge)]
+    settings = BagSequence(bags.write(tmp_path / "b", "mcap", made)).settings
     assert settings.rectification is not None
     assert settings.camera.bf / settings.camera.fx == pytest.approx(0.12)
     # Rays of one point have the same row in both rectified images.
