@@ -52,7 +52,8 @@ TimesOption = Annotated[
 TopicsOption = Annotated[
     str | None,
     typer.Option(
-        help="Topics of a bag: left (or image), right, depth, info, right_info, truth  "
+        help="Topics of a bag: left (or image), right, depth, info, right_info, "
+        "depth_info, truth  "
         "[guessed by types and names].",
         metavar="left=/a,right=/b",
     ),

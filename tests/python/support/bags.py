@@ -15,13 +15,18 @@ import numpy.typing as npt
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from orbslam2py.trajectory.rotations import quaternions_from_rotations
 
 KINDS = ("rosbag1", "rosbag2", "mcap")
 IMAGE = "sensor_msgs/msg/Image"
 COMPRESSED = "sensor_msgs/msg/CompressedImage"
 INFO = "sensor_msgs/msg/CameraInfo"
+FLOAT = "std_msgs/msg/Float32"
 STRING = "std_msgs/msg/String"
+TRANSFORM = "geometry_msgs/msg/Transform"
+TF = "tf2_msgs/msg/TFMessage"
 #: Stamp of the first message, and the step between them [ns]: real ones, with all digits.
 START, STEP = 1_700_000_000_123_456_789, 50_000_000
 
@@ -100,10 +105,25 @@ def text(topic: str, stamp: int, content: str) -> Made:
     return Made(topic, STRING, stamp, (content,))
 
 
+def transform(topic: str, T: npt.NDArray[np.float64]) -> Made:
+    """A transform (4, 4) alone."""
+    return Made(topic, TRANSFORM, START, (T,))
+
+
+def frames(
+    topic: str, *edges: tuple[str, str, npt.NDArray[np.float64]], stamp: int = START
+) -> Made:
+    """Transforms of tf: parent, child, and ``T_parent_child`` (4, 4)."""
+    return Made(topic, TF, stamp, edges)
+
+
 def write(folder: Path, kind: str, messages: Sequence[Made]) -> Path:
     """Write a bag; returns the file of ROS 1, the folder of ROS 2."""
     ros1 = kind == "rosbag1"
     store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
+    if ros1:
+        definition = "geometry_msgs/TransformStamped[] transforms"
+        store.register(get_types_from_msg(definition, TF))
     folder.parent.mkdir(parents=True, exist_ok=True)
     path = folder.with_suffix(".bag") if ros1 else folder
     plugin = StoragePlugin.MCAP if kind == "mcap" else StoragePlugin.SQLITE3
@@ -131,8 +151,12 @@ def file_of(path: Path) -> Path:
 def message_of(store: Any, made: Made, *, ros1: bool) -> Any:
     """The message as an object of rosbags."""
     types = store.types
-    if made.kind == STRING:
-        return types[STRING](*made.fields)
+    if made.kind in (STRING, FLOAT):
+        return types[made.kind](*made.fields)
+    if made.kind == TRANSFORM:
+        return _transform_of(types, made.fields[0])
+    if made.kind == TF:
+        return types[TF]([_edge_of(types, *edge, ros1=ros1) for edge in made.fields])
     fields = list(made.fields)
     if made.kind == INFO:
         fields[-1] = types["sensor_msgs/msg/RegionOfInterest"](0, 0, 0, 0, False)
@@ -140,3 +164,21 @@ def message_of(store: Any, made: Made, *, ros1: bool) -> Any:
     head = types["std_msgs/msg/Header"]
     header = head(0, time, made.frame) if ros1 else head(time, made.frame)
     return types[made.kind](header, *fields)
+
+
+def _transform_of(types: Any, T: npt.NDArray[np.float64]) -> Any:
+    x, y, z, w = (
+        quaternions_from_rotations(T[None, :3, :3])[0] if np.isfinite(T).all() else np.zeros(4)
+    )
+    return types[TRANSFORM](
+        types["geometry_msgs/msg/Vector3"](*T[:3, 3].tolist()),
+        types["geometry_msgs/msg/Quaternion"](float(x), float(y), float(z), float(w)),
+    )
+
+
+def _edge_of(types: Any, parent: str, child: str, T: npt.NDArray[np.float64], *, ros1: bool) -> Any:
+    time = types["builtin_interfaces/msg/Time"](0, 0)
+    head = types["std_msgs/msg/Header"]
+    header = head(0, time, parent) if ros1 else head(time, parent)
+    edge = types["geometry_msgs/msg/TransformStamped"]
+    return edge(header, child, _transform_of(types, T))

@@ -15,6 +15,7 @@ from orbslam2py import _core as core
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.trajectory import write_kitti, write_tum
 from orbslam2py.vocabulary import read_training_images, save_vocabulary, train_vocabulary
+from support.realsense import sdk_stream, write_sdk
 
 FRAMES, SIZE = 40, (320, 240)
 
@@ -56,6 +57,7 @@ def make_data(folder: Path) -> None:
     bag = _walk("stereo").write(folder / "bag", "mcap")
     (bag / "images.mcap").replace(folder / "drive.mcap")
     shutil.rmtree(bag)
+    _write_recording(folder / "recording.db3")
     _write_phone(folder / "phone")
     single = _walk("mono")
     images = [single.load(i).image for i in range(FRAMES)]
@@ -82,6 +84,20 @@ def _walk(sensor: str) -> SyntheticSequence:
     return SyntheticSequence(
         SyntheticOptions(world="corridor", sensor=sensor, frames=FRAMES, size=SIZE)
     )
+
+
+def _write_recording(path: Path) -> None:
+    """The infrared pair of a RealSense camera, as its SDK records it."""
+    walk = _walk("stereo")
+    camera = walk.settings.camera
+    right = np.eye(4)
+    right[0, 3] = -camera.bf / camera.fx
+    pairs = [walk.load(i) for i in range(FRAMES)]
+    left_images = [pair.image for pair in pairs]
+    right_images = [pair.right for pair in pairs if pair.right is not None]
+    left = sdk_stream("Infrared_1", left_images, camera.fx, T_stream_reference=np.eye(4))
+    other = sdk_stream("Infrared_2", right_images, camera.fx, T_stream_reference=right)
+    write_sdk(path, [*left, *other])
 
 
 def _write_phone(folder: Path) -> None:

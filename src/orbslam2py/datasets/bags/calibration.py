@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
+from orbslam2py.datasets.rectification import rectification_of_pair
+from orbslam2py.datasets.registration import distort_points
 from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.settings import (
     CameraRectification,
@@ -19,7 +21,15 @@ from orbslam2py.settings import (
     settings_for_camera,
 )
 
-_MODELS = ("plumb_bob", "rational_polynomial", "radtan", "")
+_MODELS = ("plumb_bob", "rational_polynomial", "radtan", "brown_conrady", "")
+#: Models of the RealSense SDK that are none if all coefficients are 0, as a rule.
+_NONE_IF_ZERO = ("none", "modified_brown_conrady")
+_INVERSE = "inverse_brown_conrady"
+#: Transforms of a rectified pair are off by no more than this (part of the distance, or radians).
+_AS_RECTIFIED = 2e-4
+#: So many points in a row and in a column of the image stand for all of it.
+_SAMPLES = 25
+_COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 _ADVICE = "give the calibration with --settings"
 
 
@@ -49,8 +59,16 @@ class CameraInfo:
     size: tuple[int, int]
 
     @classmethod
-    def of(cls, message: Any, what: str) -> CameraInfo | None:
-        """Read a message of ROS 1 or ROS 2; None if the camera was not calibrated."""
+    def of(cls, message: Any, what: str, *, inverse: bool = False) -> CameraInfo | None:
+        """Read a message of ROS 1 or ROS 2; None if the camera was not calibrated.
+
+        Parameters
+        ----------
+        message, what
+            The message, and its name for messages to the user.
+        inverse
+            Whether its distortion leads from distorted to undistorted points, whatever it says.
+        """
         K, D, R, P = (
             np.asarray(getattr(message, name, getattr(message, name.lower(), [])), np.float64)
             for name in "KDRP"
@@ -59,8 +77,13 @@ class CameraInfo:
             return None
         rotation = R.reshape(3, 3) if R.size == 9 and R.any() else np.eye(3)
         size = (int(message.width), int(message.height))
-        model = str(message.distortion_model)
-        return cls(what, K.reshape(3, 3), D, rotation, P.reshape(3, 4), model, size)
+        model = str(message.distortion_model).lower().replace(" ", "_")
+        K = K.reshape(3, 3)
+        if not D.any() and model in _NONE_IF_ZERO:
+            model = ""
+        elif inverse or model == _INVERSE:
+            D, model = _inverted(K, D, size), "plumb_bob"
+        return cls(what, K, D, rotation, P.reshape(3, 4), model, size)
 
     @property
     def is_undistorted(self) -> bool:
@@ -74,7 +97,7 @@ class CameraInfo:
         return self.P[:, :3] if self.P[0, 0] > 0 else self.K
 
     def distortion(self) -> FloatArray:
-        """Return k1, k2, p1, p2, k3.
+        """Return k1, k2, p1, p2, k3, k4, k5, k6.
 
         Raises
         ------
@@ -86,14 +109,14 @@ class CameraInfo:
                 f"{self.what}: the distortion model {self.model} is not supported; record "
                 f"rectified images (image_proc), or {_ADVICE} of undistorted ones"
             )
-        if self.D[5:].any():
+        if self.D[8:].any():
             raise DatasetError(
-                f"{self.what}: distortion with {self.D.size} coefficients is not supported for "
-                f"one camera; record rectified images (image_proc), or {_ADVICE} of such"
+                f"{self.what}: distortion with {self.D.size} coefficients is not supported, at "
+                f"most 8 are; record rectified images (image_proc), or {_ADVICE} of such"
             )
-        five = np.zeros(5)
-        five[: min(5, self.D.size)] = self.D[:5]
-        return five
+        eight = np.zeros(8)
+        eight[: min(8, self.D.size)] = self.D[:8]
+        return eight
 
 
 def settings_of_camera(
@@ -120,8 +143,8 @@ def settings_of_camera(
         If the calibration cannot be used.
     """
     K = info.rectified_K if rectified else info.K
-    k1, k2, p1, p2, k3 = (np.zeros(5) if rectified else info.distortion()).tolist()
-    lens = {"k1": k1, "k2": k2, "p1": p1, "p2": p2, "k3": k3}
+    coefficients = np.zeros(8) if rectified else info.distortion()
+    lens = dict(zip(_COEFFICIENTS, coefficients.tolist(), strict=True))
     try:
         camera = CameraSettings(**_pinhole(K, info.size), **lens, fps=fps, rgb=True)
         return settings_for_camera(camera, sensor, depth_factor=depth_factor)
@@ -130,7 +153,12 @@ def settings_of_camera(
 
 
 def settings_of_pair(
-    left: CameraInfo, right: CameraInfo, fps: float, *, rectified: bool
+    left: CameraInfo,
+    right: CameraInfo,
+    fps: float,
+    *,
+    rectified: bool,
+    T_right_left: FloatArray | None = None,
 ) -> Settings:
     """Make settings for a pair: of its images as they are, or with the rectification of both.
 
@@ -142,6 +170,9 @@ def settings_of_pair(
         Images per second.
     rectified
         Whether the images are rectified ones.
+    T_right_left
+        Transform (4, 4) from left to right camera coordinates [m], for calibrations that do not
+        tell the distance of the cameras themselves.
 
     Raises
     ------
@@ -150,16 +181,9 @@ def settings_of_pair(
     """
     bf = float(left.P[0, 3] - right.P[0, 3])
     if not bf:
-        raise DatasetError(
-            f"{left.what} and {right.what} do not tell the distance of the two cameras (both P "
-            f"have the same last column): each was calibrated alone; calibrate them as a pair, or "
-            f"{_ADVICE}"
-        )
+        return _settings_by_transform(left, right, fps, T_right_left, rectified=rectified)
     if bf < 0:
-        raise DatasetError(
-            f"by {right.what} that camera stands to the left of the other one; exchange the two "
-            "with --topics left=...,right=..."
-        )
+        raise _exchanged(right.what)
     if np.abs(left.rectified_K - right.rectified_K).max() > 1e-3:
         raise DatasetError(
             f"{left.what} and {right.what} are no rectified pair: their P differ in more than the "
@@ -168,8 +192,76 @@ def settings_of_pair(
     rectification = None
     if not rectified and not (left.is_undistorted and right.is_undistorted):
         rectification = StereoRectification(left=_rectification(left), right=_rectification(right))
+    return _settings(left, left.rectified_K, fps, bf, rectification)
+
+
+def _settings_by_transform(
+    left: CameraInfo,
+    right: CameraInfo,
+    fps: float,
+    T_right_left: FloatArray | None,
+    *,
+    rectified: bool,
+) -> Settings:
+    """Make settings for two cameras that were each calibrated alone, by where they stand."""
+    T = np.eye(4) if T_right_left is None else T_right_left.copy()
+    if rectified:  # images of one camera may have been turned when they were rectified
+        T[:3, 3] = right.R @ T[:3, 3]
+        T[:3, :3] = right.R @ T[:3, :3] @ left.R.T
+    at = -T[:3, :3].T @ T[:3, 3]  # the right camera in the coordinates of the left one
+    distance = float(np.linalg.norm(at))
+    if distance < 1e-6:
+        raise DatasetError(
+            f"{left.what} and {right.what} do not tell the distance of the two cameras (both P "
+            "have the same last column), and no transform in the bag does; record it with "
+            f"/tf_static, calibrate the cameras as a pair, or {_ADVICE}"
+        )
+    names = f"{left.what} and {right.what}"
+    if abs(at[0]) < np.linalg.norm(at[1:]):
+        raise DatasetError(
+            f"{names}: by the transform between them the cameras do not stand side by side (the "
+            f"right one is at {_metres(at)} from the left one), as a pair must; use one of them "
+            "(--sensor mono)"
+        )
+    if at[0] < 0:
+        raise _exchanged("the transform between the two cameras", f"that of {right.what}")
+    K = (left.rectified_K, right.rectified_K) if rectified else (left.K, right.K)
+    D = [np.zeros(8) if rectified else info.distortion() for info in (left, right)]
+    same_K = np.abs(K[0] - K[1]).max() <= 1e-3
+    parallel = np.allclose(T[:3, :3], np.eye(3), rtol=0, atol=_AS_RECTIFIED)
+    level = np.linalg.norm(at[1:]) <= _AS_RECTIFIED * distance
+    if same_K and parallel and level and not np.any(D):
+        return _settings(left, K[0], fps, float(K[0][0, 0]) * distance, None)
+    if left.size != right.size:
+        raise DatasetError(f"{names} are for images of different sizes; {_ADVICE}")
     try:
-        camera = CameraSettings(**_pinhole(left.rectified_K, left.size), fps=fps, bf=bf, rgb=True)
+        found = rectification_of_pair(K, (D[0], D[1]), T, left.size)
+    except SettingsError as error:
+        raise DatasetError(f"{names}: {error}") from error
+    P = found.right.P
+    return _settings(left, P[:, :3], fps, -float(P[0, 3]), found)
+
+
+def _exchanged(by: str, which: str = "that camera") -> DatasetError:
+    return DatasetError(
+        f"by {by} {which} stands to the left of the other one; exchange the two with "
+        "--topics left=...,right=..."
+    )
+
+
+def _metres(at: FloatArray) -> str:
+    return ", ".join(f"{number:.3f}" for number in at) + " m"
+
+
+def _settings(
+    left: CameraInfo,
+    K: FloatArray,
+    fps: float,
+    bf: float,
+    rectification: StereoRectification | None,
+) -> Settings:
+    try:
+        camera = CameraSettings(**_pinhole(K, left.size), fps=fps, bf=bf, rgb=True)
         settings = settings_for_camera(camera, Sensor.STEREO)
         return Settings(
             sensor=Sensor.STEREO,
@@ -193,10 +285,27 @@ def _pinhole(K: FloatArray, size: tuple[int, int]) -> dict[str, Any]:
     }
 
 
+def _inverted(K: FloatArray, D: FloatArray, size: tuple[int, int]) -> FloatArray:
+    """Find k1, k2, p1, p2, k3 that lead to distorted points, for numbers that lead away from them.
+
+    The numbers of the RealSense SDK's "Inverse Brown Conrady" make undistorted points of distorted
+    ones. What makes distorted points of undistorted ones is linear in its coefficients.
+    """
+    u, v = np.meshgrid(*(np.linspace(0, n - 1, _SAMPLES) for n in size))
+    seen_x, seen_y = (u.ravel() - K[0, 2]) / K[0, 0], (v.ravel() - K[1, 2]) / K[1, 1]
+    eight = np.zeros(8)
+    eight[: min(5, D.size)] = D[:5]
+    x, y = distort_points(seen_x, seen_y, eight)
+    r2, xy = x * x + y * y, 2 * x * y
+    columns_x = (x * r2, x * r2**2, xy, r2 + 2 * x * x, x * r2**3)
+    columns_y = (y * r2, y * r2**2, r2 + 2 * y * y, xy, y * r2**3)
+    A = np.hstack([columns_x, columns_y]).T
+    found, *_ = np.linalg.lstsq(A, np.hstack([seen_x - x, seen_y - y]), rcond=None)
+    return np.asarray(found, np.float64)
+
+
 def _rectification(info: CameraInfo) -> CameraRectification:
-    if info.model not in _MODELS:
-        info.distortion()  # says that the model is not supported
-    D = info.D if info.D.size in (4, 5, 8) else info.distortion()
+    D = info.D if info.model in _MODELS and info.D.size in (4, 5, 8) else info.distortion()
     width, height = info.size
     try:
         return CameraRectification(K=info.K, D=D, R=info.R, P=info.P, width=width, height=height)

@@ -17,12 +17,10 @@ _OF_ONE_CAMERA = (
     *("image_rect", "image_rect_color", "image_rect_raw"),
     *("image_mono", "image_raw", "image_color", "image"),
 )
-#: Words in names of the left and the right camera.
-_SIDES = (
-    *(("left", "right"), ("Left", "Right"), ("l", "r"), ("infra1", "infra2")),
-    *((f"{word}{i}", f"{word}{i + 1}") for i in (0, 1) for word in ("cam", "camera", "cam_")),
-    *((f"{word}{i}", f"{word}{i + 1}") for i in (0, 1) for word in ("camera_", "image", "image_")),
-)
+#: Words and numbers that names of the left and the right camera differ in, the clearest first.
+_SIDES = (("left", "right"), ("l", "r"), ("0", "1"), ("1", "2"))
+#: Words (also those of ``cameraLeft``), numbers, and what stands between them.
+_TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+|[^A-Za-z0-9]+")
 
 
 @dataclass(frozen=True)
@@ -75,7 +73,8 @@ class ImageTopic:
         return "rect" in self.base.rpartition("/")[2]
 
     def __str__(self) -> str:
-        size = ", not readable" if self.size is None else f", {self.size[0]} x {self.size[1]}"
+        unread = f", not readable: {self.problem}" if self.problem else ", not readable"
+        size = unread if self.size is None else f", {self.size[0]} x {self.size[1]}"
         return f"{self.topic.name} ({self.topic.kind}, {self.encoding}{size}, {self.topic.n})"
 
 
@@ -86,13 +85,20 @@ def rank_of(one: ImageTopic) -> tuple[bool, int, bool]:
     return (not one.is_rectified, place, one.is_compressed)
 
 
-def names_of_right(left: str) -> list[str]:
-    """Return what the right camera may be called if a name is that of the left one."""
-    names = (_exchanged(left, *sides) for sides in _SIDES)
-    return [name for name in names if name != left]
+def side_of_pair(left: str, right: str) -> int | None:
+    """Tell whether two names are those of the left and the right camera of a pair.
 
+    They are if they differ in nothing but one word or number, which is ``left`` and ``right``,
+    ``l`` and ``r``, 0 and 1, or 1 and 2: ``/infra1/image`` and ``/infra2/image``.
 
-def _exchanged(name: str, left: str, right: str) -> str:
-    """Put one word in the place of another where it stands alone: ``cam1`` is not in ``cam10``."""
-    ends = r"(?![0-9])" if left[-1].isdigit() else r"(?![a-z])"
-    return re.sub(rf"(?<![A-Za-z]){re.escape(left)}{ends}", right, name)
+    Returns
+    -------
+    int or None
+        Which of these it is, the clearest first; None if they are no such names.
+    """
+    ours, theirs = _TOKEN.findall(left), _TOKEN.findall(right)
+    if len(ours) != len(theirs):
+        return None
+    both = zip(ours, theirs, strict=True)
+    found = {(a.lower(), b.lower()) for a, b in both if a != b}
+    return _SIDES.index(found.pop()) if len(found) == 1 and found <= set(_SIDES) else None

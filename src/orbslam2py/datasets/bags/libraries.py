@@ -84,5 +84,11 @@ def type_store(encoding: str) -> Any:
     """Return rosbags' types for messages of ROS 1 (``ros1``) or ROS 2 (``cdr``)."""
     typesys = require("rosbags.typesys")
     stores = typesys.Stores
-    store = stores.ROS1_NOETIC if encoding == "ros1" else stores.ROS2_HUMBLE
-    return typesys.get_typestore(store)
+    if encoding != "ros1":
+        return typesys.get_typestore(stores.ROS2_HUMBLE)
+    store = typesys.get_typestore(stores.ROS1_NOETIC)
+    name = "tf2_msgs/msg/TFMessage"
+    if name not in store.types:
+        definition = "geometry_msgs/TransformStamped[] transforms"
+        store.register(typesys.get_types_from_msg(definition, name))
+    return store

@@ -19,6 +19,8 @@ POSES = (
     "geometry_msgs/msg/TransformStamped",
     "nav_msgs/msg/Odometry",
 )
+#: Types of messages with transforms between frames, by their names in ROS 2 and in old ROS 1.
+TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 #: Encodings of messages that can be read.
 ENCODINGS = ("ros1", "cdr")
 #: So many first bytes hold the head of every image.
@@ -95,6 +97,7 @@ def read_message(content: bytes, kind: str, encoding: str) -> Any:
         If it is damaged; without the bag's name.
     """
     serde = require("rosbags.serde")
+    kind = TRANSFORMS[0] if kind in TRANSFORMS else kind
     store = type_store(encoding)
     read = store.deserialize_ros1 if encoding == "ros1" else store.deserialize_cdr
     try:

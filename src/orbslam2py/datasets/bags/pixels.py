@@ -120,10 +120,11 @@ def decode_depth(message: Any, *, compressed: bool) -> NDArray[np.generic]:
 
 
 def _raw_image(message: Any) -> ByteArray:
-    encoding = str(message.encoding)
+    told = str(message.encoding)
+    encoding = told if told in _SEEN else told.lower()  # the RealSense SDK writes YUYV
     if encoding not in _SEEN:
         raise ImageError(
-            f"its encoding is {encoding or 'not told'}; known are {', '.join(_SEEN)}; convert it "
+            f"its encoding is {told or 'not told'}; known are {', '.join(_SEEN)}; convert it "
             "to mono8"
         )
     channels, way = _SEEN[encoding]

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from orbslam2py._arrays import FloatArray
 from orbslam2py.datasets.bags.bag import Bag, Topic
 from orbslam2py.datasets.bags.messages import read_message, stamp_of
 from orbslam2py.datasets.bags.parts import naming_damage
@@ -49,6 +50,15 @@ def read_poses(bag: Bag, topic: Topic) -> Trajectory:
     table = np.array([found[stamp] for stamp in stamps])
     poses = poses_from(rotations_from_quaternions(table[:, 3:]), table[:, :3])
     return Trajectory(stamps_of(stamps).seconds, poses)
+
+
+def pose_of_numbers(*numbers: float) -> FloatArray:
+    """Make a transform (4, 4) of x, y, z and a quaternion x, y, z, w; NaN if they are none."""
+    if not np.isfinite(numbers).all() or not any(numbers[3:]):
+        return np.full((4, 4), np.nan)
+    table = np.array([numbers])
+    T: FloatArray = poses_from(rotations_from_quaternions(table[:, 3:]), table[:, :3])[0]
+    return T
 
 
 def _numbers(message: Any) -> list[float]:

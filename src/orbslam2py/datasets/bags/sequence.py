@@ -14,15 +14,16 @@ from numpy.typing import NDArray
 
 from orbslam2py._arguments import index_of
 from orbslam2py._arrays import ByteArray, FloatArray
-from orbslam2py.datasets.bags.bag import Bag, Message, Topic
-from orbslam2py.datasets.bags.calibration import CameraInfo, settings_of_camera, settings_of_pair
+from orbslam2py.datasets.bags.bag import Bag, Message
+from orbslam2py.datasets.bags.calibration import settings_of_camera, settings_of_pair
+from orbslam2py.datasets.bags.depth_cameras import find_depth_camera
 from orbslam2py.datasets.bags.image_topics import ImageTopic
-from orbslam2py.datasets.bags.messages import CAMERA_INFO, read_message
-from orbslam2py.datasets.bags.parts import naming_damage
+from orbslam2py.datasets.bags.infos import read_info
+from orbslam2py.datasets.bags.messages import read_message
 from orbslam2py.datasets.bags.pixels import decode_depth, decode_image, units_per_metre
 from orbslam2py.datasets.bags.poses import read_poses
+from orbslam2py.datasets.bags.realsense import camera_times, units_per_metre_of
 from orbslam2py.datasets.bags.timing import (
-    TimedMessages,
     pair_messages,
     require_one_size,
     stamps_of,
@@ -30,18 +31,18 @@ from orbslam2py.datasets.bags.timing import (
     warn_of_gaps,
 )
 from orbslam2py.datasets.bags.topics import TopicChoice, parse_topics
+from orbslam2py.datasets.bags.transforms import Transforms, names_of_coordinates
 from orbslam2py.datasets.base import Images, choose_sensor, rate_of
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.frames import FramesInOrder
 from orbslam2py.datasets.rectification import Rectifier
+from orbslam2py.datasets.registration import DepthRegistration
 from orbslam2py.errors import DatasetError, ImageError
 from orbslam2py.settings import Sensor, Settings, resolve_settings
 from orbslam2py.trajectory import Trajectory
 
 _log = logging.getLogger(__name__)
 
-#: So many CameraInfo are looked at to find one of a calibrated camera.
-_MOST_INFOS = 10
 #: Images per second of a bag with a single one.
 _USUAL_RATE = 30.0
 
@@ -62,8 +63,8 @@ class BagSequence(FramesInOrder):
         Settings, a file, a built-in name, or None for what the CameraInfo of the bag tell.
     topics
         Names of topics by their roles, as a dictionary or as ``left=/a,right=/b``: ``left`` (or
-        ``image``), ``right``, ``depth``, ``left_info`` (or ``info``), ``right_info``, ``truth``. By
-        default guessed by types and names.
+        ``image``), ``right``, ``depth``, ``left_info`` (or ``info``), ``right_info``,
+        ``depth_info``, ``truth``. By default guessed by types and names.
 
     Raises
     ------
@@ -92,6 +93,8 @@ class BagSequence(FramesInOrder):
         for doubt in self._bag.doubts:
             _log.warning("%s", doubt)
         choice = TopicChoice(self._bag, named)
+        if sensor is not None:
+            choice.require(Sensor(sensor))
         self.sensor = choose_sensor(self.path, sensor, choice.sensors)
         self.topics = choice.choose(self.sensor)
         self._chosen = None if settings is None else resolve_settings(settings, self.sensor)
@@ -118,19 +121,24 @@ class BagSequence(FramesInOrder):
 
     @cached_property
     def _default_settings(self) -> Settings:
-        left = self._camera_info(self.topics.left, self.topics.left_info)
+        left = read_info(self._bag, self.topics.left, self.topics.left_info, "info")
         fps = rate_of(self.timestamps, _USUAL_RATE)
         if self.topics.right is not None:
-            right = self._camera_info(self.topics.right, self.topics.right_info)
+            right = read_info(self._bag, self.topics.right, self.topics.right_info, "right_info")
             rectified = self.topics.left.is_rectified and self.topics.right.is_rectified
-            return settings_of_pair(left, right, fps, rectified=rectified)
+            T = None
+            if left.P[0, 3] == right.P[0, 3]:  # each was calibrated alone
+                names = map(names_of_coordinates, self._streams, self._frames)
+                T = Transforms(self._bag).between(*reversed(list(names)))
+            return settings_of_pair(left, right, fps, rectified=rectified, T_right_left=T)
         depth = self.topics.depth
+        units = None if depth is None else units_per_metre_of(self._bag, depth)
         return settings_of_camera(
             left,
             self.sensor,
             fps,
             rectified=self.topics.left.is_rectified,
-            depth_factor=None if depth is None else units_per_metre(depth.encoding),
+            depth_factor=None if depth is None else units or units_per_metre(depth.encoding),
         )
 
     def __len__(self) -> int:
@@ -172,7 +180,9 @@ class BagSequence(FramesInOrder):
         timed = [time_messages(self._bag, one.topic) for one in self._streams]
         for one, messages in zip(self._streams, timed, strict=True):
             require_one_size(self.path, one.topic, messages.sizes)
-        self._check_sizes(timed)
+        timed = camera_times(self._bag, self._streams, timed)
+        self._frames = [messages.frame for messages in timed]
+        self._check_cameras()
         first = timed[0]
         self._nanoseconds, self._messages = first.nanoseconds, [first.messages]
         if len(timed) > 1:
@@ -181,29 +191,30 @@ class BagSequence(FramesInOrder):
             self._nanoseconds = [first.nanoseconds[k] for k in i]
             self._messages = [[first.messages[k] for k in i], [timed[1].messages[k] for k in j]]
 
-    def _check_sizes(self, timed: list[TimedMessages]) -> None:
+    def _check_cameras(self) -> None:
         left, *others = self._streams
+        self._depth_camera = None
+        if self.topics.depth is not None:
+            frames = (self._frames[0], self._frames[1])
+            self._depth_camera = find_depth_camera(self._bag, self.topics, frames, self._chosen)
+            return
         for other in others:
-            if other.size == left.size or other.size is None or left.size is None:
-                continue
-            sizes = [
-                f"{one.topic.name} {one.size[0]} x {one.size[1]}"
-                for one in (left, other)
-                if one.size
-            ]
-            remedy = (
-                "take the topic of depth that is registered to the colour camera (--topics depth=)"
-                if other is self.topics.depth
-                else "name two cameras of one size with --topics"
-            )
-            raise DatasetError(f"{self.path}: images differ in size, {', '.join(sizes)}; {remedy}")
-        depth = self.topics.depth
-        if depth is not None and timed[0].frame != timed[1].frame:
-            _log.warning(
-                "%s: depth of %s is in the coordinates '%s', the images are in '%s': if it is not "
-                "registered to them, the result is wrong",
-                *(self.path, depth.topic.name, timed[1].frame, timed[0].frame),
-            )
+            if other.size != left.size and other.size and left.size:
+                sizes = ", ".join(
+                    "{} {} x {}".format(one.topic.name, *(one.size or ())) for one in (left, other)
+                )
+                raise DatasetError(
+                    f"{self.path}: images differ in size, {sizes}; name two cameras of one size "
+                    "with --topics"
+                )
+
+    @cached_property
+    def _registration(self) -> DepthRegistration | None:
+        """What registers depth to the images; None if it is registered."""
+        size = self.topics.left.size
+        if self._depth_camera is None or size is None:
+            return None
+        return self._depth_camera.registration(self.settings, size)
 
     def _message(self, one: ImageTopic, message: Message) -> Any:
         try:
@@ -232,6 +243,8 @@ class BagSequence(FramesInOrder):
     def _depth(self, one: ImageTopic, message: Message, image: ByteArray) -> NDArray[np.generic]:
         try:
             depth = decode_depth(self._message(one, message), compressed=one.is_compressed)
+            if self._registration is not None:
+                depth = self._registration.register(depth)
         except ImageError as error:
             raise ImageError(f"{self._where(one)}: {error}") from error
         if depth.shape != image.shape[:2]:
@@ -250,42 +263,3 @@ class BagSequence(FramesInOrder):
 
     def _where(self, one: ImageTopic) -> str:
         return f"{one.topic.name} in {self.path}"
-
-    # ---- calibration -----------------------------------------------------------------------------
-    def _camera_info(self, image: ImageTopic, topic: Topic | None) -> CameraInfo:
-        """Return the first calibration of a camera.
-
-        Raises
-        ------
-        DatasetError
-            If there is none, or it is for images of another size.
-        """
-        advice = (
-            "give --settings with a file or a built-in name; 'orbslam2py settings new' makes a "
-            "file of the numbers of the camera"
-        )
-        if topic is None:
-            infos = [one.name for one in self._bag.topics if one.kind == CAMERA_INFO and one.n]
-            named = f"take one of {', '.join(infos)} with --topics info=..., or " if infos else ""
-            raise DatasetError(
-                f"no settings for {self.path}: it has no CameraInfo for {image.topic.name}; "
-                f"{named}{advice}"
-            )
-        what = f"{topic.name} in {self.path}"
-        for message in self._bag.messages(topic)[:_MOST_INFOS]:
-            with naming_damage(self.path):
-                read = read_message(self._bag.read(message), topic.kind, topic.encoding)
-            info = CameraInfo.of(read, what)
-            if info is not None:
-                break
-        else:
-            raise DatasetError(
-                f"no settings for {self.path}: {topic.name} is of a camera that was not "
-                f"calibrated; {advice}"
-            )
-        if image.size is not None and info.size != image.size:
-            raise DatasetError(
-                f"{what} is for {info.size[0]} x {info.size[1]} pixels, but images of "
-                f"{image.topic.name} have {image.size[0]} x {image.size[1]}; {advice}"
-            )
-        return info

@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 from orbslam2py.datasets.bags.bag import Bag, Topic
-from orbslam2py.datasets.bags.image_topics import ImageTopic, names_of_right, rank_of
+from orbslam2py.datasets.bags.image_topics import ImageTopic, rank_of, side_of_pair
 from orbslam2py.datasets.bags.messages import (
     CAMERA_INFO,
     COMPRESSED_IMAGE,
@@ -23,12 +23,12 @@ from orbslam2py.errors import DatasetError, OrbSlamError
 from orbslam2py.settings import Sensor
 
 #: What may be named, and by which other words.
-ROLES = ("left", "right", "depth", "left_info", "right_info", "truth")
+ROLES = ("left", "right", "depth", "left_info", "right_info", "depth_info", "truth")
 _ALIASES = {"image": "left", "color": "left", "colour": "left", "rgb": "left", "info": "left_info"}
 #: The topic that is taken as the true poses of the camera if nobody names one.
 _TRUTH = "/ground_truth"
 _COLOUR = re.compile(r"rgb|colou?r", re.IGNORECASE)
-_REGISTERED = re.compile(r"regist|aligned", re.IGNORECASE)
+_REGISTERED = re.compile(r"regist|aligned|depth_to_(rgb|colou?r)", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Chosen:
         Images of the only, left or colour camera.
     right, depth
         Those that belong to them, if the sensor has them.
-    left_info, right_info
+    left_info, right_info, depth_info
         Calibration of the cameras, if there is one.
     truth
         True poses of the camera, if there are any.
@@ -52,6 +52,7 @@ class Chosen:
     depth: ImageTopic | None = None
     left_info: Topic | None = None
     right_info: Topic | None = None
+    depth_info: Topic | None = None
     truth: Topic | None = None
 
 
@@ -71,7 +72,7 @@ def parse_topics(text: str) -> dict[str, str]:
             problem = "is there twice" if role in named else "is no ROLE=/TOPIC"
             raise DatasetError(
                 f"--topics: '{part}' {problem}; roles are image or left, right, depth, info or "
-                "left_info, right_info, truth"
+                "left_info, right_info, depth_info, truth"
             )
         named[role] = topic
     return named
@@ -114,6 +115,17 @@ class TopicChoice:
             found.append(Sensor.STEREO)
         return (*found, Sensor.MONOCULAR)
 
+    def require(self, sensor: Sensor) -> None:
+        """See that images for a sensor are found where there may be some.
+
+        Raises
+        ------
+        DatasetError
+            If a pair is wanted, and several cameras have names that tell no pair.
+        """
+        if sensor is Sensor.STEREO and sensor not in self.sensors and len(self._cameras) > 1:
+            raise self._not_certain("the left and right images", "left", "right")
+
     def choose(self, sensor: Sensor) -> Chosen:
         """Choose the topics for a sensor.
 
@@ -137,6 +149,7 @@ class TopicChoice:
             depth,
             self._info("left_info", left),
             None if right is None else self._info("right_info", right),
+            None if depth is None else self._info("depth_info", depth),
             self._truth(),
         )
 
@@ -166,12 +179,12 @@ class TopicChoice:
 
     @cached_property
     def _pairs(self) -> list[tuple[ImageTopic, ImageTopic]]:
-        by_name = {one.base: one for one in self._cameras}
         pairs = []
         for one in self._cameras:
-            right = next((by_name[n] for n in names_of_right(one.base) if n in by_name), None)
-            if right is not None:
-                pairs.append((one, right))
+            sides = [(side_of_pair(one.base, other.base), other) for other in self._cameras]
+            fitting = [(side, other) for side, other in sides if side is not None]
+            if fitting:
+                pairs.append((one, min(fitting, key=lambda item: item[0])[1]))
         # Of cam0, cam1, cam2 the first two are meant.
         rights = {pair[1].base for pair in pairs}
         return [pair for pair in pairs if pair[0].base not in rights]
@@ -186,23 +199,27 @@ class TopicChoice:
             if (left is None or pair[0] == left) and (right is None or pair[1] == right)
         ]
         if len(fitting) != 1:
-            raise self._not_certain("the left and right images", "left=/...,right=/...")
+            raise self._not_certain("the left and right images", "left", "right")
         return fitting[0]
 
     def _colour(self) -> ImageTopic:
         found = self._cameras
         if len(found) > 1:
             found = [one for one in found if _COLOUR.search(one.base)]
+        if not found and len(self._pairs) == 1:  # depth was made of this pair
+            return self._pairs[0][0]
         if len(found) != 1:
-            raise self._not_certain("the images that belong to the depth", "image=/...,depth=/...")
+            raise self._not_certain("the images that belong to the depth", "image", "depth")
         return found[0]
 
     def _best_depth(self) -> ImageTopic:
         found = self._depths
         if len(found) > 1:
             found = [one for one in found if _REGISTERED.search(one.base)]
+        if len(found) > 1:
+            found = [one for one in found if _COLOUR.search(one.base)]
         if len(found) != 1:
-            raise self._not_certain("the depth", "image=/...,depth=/...")
+            raise self._not_certain("the depth", "image", "depth")
         return found[0]
 
     def _single(self) -> ImageTopic:
@@ -212,7 +229,7 @@ class TopicChoice:
         if len(found) > 1:
             found = [one for one in found if _COLOUR.search(one.base)]
         if len(found) != 1:
-            raise self._not_certain("the images", "image=/...")
+            raise self._not_certain("the images", "image")
         return found[0]
 
     def _given(self, role: str) -> ImageTopic | None:
@@ -260,7 +277,11 @@ class TopicChoice:
         if role in self._named:
             return self._topic(role, self._named[role])
         parent = image.base.rpartition("/")[0]
-        wanted = [f"{image.base}/camera_info", f"{parent}/camera_info"]
+        stream = parent.rpartition("/")[0]  # as recordings of RealSense cameras have it
+        wanted = [
+            *(f"{image.base}/camera_info", f"{parent}/camera_info"),
+            f"{stream}/info/camera_info",
+        ]
         found = {t.name: t for t in self._bag.topics if t.kind == CAMERA_INFO and t.n}
         return next((found[name] for name in wanted if name in found), None)
 
@@ -303,7 +324,7 @@ class TopicChoice:
             "sensor_msgs/Image or sensor_msgs/CompressedImage"
         )
 
-    def _not_certain(self, what: str, example: str) -> DatasetError:
+    def _not_certain(self, what: str, *roles: str) -> DatasetError:
         broken = next((one for one in self._all if one.size is None), None)
         if broken is not None and all(one.size is None for one in self._all):
             return DatasetError(
@@ -311,10 +332,34 @@ class TopicChoice:
                 f"{broken.topic.name}: {broken.problem}"
             )
         listed = "".join(f"\n  {one}" for one in self._all)
+        example = ",".join(f"{role}={topic}" for role, topic in self._examples(roles).items())
         return DatasetError(
             f"cannot tell which topics of {self._bag.path} are {what}; these have images, of type, "
-            f"pixels and number:{listed}\nname them with --topics {example}"
+            f"pixels and number:{listed}\nname them with --topics, for example --topics {example}"
         )
+
+    def _examples(self, roles: tuple[str, ...]) -> dict[str, str]:
+        """Topics that may be meant by roles; ``/...`` where there is none."""
+        coloured = [one for one in self._cameras if _COLOUR.search(one.base)]
+        registered = [one for one in self._depths if _REGISTERED.search(one.base)]
+        pair = self._pairs[0] if self._pairs else tuple(self._cameras[:2])
+        found: dict[str, Sequence[ImageTopic]] = {
+            "image": coloured or self._cameras,
+            "left": pair,
+            "right": pair[1:],
+            "depth": registered or self._depths,
+        }
+        examples = {}
+        for role in roles:
+            named = self._named.get(_ALIASES.get(role, role))
+            first = next(iter(found[role]), None)
+            examples[role] = named or ("/..." if first is None else first.topic.name)
+        return examples
+
+
+def says_registered(depth: ImageTopic) -> bool:
+    """Whether the name of a topic says that its depth is registered to images."""
+    return _REGISTERED.search(depth.base) is not None
 
 
 def _has_images(topic: Topic) -> bool:

@@ -18,7 +18,25 @@ def image(topic: str, stamp: int = 0, size: int = 24) -> bags.Made:
     return bags.raw_image(topic, bags.START + stamp, GREY[:size], "mono8")
 
 
+def camera(
+    name: str, f: float = 20, encoding: str = "mono8", model: str = "plumb_bob"
+) -> list[bags.Made]:
+    """Images and calibration of a camera, in coordinates of its own."""
+    grey = GREY.astype(np.uint16) if encoding == "16UC1" else GREY
+    made = bags.raw_image(f"/{name}/image", bags.START, grey, encoding, frame=name)
+    K = np.array([[f, 0, 15.5], [0, f, 11.5], [0, 0, 1]])
+    return [made, bags.camera_info(f"/{name}/camera_info", bags.START, K=K, model=model)]
+
+
+def shift(x: float, y: float) -> bags.Made:
+    T = np.eye(4)
+    T[:2, 3] = x, y
+    return bags.frames("/tf_static", ("cam1", "cam2", T))
+
+
 INFO = bags.camera_info("/camera_info", bags.START)
+PAIR = [*camera("cam1"), *camera("cam2")]
+RGBD = [*camera("rgb"), *camera("depth", 30, "16UC1")]
 CASES: dict[str, tuple[list[bags.Made], tuple[str, ...], tuple[str, ...]]] = {
     "none": ([bags.text("/talk", bags.START, "hello")], (), ("holds no images", "/talk (std_m")),
     "infos": ([INFO], (), ("holds calibrations (CameraInfo), but no images", "give a bag with")),
@@ -28,6 +46,31 @@ CASES: dict[str, tuple[list[bags.Made], tuple[str, ...], tuple[str, ...]]] = {
     "pairs": ([image("/a"), INFO], ("--sensor", "stereo"), ("has no stereo images", "mono")),
     "named": ([image("/a"), INFO], ("--topics", "left:/a"), ("no ROLE=/TOPIC", "roles are")),
     "absent": ([image("/a"), INFO], ("--topics", "image=/b"), ("no messages of /b", "it has /a")),
+    "unlike": (
+        [image("/a"), image("/b")],
+        ("--sensor", "stereo"),
+        ("are the left and right images", "--topics left=/a,right=/b"),
+    ),
+    "nowhere": (PAIR, (), ("do not tell the distance", "/tf_static", "with --settings")),
+    "above": ([*PAIR, shift(0.01, 0.2)], (), ("do not stand side by side", "--sensor mono")),
+    "behind": ([*PAIR, shift(-0.1, 0)], (), ("to the left of the other one", "exchange the two")),
+    "half": (PAIR[:3], (), ("no CameraInfo for /cam2/image", "--topics right_info=")),
+    "fish": (
+        [*camera("cam1", model="equidistant"), *camera("cam2"), shift(0.1, 0)],
+        (),
+        ("the distortion model equidistant is not supported", "--settings"),
+    ),
+    "depth": (
+        RGBD,
+        (),
+        ("(fx 30 against 20)", "without the transform", "align_depth.enable:=true"),
+    ),
+    "both": (RGBD, ("--topics", "depth_info=/none"), ("no messages of /none (depth_info)",)),
+    "yuv": (
+        [*camera("rgb", encoding="nv99"), *camera("depth", 30, "16UC1")],
+        (),
+        ("its encoding is nv99; known are mono8", "name them with --topics"),
+    ),
     "rate": ([image("/image"), INFO], ("--fps", "10"), ("--fps is for a folder of images",)),
 }
 

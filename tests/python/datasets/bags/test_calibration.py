@@ -109,17 +109,23 @@ def test_pairs_that_cannot_be_used(
         _ = sequence.settings
 
 
-def test_many_coefficients(tmp_path: Path) -> None:
-    """Eight that are not zero: nothing of one camera, but a pair is rectified with them."""
+def test_eight_coefficients(tmp_path: Path) -> None:
+    """One camera has them in its settings; a pair is rectified with them."""
     eight = (*D, 0.1, 0.02, 0.003)
     info = {**raw_pair()["left"], "D": eight, "model": "rational_polynomial"}
     bag = bags.write(tmp_path / "b", "mcap", messages("image_raw", {"camera": info}))
-    with pytest.raises(orb.DatasetError, match="8 coefficients is not supported for one camera"):
-        _ = BagSequence(bag).settings
+    assert BagSequence(bag).settings.camera.distortion.tolist() == list(eight)
     infos = {side: {**one, "D": eight} for side, one in raw_pair().items()}
     pair = BagSequence(bags.write(tmp_path / "c", "mcap", messages("image_raw", infos)))
     assert pair.settings.rectification is not None
     assert pair.settings.rectification.left.D.tolist() == list(eight)
+
+
+def test_more_coefficients(tmp_path: Path) -> None:
+    info = {**raw_pair()["left"], "D": (*D, *[0.1] * 9), "model": "rational_polynomial"}
+    bag = bags.write(tmp_path / "b", "mcap", messages("image_raw", {"camera": info}))
+    with pytest.raises(orb.DatasetError, match="14 coefficients is not supported, at most 8 are"):
+        _ = BagSequence(bag).settings
 
 
 def test_no_calibration(tmp_path: Path) -> None:

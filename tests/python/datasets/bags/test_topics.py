@@ -79,6 +79,20 @@ def opened(
             "rgbd",
             ["/c/color/image", "/c/depth/image"],
         ),
+        (
+            ["/c/infra2/image", "/c/infra1/image", "/c/depth/image"],
+            "rgbd",
+            ["/c/infra1/image", "/c/depth/image"],
+        ),
+        (
+            [
+                "/c/aligned_depth_to_infra1/image_raw",
+                "/c/aligned_depth_to_color/image_raw",
+                "/c/color/image_raw",
+            ],
+            "rgbd",
+            ["/c/color/image_raw", "/c/aligned_depth_to_color/image_raw"],
+        ),
     ],
 )
 def test_guess(tmp_path: Path, topics: list[str], sensor: str, chosen: list[str] | None) -> None:
@@ -92,15 +106,26 @@ def test_guess(tmp_path: Path, topics: list[str], sensor: str, chosen: list[str]
 @pytest.mark.parametrize(
     ("topics", "sensor", "what", "example"),
     [
-        (["/front/image_raw", "/back/image_raw"], "mono", "are the images;", "image=/..."),
+        (
+            ["/front/image_raw", "/back/image_raw"],
+            "mono",
+            "are the images;",
+            "image=/back/image_raw",
+        ),
+        (["/a/image", "/b/image"], "stereo", "left and right", "left=/a/image,right=/b/image"),
         (
             ["/a_left", "/a_right", "/b_left", "/b_right"],
             "stereo",
             "the left and right images",
-            "left=/...,right=/...",
+            "left=/a_left,right=/a_right",
         ),
-        (["/a_rgb", "/b_depth", "/c_depth"], "rgbd", "the depth", "image=/...,depth=/..."),
-        (["/a_rgb", "/b_rgb", "/c_depth"], "rgbd", "belong to the depth", "image=/...,depth=/..."),
+        (["/a_rgb", "/b_depth", "/c_depth"], "rgbd", "the depth", "image=/a_rgb,depth=/b_depth"),
+        (
+            ["/a_rgb", "/b_rgb", "/c_depth"],
+            "rgbd",
+            "belong to the dep",
+            "image=/a_rgb,depth=/c_depth",
+        ),
     ],
 )
 def test_not_certain(
@@ -114,6 +139,52 @@ def test_not_certain(
     for topic in topics:
         assert f"\n  {topic} (sensor_msgs/msg/Image, " in message
     assert "32 x 24, 1)" in message
+
+
+@pytest.mark.parametrize(
+    ("left", "right"),
+    [
+        ("/camera/fisheye1/image_raw", "/camera/fisheye2/image_raw"),
+        (
+            "/device_0/sensor_0/Infrared_1/image/data",
+            "/device_0/sensor_0/Infrared_2/image/data",
+        ),
+        ("/cam0/image0", "/cam1/image1"),
+        ("/rig/cameraLeft", "/rig/cameraRight"),
+        ("/LEFT/image", "/RIGHT/image"),
+        ("/stereo/l/image_raw", "/stereo/r/image_raw"),
+        ("/oak/mono_1", "/oak/mono_2"),
+    ],
+)
+@pytest.mark.parametrize("kind", bags.KINDS)
+def test_pairs_by_one_word(tmp_path: Path, left: str, right: str, kind: str) -> None:
+    bag = bags.write(tmp_path / "b", kind, [image(right), image(left)])
+    roles = BagSequence(bag, "stereo").topics
+    assert roles.right is not None
+    assert (roles.left.topic.name, roles.right.topic.name) == (left, right)
+    assert BagSequence(bag).sensor is Sensor.STEREO
+    assert BagSequence(bag, "mono").topics.left.topic.name == left
+
+
+@pytest.mark.parametrize(
+    ("left", "right"),
+    [
+        ("/cam0/image1", "/cam1/image2"),  # two numbers, which differ in different ways
+        ("/cam0/image", "/cam2/image"),
+        ("/cam1/image", "/cam10/image"),
+        ("/left/image", "/right/picture"),
+        ("/left/image", "/front/image"),
+    ],
+)
+def test_no_pairs(tmp_path: Path, left: str, right: str) -> None:
+    with pytest.raises(orb.DatasetError) as told:
+        opened(tmp_path, left, right, sensor="stereo")
+    example = ",".join(
+        f"{role}={name}"
+        for role, name in zip(("left", "right"), sorted((left, right)), strict=True)
+    )
+    assert str(told.value).endswith(f"--topics {example}")
+    assert opened(tmp_path / "again", left, right, named=example).sensor is Sensor.STEREO
 
 
 def test_named(tmp_path: Path) -> None:
@@ -224,5 +295,5 @@ def test_depth_of_another_camera(tmp_path: Path, caplog: pytest.LogCaptureFixtur
 
 def test_depth_of_another_size(tmp_path: Path) -> None:
     small = bags.raw_image("/depth", bags.START, DEPTH[::2, ::2].copy(), "16UC1")
-    with pytest.raises(orb.DatasetError, match="/rgb 32 x 24, /depth 16 x 12; take the topic of"):
+    with pytest.raises(orb.DatasetError, match=r"16 x 12 pixels against 32 x 24.*align_depth"):
         BagSequence(bags.write(tmp_path / "b", "mcap", [image("/rgb"), small]))

@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Whether depth is that of the colour camera; if not, from which camera it is."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+import numpy as np
+
+from orbslam2py._arrays import FloatArray
+from orbslam2py.datasets.bags.bag import Bag
+from orbslam2py.datasets.bags.calibration import CameraInfo
+from orbslam2py.datasets.bags.image_topics import ImageTopic
+from orbslam2py.datasets.bags.infos import info_if_any
+from orbslam2py.datasets.bags.realsense import stream_of
+from orbslam2py.datasets.bags.topics import Chosen, says_registered
+from orbslam2py.datasets.bags.transforms import Transforms, names_of_coordinates
+from orbslam2py.datasets.registration import DepthRegistration, Lens
+from orbslam2py.errors import DatasetError
+from orbslam2py.settings import Settings
+
+_log = logging.getLogger(__name__)
+
+#: Numbers of one camera, written by two programs, differ by no more pixels than this.
+_ROUNDING = 0.1
+#: Two calibrations of one camera differ by no more than this part of the focal length.
+_OTHER_CALIBRATION = 0.05
+#: Cameras are in one place if things at this distance [m] are seen within half a pixel.
+_NEAR, _HALF_A_PIXEL = 0.5, 0.5
+_REMEDY = (
+    "record depth that is aligned to the images (realsense2_camera: align_depth.enable:=true), or "
+    "run the images alone (--sensor mono)"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class DepthCamera:
+    """A camera of depth beside the one of the images.
+
+    Attributes
+    ----------
+    lens
+        Its calibration.
+    T_colour_depth
+        Transform (4, 4) from its coordinates to those of the images' camera [m].
+    """
+
+    lens: Lens
+    T_colour_depth: FloatArray
+
+    def registration(self, settings: Settings, size: tuple[int, int]) -> DepthRegistration:
+        """Make what registers its images to those of the camera of the settings.
+
+        Parameters
+        ----------
+        settings
+            RGB-D settings.
+        size
+            Width and height of the images [pixels].
+        """
+        colour = Lens(settings.camera.matrix, settings.camera.distortion, size)
+        units = (settings.depth.raw_per_metre if settings.depth else None) or 1.0
+        return DepthRegistration(self.lens, colour, self.T_colour_depth, units)
+
+
+def find_depth_camera(
+    bag: Bag, topics: Chosen, frames: tuple[str, str], chosen: Settings | None
+) -> DepthCamera | None:
+    """Find the camera that depth must be registered from.
+
+    Parameters
+    ----------
+    bag, topics
+        The bag, and the topics of a run with depth.
+    frames
+        Coordinates that stand in the heads of images and depth.
+    chosen
+        Settings that the user gave.
+
+    Returns
+    -------
+    DepthCamera or None
+        None if depth is that of the images' camera, or nothing says otherwise.
+
+    Raises
+    ------
+    DatasetError
+        If depth is that of another camera, and the bag does not tell how to register it.
+    """
+    images, depth = topics.left, topics.depth
+    if depth is None:
+        return None
+    colour_info = info_if_any(bag, images, topics.left_info)
+    depth_info = info_if_any(bag, depth, topics.depth_info)
+    how = _difference(images, depth, colour_info, depth_info, chosen)
+    names = [
+        names_of_coordinates(one, frame) for one, frame in zip((images, depth), frames, strict=True)
+    ]
+    one_info = topics.left_info is not None and topics.left_info == topics.depth_info
+    T = None if one_info else Transforms(bag).between(*names)
+    if how and T is None and colour_info is None and chosen and images.size == depth.size:
+        _warn(bag, depth, f"is of another camera than that of the settings ({how})")
+        return None
+    known = depth_info is not None and (colour_info or chosen) is not None
+    if not how and (one_info or T is None or not known or says_registered(depth)):
+        if frames[0] != frames[1]:
+            where = f"is in the coordinates '{frames[1]}', the images are in '{frames[0]}'"
+            _warn(bag, depth, where)
+        return None
+    missing = [
+        f"a CameraInfo for {one.topic.name} of its size"
+        for one, told in ((depth, depth_info), (images, colour_info or chosen))
+        if told is None
+    ]
+    if T is None or depth_info is None or missing:
+        raise _cannot_be_registered(bag, topics, depth, how, missing, T)
+    if not how and _in_one_place(T, depth_info):
+        return None
+    _log.info(
+        "%s: depth of %s is of another camera than %s (%s); it is registered with the calibrations "
+        "of both and the transform between them (%.1f mm apart)",
+        *(bag.path, depth.topic.name, images.topic.name, how or "another place"),
+        np.linalg.norm(T[:3, 3]) * 1e3,
+    )
+    if set(names[0]) & set(names[1]):
+        _log.warning(
+            "%s: images and depth are both in the coordinates '%s', so the two cameras are taken "
+            "to stand in one place; if they do not, depth is some pixels off",
+            *(bag.path, frames[0]),
+        )
+    return DepthCamera(_lens_of(depth, depth_info), T)
+
+
+def _warn(bag: Bag, depth: ImageTopic, told: str) -> None:
+    _log.warning(
+        "%s: depth of %s %s: if it is not registered to the images, the result is wrong",
+        *(bag.path, depth.topic.name, told),
+    )
+
+
+def _lens_of(image: ImageTopic, info: CameraInfo) -> Lens:
+    if image.is_rectified or info.is_undistorted:
+        return Lens(info.rectified_K, np.zeros(8), info.size)
+    return Lens(info.K, info.distortion(), info.size)
+
+
+def _difference(
+    images: ImageTopic,
+    depth: ImageTopic,
+    colour_info: CameraInfo | None,
+    depth_info: CameraInfo | None,
+    chosen: Settings | None,
+) -> str:
+    """Say in what the two cameras differ; nothing if they do not, or nobody knows."""
+    if images.size != depth.size and images.size and depth.size:
+        return "{} x {} pixels against {} x {}".format(*depth.size, *images.size)
+    if depth_info is None or (colour_info is None and chosen is None):
+        return ""
+    K = depth_info.rectified_K if depth.is_rectified else depth_info.K
+    others, allowed = [], _ROUNDING
+    if colour_info is not None:
+        others = [colour_info.K, colour_info.rectified_K]
+    elif chosen is not None:
+        others, allowed = [chosen.camera.matrix], _OTHER_CALIBRATION * chosen.camera.fx
+    if min(np.abs(K - other).max() for other in others) <= allowed:
+        return ""
+    names = (("fx", 0, 0), ("fy", 1, 1), ("cx", 0, 2), ("cy", 1, 2))
+    worst = max(names, key=lambda one: abs(K[one[1:]] - others[0][one[1:]]))
+    return f"{worst[0]} {K[worst[1:]]:.6g} against {others[0][worst[1:]]:.6g}"
+
+
+def _in_one_place(T: FloatArray, info: CameraInfo) -> bool:
+    """Whether a pixel of one camera is, at all usual distances, the same one of the other."""
+    fx = info.K[0, 0]
+    apart = np.linalg.norm(T[:3, 3]) / _NEAR
+    turned = np.abs(T[:3, :3] - np.eye(3)).max()
+    return bool(fx * (apart + turned) < _HALF_A_PIXEL)
+
+
+def _cannot_be_registered(
+    bag: Bag,
+    topics: Chosen,
+    depth: ImageTopic,
+    how: str,
+    missing: list[str],
+    T: FloatArray | None,
+) -> DatasetError:
+    images = topics.left
+    if T is None:
+        where = "/tf_static" if stream_of(depth) is None else "/tf_static, or /tf of the stream"
+        missing.append(f"the transform between the two cameras ({where})")
+    registered = ""
+    if topics.left_info is not None and images.size == depth.size:
+        registered = (
+            f"; if it is registered already, say so: --topics depth_info={topics.left_info.name}"
+        )
+    return DatasetError(
+        f"{bag.path}: depth of {depth.topic.name} is of another camera than {images.topic.name} "
+        f"({how}), and cannot be registered to it without {' and '.join(missing)}; {_REMEDY}"
+        f"{registered}"
+    )
