@@ -4,7 +4,10 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <algorithm>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "bindings/arrays.hpp"
 #include "bindings/bindings.hpp"
@@ -52,19 +55,33 @@ void flat_property(py::class_<CameraOptions>& options, const char* name, Part Ca
       [=](CameraOptions& o, Value v) { o.*part.*value = v; }, doc);
 }
 
+// 4, 5 or 8 coefficients in OpenCV's order; those that are not given are 0.
+Distortion distortion_of(const std::vector<double>& coefficients) {
+  Distortion distortion{};
+  if (coefficients.size() > distortion.size()) {
+    throw py::value_error("distortion has at most 8 coefficients, got " +
+                          std::to_string(coefficients.size()));
+  }
+  std::copy(coefficients.begin(), coefficients.end(), distortion.begin());
+  return distortion;
+}
+
 void bind_camera_options(py::module_& module) {
   py::class_<CameraOptions> options(module, "CameraOptions", "What a Camera is made from.");
   options
       .def(py::init([](double fx, double fy, double cx, double cy, int width, int height,
-                       const std::array<double, 5>& distortion, double bf, double depth_ratio) {
-             return CameraOptions{{fx, fy, cx, cy}, distortion, bf, depth_ratio, {width, height}};
+                       const std::vector<double>& distortion, double bf, double depth_ratio) {
+             const Distortion lens = distortion_of(distortion);
+             return CameraOptions{{fx, fy, cx, cy}, lens, bf, depth_ratio, {width, height}};
            }),
            py::arg("fx") = 0.0, py::arg("fy") = 0.0, py::arg("cx") = 0.0, py::arg("cy") = 0.0,
            py::arg("width") = 0, py::arg("height") = 0,
-           py::arg("distortion") = std::array<double, 5>{}, py::arg("bf") = 0.0,
+           py::arg("distortion") = std::vector<double>{}, py::arg("bf") = 0.0,
            py::arg("depth_ratio") = 0.0, "Nothing is checked before a Camera is made.")
-      .def_readwrite("distortion", &CameraOptions::distortion,
-                     "k1, k2, p1, p2, k3; zeros for rectified images.")
+      .def_property(
+          "distortion", [](const CameraOptions& o) { return o.distortion; },
+          [](CameraOptions& o, const std::vector<double>& d) { o.distortion = distortion_of(d); },
+          "k1, k2, p1, p2[, k3[, k4, k5, k6]]; zeros for rectified images.")
       .def_readwrite("bf", &CameraOptions::bf, "Baseline times fx [px m]; 0: single camera.")
       .def_readwrite("depth_ratio", &CameraOptions::depth_ratio,
                      "Close/far limit in multiples of the baseline.");

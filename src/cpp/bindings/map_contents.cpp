@@ -44,9 +44,9 @@ void put_cameras(py::dict& arrays, const std::vector<CameraContents>& cameras) {
   put("cameras.fy", [](const C& c) { return c.camera.pinhole.fy; });
   put("cameras.cx", [](const C& c) { return c.camera.pinhole.cx; });
   put("cameras.cy", [](const C& c) { return c.camera.pinhole.cy; });
-  std::vector<std::array<double, 5>> distortion;
+  std::vector<Distortion> distortion;
   for (const C& c : cameras) distortion.push_back(c.camera.distortion);
-  arrays["cameras.distortion"] = owned<double>(std::move(distortion), {5});
+  arrays["cameras.distortion"] = owned<double>(std::move(distortion), {8});
   put("cameras.bf", [](const C& c) { return c.camera.bf; });
   put("cameras.depth_ratio", [](const C& c) { return c.camera.depth_ratio; });
   put("cameras.width", [](const C& c) { return std::int64_t{c.camera.image_size.width}; });
@@ -223,7 +223,7 @@ void read_cameras(Arrays& arrays, StoredMap& stored) {
              cy = arrays.column<double>("cameras.cy", n),
              bf = arrays.column<double>("cameras.bf", n),
              ratio = arrays.column<double>("cameras.depth_ratio", n);
-  const auto distortion = arrays.column<std::array<double, 5>, double, 5>("cameras.distortion", n);
+  const auto distortion = arrays.column<Distortion, double, 8>("cameras.distortion", n);
   const auto width = arrays.column<std::int64_t>("cameras.width", n),
              height = arrays.column<std::int64_t>("cameras.height", n),
              levels = arrays.column<std::int64_t>("cameras.n_levels", n);

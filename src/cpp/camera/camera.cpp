@@ -13,6 +13,32 @@ namespace {
 // Enough for the lenses of the field, and a fixed number keeps the result reproducible.
 constexpr int kUndistortIterations = 5;
 
+// Newton's steps for the rational model: they end sooner, when a step is below the tolerance.
+constexpr int kMostNewtonSteps = 30;
+constexpr double kNewtonTolerance = 1e-12;
+
+/// Where the lens moves a point at unit depth, and by how much per shift of the point.
+struct Moved {
+  double x, y;
+  double x_by_x, x_by_y, y_by_y;  // y_by_x equals x_by_y
+};
+
+Moved through_lens(const Distortion& coefficients, double x, double y) {
+  const auto [k1, k2, p1, p2, k3, k4, k5, k6] = coefficients;
+  const double r2 = x * x + y * y;
+  const double numerator = 1 + ((k3 * r2 + k2) * r2 + k1) * r2;
+  const double denominator = 1 + ((k6 * r2 + k5) * r2 + k4) * r2;
+  const double radial = numerator / denominator;
+  const double numerator_by_r2 = (3 * k3 * r2 + 2 * k2) * r2 + k1;
+  const double denominator_by_r2 = (3 * k6 * r2 + 2 * k5) * r2 + k4;
+  const double radial_by_r2 = (numerator_by_r2 - radial * denominator_by_r2) / denominator;
+  return {x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
+          y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
+          radial + 2 * x * x * radial_by_r2 + 2 * p1 * y + 6 * p2 * x,
+          2 * x * y * radial_by_r2 + 2 * p1 * x + 2 * p2 * y,
+          radial + 2 * y * y * radial_by_r2 + 6 * p1 * y + 2 * p2 * x};
+}
+
 bool positive(double value) { return std::isfinite(value) && value > 0; }
 
 void check(const CameraOptions& options) {
@@ -32,7 +58,7 @@ void check(const CameraOptions& options) {
   }
   for (const double coefficient : options.distortion) {
     if (!std::isfinite(coefficient)) {
-      throw SettingsError("distortion coefficients k1, k2, p1, p2, k3 must be finite, got " +
+      throw SettingsError("distortion coefficients k1, k2, p1, p2, k3 to k6 must be finite, got " +
                           std::to_string(coefficient));
     }
   }
@@ -46,7 +72,7 @@ void check(const CameraOptions& options) {
   }
 }
 
-std::shared_ptr<const LensModel> make_lens(const std::array<double, 5>& coefficients) {
+std::shared_ptr<const LensModel> make_lens(const Distortion& coefficients) {
   auto lens = std::make_shared<RadialTangential>(coefficients);
   if (lens->is_identity()) return std::make_shared<NoDistortion>();
   return lens;
@@ -65,7 +91,7 @@ ImageBounds bounds_of(const LensModel& lens, const Pinhole& pinhole, ImageSize s
   if (!(bounds.min_x < bounds.max_x && bounds.min_y < bounds.max_y)) {
     throw SettingsError(
         "the distortion coefficients fold the image corners over each other; "
-        "check k1, k2, p1, p2, k3 and the focal lengths");
+        "check k1, k2, p1, p2, k3 to k6 and the focal lengths");
   }
   return bounds;
 }
@@ -82,7 +108,11 @@ bool RadialTangential::is_identity() const {
 // order, so that coordinates are those of its undistortPoints, to the bit.
 void RadialTangential::undistort(const Pinhole& pinhole, std::vector<float>& xy) const {
   if (is_identity()) return;
-  const auto [k1, k2, p1, p2, k3] = coefficients_;
+  const auto [k1, k2, p1, p2, k3, k4, k5, k6] = coefficients_;
+  if (k4 != 0 || k5 != 0 || k6 != 0) {
+    undistort_rational(pinhole, xy);
+    return;
+  }
   const double inverse_fx = 1 / pinhole.fx, inverse_fy = 1 / pinhole.fy;
   for (std::size_t i = 0; i + 1 < xy.size(); i += 2) {
     const double seen_x = (xy[i] - pinhole.cx) * inverse_fx;
@@ -101,6 +131,29 @@ void RadialTangential::undistort(const Pinhole& pinhole, std::vector<float>& xy)
       x = (seen_x - tangential_x) * inverse_radial;
       y = (seen_y - tangential_y) * inverse_radial;
     }
+    xy[i] = static_cast<float>(pinhole.fx * x + pinhole.cx);
+    xy[i + 1] = static_cast<float>(pinhole.fy * y + pinhole.cy);
+  }
+}
+
+// The rational model of OpenCV's calib3d; Newton's method from the seen point on. A point that it
+// cannot reach, where the model folds the image over, stays where it was seen.
+void RadialTangential::undistort_rational(const Pinhole& pinhole, std::vector<float>& xy) const {
+  for (std::size_t i = 0; i + 1 < xy.size(); i += 2) {
+    const double seen_x = (xy[i] - pinhole.cx) / pinhole.fx;
+    const double seen_y = (xy[i + 1] - pinhole.cy) / pinhole.fy;
+    double x = seen_x, y = seen_y;
+    bool reached = false;
+    for (int step = 0; step < kMostNewtonSteps && !reached; ++step) {
+      const Moved moved = through_lens(coefficients_, x, y);
+      const double off_x = moved.x - seen_x, off_y = moved.y - seen_y;
+      reached = std::abs(off_x) + std::abs(off_y) < kNewtonTolerance;
+      const double determinant = moved.x_by_x * moved.y_by_y - moved.x_by_y * moved.x_by_y;
+      if (!(determinant > 0)) break;
+      x -= (moved.y_by_y * off_x - moved.x_by_y * off_y) / determinant;
+      y -= (moved.x_by_x * off_y - moved.x_by_y * off_x) / determinant;
+    }
+    if (!reached) continue;
     xy[i] = static_cast<float>(pinhole.fx * x + pinhole.cx);
     xy[i + 1] = static_cast<float>(pinhole.fy * y + pinhole.cy);
   }

@@ -50,16 +50,20 @@ class NoDistortion final : public LensModel {
   void undistort(const Pinhole&, std::vector<float>&) const override {}
 };
 
-/// OpenCV's radial-tangential model with coefficients k1, k2, p1, p2, k3.
+/// OpenCV's coefficients k1, k2, p1, p2, k3, and k4, k5, k6 of the rational model; zeros: unused.
+using Distortion = std::array<double, 8>;
+
+/// OpenCV's radial-tangential lens: with k4, k5 or k6 the rational model.
 class RadialTangential final : public LensModel {
  public:
-  explicit RadialTangential(const std::array<double, 5>& coefficients)
-      : coefficients_(coefficients) {}
+  explicit RadialTangential(const Distortion& coefficients) : coefficients_(coefficients) {}
   bool is_identity() const override;
   void undistort(const Pinhole& pinhole, std::vector<float>& xy) const override;
 
  private:
-  std::array<double, 5> coefficients_;
+  void undistort_rational(const Pinhole& pinhole, std::vector<float>& xy) const;
+
+  Distortion coefficients_;
 };
 
 /// Limits of undistorted pixel coordinates.
@@ -78,7 +82,7 @@ struct ImageBounds {
 
 struct CameraOptions {
   Pinhole pinhole;
-  std::array<double, 5> distortion{};  ///< k1, k2, p1, p2, k3; all zero for rectified images
+  Distortion distortion{};  ///< k1, k2, p1, p2, k3, k4, k5, k6; all zero for rectified images
   double bf = 0;                       ///< baseline times fx [pixel metre]; 0 for a single camera
   double depth_ratio = 0;              ///< close/far limit in multiples of the baseline (ThDepth)
   ImageSize image_size;                ///< of the first image

@@ -51,7 +51,7 @@ class Cameras(ArrayGroup):
     """Principal point [px]."""
     cy: FloatArray
     distortion: FloatArray
-    """(c, 5): k1, k2, p1, p2, k3; zeros when the images are rectified."""
+    """(c, 8): k1, k2, p1, p2, k3, k4, k5, k6; zeros when the images are rectified."""
     bf: FloatArray
     """Baseline times fx [px m]; 0 with a single camera."""
     depth_ratio: FloatArray

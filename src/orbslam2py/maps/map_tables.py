@@ -27,7 +27,7 @@ from orbslam2py.maps.content_groups import (
 )
 from orbslam2py.maps.contents import MapContents
 from orbslam2py.maps.map_rows import Row, checksum
-from orbslam2py.maps.schema import Blob, Table
+from orbslam2py.maps.schema import RATIONAL_LENS, Blob, Table
 
 #: Keyframes whose keypoints are read at once: a few megabytes.
 _PART = 64
@@ -231,7 +231,7 @@ class MapTables:
             map_index=0,
             next_keyframe=next_keyframe,
             next_point=next_point,
-            cameras=_read_cameras(read_rows(connection, tables["cameras"])),
+            cameras=_read_cameras(read_rows(connection, tables["cameras"]), tables["cameras"]),
             keyframes=self._keyframes(keypoints),
             removed_keyframes=RemovedKeyframes(
                 ids=_column(removed, 0, np.int64),
@@ -270,19 +270,23 @@ class MapTables:
         )
 
 
-def _read_cameras(rows: list[Row]) -> Cameras:
+def _read_cameras(rows: list[Row], table: Table) -> Cameras:
     if [row[0] for row in rows] != list(range(len(rows))):
         raise MapFileError("a camera is missing")
-    names = ("fx", "fy", "cx", "cy")
+
+    def column(name: str, dtype: Any = np.float64) -> NDArray[Any]:
+        if name not in table.columns:  # of a later version
+            return np.zeros(len(rows), dtype)
+        return _column(rows, table.columns.index(name), dtype)
+
+    lens = ("k1", "k2", "p1", "p2", "k3", *RATIONAL_LENS)
     return Cameras(
-        **{name: _column(rows, 1 + i, np.float64) for i, name in enumerate(names)},
-        distortion=np.array([row[5:10] for row in rows], np.float64).reshape(-1, 5),
-        bf=_column(rows, 10, np.float64),
-        depth_ratio=_column(rows, 11, np.float64),
-        width=_column(rows, 12, np.int64),
-        height=_column(rows, 13, np.int64),
-        scale_factor=_column(rows, 14, np.float32),
-        n_levels=_column(rows, 15, np.int64),
+        **{name: column(name) for name in ("fx", "fy", "cx", "cy", "bf", "depth_ratio")},
+        distortion=np.stack([column(name) for name in lens], axis=1),
+        width=column("width", np.int64),
+        height=column("height", np.int64),
+        scale_factor=column("scale_factor", np.float32),
+        n_levels=column("n_levels", np.int64),
     )
 
 

@@ -56,9 +56,9 @@ def project_points(
     X = np.einsum("sij,sj->si", T[:, :3, :3], contents.points.positions[points]) + T[:, :3, 3]
     x, y = X[:, 0] / X[:, 2], X[:, 1] / X[:, 2]
     camera = keyframes.camera[rows]
-    k1, k2, p1, p2, k3 = np.where(bent, cameras.distortion[camera].T, 0.0)
+    k1, k2, p1, p2, k3, k4, k5, k6 = np.where(bent, cameras.distortion[camera].T, 0.0)
     r2 = x * x + y * y
-    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
     u = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
     v = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
     return np.stack(

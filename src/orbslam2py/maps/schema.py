@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 #: Tells map files from other SQLite files: "ORBm" in ASCII.
 APPLICATION_ID = 0x4F52426D
-#: Version of the format that is written; later ones are refused. Version 1 had no words.
-FORMAT_VERSION = 2
+#: Version of the format that is written; later ones are refused. Version 1 had no words, and
+#: version 2 no rational lens (k4 to k6).
+FORMAT_VERSION = 3
 #: Begins a line of the settings' text, after which come the roots of maps that were given metres.
 #: Programs that know nothing of it take it for a comment, and drop it when they write a file.
 IN_METRES = "# Maps in metres, by their roots:"
@@ -99,6 +100,8 @@ class Table(NamedTuple):
         )
 
 
+#: Further coefficients of a camera since version 3.
+RATIONAL_LENS = ("k4", "k5", "k6")
 #: A pose as 7 float64: unit quaternion x, y, z, w, then the translation. A blob, because SQLite
 #: does not keep the sign of a zero in a REAL column.
 POSE = "pose"
@@ -113,8 +116,8 @@ TABLES = {
             "cameras",
             ("id",),
             (
-                *("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "bf", "depth_ratio"),
-                *("width", "height", "scale_factor", "n_levels"),
+                *("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", *RATIONAL_LENS),
+                *("bf", "depth_ratio", "width", "height", "scale_factor", "n_levels"),
             ),
         ),
         Table(
@@ -139,9 +142,14 @@ TABLES = {
 
 def tables_of(version: int) -> dict[str, Table]:
     """The tables of a version of the format."""
-    if version > 1:
-        return TABLES
-    return {**TABLES, "keypoints": Table("keypoints", ("keyframe",), (), KEYPOINTS[:-1])}
+    older: dict[str, Table] = {}
+    if version < 3:
+        cameras = TABLES["cameras"]
+        plain = tuple(value for value in cameras.values if value not in RATIONAL_LENS)
+        older["cameras"] = cameras._replace(values=plain)
+    if version < 2:
+        older["keypoints"] = Table("keypoints", ("keyframe",), (), KEYPOINTS[:-1])
+    return {**TABLES, **older}
 
 
 def _blob_columns(blobs: tuple[Blob, ...]) -> str:
@@ -155,8 +163,11 @@ def create_script(version: int = FORMAT_VERSION) -> str:
 
     Rows carry their checksums; `totals` counts the rows and adds them up.
     """
-    keypoints = _blob_columns(tables_of(version)["keypoints"].blobs)
-    return _CREATE.format(version=version, keypoints=keypoints)
+    tables = tables_of(version)
+    keypoints = _blob_columns(tables["keypoints"].blobs)
+    lens = [name for name in tables["cameras"].values if name in RATIONAL_LENS]
+    rational_lens = "".join(f"  {name} REAL NOT NULL,\n" for name in lens)
+    return _CREATE.format(version=version, keypoints=keypoints, rational_lens=rational_lens)
 
 
 #: Bytes at the beginning of a file that say whose SQLite file it is.
@@ -216,7 +227,7 @@ CREATE TABLE cameras (
   p1 REAL NOT NULL,
   p2 REAL NOT NULL,
   k3 REAL NOT NULL,
-  bf REAL NOT NULL,
+{{rational_lens}}  bf REAL NOT NULL,
   depth_ratio REAL NOT NULL,
   width INTEGER NOT NULL,
   height INTEGER NOT NULL,

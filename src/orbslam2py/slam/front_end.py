@@ -270,7 +270,7 @@ def _camera_options(settings: Settings, width: int, height: int) -> core.CameraO
         cy=camera.cy,
         width=width,
         height=height,
-        distortion=(camera.k1, camera.k2, camera.p1, camera.p2, camera.k3),
+        distortion=camera.distortion.tolist(),
         bf=camera.bf,
         depth_ratio=settings.depth.close_factor if settings.depth is not None else 0.0,
     )

@@ -39,10 +39,10 @@ CameraOptions rectified_options() {
 }
 
 // The forward model, written from its formula.
-std::pair<double, double> distort(const Pinhole& k, const std::array<double, 5>& d, double u,
-                                  double v) {
+std::pair<double, double> distort(const Pinhole& k, const Distortion& d, double u, double v) {
   const double x = (u - k.cx) / k.fx, y = (v - k.cy) / k.fy, r2 = x * x + y * y;
-  const double radial = 1 + r2 * (d[0] + r2 * (d[1] + r2 * d[4]));
+  const double radial = (1 + r2 * (d[0] + r2 * (d[1] + r2 * d[4]))) /
+                        (1 + r2 * (d[5] + r2 * (d[6] + r2 * d[7])));
   return {k.fx * (x * radial + 2 * d[2] * x * y + d[3] * (r2 + 2 * x * x)) + k.cx,
           k.fy * (y * radial + d[2] * (r2 + 2 * y * y) + 2 * d[3] * x * y) + k.cy};
 }
@@ -81,6 +81,38 @@ TEST(Camera, DistortingAgainReturnsTheRawPixels) {
   }
 }
 
+// The lens of an Azure Kinect's colour camera, by its factory calibration.
+CameraOptions rational_options() {
+  CameraOptions options;
+  options.pinhole = {611.5, 611.3, 639.2, 367.1};
+  options.distortion = {0.46, -2.63, 0.0006, -0.0003, 1.52, 0.34, -2.45, 1.45};
+  options.image_size = {1280, 720};
+  return options;
+}
+
+TEST(Camera, TheRationalLensIsUndistortedOverTheWholeImage) {
+  const CameraOptions options = rational_options();
+  const Camera camera(options);
+  for (int v = 0; v <= 720; v += 16) {
+    for (int u = 0; u <= 1280; u += 16) {
+      std::vector<float> xy = {static_cast<float>(u), static_cast<float>(v)};
+      camera.lens().undistort(camera.pinhole(), xy);
+      const auto [x, y] = distort(options.pinhole, options.distortion, xy[0], xy[1]);
+      EXPECT_NEAR(x, u, 2e-4) << u << ' ' << v;
+      EXPECT_NEAR(y, v, 2e-4) << u << ' ' << v;
+    }
+  }
+}
+
+TEST(Camera, ARationalLensWithoutItsDenominatorIsTheRadialOne) {
+  CameraOptions options = golden_options();
+  auto radial = golden("grid").values, rational = radial;
+  Camera(options).lens().undistort(options.pinhole, radial);
+  options.distortion[7] = 1e-15;  // not 0: Newton's method
+  Camera(options).lens().undistort(options.pinhole, rational);
+  for (std::size_t i = 0; i < radial.size(); ++i) EXPECT_NEAR(radial[i], rational[i], 0.4);
+}
+
 TEST(Camera, RectifiedBoundsAreTheImageRectangle) {
   const Camera camera(rectified_options());
   EXPECT_TRUE(camera.lens().is_identity());
@@ -103,7 +135,7 @@ TEST(Camera, BoundsOfFramesAreClosedAndThoseOfKeyframesHalfOpen) {
 
 // OD-2: not the first coefficient alone.
 TEST(Camera, AnyCoefficientMakesALens) {
-  for (std::size_t i = 0; i < 5; ++i) {
+  for (std::size_t i = 0; i < 8; ++i) {
     CameraOptions options = rectified_options();
     options.distortion[i] = 0.01;
     EXPECT_FALSE(Camera(options).lens().is_identity()) << "coefficient " << i;

@@ -41,6 +41,8 @@ def written_as_version_1(folder: Path) -> Path:
         connection.executescript(create_script(1))
         for name, present in all_rows(small_map()):
             row = present[:-1] if name == "keypoints" else present
+            if name == "cameras":
+                row = (*present[:10], *present[13:])
             if name == "vocabulary":
                 row = (1, "", f"{load_vocabulary().hash:016x}", "")
             sums[name].append(checksum(row))

@@ -156,13 +156,13 @@ def _camera(
         sx * (cameras.cx[row] + 0.5),
         sy * (cameras.cy[row] + 0.5),
     ]
-    *four, k3 = cameras.distortion[row].tolist()
+    lens = cameras.distortion[row].tolist()
     if view.undistorted:
         model, parameters = "PINHOLE", pinhole
-    elif k3:
-        model, parameters = "FULL_OPENCV", [*pinhole, *four, k3, 0.0, 0.0, 0.0]
+    elif any(lens[4:]):
+        model, parameters = "FULL_OPENCV", [*pinhole, *lens]
     else:
-        model, parameters = "OPENCV", [*pinhole, *four]
+        model, parameters = "OPENCV", [*pinhole, *lens[:4]]
     return ColmapCamera(camera_id, model, view.width, view.height, np.array(parameters))
 
 

@@ -134,8 +134,13 @@ def _camera(contents: MapContents, view: View) -> dict[str, float]:
     cameras: Cameras = contents.cameras
     row = int(contents.keyframes.camera[view.row])
     sx, sy = pixel_scale(contents, view)
-    lens = np.zeros(5) if view.undistorted else cameras.distortion[row]
-    k1, k2, p1, p2, k3 = lens.tolist()
+    lens = np.zeros(8) if view.undistorted else cameras.distortion[row]
+    k1, k2, p1, p2, k3, *rational = lens.tolist()
+    if any(rational):
+        raise DatasetError(
+            "nerfstudio's transforms.json cannot hold a rational lens (k4 to k6); export the images "
+            "as well, which are then undistorted"
+        )
     return {
         "w": view.width,
         "h": view.height,
