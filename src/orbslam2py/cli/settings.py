@@ -29,6 +29,7 @@ from orbslam2py.settings import (
 )
 from orbslam2py.settings.builtin import BUILTIN_DATA, builtin_sensors
 from orbslam2py.settings.check import read_choice, warn_of_doubts
+from orbslam2py.settings.groups import DISTORTION_FIELDS
 
 app = typer.Typer(
     help="Make, show, check and list settings files.",
@@ -59,7 +60,9 @@ def new(
     baseline: Baseline = None,
     distortion: Annotated[
         str | None,
-        typer.Option(help="OpenCV's k1,k2,p1,p2 or k1,k2,p1,p2,k3 [none].", metavar="NUMBERS"),
+        typer.Option(
+            help="OpenCV's k1,k2,p1,p2, with k3, or with k3,k4,k5,k6 [none].", metavar="NUMBERS"
+        ),
     ] = None,
     features: Annotated[
         int | None,
@@ -134,12 +137,12 @@ def _coefficients(text: str | None) -> dict[str, Any]:
         numbers = [float(word) for word in text.replace(",", " ").split()]
     except ValueError:
         numbers = []
-    if len(numbers) not in (4, 5):
+    if len(numbers) not in (4, 5, 8):
         raise SettingsError(
-            f"--distortion is '{text}'; give four or five numbers k1,k2,p1,p2[,k3] like "
-            "0.1,-0.2,0,0"
+            f"--distortion is '{text}'; give four, five or eight numbers "
+            "k1,k2,p1,p2[,k3[,k4,k5,k6]] like 0.1,-0.2,0,0"
         )
-    return dict(zip(("k1", "k2", "p1", "p2", "k3"), numbers, strict=False))
+    return dict(zip(DISTORTION_FIELDS, numbers, strict=False))
 
 
 def _describe(console: Console, settings: Settings) -> None:

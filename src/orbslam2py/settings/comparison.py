@@ -8,7 +8,8 @@ import numpy as np
 from orbslam2py._arrays import FloatArray
 from orbslam2py.settings.builtin import BUILTIN_DATA
 from orbslam2py.settings.fit import FitThresholds, Misfit, known_camera
-from orbslam2py.settings.groups import CameraSettings
+from orbslam2py.settings.groups import DISTORTION_FIELDS, CameraSettings
+from orbslam2py.settings.projection import distorted
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import Settings
 
@@ -85,9 +86,9 @@ def _raw_cameras(settings: Settings) -> list[CameraSettings]:
         return [settings.camera]
     cameras = []
     for side in (pair.left, pair.right):
-        k1, k2, p1, p2, k3 = (*side.D.tolist(), 0.0)[:5]
         fx, fy, cx, cy = side.K[0, 0], side.K[1, 1], side.K[0, 2], side.K[1, 2]
-        cameras.append(CameraSettings(fx, fy, cx, cy, k1, k2, p1, p2, k3))
+        lens = dict(zip(DISTORTION_FIELDS, side.D.tolist(), strict=False))
+        cameras.append(CameraSettings(fx, fy, cx, cy, **lens))
     return cameras
 
 
@@ -104,18 +105,15 @@ def calibration_distance(
         Width and height of the images, pixels.
     """
     u, v = np.meshgrid(np.linspace(0, size[0] - 1, 12), np.linspace(0, size[1] - 1, 9))
-    x, y = (u - other.cx) / other.fx, (v - other.cy) / other.fy
-    apart = _project(one, x, y) - _project(other, x, y)
-    return float(np.median(np.hypot(apart[0], apart[1])))
+    pixels = np.stack([u.ravel(), v.ravel()], axis=1)
+    plane = (pixels - (other.cx, other.cy)) / (other.fx, other.fy)
+    apart = _project(one, plane) - _project(other, plane)
+    return float(np.median(np.hypot(apart[:, 0], apart[:, 1])))
 
 
-def _project(camera: CameraSettings, x: FloatArray, y: FloatArray) -> FloatArray:
-    """Pixels of normalised coordinates, (2, ...): the radial-tangential model of OpenCV."""
-    r2 = x * x + y * y
-    radial = 1 + r2 * (camera.k1 + r2 * (camera.k2 + r2 * camera.k3))
-    xd = x * radial + 2 * camera.p1 * x * y + camera.p2 * (r2 + 2 * x * x)
-    yd = y * radial + camera.p1 * (r2 + 2 * y * y) + 2 * camera.p2 * x * y
-    return np.stack([camera.fx * xd + camera.cx, camera.fy * yd + camera.cy])
+def _project(camera: CameraSettings, plane: FloatArray) -> FloatArray:
+    """Pixels (n, 2) of points on the plane at distance 1 before the camera (n, 2)."""
+    return distorted(plane, camera.distortion) * (camera.fx, camera.fy) + (camera.cx, camera.cy)
 
 
 def _numbers(camera: CameraSettings) -> str:

@@ -25,16 +25,20 @@ def raise_if_any(problems: list[str]) -> None:
         raise SettingsError("; ".join(problems))
 
 
+#: Fields of `CameraSettings` in OpenCV's order of the coefficients.
+DISTORTION_FIELDS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+
+
 @dataclass(frozen=True)
 class CameraSettings:
-    """Pinhole camera with OpenCV's radial-tangential distortion.
+    """Pinhole camera with OpenCV's radial-tangential or rational distortion.
 
     Attributes
     ----------
     fx, fy, cx, cy
         Focal lengths and principal point in pixels; the centre of the top-left pixel is (0, 0).
     k1, k2, p1, p2, k3
-        Distortion in OpenCV's order; all 0 for rectified images.
+        Radial-tangential distortion in OpenCV's order; all 0 for rectified images.
     width, height
         Image size in pixels as far as known. Never enforced: the first image decides.
     fps
@@ -43,6 +47,8 @@ class CameraSettings:
         Baseline times fx [pixel metres]; 0 for a single camera.
     rgb
         Whether colour images are RGB (True) or BGR.
+    k4, k5, k6
+        Denominator of the rational distortion model; all 0 for the radial-tangential model.
     """
 
     fx: float
@@ -59,6 +65,9 @@ class CameraSettings:
     fps: float = 30.0
     bf: float = 0.0
     rgb: bool = False
+    k4: float = 0.0
+    k5: float = 0.0
+    k6: float = 0.0
 
     def __post_init__(self) -> None:
         raise_if_any(check_group("camera", self))
@@ -70,8 +79,14 @@ class CameraSettings:
 
     @property
     def distortion(self) -> FloatArray:
-        """Coefficients k1, k2, p1, p2 and, only if it is not 0, k3; float64 (4,) or (5,)."""
+        """Coefficients in OpenCV's order, float64 (4,), (5,) or (8,).
+
+        k1, k2, p1, p2; with k3 only if it is not 0; with k3, k4, k5, k6 if one of the last three
+        is not 0.
+        """
         four = [self.k1, self.k2, self.p1, self.p2]
+        if self.k4 or self.k5 or self.k6:
+            return np.array([*four, self.k3, self.k4, self.k5, self.k6])
         return np.array([*four, self.k3] if self.k3 else four)
 
     @property
@@ -110,8 +125,8 @@ class CameraSettings:
         if T_cw is not None:
             T = pose_of(T_cw, "T_cw")
             positions = positions @ T[:3, :3].T + T[:3, 3]
-        coefficients = (self.k1, self.k2, self.p1, self.p2, self.k3)
-        plane = on_image_plane(positions, coefficients if choice_of(distort, "distort") else None)
+        lens = self.distortion if choice_of(distort, "distort") else None
+        plane = on_image_plane(positions, lens)
         return plane * (self.fx, self.fy) + (self.cx, self.cy)
 
 

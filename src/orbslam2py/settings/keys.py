@@ -105,6 +105,9 @@ KEYS: tuple[Key, ...] = (
     Key("Camera.p1", "camera", "p1", float, _COEFFICIENT),
     Key("Camera.p2", "camera", "p2", float, _COEFFICIENT),
     Key("Camera.k3", "camera", "k3", float, _COEFFICIENT),
+    Key("Camera.k4", "camera", "k4", float, _COEFFICIENT),
+    Key("Camera.k5", "camera", "k5", float, _COEFFICIENT),
+    Key("Camera.k6", "camera", "k6", float, _COEFFICIENT),
     Key("Camera.width", "camera", "width", int, _SIZE),
     Key("Camera.height", "camera", "height", int, _SIZE),
     Key("Camera.fps", "camera", "fps", float, _above_zero(1e5, "Hz")),
@@ -185,7 +188,6 @@ CAMERA_TYPE_KEY = "Camera.type"
 _IGNORED = frozenset(
     {
         CAMERA_TYPE_KEY,
-        "Camera.k4",
         "Camera.newWidth",
         "Camera.newHeight",
         "Camera.imageScale",

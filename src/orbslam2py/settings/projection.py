@@ -2,7 +2,9 @@
 """From points to the image plane, through the lens.
 
 The distortion is OpenCV's radial-tangential model (D. C. Brown, "Close-range camera calibration",
-1971): with s = x^2 + y^2 the radius is multiplied by 1 + k1 s + k2 s^2 + k3 s^3.
+1971): with s = x^2 + y^2 the radius is multiplied by 1 + k1 s + k2 s^2 + k3 s^3. The rational model
+(D. Claus and A. Fitzgibbon, "A rational function lens distortion model for general cameras", 2005)
+divides that by 1 + k4 s + k5 s^2 + k6 s^3.
 """
 
 from __future__ import annotations
@@ -13,19 +15,17 @@ import numpy as np
 
 from orbslam2py._arrays import FloatArray
 
-#: k1, k2, p1, p2, k3.
-Coefficients = tuple[float, float, float, float, float]
 
-
-def on_image_plane(points: FloatArray, coefficients: Coefficients | None) -> FloatArray:
+def on_image_plane(points: FloatArray, distortion: FloatArray | None) -> FloatArray:
     """Project points onto the plane at distance 1 before the camera.
 
     Parameters
     ----------
     points
         In the camera frame, float64 (n, 3).
-    coefficients
-        k1, k2, p1, p2, k3 of the lens; None leaves the lens out.
+    distortion
+        Coefficients of the lens in OpenCV's order, float64 (4,), (5,) or (8,); None leaves the lens
+        out.
 
     Returns
     -------
@@ -35,14 +35,28 @@ def on_image_plane(points: FloatArray, coefficients: Coefficients | None) -> Flo
     """
     z = np.where(points[:, 2] > 0, points[:, 2], np.nan)
     plane = np.asarray(points[:, :2] / z[:, None])
-    if coefficients is None or not any(coefficients):
+    if distortion is None or not np.any(distortion):
         return plane
-    k1, k2, p1, p2, k3 = coefficients
+    # Beyond, points would fold back into the image: far ones seem to be in its middle.
+    inside = np.sum(plane * plane, axis=1) < largest_radius(distortion) ** 2
+    return distorted(np.where(inside[:, None], plane, np.nan), distortion)
+
+
+def distorted(plane: FloatArray, distortion: FloatArray) -> FloatArray:
+    """Move points on the plane at distance 1 to where the lens draws them.
+
+    Parameters
+    ----------
+    plane
+        x, y, float64 (n, 2).
+    distortion
+        Coefficients in OpenCV's order, float64 (4,), (5,) or (8,).
+    """
+    p1, p2 = distortion[2:4]
+    numerator, denominator = _radial_polynomials(distortion)
     x, y = plane[:, 0], plane[:, 1]
     s = x * x + y * y
-    # Beyond, points would fold back into the image: far ones seem to be in its middle.
-    s = np.where(s < largest_radius(coefficients) ** 2, s, np.nan)
-    radial = 1 + s * (k1 + s * (k2 + s * k3))
+    radial = np.polyval(numerator, s) / np.polyval(denominator, s)
     return np.stack(
         [
             x * radial + 2 * p1 * x * y + p2 * (s + 2 * x * x),
@@ -52,13 +66,35 @@ def on_image_plane(points: FloatArray, coefficients: Coefficients | None) -> Flo
     )
 
 
-def largest_radius(coefficients: Coefficients) -> float:
+def largest_radius(distortion: FloatArray) -> float:
     """Find the radius up to which a lens draws what is farther aside farther outside.
 
-    It is where the derivative of r (1 + k1 r^2 + k2 r^4 + k3 r^6) first becomes 0; infinite if it
-    never does.
+    It is where the derivative of the distorted radius r N(r^2) / D(r^2) first becomes 0, or where
+    D, the polynomial of k4, k5, k6, first does; infinite if neither ever does.
+
+    Parameters
+    ----------
+    distortion
+        Coefficients in OpenCV's order, float64 (4,), (5,) or (8,).
     """
-    k1, k2, _, _, k3 = coefficients
-    roots = np.roots([7 * k3, 5 * k2, 3 * k1, 1.0])
-    turning = roots.real[(np.abs(roots.imag) < 1e-9 * np.abs(roots)) & (roots.real > 0)]
-    return math.sqrt(float(turning.min())) if len(turning) else math.inf
+    numerator, denominator = _radial_polynomials(distortion)
+    # By s = r^2 the derivative is (N D + 2 s (N' D - N D')) / D^2.
+    slope: FloatArray = np.polysub(
+        np.polymul(np.polyder(numerator), denominator),
+        np.polymul(numerator, np.polyder(denominator)),
+    )
+    turning = np.polyadd(np.polymul(numerator, denominator), np.polymul([2.0, 0.0], slope))
+    roots = np.concatenate([_positive_roots(turning), _positive_roots(denominator)])
+    return math.sqrt(float(roots.min())) if len(roots) else math.inf
+
+
+def _radial_polynomials(distortion: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Numerator and denominator of the radial factor by s = r^2, the highest power first."""
+    k1, k2, _, _, k3, k4, k5, k6 = (*distortion.tolist(), *(0.0,) * 4)[:8]
+    return np.array([k3, k2, k1, 1.0]), np.array([k6, k5, k4, 1.0])
+
+
+def _positive_roots(polynomial: FloatArray) -> FloatArray:
+    roots = np.roots(polynomial)
+    real = (np.abs(roots.imag) < 1e-9 * np.abs(roots)) & (roots.real > 0)
+    return np.asarray(roots.real[real], dtype=np.float64)

@@ -19,6 +19,7 @@ from orbslam2py._files import atomic_write
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings.builtin import BUILTIN_NAMES, builtin_file, is_builtin_name
 from orbslam2py.settings.groups import (
+    DISTORTION_FIELDS,
     CameraSettings,
     DepthSettings,
     OrbSettings,
@@ -218,13 +219,13 @@ class Settings:
     def describe(self) -> list[str]:
         """Say line by line what a log should hold about these settings."""
         camera, orb = self.camera, self.orb
-        distortion = ", ".join(f"{value:g}" for value in camera.distortion)
+        distortion = camera.distortion
+        names = ", ".join(DISTORTION_FIELDS[: len(distortion)])
+        values = ", ".join(f"{value:g}" for value in distortion)
         lines = [
             f"camera ({self.sensor}): fx {camera.fx:g}, fy {camera.fy:g}, cx {camera.cx:g}, "
             f"cy {camera.cy:g}, {camera.fps:g} fps, colour order {'RGB' if camera.rgb else 'BGR'}",
-            f"distortion (k1, k2, p1, p2[, k3]): {distortion}"
-            if camera.is_distorted
-            else "no distortion",
+            f"distortion ({names}): {values}" if camera.is_distorted else "no distortion",
             f"ORB: {orb.n_features} features, {orb.n_levels} levels, factor {orb.scale_factor:g}, "
             f"FAST thresholds {orb.ini_th_fast} and {orb.min_th_fast}"
             + (", coordinates of the original" if orb.original_coordinates else ""),

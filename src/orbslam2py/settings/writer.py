@@ -20,6 +20,10 @@ _TITLES: dict[Literal["camera", "depth", "orb", "viewer"], str] = {
 }
 
 
+#: Written only of a rational distortion, so that files of other cameras stay as others read them.
+_RATIONAL = ("k4", "k5", "k6")
+
+
 def format_settings(sensor: Sensor, groups: SettingsGroups) -> str:
     """Make the text that reads back as equal settings; numbers keep all their digits."""
     lines = ["%YAML:1.0", f"# Settings for sensor {sensor}"]
@@ -30,6 +34,8 @@ def format_settings(sensor: Sensor, groups: SettingsGroups) -> str:
         lines += ["", f"# {title}"]
         for key in KEYS:
             value = getattr(values, key.field) if key.group == group else None
+            if key.field in _RATIONAL and len(groups["camera"].distortion) < 8:
+                continue
             if value is not None and sensor in key.sensors:
                 lines.append(f"{key.name}: {_number(key, value)}")
     rectification = groups["rectification"]

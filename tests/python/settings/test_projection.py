@@ -14,6 +14,10 @@ from orbslam2py.settings.projection import largest_radius
 PLAIN = CameraSettings(500, 510, 320, 240)
 BENT = CameraSettings(500, 510, 320, 240, k1=0.26, k2=-0.95, p1=0.005, p2=0.0026, k3=1.16)
 BARREL = CameraSettings(500, 510, 320, 240, k1=-0.3)
+#: As Azure Kinect's, with eight coefficients.
+RATIONAL = CameraSettings(
+    500, 510, 320, 240, 0.45, -2.6, 6e-4, -2e-4, 1.5, k4=0.33, k5=-2.4, k6=1.42
+)
 POINTS = np.random.default_rng(1).uniform([-1, -1, 2], [1, 1, 5], (200, 3))
 
 
@@ -24,7 +28,9 @@ def pose() -> np.ndarray:
     return T_cw
 
 
-@pytest.mark.parametrize("camera", [PLAIN, BENT, BARREL], ids=["plain", "bent", "barrel"])
+@pytest.mark.parametrize(
+    "camera", [PLAIN, BENT, BARREL, RATIONAL], ids=["plain", "bent", "barrel", "rational"]
+)
 def test_as_opencv_projects(camera: CameraSettings) -> None:
     T_cw = pose()
     expected, _ = cv2.projectPoints(
@@ -62,13 +68,16 @@ def test_what_is_not_in_front_is_not_seen() -> None:
 
 def test_a_lens_does_not_fold_the_world_back_into_the_image() -> None:
     """A polynomial does: what is far aside would appear in the middle."""
-    edge = largest_radius((-0.3, 0, 0, 0, 0))
+    edge = largest_radius(BARREL.distortion)
     assert edge == pytest.approx(np.sqrt(1 / 0.9))
     aside = np.linspace(0, 3, 301)
     seen = BARREL.project(np.stack([aside, 0 * aside, 1 + 0 * aside], axis=1))
     np.testing.assert_array_equal(np.isfinite(seen[:, 0]), aside < edge)
     assert (np.diff(seen[aside < edge, 0]) > 0).all()
-    assert largest_radius((0.1, 0, 0, 0, 0)) == np.inf
+    assert largest_radius(np.array([0.1, 0, 0, 0])) == np.inf
+    # r / (1 + r^2) turns at 1, r / (1 - r^2) has its pole there.
+    assert largest_radius(np.array([0, 0, 0, 0, 0, 1.0, 0, 0])) == pytest.approx(1)
+    assert largest_radius(np.array([0, 0, 0, 0, 0, -1.0, 0, 0])) == pytest.approx(1)
 
 
 @pytest.mark.parametrize("name", BUILTIN_NAMES)

@@ -39,6 +39,9 @@ CAMERAS = st.builds(
     fps=number(1e-3, 1e5),
     bf=number(1e-3, 1e6),
     rgb=st.booleans(),
+    k4=st.just(0.0) | number(-1e4, 1e4),
+    k5=st.just(0.0) | number(-1e4, 1e4),
+    k6=st.just(0.0) | number(-1e4, 1e4),
 )
 
 ORBS = st.integers(1, 254).flatmap(

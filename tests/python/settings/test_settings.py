@@ -72,6 +72,13 @@ def test_distortion_vector() -> None:
     np.testing.assert_array_equal(camera.distortion, [0, 0, 0, 0.1])
     assert camera.is_distorted
     assert dataclasses.replace(camera, k3=0.5).distortion.shape == (5,)
+    rational = dataclasses.replace(camera, k3=0.5, k5=-2.0)
+    np.testing.assert_array_equal(rational.distortion, [0, 0, 0, 0.1, 0.5, 0, -2.0, 0])
+    assert "distortion (k1, k2, p1, p2, k3, k4, k5, k6): 0, 0, 0, 0.1, 0.5, 0, -2, 0" in (
+        Settings("mono", rational).describe()
+    )
+    assert "Camera.k6: 0.0" in Settings("mono", rational).to_yaml()
+    assert "Camera.k4" not in Settings("mono", camera).to_yaml()
     assert not CameraSettings(500, 500, 320, 240).is_distorted
 
 
