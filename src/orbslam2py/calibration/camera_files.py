@@ -18,6 +18,7 @@ from orbslam2py.calibration.unknown_files import refuse_unknown
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import OrbSettings, Sensor, Settings, settings_for_camera
 from orbslam2py.settings.foreign import FOREIGN_FORMATS, FORMATS, recognise_camera_file
+from orbslam2py.settings.pair_views import is_likely_baseline
 
 _log = logging.getLogger(__name__)
 
@@ -86,7 +87,8 @@ def read_camera_file(
     sensor
         What the settings are for; by default a single camera or the pair, as the file is.
     baseline, depth_factor
-        As for `orbslam2py.settings.settings_for_camera`.
+        As for `orbslam2py.settings.settings_for_camera`. A pair has its baseline from the file;
+        only if that is in another unit than metres, `baseline` replaces it.
     fps, n_features
         Frames per second and ORB features per image. By default what the file tells, or 30 (KITTI:
         10), and 1000 or, above 0.6 megapixels and for KITTI, 2000.
@@ -141,7 +143,8 @@ def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
         or len(size) != 2
         or not all(is_whole(side) and side >= 1 for side in size)
     ):
-        raise SettingsError(f"size is {shown(size)}; give width and height in pixels, 1 or more")
+        given = " x ".join(map(str, size)) if isinstance(size, tuple) else shown(size)
+        raise SettingsError(f"size is {given}; give width and height in pixels, 1 or more")
     return int(size[0]), int(size[1])
 
 
@@ -287,11 +290,31 @@ def _made_for(
 ) -> Settings:
     sensor = sensor or settings.sensor
     if settings.sensor is Sensor.STEREO and sensor is Sensor.STEREO and depth_factor is None:
-        if baseline is not None:
-            raise SettingsError(
-                f"{path} tells the baseline, {settings.baseline:.4g} m; leave --baseline out"
-            )
-        return settings
+        return _with_baseline(path, settings, baseline)
     return settings_for_camera(
         settings.camera, sensor, baseline=baseline, depth_factor=depth_factor, orb=settings.orb
     )
+
+
+def _with_baseline(path: Path, settings: Settings, baseline: float | None) -> Settings:
+    """Set the baseline of a pair right whose file is in another unit than metres."""
+    found = settings.baseline
+    likely = is_likely_baseline(found)
+    if baseline is None:
+        if not likely:
+            _log.warning(
+                "%s gives a baseline of %.4g m; if it is in another unit, give the distance of the "
+                "two cameras in metres with --baseline",
+                path,
+                found,
+            )
+        return settings
+    if likely:
+        raise SettingsError(f"{path} tells the baseline, {found:.4g} m; leave --baseline out")
+    bf = settings_for_camera(settings.camera, Sensor.STEREO, baseline=baseline).camera.bf
+    pair = settings.rectification
+    if pair is not None:
+        P = pair.right.P.copy()
+        P[0, 3] = -bf
+        pair = replace(pair, right=replace(pair.right, P=P))
+    return replace(settings, camera=replace(settings.camera, bf=bf), rectification=pair)

@@ -64,8 +64,9 @@ def checked_numbers(path: object, where: str, value: object, count: tuple[int, .
         count = count or (1,)
     if (count and found.size not in count) or not np.isfinite(found).all():
         wanted = " or ".join(map(str, count))
+        noun = "number" if count == (1,) else "numbers"
         raise SettingsError(
-            f"{path}: {where} must hold {wanted} finite numbers, found {repr(value)[:200]}"
+            f"{path}: {where} must hold {wanted} finite {noun}, found {repr(value)[:200]}"
         )
     return found
 

@@ -156,8 +156,8 @@ def _found_rectification(pair: Pair, size: tuple[int, int]) -> StereoRectificati
     assert right.K is not None
     if left.T_camera_rig is None or right.T_camera_rig is None:
         raise SettingsError(
-            f"{pair.where} does not tell how {pair.names} stand to each other: {key} is missing; "
-            f"add it, or {pair.alone}"
+            f"{pair.where} does not tell how {pair.names} stand to each other; add {key}, or "
+            f"{pair.alone}"
         )
     for camera, K in ((left, left.K), (right, right.K)):
         _require_centre_inside(pair.where, camera.name, K, size)

@@ -107,6 +107,6 @@ def _lenses(
             yield from _lenses(value, inside, depth - 1)
         elif str(key).lower().endswith(("model", "type")) and isinstance(value, str):
             try:
-                yield f"its {inside} ({value})", lens_of("", "", value)
+                yield f"its camera ({inside}: {value})", lens_of("", "", value)
             except SettingsError:
                 continue

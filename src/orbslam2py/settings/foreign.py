@@ -133,7 +133,7 @@ FORMATS: tuple[ForeignFormat, ...] = (
         "a camchain of Kalibr",
         "Kalibr",
         "One camera, or the pair of the first two with its rectification.",
-        _line(r"^cam\d+\s*:\s*$"),
+        _line(r"^cam\d+\s*:"),
         "cam0:\n  camera_model: pinhole",
         "file",
     ),

@@ -14,6 +14,8 @@ from orbslam2py.settings.groups import StereoRectification
 #: Part of the left view below which a pair hardly looks the same way.
 LEAST_OVERLAP = 0.6
 _COLUMNS, _ROWS = 41, 31
+#: Baselines of pairs, also of those that a depth camera counts as, beyond which one is doubted [m].
+_LEAST_BASELINE, _MOST_BASELINE = 1e-3, 10.0
 
 _View = tuple[FloatArray, tuple[int, int]]
 
@@ -38,6 +40,11 @@ class PairViews:
             f"the two cameras are turned by {self.turned:.1f} degrees against each other, and "
             f"{self.overlap:.0%} of their views overlap"
         )
+
+
+def is_likely_baseline(baseline: float) -> bool:
+    """Whether a pair may have this distance [m]: most others are of another unit."""
+    return _LEAST_BASELINE <= baseline <= _MOST_BASELINE
 
 
 def views_of_pair(pair: StereoRectification) -> PairViews:

@@ -41,12 +41,11 @@ from orbslam2py.settings.opencv_yaml import (
     read_number,
     scan,
 )
+from orbslam2py.settings.pair_views import is_likely_baseline
 from orbslam2py.settings.sensor import Sensor
 
 _log = logging.getLogger(__name__)
 _MOST_PROBLEMS = 30
-#: Baselines of pairs, also of those that a depth camera counts as, beyond which one is doubted [m].
-_LEAST_BASELINE, _MOST_BASELINE = 1e-3, 10.0
 
 
 #: What text files do not hold: control characters.
@@ -316,7 +315,7 @@ def _doubts(sensor: Sensor, groups: SettingsGroups) -> list[str]:
 def _doubts_of_depth(camera: CameraSettings, depth: DepthSettings | None) -> list[str]:
     found = []
     baseline = camera.bf / camera.fx
-    if not _LEAST_BASELINE <= baseline <= _MOST_BASELINE:
+    if not is_likely_baseline(baseline):
         found.append(
             f"Camera.bf {camera.bf:g} by Camera.fx is a baseline of {baseline:.3g} m; bf is in "
             "pixel metres"

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from orbslam2py import Sensor, Settings, SettingsError
-from orbslam2py.calibration import CameraFileFormat, camera_files, read_camera_file
+from orbslam2py.calibration import CameraFileFormat, read_camera_file
+from orbslam2py.calibration.readers import opencv
 from orbslam2py.settings import CameraSettings
 from support.camera_files import CX, CY, FX, FY, KALIBR, KALIBR_PAIR, OPENCV, ROS, D, written
 
@@ -54,8 +55,8 @@ def test_whole_numbers_of_opencv(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     path = written(tmp_path, OPENCV.replace("0.,", "0,").replace("1. ]", "1 ]"))
     expected = CameraSettings(FX, FY, CX, CY, *D, width=640, height=480)
     assert read_camera_file(path).camera == expected
-    node = camera_files._node
-    monkeypatch.setattr(camera_files, "_node", lambda *given: WholeNumbersMisread(node(*given)))
+    node = opencv._node
+    monkeypatch.setattr(opencv, "_node", lambda *given: WholeNumbersMisread(node(*given)))
     assert read_camera_file(path).camera == expected
 
 
@@ -90,8 +91,10 @@ def test_kalibr_pair(tmp_path: Path) -> None:
     settings.save(tmp_path / "pair.yaml")
     assert Settings.load(tmp_path / "pair.yaml", Sensor.STEREO) == settings
     assert read_camera_file(path, camera=1).sensor is Sensor.MONOCULAR
-    with pytest.raises(SettingsError, match="to the right of the first"):
-        read_camera_file(written(tmp_path, KALIBR_PAIR.replace("-0.11", "0.11")))
+    exchanged = written(tmp_path, KALIBR_PAIR.replace("-0.11", "0.11"))
+    with pytest.raises(SettingsError, match="cam1 does not stand to the right of cam0"):
+        read_camera_file(exchanged)
+    assert read_camera_file(exchanged, camera=1, sensor="stereo") == settings
 
 
 def test_ros_pair(tmp_path: Path) -> None:
@@ -109,10 +112,11 @@ def test_ros_pair(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (KALIBR.replace("pinhole", "omni"), r"camera_model omni .*supported: pinhole"),
-        (KALIBR.replace("radtan", "equidistant"), r"equidistant .*supported: radtan, none"),
-        (ROS.replace("plumb_bob", "equidistant"), r"equidistant .*supported: plumb_bob"),
-        ("1 FISHEYE 640 480 1 2 3\n", r"FISHEYE .*supported: SIMPLE_PINHOLE, PINHOLE"),
+        (KALIBR.replace("pinhole", "omni"), r"Kalibr: cam0 is an omnidirectional .*only pinhole"),
+        (KALIBR.replace("radtan", "equidistant"), r"fisheye .*cv2\.fisheye\.undistortImage"),
+        (KALIBR.replace("radtan", "lens9"), r"cam0.distortion_model lens9 is not known"),
+        (ROS.replace("plumb_bob", "equidistant"), r"ROS: its camera is a fisheye .*only pinhole"),
+        ("1 LENS 640 480 1 2 3\n", r"camera model LENS is not known; undistort"),
         ("1 PINHOLE 640 480 1 2 3\n", "parameters of PINHOLE must hold 4"),
         ("1 PINHOLE 9 9 1 1 1 1\n2 PINHOLE 9 9 1 1 1 1\n", r"lists 2 cameras \(1, 2\)"),
         (KALIBR.replace("intrinsics", "other"), r"cam0\.intrinsics is missing"),

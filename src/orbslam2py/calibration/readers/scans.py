@@ -30,7 +30,8 @@ from orbslam2py.calibration.readers.slam_systems import lens_by_keys
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings.foreign import MATRIX_KEYS
 
-_EIGHT = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+_FIVE = ("k1", "k2", "p1", "p2", "k3")
+_EIGHT = (*_FIVE, "k4", "k5", "k6")
 _NAME = "the camera"
 
 
@@ -61,7 +62,13 @@ def read_nerfstudio(source: CalibrationSource) -> CameraFile:
     fx = _focal(source, values, "x", size)
     fy = _focal(source, values, "y", size) if {"fl_y", "camera_angle_y"} & set(values) else fx
     K = pinhole_matrix(path, "fl_x, fl_y, cx, cy", [fx, fy, cx, cy])
-    D = opencv_coefficients(path, in_order(values, *_EIGHT), K, size)
+    if values.get("k4"):
+        raise SettingsError(
+            f"{path}: k4 is {values['k4']}, and only k1, k2, k3, p1, p2 of a pinhole camera are "
+            "supported; name the camera_model if it is a fisheye camera, or export the images "
+            "undistorted"
+        )
+    D = opencv_coefficients(path, in_order(values, *_FIVE), K, size)
     return _one(ForeignCamera(_NAME, 0, K, D, size))
 
 
@@ -164,8 +171,8 @@ def read_numbers(source: CalibrationSource) -> CameraFile:
     lens = lens_by_keys(values)
     model = first_of(values, *_MODELS)
     given = first_of(values, *_COEFFICIENTS)
-    if isinstance(given, Mapping) or given is None:
-        given = in_order(values if given is None else given, *_EIGHT)
+    if lens == PINHOLE and (given is None or isinstance(given, Mapping)):
+        given = _coefficients_by_name(source, values if given is None else given)
     # Without coefficients RealSense's models are the same.
     plain = "brown_conrady" in str(model) and not np.any(checked_numbers(path, "coeffs", given, ()))
     if lens == PINHOLE and model is not None and not plain:
@@ -178,6 +185,15 @@ def read_numbers(source: CalibrationSource) -> CameraFile:
         return _one(ForeignCamera(_NAME, 0, None, NO_DISTORTION, size, lens))
     K = _numbers_matrix(source)
     return _one(ForeignCamera(_NAME, 0, K, opencv_coefficients(path, given, K, size), size))
+
+
+def _coefficients_by_name(source: CalibrationSource, values: Mapping[str, Any]) -> list[Any]:
+    if values.get("k4") and not {"k5", "k6"} <= set(values):
+        raise SettingsError(
+            f"{source.path}: k4 is {values['k4']}, but k5 and k6 are missing; add them (0, if "
+            'there are none), or name the lens with "model": "fisheye" if it is one'
+        )
+    return in_order(values, *_EIGHT)
 
 
 def _numbers_matrix(source: CalibrationSource) -> FloatArray:

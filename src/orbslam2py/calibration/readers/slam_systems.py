@@ -148,7 +148,7 @@ def read_basalt(source: CalibrationSource) -> CameraFile:
         coefficients = in_order(numbers, *_EIGHT)
         cameras.append(
             named_camera(
-                source, numbers, f"cam{i}", lens, size, coefficients, number=i, T_camera_rig=T
+                source, numbers, f"cam{i}.", lens, size, coefficients, number=i, T_camera_rig=T
             )
         )
     pairs = both_ways([camera.number for camera in cameras])
