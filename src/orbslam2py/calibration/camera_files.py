@@ -16,7 +16,7 @@ from orbslam2py.calibration.formats import READERS
 from orbslam2py.calibration.lenses import require_pinhole
 from orbslam2py.calibration.unknown_files import refuse_unknown
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings import OrbSettings, Sensor, Settings, settings_for_camera
+from orbslam2py.settings import CameraSettings, OrbSettings, Sensor, Settings, settings_for_camera
 from orbslam2py.settings.foreign import FOREIGN_FORMATS, FORMATS, recognise_camera_file
 from orbslam2py.settings.pair_views import is_likely_baseline
 
@@ -118,15 +118,24 @@ def read_camera_file(
         chosen = _choose(path, file, camera, sensor)
     else:
         chosen = _pair_of_files(source, file, file_format, right, camera, sensor)
+    if fps is not None:
+        CameraSettings(1.0, 1.0, 0.0, 0.0, fps=fps)  # a wrong rate is not the file's fault
     rate = fps if fps is not None else file.fps or _RATE
     what = f"{path} is {FOREIGN_FORMATS[file_format.value]}"
-    settings = _settings_of(what, file, chosen, sensor, rate)
+    try:
+        settings = _settings_of(what, file, chosen, sensor, rate)
+    except SettingsError as error:
+        raise SettingsError(_named(path, str(error))) from error
     n_features = file.n_features if n_features is None else n_features
     if n_features is not None:
         settings = replace(settings, orb=OrbSettings(n_features=n_features))
     if sensor is Sensor.RGBD and depth_factor is None:
         depth_factor = file.depth_factor
     return _made_for(path, settings, sensor, baseline, depth_factor)
+
+
+def _named(path: Path, message: str) -> str:
+    return message if str(path) in message else f"{path}: {message}"
 
 
 def _open(path: Path, size: tuple[int, int] | None) -> CalibrationSource:

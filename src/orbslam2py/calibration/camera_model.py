@@ -59,7 +59,7 @@ def checked_numbers(path: object, where: str, value: object, count: tuple[int, .
     """
     try:
         found = np.asarray(value, dtype=np.float64).reshape(-1)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         found = np.zeros(0)
         count = count or (1,)
     if (count and found.size not in count) or not np.isfinite(found).all():

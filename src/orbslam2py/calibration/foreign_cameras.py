@@ -196,7 +196,8 @@ def _named_values(loader: yaml.SafeLoader, node: yaml.Node) -> Any:
     return loader.construct_mapping(node, deep=True) if isinstance(node, yaml.MappingNode) else None
 
 
-_Loader.add_constructor("tag:yaml.org,2002:opencv-matrix", _named_values)
+for _kind in ("opencv-matrix", "opencv-nd-matrix"):
+    _Loader.add_constructor(f"tag:yaml.org,2002:{_kind}", _named_values)
 
 
 def first_of(values: Mapping[str, Any], *names: str) -> Any:

@@ -88,15 +88,15 @@ def _line(*patterns: str) -> Callable[[CalibrationText], bool]:
 
 
 def _is_opencv_pair(content: CalibrationText) -> bool:
-    signs = r"opencv-matrix|<opencv_storage>", r"\bT\b\s*[:>]", r"\bR\b\s*[:>]"
-    return all(re.search(sign, content.text) for sign in signs)
+    return bool(re.search(r"\b(?:[MK]2|[KM]R|\w*[mM]atrix_?[2R]|\w*right\w*)\b", content.text))
 
 
 def _is_nerfstudio(content: CalibrationText) -> bool:
-    return content.has("frames") and bool(
-        {"fl_x", "camera_angle_x", "camera_model"} & set(content.json)
-        or any("fl_x" in one for one in content.json["frames"][:1] if isinstance(one, dict))
-    )
+    frames = content.json.get("frames")
+    if not isinstance(frames, list):
+        return False
+    first = frames[0] if frames and isinstance(frames[0], dict) else {}
+    return bool({"fl_x", "camera_angle_x", "camera_model"} & (set(content.json) | set(first)))
 
 
 def _is_replica(content: CalibrationText) -> bool:
@@ -150,7 +150,7 @@ FORMATS: tuple[ForeignFormat, ...] = (
         "a calibration of OpenCV",
         "OpenCV's FileStorage (YAML or XML), its calibration samples",
         "One camera, or the pair of M1, D1, M2, D2, R, T with its rectification.",
-        _line(r"opencv-matrix|<opencv_storage>"),
+        _line(r"opencv-(?:nd-)?matrix|<opencv_storage>"),
         "camera_matrix: !!opencv-matrix",
     ),
     ForeignFormat(

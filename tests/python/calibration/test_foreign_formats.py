@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import random
+import re
 from pathlib import Path
 from typing import Any
 
@@ -174,6 +176,31 @@ def test_eight_coefficients_by_their_names(tmp_path: Path) -> None:
 def test_eight_of_which_three_are_zero_are_five(tmp_path: Path) -> None:
     text = files.ROS1.replace(str(list(D)), str([*D, 0, 0, 0]))
     np.testing.assert_array_equal(read_camera_file(written(tmp_path, text)).camera.distortion, D)
+
+
+# ---- spoilt files ------------------------------------------------------------------------------
+WHOLE = [text for text, _, _ in ONE_CAMERA.values()] + [*OTHERS.values(), files.BASALT_PAIR]
+WHOLE += [files.OPENCV_PAIR, files.OST_PAIR, files.zed("HD", "VGA"), files.kalibr_pair(5)]
+
+
+@pytest.mark.parametrize("number", range(len(WHOLE)))
+def test_spoilt_files_are_read_or_refused(tmp_path: Path, number: int) -> None:
+    """A file that was cut off or edited gets a message, never an error of Python's own."""
+    text, rng = WHOLE[number], random.Random(number)
+    numbers = list(re.finditer(r"-?\d+\.?\d*", text))
+    words = ("x", "", "nan", "-1", "0", "1e400", "9" * 400, "[", "{}", "null", "[1, 2]", '"a"')
+    spoilt = [text[: rng.randrange(len(text))] for _ in range(5)]
+    for word in words:
+        match = rng.choice(numbers)
+        spoilt.append(text[: match.start()] + word + text[match.end() :])
+    for one in spoilt:
+        path = written(tmp_path, one)
+        try:
+            camera = read_camera_file(path).camera
+        except SettingsError as error:
+            assert str(path) in str(error)
+        else:
+            assert np.isfinite([camera.fx, camera.fy, camera.cx, camera.cy]).all()
 
 
 # ---- size ----------------------------------------------------------------------------------------

@@ -27,7 +27,7 @@ from orbslam2py.calibration.foreign_cameras import (
     ForeignCamera,
     both_ways,
 )
-from orbslam2py.calibration.lenses import PINHOLE
+from orbslam2py.calibration.lenses import PINHOLE, lens_of
 from orbslam2py.errors import SettingsError
 from orbslam2py.trajectory.rotations import inverse_poses
 
@@ -35,13 +35,14 @@ _METRES_PER_CENTIMETRE, _METRES_PER_MILLIMETRE = 0.01, 0.001
 
 # ---- OAK -----------------------------------------------------------------------------------------
 #: By the number of ``cameraType``.
-_OAK_LENSES: dict[Any, str] = {0: PINHOLE, 1: "equidistant", 2: "equirectangular"}
+_OAK_LENSES = {"0": PINHOLE, "1": "equidistant", "2": "equirectangular", "3": "polynomial"}
 
 
 def read_oak(source: CalibrationSource) -> CameraFile:
     """Read the cameras of all sockets; each tells where another one stands, in centimetres."""
     cameras: dict[int, Mapping[str, Any]] = {}
-    for entry in source.value("cameraData"):
+    listed = source.value("cameraData")
+    for entry in listed if isinstance(listed, list) else [listed]:
         if not (isinstance(entry, list) and len(entry) == 2 and isinstance(entry[0], int)):
             raise SettingsError(
                 f"{source.path}: cameraData must list [socket, values]; read the calibration from "
@@ -80,7 +81,7 @@ def _places(
     links: dict[tuple[int, int], FloatArray] = {}
     for socket, values in cameras.items():
         given = values.get("extrinsics")
-        if not isinstance(given, Mapping) or given.get("toCameraSocket") not in cameras:
+        if not isinstance(given, Mapping) or given.get("toCameraSocket") not in list(cameras):
             continue
         where = f"socket {socket}: extrinsics"
         t = source.mapping(source.value("translation", given, f"{where}."), f"{where}.translation")
@@ -109,7 +110,7 @@ def _oak_camera(
     sides = [source.value(side, values, f"{name}: ") for side in ("width", "height")]
     size = checked_size(path, sides)
     kind = values.get("cameraType", 0)
-    lens = _OAK_LENSES.get(kind, "polynomial")
+    lens = _OAK_LENSES.get(str(kind)) or lens_of(path, "cameraType", kind)
     K, D = None, NO_DISTORTION
     if lens == PINHOLE:
         matrix = source.value("intrinsicMatrix", values, f"{name}: ")

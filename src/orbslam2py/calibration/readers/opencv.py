@@ -3,12 +3,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+from xml.etree import ElementTree
+
 import cv2
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py.calibration.camera_model import (
     checked_camera_matrix,
+    checked_numbers,
     checked_size,
     opencv_coefficients,
     pose_of_parts,
@@ -19,9 +24,9 @@ from orbslam2py.calibration.foreign_cameras import (
     CameraFile,
     ForeignCamera,
     both_ways,
+    first_of,
 )
 from orbslam2py.calibration.lenses import PINHOLE
-from orbslam2py.datasets.images import quiet_opencv
 from orbslam2py.errors import SettingsError
 
 _ONE = (
@@ -57,25 +62,18 @@ _SIZE = ("image_size", "imageSize", "img_size", "size")
 
 
 def read_opencv(source: CalibrationSource) -> CameraFile:
-    """Read one camera, or both of a pair and where the right one stands (in metres)."""
+    """Read one camera, or both of a pair and where the right one stands (in metres).
+
+    OpenCV's own reader is not used: files with a damaged matrix make it write beyond its memory.
+    """
     path = source.path
-    try:
-        with quiet_opencv():
-            storage = cv2.FileStorage(source.text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
-            fisheye = bool(_node(storage, ("fisheye_model",)).real())
-            one, left, right = (
-                [_matrix(_node(storage, names)) for names in camera]
-                for camera in (_ONE, _LEFT, _RIGHT)
-            )
-            R, T = (_matrix(_node(storage, names)) for names in (_ROTATION, _TRANSLATION))
-            sides = _sides(storage)
-    except (cv2.error, SystemError) as error:
-        # What it says of the reason is a line of its own source.
-        raise SettingsError(
-            f"{path} is damaged: OpenCV cannot read it, or a matrix in it has another size than it "
-            "says; write it again with cv2.FileStorage, with camera_matrix 3 x 3 and "
-            "distortion_coefficients"
-        ) from error
+    values = _xml_values(source) if source.text.lstrip().startswith("<") else source.values
+    fisheye = str(values.get("fisheye_model", 0)) not in ("0", "0.0", "False")
+    one, left, right = (
+        [_matrix(source, values, names) for names in camera] for camera in (_ONE, _LEFT, _RIGHT)
+    )
+    R, T = (_matrix(source, values, names) for names in (_ROTATION, _TRANSLATION))
+    sides = _sides(values)
     size = source.size if sides is None else checked_size(path, sides)
     lens = "equidistant" if fisheye else PINHOLE
     if left[0] is None or right[0] is None:
@@ -115,34 +113,49 @@ def _camera(
     return ForeignCamera(name, number, K, known, size, lens, T)
 
 
-def _sides(storage: cv2.FileStorage) -> list[float] | None:
-    nodes = [_node(storage, names) for names in (_WIDTH, _HEIGHT)]
-    if not any(node.empty() for node in nodes):
-        return [node.real() for node in nodes]
-    node = _node(storage, _SIZE)
-    if node.empty():
+def _sides(values: Mapping[str, Any]) -> object:
+    """Take width and height; None if there are none."""
+    sides = [first_of(values, *names) for names in (_WIDTH, _HEIGHT)]
+    if None not in sides:
+        return sides
+    size = first_of(values, *_SIZE)
+    return size.get("data") if isinstance(size, Mapping) else size
+
+
+def _matrix(
+    source: CalibrationSource, values: Mapping[str, Any], names: tuple[str, ...]
+) -> FloatArray | None:
+    """Take the numbers of a matrix; None if there is none of these names."""
+    name = next((one for one in names if one in values), None)
+    if name is None:
         return None
-    items = node if node.isSeq() else node.getNode("data")
-    return [items.at(i).real() for i in range(items.size())]
+    value = values[name]
+    if not isinstance(value, Mapping):
+        return checked_numbers(source.path, name, value, ())
+    keys = ["sizes"] if "sizes" in value else ["rows", "cols"]
+    given = [source.value(key, value, f"{name}.") for key in keys]
+    sizes = checked_numbers(source.path, f"{name}.{' and '.join(keys)}", given, ())
+    found = checked_numbers(source.path, name, source.value("data", value, f"{name}."), ())
+    if found.size != np.prod(sizes):
+        shape = " x ".join(f"{side:g}" for side in sizes)
+        raise SettingsError(
+            f"{source.path}: {name} has {found.size} numbers, but says that they are {shape}; "
+            "write the file again with cv2.FileStorage"
+        )
+    return found
 
 
-def _node(storage: cv2.FileStorage, names: tuple[str, ...]) -> cv2.FileNode:
-    for name in names:
-        node = storage.getNode(name)
-        if not node.empty():
-            return node
-    return storage.getNode(names[0])
-
-
-def _matrix(node: cv2.FileNode) -> FloatArray | None:
-    """Give what a node holds; None if there is no matrix.
-
-    Number by number, as `mat` of OpenCV 4.11 makes nonsense of whole ones, "0" or "1", between
-    others with a point.
-    """
-    known = node.mat()  # of which the shape is right, and what is no matrix is refused
-    if known is None:
-        return None
-    known, data = np.asarray(known), node.getNode("data")
-    numbers = np.array([data.at(i).real() for i in range(data.size())], dtype=np.float64)
-    return numbers.reshape(known.shape)
+def _xml_values(source: CalibrationSource) -> Mapping[str, Any]:
+    """Read named values of XML as those of YAML."""
+    try:
+        root = ElementTree.fromstring(source.text.strip())
+    except ElementTree.ParseError as error:
+        raise SettingsError(
+            f"{source.path} is damaged XML: {error}; write it again with cv2.FileStorage"
+        ) from error
+    values: dict[str, Any] = {}
+    for node in root:
+        parts = {part.tag: (part.text or "").split() for part in node}
+        words = (node.text or "").split()
+        values[node.tag] = parts or (words[0] if len(words) == 1 else words)
+    return values

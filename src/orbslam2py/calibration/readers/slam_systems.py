@@ -132,10 +132,13 @@ def read_basalt(source: CalibrationSource) -> CameraFile:
     """Read all cameras; T_imu_cam tells where they stand."""
     path = source.path
     inner = source.mapping(source.value("value0"), "value0")
-    listed = source.mappings(source.value("intrinsics", inner, "value0."), "value0.intrinsics")
-    sizes, places = inner.get("resolution") or [], inner.get("T_imu_cam") or []
+    intrinsics = source.mappings(source.value("intrinsics", inner, "value0."), "value0.intrinsics")
+    sizes, places = (
+        listed if isinstance(listed := inner.get(key), list) else []
+        for key in ("resolution", "T_imu_cam")
+    )
     cameras = []
-    for i, one in enumerate(listed):
+    for i, one in enumerate(intrinsics):
         where = f"value0.intrinsics[{i}]."
         name = source.value("camera_type", one, where)
         lens = lens_of(f"{path}", f"{where}camera_type", name)
