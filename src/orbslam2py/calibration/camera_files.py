@@ -114,6 +114,8 @@ def read_camera_file(
         known = recognise_camera_file(source.text)
         file_format = CameraFileFormat(known or refuse_unknown(source))
     file = _sized(source, READERS[file_format.value](source))
+    if file.note:
+        _log.info("%s: %s", path, file.note)
     if right is None:
         chosen = _choose(path, file, camera, sensor)
     else:

@@ -77,6 +77,8 @@ class CameraFile:
         What else is known: images per second, units of depth images per metre, ORB features.
     rgb
         Whether colour images are RGB.
+    note
+        What the user should know of how the numbers were read.
     """
 
     cameras: tuple[ForeignCamera, ...]
@@ -88,6 +90,7 @@ class CameraFile:
     depth_factor: float | None = None
     n_features: int | None = None
     rgb: bool = False
+    note: str = ""
 
 
 class CalibrationSource(CalibrationText):

@@ -112,6 +112,12 @@ def test_one_of_a_pair_is_told(command: CommandLine, tmp_path: Path) -> None:
     assert "baseline 0.12 m" in done.out
 
 
+def test_half_a_pixel_of_nerfstudio_is_told(command: CommandLine, tmp_path: Path) -> None:
+    written(tmp_path, files.NERFSTUDIO, "file")
+    assert "Note: file: cx and cy of nerfstudio count from the image's" in command(*IMPORT).err
+    assert numbers_of("my.yaml") == (FX, FY, CX, CY)
+
+
 # ---- remedies ------------------------------------------------------------------------------------
 @pytest.mark.parametrize("name", EQUIDISTANT)
 def test_fisheye_is_undistorted_by_opencv(command: CommandLine, tmp_path: Path, name: str) -> None:

@@ -69,7 +69,8 @@ def read_nerfstudio(source: CalibrationSource) -> CameraFile:
             "undistorted"
         )
     D = opencv_coefficients(path, in_order(values, *_FIVE), K, size)
-    return _one(ForeignCamera(_NAME, 0, K, D, size))
+    note = "cx and cy of nerfstudio count from the image's corner; half a pixel is taken off"
+    return CameraFile((ForeignCamera(_NAME, 0, K, D, size),), note=note)
 
 
 def _middle(
