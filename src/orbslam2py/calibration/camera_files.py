@@ -1,44 +1,32 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Settings from calibration files of other programs: OpenCV, Kalibr, ROS, COLMAP and KITTI.
-
-All of these use OpenCV's distortion, and but for COLMAP also its pixels, in which the centre of the
-top-left pixel is (0, 0).
-"""
+"""Settings from calibration files of other programs; `settings.foreign` lists their formats."""
 
 from __future__ import annotations
 
+import logging
 from dataclasses import replace
 from enum import Enum
 from pathlib import Path
 
-import cv2
-import numpy as np
-
-from orbslam2py._arguments import cannot_open, member_of, path_of
-from orbslam2py._arrays import FloatArray
-from orbslam2py.calibration.camera_model import (
-    CameraModel,
-    checked_camera_matrix,
-    checked_numbers,
-    checked_size,
-    five_coefficients,
-    require_supported,
-)
-from orbslam2py.calibration.kitti_camera_file import kitti_settings
-from orbslam2py.calibration.yaml_camera_files import (
-    kalibr_settings,
-    parse_yaml,
-    ros_camera,
-    ros_pair_settings,
-)
-from orbslam2py.datasets.images import quiet_opencv
+from orbslam2py._arguments import cannot_open, is_whole, member_of, path_of, shown
+from orbslam2py.calibration.camera_model import camera_settings
+from orbslam2py.calibration.foreign_cameras import CalibrationSource, CameraFile, ForeignCamera
+from orbslam2py.calibration.foreign_pairs import Pair, pair_settings
+from orbslam2py.calibration.formats import READERS
+from orbslam2py.calibration.lenses import require_pinhole
+from orbslam2py.calibration.unknown_files import refuse_unknown
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings import OrbSettings, Sensor, Settings, settings_for_camera
-from orbslam2py.settings.foreign import recognise_camera_file
+from orbslam2py.settings import CameraSettings, OrbSettings, Sensor, Settings, settings_for_camera
+from orbslam2py.settings.foreign import FOREIGN_FORMATS, FORMATS, recognise_camera_file
+from orbslam2py.settings.pair_views import is_likely_baseline
+
+_log = logging.getLogger(__name__)
+
+_RATE = 30.0
 
 
 class CameraFileFormat(str, Enum):
-    """Who wrote a calibration file."""
+    """Who wrote a calibration file; `orbslam2py.settings.foreign.FORMATS` describes them."""
 
     AUTO = "auto"
     OPENCV = "opencv"
@@ -46,6 +34,20 @@ class CameraFileFormat(str, Enum):
     ROS = "ros"
     COLMAP = "colmap"
     KITTI = "kitti"
+    OST = "ost"
+    EUROC = "euroc"
+    VINS = "vins"
+    STELLA_VSLAM = "stella_vslam"
+    OAK = "oak"
+    ZED = "zed"
+    BASALT = "basalt"
+    NERFSTUDIO = "nerfstudio"
+    OPEN3D = "open3d"
+    REPLICA = "replica"
+    RECORD3D = "record3d"
+    POLYCAM = "polycam"
+    FCA = "fca"
+    NUMBERS = "numbers"
 
     def __str__(self) -> str:
         return self.value
@@ -57,6 +59,7 @@ def read_camera_file(
     *,
     camera: int | None = None,
     right: str | Path | None = None,
+    size: tuple[int, int] | None = None,
     sensor: Sensor | str | None = None,
     baseline: float | None = None,
     depth_factor: float | None = None,
@@ -73,17 +76,22 @@ def read_camera_file(
         Who wrote it, also as text (``"kalibr"``); by default told by its content.
     camera
         Number of the camera: ``cam0``, ``cam1`` ... of Kalibr, ``CAMERA_ID`` of COLMAP, ``P0`` to
-        ``P3`` of KITTI. By default the only one; of a file of Kalibr or KITTI with several the pair
-        of the first two.
+        ``P3`` of KITTI, the socket of OAK; 0 is the left one of OpenCV and ZED. With `sensor`
+        stereo it is the left camera of the pair. By default the only one; of a file with a pair the
+        pair.
     right
-        ROS: the file of the right camera of a rectified pair; `path` is the left one's.
+        ROS and EuRoC: the file of the right camera of a pair; `path` is the left one's.
+    size
+        Width and height of the images [pixels], for a file that does not tell them, or that holds
+        calibrations of several sizes (ZED).
     sensor
         What the settings are for; by default a single camera or the pair, as the file is.
     baseline, depth_factor
-        As for `orbslam2py.settings.settings_for_camera`.
+        As for `orbslam2py.settings.settings_for_camera`. A pair has its baseline from the file;
+        only if that is in another unit than metres, `baseline` replaces it.
     fps, n_features
-        Frames per second and ORB features per image, which such files do not tell. By default 30
-        (KITTI: 10), and 1000 or, above 0.6 megapixels and for KITTI, 2000.
+        Frames per second and ORB features per image. By default what the file tells, or 30 (KITTI:
+        10), and 1000 or, above 0.6 megapixels and for KITTI, 2000.
 
     Returns
     -------
@@ -97,51 +105,191 @@ def read_camera_file(
         for the name of a format that there is not.
     """
     path = path_of(path, "the calibration file", SettingsError)
-    what = "the format of the calibration file"
-    file_format = member_of(CameraFileFormat, file_format, what, SettingsError)
-    text = _read_text(path)
-    if file_format is CameraFileFormat.AUTO:
-        file_format = _recognise(path, text)
+    named = "the format of the calibration file"
+    file_format = member_of(CameraFileFormat, file_format, named, SettingsError)
     sensor = None if sensor is None else Sensor(sensor)
-    settings = _read(path, text, file_format, camera, right, sensor, fps)
+    size = None if size is None else _checked_size(size)
+    source = _open(path, size)
+    if file_format is CameraFileFormat.AUTO:
+        known = recognise_camera_file(source.text)
+        file_format = CameraFileFormat(known or refuse_unknown(source))
+    file = _sized(source, READERS[file_format.value](source))
+    if file.note:
+        _log.info("%s: %s", path, file.note)
+    if right is None:
+        chosen = _choose(path, file, camera, sensor)
+    else:
+        chosen = _pair_of_files(source, file, file_format, right, camera, sensor)
+    if fps is not None:
+        CameraSettings(1.0, 1.0, 0.0, 0.0, fps=fps)  # a wrong rate is not the file's fault
+    rate = fps if fps is not None else file.fps or _RATE
+    what = f"{path} is {FOREIGN_FORMATS[file_format.value]}"
+    try:
+        settings = _settings_of(what, file, chosen, sensor, rate)
+    except SettingsError as error:
+        raise SettingsError(_named(path, str(error))) from error
+    n_features = file.n_features if n_features is None else n_features
     if n_features is not None:
         settings = replace(settings, orb=OrbSettings(n_features=n_features))
+    if sensor is Sensor.RGBD and depth_factor is None:
+        depth_factor = file.depth_factor
     return _made_for(path, settings, sensor, baseline, depth_factor)
 
 
-def _read(
-    path: Path,
-    text: str,
-    file_format: CameraFileFormat,
-    camera: int | None,
-    right: str | Path | None,
-    sensor: Sensor | None,
-    fps: float | None,
-) -> Settings:
-    """Make settings of what the file holds: of one camera, or of a pair if none else is wanted."""
-    alone = sensor is not None and sensor is not Sensor.STEREO
-    if right is not None and file_format is not CameraFileFormat.ROS:
+def _named(path: Path, message: str) -> str:
+    return message if str(path) in message else f"{path}: {message}"
+
+
+def _open(path: Path, size: tuple[int, int] | None) -> CalibrationSource:
+    try:
+        text = path.read_text(encoding="utf-8-sig", errors="replace")
+    except OSError as error:
+        raise SettingsError(cannot_open(path, error)) from error
+    return CalibrationSource(path, text, size)
+
+
+def _checked_size(size: tuple[int, int]) -> tuple[int, int]:
+    if (
+        not isinstance(size, tuple | list)
+        or len(size) != 2
+        or not all(is_whole(side) and side >= 1 for side in size)
+    ):
+        given = " x ".join(map(str, size)) if isinstance(size, tuple) else shown(size)
+        raise SettingsError(f"size is {given}; give width and height in pixels, 1 or more")
+    return int(size[0]), int(size[1])
+
+
+def _sized(source: CalibrationSource, file: CameraFile) -> CameraFile:
+    """Give cameras of unknown size the one that the user names."""
+    size = source.size
+    if size is None:
+        return file
+    for camera in file.cameras:
+        if camera.size is not None and camera.size != size:
+            width, height = camera.size
+            raise SettingsError(
+                f"{source.path} is for images of {width} x {height} pixels, not {size[0]} x "
+                f"{size[1]}; leave --size out, and give images of that size or calibrate the "
+                "camera at the size of yours"
+            )
+    return replace(file, cameras=tuple(replace(camera, size=size) for camera in file.cameras))
+
+
+# ---- which camera --------------------------------------------------------------------------------
+def _choose(
+    path: Path, file: CameraFile, number: int | None, sensor: Sensor | None
+) -> ForeignCamera | Pair:
+    """Choose the camera, or the pair if none else is wanted."""
+    cameras = {camera.number: camera for camera in file.cameras}
+    names = ", ".join(camera.name for camera in file.cameras)
+    if number is not None and file.prefix is None:
+        raise SettingsError(f"{path} holds one camera, and no camera {number}; leave out --camera")
+    if number is not None and number not in cameras:
         raise SettingsError(
-            f"a file of the right camera goes with ros files, {path} is not one; leave out --right"
+            f"{path} has no {file.prefix}{number}; give --camera with one there is: {names}"
         )
-    if camera is not None and file_format in (CameraFileFormat.OPENCV, CameraFileFormat.ROS):
+    alone = sensor is not None and sensor is not Sensor.STEREO
+    if file.pairs and not alone and (number is None or sensor is Sensor.STEREO):
+        left, right = _numbers_of_pair(path, file, number)
+        _tell_rest(path, file, (left, right))
+        remedy = f"take one of them with --camera {left}"
+        if sensor is Sensor.STEREO:
+            remedy += " --sensor mono"
+        return Pair(str(path), file, cameras[left], cameras[right], remedy)
+    if number is not None:
+        return cameras[number]
+    if len(cameras) > 1 and not file.pairs:
+        raise SettingsError(
+            f"{path} lists {len(cameras)} cameras ({names}); choose one with --camera"
+        )
+    first = file.pairs[0][0] if file.pairs else file.cameras[0].number
+    _tell_rest(path, file, (first,))
+    return cameras[first]
+
+
+def _numbers_of_pair(path: Path, file: CameraFile, number: int | None) -> tuple[int, int]:
+    if number is None:
+        return file.pairs[0]
+    for pair in file.pairs:
+        if pair[0] == number:
+            return pair
+    there = ", ".join(f"--camera {left} (with {file.prefix}{right})" for left, right in file.pairs)
+    raise SettingsError(
+        f"{path} has no right camera for {file.prefix}{number}, which stereo needs; give one of "
+        f"{there}"
+    )
+
+
+def _tell_rest(path: Path, file: CameraFile, used: tuple[int, ...]) -> None:
+    """Say which cameras of a file are left out."""
+    rest = [camera for camera in file.cameras if camera.number not in used]
+    if not rest:
+        return
+    names = {camera.number: camera.name for camera in file.cameras}
+    _log.info(
+        "%s holds %d cameras; the settings are of %s, not of %s (--camera %d)",
+        path,
+        len(file.cameras),
+        " and ".join(names[number] for number in used),
+        ", ".join(camera.name for camera in rest),
+        rest[0].number,
+    )
+
+
+def _pair_of_files(
+    source: CalibrationSource,
+    file: CameraFile,
+    file_format: CameraFileFormat,
+    right: str | Path,
+    camera: int | None,
+    sensor: Sensor | None,
+) -> Pair:
+    path = source.path
+    kinds = [one.name for one in FORMATS if one.pair == "right"]
+    if file_format.value not in kinds:
+        raise SettingsError(
+            f"a file of the right camera goes with {', '.join(kinds)} files, {path} is not one; "
+            "leave out --right"
+        )
+    if camera is not None:
         raise SettingsError(f"{path} holds one camera, and no camera {camera}; leave out --camera")
-    if file_format is CameraFileFormat.KITTI:
-        return kitti_settings(path, text, camera, sensor, fps)
-    fps = 30.0 if fps is None else fps
-    if file_format is CameraFileFormat.COLMAP:
-        return _colmap(path, text, camera).settings(fps)
-    if file_format is CameraFileFormat.OPENCV:
-        return _opencv(path, text).settings(fps)
-    document = parse_yaml(path, text)
-    if file_format is CameraFileFormat.KALIBR:
-        return kalibr_settings(path, document, camera, fps, alone=alone)
-    if right is None:
-        return ros_camera(path, document).settings(fps)
-    if alone:
+    if sensor is not None and sensor is not Sensor.STEREO:
         raise SettingsError(f"{path} and {right} are a pair; leave --right out for {sensor}")
     right = path_of(right, "the file of the right camera", SettingsError)
-    return ros_pair_settings((path, document), (right, parse_yaml(right, _read_text(right))), fps)
+    second = _open(right, source.size)
+    other = _sized(second, READERS[file_format.value](second))
+    for where, one in ((path, file), (right, other)):
+        if len(one.cameras) != 1:
+            raise SettingsError(f"{where} holds a pair already; leave out --right")
+    left = replace(file.cameras[0], name=str(path))
+    return Pair(
+        f"{path} and {right}",
+        file,
+        left,
+        replace(other.cameras[0], name=str(right)),
+        "leave out --right for the first one alone",
+    )
+
+
+# ---- settings ------------------------------------------------------------------------------------
+def _settings_of(
+    what: str, file: CameraFile, chosen: ForeignCamera | Pair, sensor: Sensor | None, fps: float
+) -> Settings:
+    if isinstance(chosen, Pair):
+        for one in (chosen.left, chosen.right):
+            require_pinhole(f"{what}: {_called(file, one)}", one.lens, Sensor.STEREO)
+        return pair_settings(chosen, fps)
+    require_pinhole(f"{what}: {_called(file, chosen)}", chosen.lens, sensor or Sensor.MONOCULAR)
+    assert chosen.K is not None
+    camera = camera_settings(chosen.K, chosen.distortion, chosen.size, fps=fps, rgb=file.rgb)
+    return settings_for_camera(camera, Sensor.MONOCULAR)
+
+
+def _called(file: CameraFile, camera: ForeignCamera) -> str:
+    """What a camera is called in a sentence."""
+    if file.prefix is None:
+        return "its camera"
+    return f"{file.prefix}{camera.name}" if camera.name.isdecimal() else camera.name
 
 
 def _made_for(
@@ -153,154 +301,31 @@ def _made_for(
 ) -> Settings:
     sensor = sensor or settings.sensor
     if settings.sensor is Sensor.STEREO and sensor is Sensor.STEREO and depth_factor is None:
-        if baseline is not None:
-            raise SettingsError(
-                f"{path} tells the baseline, {settings.baseline:.4g} m; leave --baseline out"
-            )
-        return settings
+        return _with_baseline(path, settings, baseline)
     return settings_for_camera(
         settings.camera, sensor, baseline=baseline, depth_factor=depth_factor, orb=settings.orb
     )
 
 
-def _read_text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8-sig", errors="replace")
-    except OSError as error:
-        raise SettingsError(cannot_open(path, error)) from error
-
-
-def _recognise(path: Path, text: str) -> CameraFileFormat:
-    known = recognise_camera_file(text)
-    if known is not None:
-        return CameraFileFormat(known)
-    raise SettingsError(
-        f"{path} is no camera file we know: an OpenCV file (matrices), Kalibr's camchain.yaml "
-        "(cam0), ROS's camera_info (camera_matrix), COLMAP's cameras.txt or KITTI's calib.txt. "
-        "Name the format if it is one of them"
-    )
-
-
-# ---- OpenCV --------------------------------------------------------------------------------------
-_OPENCV_NAMES = {
-    "camera_matrix": ("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "M1", "mtx"),
-    "distortion_coefficients": (
-        "distortion_coefficients",
-        "Distortion_Coefficients",
-        "distCoeffs",
-        "dist_coeffs",
-        "distortion",
-        "dist",
-        "D",
-        "D1",
-    ),
-    "image_width": ("image_width", "image_Width", "width"),
-    "image_height": ("image_height", "image_Height", "height"),
-}
-
-
-def _opencv(path: Path, text: str) -> CameraModel:
-    try:
-        with quiet_opencv():
-            storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
-            if _node(storage, "fisheye_model").real():
-                require_supported(path, "camera model", "fisheye", ("pinhole",))
-            K = _matrix(_node(storage, "camera_matrix"))
-            D = _matrix(_node(storage, "distortion_coefficients"))
-            sizes = [_node(storage, name) for name in ("image_width", "image_height")]
-            size = None if any(s.empty() for s in sizes) else [int(s.real()) for s in sizes]
-            if size is None and not _node(storage, "image_size").empty():
-                node = _node(storage, "image_size")
-                size = [int(node.at(i).real()) for i in range(2)]
-    except (cv2.error, SystemError) as error:
-        # What it says of the reason is a line of its own source.
-        raise SettingsError(
-            f"{path} is damaged: OpenCV cannot read it, or a matrix in it has another size than it "
-            "says; write it again with cv2.FileStorage, with camera_matrix 3 x 3 and "
-            "distortion_coefficients"
-        ) from error
-    if K is None:
-        names = ", ".join(_OPENCV_NAMES["camera_matrix"])
-        raise SettingsError(
-            f"{path} has no camera matrix (looked for {names}); is it a file of OpenCV?"
-        )
-    return CameraModel(
-        checked_camera_matrix(path, K),
-        five_coefficients(path, np.zeros(0) if D is None else D),
-        None if size is None else checked_size(path, size),
-    )
-
-
-def _node(storage: cv2.FileStorage, name: str) -> cv2.FileNode:
-    for alias in _OPENCV_NAMES.get(name, (name,)):
-        node = storage.getNode(alias)
-        if not node.empty():
-            return node
-    return storage.getNode(name)
-
-
-def _matrix(node: cv2.FileNode) -> FloatArray | None:
-    """Give what a node holds; None if there is no matrix.
-
-    Number by number, as `mat` of OpenCV 4.11 makes nonsense of whole ones, "0" or "1", between
-    others with a point.
-    """
-    known = node.mat()  # of which the shape is right, and what is no matrix is refused
-    if known is None:
-        return None
-    known, data = np.asarray(known), node.getNode("data")
-    numbers = np.array([data.at(i).real() for i in range(data.size())], dtype=np.float64)
-    return numbers.reshape(known.shape)
-
-
-# ---- COLMAP --------------------------------------------------------------------------------------
-#: Where fx, fy, cx, cy, k1, k2, p1, p2 are among the parameters of a model; -1: zero.
-_COLMAP = {
-    "SIMPLE_PINHOLE": (0, 0, 1, 2, -1, -1, -1, -1),
-    "PINHOLE": (0, 1, 2, 3, -1, -1, -1, -1),
-    "SIMPLE_RADIAL": (0, 0, 1, 2, 3, -1, -1, -1),
-    "RADIAL": (0, 0, 1, 2, 3, 4, -1, -1),
-    "OPENCV": (0, 1, 2, 3, 4, 5, 6, 7),
-}
-
-
-def _colmap(path: Path, text: str, number: int | None) -> CameraModel:
-    cameras: dict[int, tuple[int, list[str]]] = {}
-    for line_number, line in enumerate(text.splitlines(), start=1):
-        fields = line.split()
-        if not fields or fields[0].startswith("#"):
-            continue
-        if len(fields) < 5 or not fields[0].isdecimal():
-            raise SettingsError(
-                f"{path}:{line_number}: expected 'CAMERA_ID MODEL WIDTH HEIGHT PARAMS...'; is it "
-                "cameras.txt of COLMAP?"
+def _with_baseline(path: Path, settings: Settings, baseline: float | None) -> Settings:
+    """Set the baseline of a pair right whose file is in another unit than metres."""
+    found = settings.baseline
+    likely = is_likely_baseline(found)
+    if baseline is None:
+        if not likely:
+            _log.warning(
+                "%s gives a baseline of %.4g m; if it is in another unit, give the distance of the "
+                "two cameras in metres with --baseline",
+                path,
+                found,
             )
-        cameras[int(fields[0])] = (line_number, fields[1:])
-    ids = ", ".join(map(str, cameras))
-    if not cameras:
-        raise SettingsError(f"{path} lists no camera")
-    if number is None and len(cameras) > 1:
-        raise SettingsError(
-            f"{path} lists {len(cameras)} cameras ({ids}); choose one with --camera"
-        )
-    if number is not None and number not in cameras:
-        raise SettingsError(
-            f"{path} has no camera {number}; give --camera with one there is: {ids}"
-        )
-    line_number, (model, *values) = cameras[next(iter(cameras)) if number is None else number]
-    where = Path(f"{path}:{line_number}")
-    require_supported(where, "camera model", model, tuple(_COLMAP))
-    places = _COLMAP[model]
-    try:
-        width, height, *parameters = [float(value) for value in values]
-    except ValueError as error:
-        raise SettingsError(f"{where}: {error}") from None
-    checked_numbers(where, f"parameters of {model}", parameters, (max(places) + 1,))
-    fx, fy, cx, cy, k1, k2, p1, p2 = (0.0 if i < 0 else parameters[i] for i in places)
-    # COLMAP's pixels begin at their corner: the centre of the first one is (0.5, 0.5).
-    K = np.array([[fx, 0.0, cx - 0.5], [0.0, fy, cy - 0.5], [0.0, 0.0, 1.0]])
-    return CameraModel(
-        K=checked_camera_matrix(where, K, model),
-        distortion=np.array([k1, k2, p1, p2, 0.0]),
-        size=checked_size(where, [width, height]),
-    )
+        return settings
+    if likely:
+        raise SettingsError(f"{path} tells the baseline, {found:.4g} m; leave --baseline out")
+    bf = settings_for_camera(settings.camera, Sensor.STEREO, baseline=baseline).camera.bf
+    pair = settings.rectification
+    if pair is not None:
+        P = pair.right.P.copy()
+        P[0, 3] = -bf
+        pair = replace(pair, right=replace(pair.right, P=P))
+    return replace(settings, camera=replace(settings.camera, bf=bf), rectification=pair)

@@ -1,43 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The camera that calibration files of other programs are read into, and checks they share."""
+"""Numbers of a camera in files of other programs: the checks that all formats share."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from orbslam2py._arguments import number_of
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import SettingsError
-from orbslam2py.settings import CameraSettings, Sensor, Settings, settings_for_camera
+from orbslam2py.settings import CameraSettings, Sensor
+from orbslam2py.settings.foreign import filled_line
+from orbslam2py.settings.groups import DISTORTION_FIELDS
 from orbslam2py.settings.keys import focal_problems
-
-
-@dataclass(frozen=True, eq=False)
-class CameraModel:
-    """A pinhole camera with OpenCV's distortion.
-
-    Attributes
-    ----------
-    K
-        Camera matrix (3, 3), pixels.
-    distortion
-        k1, k2, p1, p2, k3, (5,).
-    size
-        Width and height [pixels]; None if the file does not tell.
-    """
-
-    K: FloatArray
-    distortion: FloatArray
-    size: tuple[int, int] | None
-
-    def settings(self, fps: float) -> Settings:
-        """Make settings for this camera alone."""
-        camera = camera_settings(self.K, self.distortion, self.size, fps=fps)
-        return settings_for_camera(camera, Sensor.MONOCULAR)
 
 
 def camera_settings(
@@ -48,19 +25,14 @@ def camera_settings(
     fps: float,
     rgb: bool = False,
 ) -> CameraSettings:
-    """Camera settings of a matrix (3, 3) [pixels], five coefficients, and width and height."""
-    k1, k2, p1, p2, k3 = distortion.tolist()
+    """Camera settings of a matrix (3, 3) [pixels], up to eight coefficients, width and height."""
     width, height = size or (None, None)
     return CameraSettings(
         fx=K[0, 0],
         fy=K[1, 1],
         cx=K[0, 2],
         cy=K[1, 2],
-        k1=k1,
-        k2=k2,
-        p1=p1,
-        p2=p2,
-        k3=k3,
+        **dict(zip(DISTORTION_FIELDS, distortion.tolist(), strict=False)),
         width=width,
         height=height,
         fps=fps,
@@ -68,7 +40,7 @@ def camera_settings(
     )
 
 
-def checked_numbers(path: Path, where: str, value: object, count: tuple[int, ...]) -> FloatArray:
+def checked_numbers(path: object, where: str, value: object, count: tuple[int, ...]) -> FloatArray:
     """Make float64 (n,) finite numbers of a value in a file.
 
     Parameters
@@ -87,26 +59,20 @@ def checked_numbers(path: Path, where: str, value: object, count: tuple[int, ...
     """
     try:
         found = np.asarray(value, dtype=np.float64).reshape(-1)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         found = np.zeros(0)
         count = count or (1,)
     if (count and found.size not in count) or not np.isfinite(found).all():
         wanted = " or ".join(map(str, count))
-        raise SettingsError(f"{path}: {where} must hold {wanted} finite numbers, found {value!r}")
+        noun = "number" if count == (1,) else "numbers"
+        raise SettingsError(
+            f"{path}: {where} must hold {wanted} finite {noun}, found {repr(value)[:200]}"
+        )
     return found
 
 
-def require_supported(path: Path, what: str, name: object, supported: tuple[str, ...]) -> None:
-    """Raise `SettingsError` unless a model is one of those supported."""
-    if name not in supported:
-        raise SettingsError(
-            f"{path}: {what} {name} is not supported; supported: {', '.join(supported)}. Calibrate "
-            "anew with one of these, or undistort the images first"
-        )
-
-
 def checked_camera_matrix(
-    path: Path, K: NDArray[Any], where: str = "the camera matrix"
+    path: object, K: NDArray[Any], where: str = "the camera matrix"
 ) -> FloatArray:
     """Check a camera matrix (3, 3) [pixels].
 
@@ -126,35 +92,95 @@ def checked_camera_matrix(
     for problem in focal_problems(where, K):
         raise SettingsError(f"{path}: {problem}")
     if abs(K[0, 1]) > 1e-6 * K[0, 0]:
-        raise SettingsError(f"{path}: a camera with skew ({K[0, 1]:g}) is not supported")
+        raise SettingsError(
+            f"{path}: a camera with skew ({K[0, 1]:g}) is not supported; calibrate it without"
+        )
     return K
 
 
-def five_coefficients(path: Path, coefficients: NDArray[Any]) -> FloatArray:
-    """Bring 0, 4, 5 or more coefficients to k1, k2, p1, p2, k3; float64 (5,).
+def opencv_coefficients(
+    path: object, coefficients: object, K: FloatArray, size: tuple[int, int] | None
+) -> FloatArray:
+    """Bring coefficients in OpenCV's order to as few as there must be; float64 (5,) or (8,).
+
+    Parameters
+    ----------
+    path
+        The file, and the camera in it, for the message.
+    coefficients
+        0, 4, 5, 8, 12 or 14 numbers.
+    K, size
+        Camera matrix (3, 3) and size [pixels], for the message.
 
     Raises
     ------
     SettingsError
-        If there is another number of them, or further ones are not zero.
+        If there is another number of them, or those beyond the eighth are not zero.
     """
     given = checked_numbers(path, "the distortion", coefficients, ())
     if given.size not in (0, 4, 5, 8, 12, 14):
         raise SettingsError(
-            f"{path}: {given.size} distortion coefficients; there must be k1, k2, p1, p2 and "
-            "perhaps k3"
+            f"{path}: {number_of(given.size, 'distortion coefficient')}; give k1, k2, p1, p2 and "
+            "perhaps k3, or k3, k4, k5, k6, as OpenCV has them (0 for those there are not)"
         )
-    if np.any(given[5:]):
+    if np.any(given[8:]):
         raise SettingsError(
-            f"{path}: distortion with {given.size} coefficients (rational, thin prism or tilted "
-            "model) is not supported; supported: k1, k2, p1, p2, k3"
+            f"{path}: distortion with {given.size} coefficients (thin prism or tilted model) is "
+            "not supported, only the first 8; undistort the images with OpenCV (cv2.undistort "
+            "with K and D of this file), and make settings of the undistorted images:\n"
+            f"    {filled_line(K, size, Sensor.MONOCULAR)}"
         )
-    five = np.zeros(5)
-    five[: min(given.size, 5)] = given[:5]
-    return five
+    all_of_them = np.zeros(8)
+    all_of_them[: min(given.size, 8)] = given[:8]
+    return all_of_them if np.any(all_of_them[5:]) else all_of_them[:5]
 
 
-def checked_size(path: Path, size: list[Any]) -> tuple[int, int]:
+def pinhole_matrix(path: object, where: str, values: object) -> FloatArray:
+    """Make the camera matrix (3, 3) of fx, fy, cx, cy.
+
+    Raises
+    ------
+    SettingsError
+        If these are other than four numbers, or a focal length is not above 0.
+    """
+    fx, fy, cx, cy = checked_numbers(path, where, values, (4,))
+    K = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+    return checked_camera_matrix(path, K, where)
+
+
+def checked_pose(path: object, where: str, value: object) -> FloatArray:
+    """Make a rigid transform (4, 4) of 16 numbers.
+
+    Raises
+    ------
+    SettingsError
+        If it is none.
+    """
+    T = checked_numbers(path, where, value, (16,)).reshape(4, 4)
+    R = T[:3, :3]
+    if np.abs(R @ R.T - np.eye(3)).max() > 1e-3 or np.linalg.det(R) < 0:
+        raise SettingsError(
+            f"{path}: {where} is no 4 x 4 rigid transform; give a rotation (no mirror, no scale) "
+            "and the translation beside it"
+        )
+    return T
+
+
+def pose_of_parts(path: object, where: str, R: object, t: object) -> FloatArray:
+    """Make a rigid transform (4, 4) of a rotation, 9 numbers, and a translation, 3 numbers.
+
+    Raises
+    ------
+    SettingsError
+        If they are none.
+    """
+    T = np.eye(4)
+    T[:3, :3] = checked_numbers(path, f"the rotation of {where}", R, (9,)).reshape(3, 3)
+    T[:3, 3] = checked_numbers(path, f"the translation of {where}", t, (3,))
+    return checked_pose(path, where, T)
+
+
+def checked_size(path: object, size: object, where: str = "the image size") -> tuple[int, int]:
     """Check width and height of an image [pixels].
 
     Raises
@@ -162,7 +188,10 @@ def checked_size(path: Path, size: list[Any]) -> tuple[int, int]:
     SettingsError
         If they are no whole numbers above 0.
     """
-    width, height = (float(value) for value in size)
+    width, height = checked_numbers(path, where, size, (2,)).tolist()
     if not (width.is_integer() and height.is_integer() and min(width, height) >= 1):
-        raise SettingsError(f"{path}: an image size of {width:g} x {height:g} makes no sense")
+        raise SettingsError(
+            f"{path}: an image size of {width:g} x {height:g} makes no sense; give whole numbers "
+            "of pixels, 1 or more"
+        )
     return int(width), int(height)

@@ -25,10 +25,12 @@ from orbslam2py.calibration import (
 from orbslam2py.calibration import calibrate as calibrate_views
 from orbslam2py.calibration.plot import draw_residuals
 from orbslam2py.cli.messages import log_to
+from orbslam2py.cli.synthesize import parse_size
 from orbslam2py.cli.targets import check_apart, check_target
 from orbslam2py.errors import OutputFileError, SettingsError
 from orbslam2py.settings import CameraSettings, OrbSettings, Sensor, settings_for_camera
 from orbslam2py.settings.check import warn_of_doubts
+from orbslam2py.settings.pair_views import views_of_pair
 
 Output = Annotated[Path, typer.Option("--output", "-o", help="Settings file to write.")]
 Fps = Annotated[
@@ -128,8 +130,8 @@ def import_camera(
     file: Annotated[
         Path,
         typer.Argument(
-            help="OpenCV YAML or XML, Kalibr camchain, ROS camera_info, COLMAP cameras.txt, "
-            "KITTI calib.txt."
+            help="Calibration file of OpenCV, Kalibr, ROS, COLMAP, KITTI, EuRoC, OAK, ZED and "
+            "others (--format lists all)."
         ),
     ],
     output: Output,
@@ -139,14 +141,22 @@ def import_camera(
     camera: Annotated[
         int | None,
         typer.Option(
-            help="Number of the camera in a file of several; without it, the pair of a Kalibr "
-            "camchain or of KITTI (--sensor stereo --camera 2: its colour pair).",
+            help="Number of the camera in a file of several; without it, the pair if the file "
+            "holds one. With --sensor stereo, the left camera of the pair.",
             min=0,
         ),
     ] = None,
     right: Annotated[
         Path | None,
-        typer.Option(help="ROS: camera_info of the right camera, to get settings for a pair."),
+        typer.Option(help="ROS, EuRoC: the file of the right camera, to get settings for a pair."),
+    ] = None,
+    size: Annotated[
+        str | None,
+        typer.Option(
+            help="Size of the images, such as 640x480, if the file does not tell it or holds "
+            "several (ZED).",
+            metavar="WxH",
+        ),
     ] = None,
     sensor: OutputSensor = None,
     depth_factor: DepthFactor = None,
@@ -161,11 +171,13 @@ def import_camera(
     """Turn another program's calibration into a settings file."""
     check_apart({"--output": output}, [file, *([] if right is None else [right])])
     check_target(output, force=force)
+    log_to(Console(stderr=True), quiet=quiet)
     settings = read_camera_file(
         file,
         file_format,
         camera=camera,
         right=right,
+        size=None if size is None else parse_size(size),
         sensor=sensor,
         baseline=baseline,
         depth_factor=depth_factor,
@@ -173,11 +185,12 @@ def import_camera(
         n_features=features,
     )
     settings.save(output)
-    log_to(Console(stderr=True), quiet=quiet)
     warn_of_doubts(settings, output)
     console = Console(quiet=quiet, highlight=False, soft_wrap=True)
     for line in settings.describe():
         console.print(line, markup=False)
+    if settings.rectification is not None:
+        console.print(str(views_of_pair(settings.rectification)), markup=False)
     console.print(f"Settings are in [bold]{escape(str(output))}[/]")
 
 

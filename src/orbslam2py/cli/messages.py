@@ -66,7 +66,9 @@ def log_to(console: Console, *, quiet: bool) -> None:
     logger.propagate = False
     logger.setLevel(logging.ERROR if quiet else logging.WARNING)
     # What was guessed of the input is said as well.
-    logging.getLogger(f"{logger.name}.datasets").setLevel(logging.ERROR if quiet else logging.INFO)
+    for room in ("datasets", "calibration.camera_files"):
+        level = logging.ERROR if quiet else logging.INFO
+        logging.getLogger(f"{logger.name}.{room}").setLevel(level)
 
 
 def tell_repeated() -> None:

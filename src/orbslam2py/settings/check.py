@@ -14,6 +14,7 @@ from orbslam2py.settings.builtin import builtin_sensors, is_builtin_name
 from orbslam2py.settings.fit import find_misfit, known_camera
 from orbslam2py.settings.groups import CameraRectification, CameraSettings
 from orbslam2py.settings.opencv_yaml import scan
+from orbslam2py.settings.pair_views import LEAST_OVERLAP, views_of_pair
 from orbslam2py.settings.reader import groups_of_text, read_text
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.settings.settings import (
@@ -96,7 +97,7 @@ def doubts_of_size(settings: Settings) -> list[str]:
             raw = Settings(Sensor.MONOCULAR, _raw_camera(getattr(settings.rectification, side)))
             found += _misfits(f"{side.upper()}.K: ", raw)
     # Of wrong cameras nothing else can come than a wrong rectified one.
-    return found or ([] if _is_published(settings) else _misfits("", settings))
+    return found or _doubts_of_views(settings) or _misfits_of_camera(settings)
 
 
 def warn_of_doubts(settings: Settings, source: str | PathLike[str]) -> None:
@@ -111,6 +112,23 @@ def warn_of_doubts(settings: Settings, source: str | PathLike[str]) -> None:
     """
     for doubt in (*settings.doubts(), *doubts_of_size(settings)):
         _log.warning("%s: %s", source, doubt)
+
+
+def _doubts_of_views(settings: Settings) -> list[str]:
+    """Say that a pair hardly looks the same way, of which its rectified camera is odd, too."""
+    if settings.rectification is None:
+        return []
+    views = views_of_pair(settings.rectification)
+    if views.overlap >= LEAST_OVERLAP:
+        return []
+    return [
+        f"{views}; so few points have depth: turn the cameras the same way and calibrate them "
+        "again, or use one of them (import-camera with --camera 0)"
+    ]
+
+
+def _misfits_of_camera(settings: Settings) -> list[str]:
+    return [] if _is_published(settings) else _misfits("", settings)
 
 
 def _misfits(name: str, settings: Settings) -> list[str]:

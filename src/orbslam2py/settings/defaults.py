@@ -93,13 +93,13 @@ def _check(
             raise SettingsError(f"the baseline is {baseline:g}; give {metres}")
     if sensor is not Sensor.STEREO:
         return
+    if camera.is_distorted:
+        raise SettingsError(
+            "stereo images must be rectified, and this camera has distortion; give the calibration "
+            "of both cameras to import-camera (a file that holds both, or --right with ROS)"
+        )
     if baseline is None and not camera.bf:
         raise SettingsError(
             "the baseline is missing; stereo needs the distance of its two cameras in metres "
             "(--baseline 0.12)"
-        )
-    if camera.is_distorted:
-        raise SettingsError(
-            "stereo images must be rectified, and this camera has distortion; give the calibration "
-            "of both cameras to import-camera (camchain of Kalibr, or --right with ROS)"
         )

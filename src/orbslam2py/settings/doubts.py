@@ -7,11 +7,10 @@ import numpy as np
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py.settings.groups import CameraSettings, DepthSettings, SettingsGroups
+from orbslam2py.settings.pair_views import MOST_BASELINE, is_likely_baseline
 from orbslam2py.settings.projection import distorted, largest_radius
 from orbslam2py.settings.sensor import Sensor
 
-#: Baselines of pairs, also of those that a depth camera counts as, beyond which one is doubted [m].
-_LEAST_BASELINE, _MOST_BASELINE = 1e-4, 10.0
 #: Most tangential distortion. Lenses have up to some 0.005.
 _MOST_TANGENTIAL = 0.015
 _INTRINSICS = ((0, 0), (1, 1), (0, 2), (1, 2))
@@ -63,11 +62,11 @@ def _doubts_of_rectification(groups: SettingsGroups) -> list[str]:
 def _doubts_of_depth(camera: CameraSettings, depth: DepthSettings | None) -> list[str]:
     found = []
     baseline = camera.bf / camera.fx
-    if not _LEAST_BASELINE <= baseline <= _MOST_BASELINE:
+    if not is_likely_baseline(baseline):
         likely = (
             "is the calibration in millimetres? Then all lengths become 1000 times too long; "
             "divide its translation, or bf, by 1000"
-            if baseline > _MOST_BASELINE
+            if baseline > MOST_BASELINE
             else "bf is in pixel metres, the baseline in metres times fx"
         )
         found.append(

@@ -45,7 +45,11 @@ def test_rectified_camera_becomes_a_pair_by_its_baseline(tmp_path: Path) -> None
         (KALIBR, {"depth_factor": 1000}, "leave it out for mono"),
         (ROS, {"sensor": "rgbd", "right": "right.yaml"}, "leave --right out for rgbd"),
         (KITTI, {"camera": 4}, "has no P4; give --camera with one there is: P0, P1, P2, P3"),
-        (KITTI, {"camera": 3, "sensor": "stereo"}, "has no P4, the right camera"),
+        (
+            KITTI,
+            {"camera": 3, "sensor": "stereo"},
+            "no right camera for P3.*one of --camera 0",
+        ),
         (KITTI, {"camera": 1, "sensor": "stereo"}, "P2 does not stand to the right of P1"),
         (KITTI.replace("P0: 700", "P0: x"), {}, "P0 must hold 12 finite numbers"),
         (KITTI.replace("P0: 700 ", "P0: "), {}, "P0 must hold 12 finite numbers"),
@@ -57,14 +61,14 @@ def test_rectified_camera_becomes_a_pair_by_its_baseline(tmp_path: Path) -> None
         (
             KALIBR_PAIR.replace("[640, 480]", "[320, 240]"),
             {},
-            r"yaml: cam0.intrinsics has its centre at 325.75, 236.125, outside of the 320 x 240 "
-            "pixels of cam0.resolution",
+            r"yaml: cam0 has its centre at 325.75, 236.125, outside of its images of 320 x 240 "
+            "pixels; give the intrinsics and the size of the same images",
         ),
         (
             KALIBR_PAIR.replace("0.0, -0.11", "0.0, 0.0"),
             {},
-            r"yaml: the pair cannot be rectified \(the two cameras of the pair stand in one place.*"
-            r"look at intrinsics, distortion_coeffs and T_cn_cnm1",
+            r"yaml: the pair cannot be rectified, because cam0 and cam1 stand in one place.*"
+            r"look at T_cn_cnm1, or take one of them with --camera 0",
         ),
     ],
 )

@@ -14,6 +14,7 @@ from orbslam2py.settings import CameraSettings, settings_for_camera
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.trajectory import write_kitti, write_tum
 from support.camera_files import KALIBR, KALIBR_PAIR, KITTI, OPENCV, ROS
+from support.foreign_cameras import WRONG as WRONG_CALIBRATIONS
 from support.made_up_paths import wander
 
 SIZE = (160, 120)
@@ -28,6 +29,7 @@ def fill(place: Path) -> None:
         SyntheticSequence(options).write(place / name)
     _write_trajectories(place)
     _write_images(place)
+    (place / "calibrations").mkdir()
     for name, text in (
         ("opencv.yaml", OPENCV),
         ("kalibr.yaml", KALIBR),
@@ -39,6 +41,7 @@ def fill(place: Path) -> None:
         ("nothing.txt", ""),
         ("film.mp4", "this is no film\n" * 100),
         ("T_BS.yaml", "T_BS:\n  data: [1, 2, 3]\n"),
+        *((f"calibrations/{name}", text) for name, text in WRONG_CALIBRATIONS.items()),
     ):
         (place / name).write_text(text)
     (place / "noise.bin").write_bytes(np.random.default_rng(0).bytes(3000))

@@ -138,8 +138,8 @@ def _camera(contents: MapContents, view: View) -> dict[str, float]:
     k1, k2, p1, p2, k3, *rational = lens.tolist()
     if any(rational):
         raise DatasetError(
-            "nerfstudio's transforms.json cannot hold a rational lens (k4 to k6); export the images "
-            "as well, which are then undistorted"
+            "nerfstudio's transforms.json cannot hold a rational lens (k4 to k6); export the "
+            "images as well, which are then undistorted"
         )
     return {
         "w": view.width,

@@ -1,0 +1,288 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``orbslam2py import-camera``: what it tells, and where the remedies of its messages lead."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from orbslam2py import Sensor, Settings
+from support import foreign_cameras as files
+from support.camera_files import KALIBR, ROS, written
+from support.command_line import CommandLine, Outcome
+from support.foreign_cameras import BASELINE, CX, CY, FX, FY, D, kalibr_pair
+
+IMPORT = ("import-camera", "file", "--output", "my.yaml")
+THIN_PRISM = files.ROS1.replace(str(list(D)), str([*files.RATIONAL, 0.01, 0.02, 0.03, 0.04]))
+FISHEYE = (0.02, -0.01, 0.004, -0.001)
+FISHEYE_NAMES = dict(zip(("k1", "k2", "k3", "k4"), FISHEYE, strict=True))
+EQUIDISTANT = {
+    "kalibr": KALIBR.replace("radtan", "equidistant"),
+    "ros": ROS.replace("plumb_bob", "equidistant"),
+    "euroc": files.EUROC.replace("radial-tangential", "equidistant"),
+    "opencv": "fisheye_model: 1\n" + files.matrix("K", files.ROWS) + files.matrix("D", FISHEYE, 4),
+    "colmap": f"1 OPENCV_FISHEYE 640 480 {FX} {FY} {CX} {CY} 0.02 -0.01 0.004 -0.001\n",
+    "basalt": files.basalt("kb4", files.NUMBERS | FISHEYE_NAMES),
+    "oak": '{"cameraData": [[0, {"cameraType": 1, "width": 640, "height": 480}]]}',
+    "vins": "model_type: KANNALA_BRANDT\nimage_width: 640\nimage_height: 480\n",
+    "stella": files.STELLA.replace("perspective", "fisheye"),
+    "nerfstudio": files.NERFSTUDIO.replace('"OPENCV"', '"OPENCV_FISHEYE"'),
+    "fca": files.FCA.partition("  k1")[0] + "  k1: 0.1\n  k2: 0\n  k3: 0\n  k4: 0\n",
+    "numbers": '{"fx": 200, "fy": 200, "cx": 320, "cy": 240, "model": "fisheye"}',
+    "by its coefficients": '{"fx": 200, "fy": 200, "cx": 320, "cy": 240, "k1": 0, "k4": 0.1}',
+    "orb-slam3": 'Camera.type: "KannalaBrandt8"\nCamera1.fx: 200\n',
+}
+OTHER_LENSES = {
+    "double sphere": (KALIBR.replace("pinhole", "ds"), "double sphere"),
+    "eucm": (files.basalt("eucm", files.NUMBERS), "EUCM"),
+    "omni": (KALIBR.replace("pinhole", "omni"), "Mei"),
+    "mei": ("model_type: MEI\nimage_width: 640\nimage_height: 480\n", "Mei"),
+    "fov": (KALIBR.replace("radtan", "fov"), "field-of-view"),
+    "colmap fov": ("1 FOV 640 480 300 300 320 240 0.9\n", "field-of-view"),
+    "thin prism": ("1 THIN_PRISM_FISHEYE 640 480 300 300 320 240\n", "thin prism"),
+    "polynomial": ('{"intrinsic": {"model": "radial_poly", "k1": 339.7}}', "polynomial"),
+    "scaramuzza": ("model_type: SCARAMUZZA\nimage_width: 640\nimage_height: 480\n", "Scaramuzza"),
+}
+
+
+def refused(done: Outcome) -> str:
+    assert done.code == 2, done.err
+    assert done.err.startswith("Error: file")
+    assert done.err.count("\n") <= 4
+    assert not Path("my.yaml").exists()
+    return done.err
+
+
+def line_in(text: str) -> list[str]:
+    """The command that a message ends with."""
+    words = shlex.split(text.strip().splitlines()[-1])
+    assert words[0] == "orbslam2py"
+    return words[1:]
+
+
+def numbers_of(path: str, sensor: str = "mono") -> tuple[float, ...]:
+    camera = Settings.load(path, sensor).camera
+    return camera.fx, camera.fy, camera.cx, camera.cy
+
+
+@pytest.fixture(autouse=True)
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+# ---- round trip ----------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    "text", [files.ROS2, files.OST, files.VINS_MONO, files.SIMPLE, files.OAK, files.zed("VGA")]
+)
+@pytest.mark.parametrize("sensor", list(Sensor))
+def test_what_is_written_is_read(
+    command: CommandLine, tmp_path: Path, text: str, sensor: Sensor
+) -> None:
+    """By settings check, with the same numbers."""
+    written(tmp_path, text, "file")
+    more = ("--camera", "1") if text == files.OAK and sensor is not Sensor.STEREO else ()
+    done = command(*IMPORT, "--sensor", sensor, *more)
+    pair = text in (files.OAK, files.zed("VGA"))
+    if sensor is Sensor.STEREO and not pair:
+        assert done.code == 2
+        assert "give the calibration of both cameras to import-camera" in done.err
+        return
+    assert done.code == 0, done.err
+    checked = command("settings", "check", "my.yaml", "--sensor", sensor)
+    assert checked.code == 0, checked.err
+    said = [line for line in done.out.splitlines() if not line.startswith(("Settings", "the two"))]
+    assert checked.out.splitlines()[: len(said)] == said
+    if sensor is not Sensor.STEREO:
+        assert numbers_of("my.yaml", sensor) == (FX, FY, CX, CY)
+
+
+def test_one_of_a_pair_is_told(command: CommandLine, tmp_path: Path) -> None:
+    written(tmp_path, files.OPENCV_PAIR, "file")
+    done = command(*IMPORT, "--sensor", "mono")
+    assert "Note: file holds 2 cameras; the settings are of camera 0, not of camera 1" in done.err
+    assert command(*IMPORT, "--force", "--sensor", "mono", "--quiet").err == ""
+    done = command(*IMPORT, "--force")
+    assert done.err == ""
+    assert "turned by 0.0 degrees against each other, and 100% of their views" in done.out
+    assert "baseline 0.12 m" in done.out
+
+
+def test_half_a_pixel_of_nerfstudio_is_told(command: CommandLine, tmp_path: Path) -> None:
+    written(tmp_path, files.NERFSTUDIO, "file")
+    assert "Note: file: cx and cy of nerfstudio count from the image's" in command(*IMPORT).err
+    assert numbers_of("my.yaml") == (FX, FY, CX, CY)
+
+
+# ---- remedies ------------------------------------------------------------------------------------
+@pytest.mark.parametrize("name", EQUIDISTANT)
+def test_fisheye_is_undistorted_by_opencv(command: CommandLine, tmp_path: Path, name: str) -> None:
+    written(tmp_path, EQUIDISTANT[name], "file")
+    message = refused(command(*IMPORT))
+    assert "is a fisheye camera (equidistant, also called Kannala-Brandt)" in message
+    assert "only pinhole cameras are supported" in message
+    assert "cv2.fisheye.undistortImage" in message
+    assert not re.search(r"--f[xy] [\d.]", message), "the numbers of a fisheye camera are wrong"
+    # The line leads to settings of the images that OpenCV makes.
+    K = np.array(files.K)
+    new = np.diag([0.5, 0.5, 1.0]) @ K
+    values = {"FX": new[0, 0], "FY": new[1, 1], "CX": new[0, 2], "CY": new[1, 2]}
+    line = [str(values.get(word, word)) for word in line_in(message)]
+    assert command(*line).code == 0
+    points = np.array([[0.4, -0.2, 1.0], [2.0, 1.0, 1.5]])
+    nothing = np.zeros(3)
+    raw, _ = cv2.fisheye.projectPoints(points[:, None], nothing, nothing, K, np.array(FISHEYE))
+    straight = cv2.fisheye.undistortPoints(raw, K, np.array(FISHEYE), P=new)
+    camera = Settings.load("my.yaml", "mono").camera
+    np.testing.assert_allclose(camera.project(points), straight.reshape(-1, 2), atol=1e-3)
+
+
+def test_pair_of_fisheyes(command: CommandLine, tmp_path: Path) -> None:
+    written(tmp_path, kalibr_pair(0).replace("radtan", "equidistant"), "file")
+    message = refused(command(*IMPORT))
+    assert "file is a camchain of Kalibr: cam0 is a fisheye camera" in message
+    assert "cv2.fisheye.stereoRectify" in message
+    words = {"FX": "300", "FY": "300", "CX": "320", "CY": "240", "METRES": "0.12"}
+    assert command(*[words.get(word, word) for word in line_in(message)]).code == 0
+    assert Settings.load("my.yaml", "stereo").baseline == pytest.approx(0.12)
+
+
+@pytest.mark.parametrize("name", OTHER_LENSES)
+def test_other_lenses(command: CommandLine, tmp_path: Path, name: str) -> None:
+    text, lens = OTHER_LENSES[name]
+    written(tmp_path, text, "file")
+    message = refused(command(*IMPORT))
+    assert lens in message
+    assert "only pinhole cameras are supported; calibrate the camera with the equidist" in message
+    assert "orbslam2py calibrate" in message
+    assert "--fx" not in message
+
+
+def test_thin_prism_is_undistorted_by_opencv(command: CommandLine, tmp_path: Path) -> None:
+    written(tmp_path, THIN_PRISM, "file")
+    message = refused(command(*IMPORT))
+    assert "12 coefficients (thin prism or tilted model)" in message
+    assert "cv2.undistort with K and D" in message
+    assert command(*line_in(message)).code == 0
+    assert numbers_of("my.yaml") == (FX, FY, CX, CY), "cv2.undistort keeps the camera matrix"
+
+
+def test_numbers_in_an_unknown_file(command: CommandLine, tmp_path: Path) -> None:
+    written(tmp_path, '{"cam": {"intr": {"fx": 500, "fy": 501, "cx": 320, "cy": 240}}}', "file")
+    message = refused(command(*IMPORT))
+    assert "file is no camera file we know, but cam.intr holds fx, fy, cx, cy" in message
+    assert command(*line_in(message)).code == 0
+    assert numbers_of("my.yaml") == (500, 501, 320, 240)
+
+
+@pytest.mark.parametrize("lens", ['"xi": 1.2', '"note": "fisheye"'])
+def test_numbers_of_another_lens_are_not_filled_in(
+    command: CommandLine, tmp_path: Path, lens: str
+) -> None:
+    text = f'{{"cam": {{"fx": 500, "fy": 501, "cx": 320, "cy": 240, {lens}}}}}'
+    written(tmp_path, text, "file")
+    assert "--fx FX --fy FY" in refused(command(*IMPORT))
+
+
+@pytest.mark.parametrize("degrees", [110, 180])
+def test_back_to_back(command: CommandLine, tmp_path: Path, degrees: float) -> None:
+    written(tmp_path, kalibr_pair(degrees), "file")
+    message = refused(command(*IMPORT))
+    assert f"cam0 and cam1 are turned by {degrees} degrees against each other" in message
+    assert message.strip().endswith("take one of them with --camera 0")
+    assert command(*IMPORT, "--camera", "0").code == 0
+    assert numbers_of("my.yaml") == (FX, FY, CX, CY)
+    message = command(*IMPORT, "--force", "--sensor", "stereo").err
+    assert message.strip().endswith("take one of them with --camera 0 --sensor mono")
+    assert command(*IMPORT, "--force", "--camera", "0", "--sensor", "mono").code == 0
+
+
+def test_cameras_that_hardly_look_the_same_way(command: CommandLine, tmp_path: Path) -> None:
+    written(tmp_path, kalibr_pair(60), "file")
+    done = command(*IMPORT)
+    assert done.code == 0
+    assert "the two cameras are turned by 60.0 degrees against each other" in done.err
+    assert "use one of them (import-camera with --camera 0)" in done.err
+    assert "scaled" not in done.err, "it is not the images"
+    assert command("settings", "check", "my.yaml").err == done.err
+    assert command(*IMPORT, "--camera", "0", "--force").err == ""
+
+
+def test_left_and_right_exchanged(command: CommandLine, tmp_path: Path) -> None:
+    written(tmp_path, kalibr_pair(0, BASELINE), "file")
+    assert "give --camera 1 --sensor stereo" in refused(command(*IMPORT))
+    assert command(*IMPORT, "--camera", "1", "--sensor", "stereo").code == 0
+    assert Settings.load("my.yaml", "stereo").baseline == pytest.approx(BASELINE)
+
+
+@pytest.mark.parametrize("unit", [1000, 100])
+def test_baseline_in_another_unit(command: CommandLine, tmp_path: Path, unit: float) -> None:
+    written(tmp_path, kalibr_pair(0, -unit * BASELINE), "file")
+    done = command(*IMPORT)
+    assert done.code == 0
+    assert f"file gives a baseline of {unit * BASELINE:g} m; if it is in another unit" in done.err
+    assert "with --baseline" in done.err
+    fixed = command(*IMPORT, "--baseline", str(BASELINE), "--force")
+    assert (fixed.code, fixed.err) == (0, "")
+    settings = Settings.load("my.yaml", "stereo")
+    assert settings.baseline == pytest.approx(BASELINE)
+    written(tmp_path, kalibr_pair(0), "right")
+    assert command("import-camera", "right", "-o", "right.yaml").code == 0
+    right = Settings.load("right.yaml", "stereo").rectification
+    assert right is not None
+    assert settings.rectification is not None
+    np.testing.assert_allclose(settings.rectification.right.P, right.right.P, rtol=1e-6)
+
+
+def test_size_that_is_missing(command: CommandLine, tmp_path: Path) -> None:
+    text = files.OPENCV_PAIR.replace("image_width: 640\nimage_height: 480\n", "")
+    written(tmp_path, text, "file")
+    assert "give it with --size WIDTHxHEIGHT" in refused(command(*IMPORT))
+    assert command(*IMPORT, "--size", "640x480").code == 0
+    assert Settings.load("my.yaml", "stereo").camera.width == 640
+
+
+def test_resolution_that_is_chosen(command: CommandLine, tmp_path: Path) -> None:
+    written(tmp_path, files.zed("VGA", "HD"), "file")
+    message = refused(command(*IMPORT))
+    option = re.search(r"choose yours with (--size \S+)", message)
+    assert option
+    assert command(*IMPORT, *option[1].split()).code == 0
+    assert Settings.load("my.yaml", "stereo").camera.width == 672
+
+
+def test_settings_that_are_given_as_calibration(command: CommandLine, tmp_path: Path) -> None:
+    new = "settings new --sensor mono --fx 9 --fy 9 --cx 4 --cy 4 -o file"
+    assert command(*new.split()).code == 0
+    message = refused(command(*IMPORT))
+    assert "is a settings file already" in message
+    assert command("settings", "check", "file").code == 0
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *(files.ROS1, files.OST, files.EUROC, files.VINS, files.STELLA, files.zed("HD"), files.OAK),
+        *(files.BASALT_PAIR, files.NERFSTUDIO, files.OPEN3D, files.REPLICA, files.RECORD3D),
+        *(files.POLYCAM, files.FCA, files.SIMPLE, files.OPENCV_PAIR),
+    ],
+)
+@pytest.mark.parametrize("sensor", list(Sensor))
+def test_calibration_given_as_settings(
+    command: CommandLine, tmp_path: Path, text: str, sensor: Sensor
+) -> None:
+    """The line that is told works, if one camera is enough or the file holds two."""
+    written(tmp_path, text, "file")
+    line = line_in(refused(command("settings", "check", "file", "--sensor", sensor)))
+    done = command(*line)
+    pair = text in (files.zed("HD"), files.OAK, files.OPENCV_PAIR, files.BASALT_PAIR)
+    if sensor is Sensor.STEREO and not pair:
+        assert {"METRES", "RIGHT.yaml"} & set(line)
+        assert done.code == 2
+        return
+    assert done.code == 0, done.err
+    assert command("settings", "check", "my.yaml", "--sensor", sensor).code == 0
