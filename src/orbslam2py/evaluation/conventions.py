@@ -34,7 +34,7 @@ _LARGEST_TURN = np.radians(60.0)  # between two poses that are compared
 _MUCH_BETTER = 3.0
 _NO_WORSE = 1.2
 _GOOD_FIT = 0.5  # difference of motions, in parts of the motions
-_CLEARLY_ELSE = 1.5  # better by this, the truth is to blame and not the estimate
+_CLEARLY = 1.5  # by which one reading must fit better than another that is more likely
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +49,8 @@ class OtherReading:
         The order in which to read its quaternions; None to leave it.
     inverse
         Whether its poses are those of the world in the camera; None to leave it.
+    either
+        Whether the file of the other one may as well be the one that is to be read otherwise.
     as_read, otherwise
         The figures as the files were read, and with the other reading.
     """
@@ -56,6 +58,7 @@ class OtherReading:
     of_truth: bool
     quaternions: QuaternionOrder | None
     inverse: bool | None
+    either: bool
     as_read: Evaluation
     otherwise: Evaluation
 
@@ -79,12 +82,16 @@ class OtherReading:
         if self.inverse is not None:
             what = "the world in the camera" if self.inverse else "the camera in the world"
             looks.append(f"the poses of {whose} look like poses of {what}")
-        return f"{' and '.join(looks)}: {self._figures()}; {self.options}"
+        either = ""
+        if self.either:
+            either = f" (or it is {'the estimate' if self.of_truth else 'the truth'} that is so)"
+        return f"{' and '.join(looks)}{either}: {self._figures()}; {self.options}"
 
     def _figures(self) -> str:
         pairs = (
             ("ATE", "m", self.otherwise.ate, self.as_read.ate),
-            ("rotation error", "deg", self.otherwise.rpe_rotation, self.as_read.rpe_rotation),
+            ("RPE", "m", self.otherwise.rpe_translation, self.as_read.rpe_translation),
+            ("RPE", "deg", self.otherwise.rpe_rotation, self.as_read.rpe_rotation),
         )
         texts = [
             f"{name} {new.rmse:.3g} {unit} instead of {old.rmse:.3g} {unit}"
@@ -164,7 +171,7 @@ def find_other_reading(
         best = _best_reading(pair, readings, T_body_camera)
     if best is None:
         return None
-    side, swap, invert = best
+    side, swap, invert, either = best
 
     def read_again(trajectory: Trajectory) -> Trajectory:
         reading, extrinsics = readings[side], T_body_camera if side else None
@@ -187,6 +194,7 @@ def find_other_reading(
         of_truth=bool(side),
         quaternions=order.other if swap and order is not None else None,
         inverse=not readings[side].inverse if invert else None,
+        either=either,
         as_read=as_read,
         otherwise=figures(*again, alignment),
     )
@@ -194,8 +202,8 @@ def find_other_reading(
 
 def _best_reading(
     pair: tuple[FloatArray, FloatArray], readings: list[Reading], extrinsics: FloatArray | None
-) -> tuple[int, bool, bool] | None:
-    """Side (0 estimate, 1 truth), whether to swap the order, whether to invert; or None."""
+) -> tuple[int, bool, bool, bool] | None:
+    """Side (0 estimate, 1 truth), whether to swap the order, to invert, whether it is either."""
     if not all(np.isfinite(poses).all() and _turns(poses) for poses in pair):
         return None
     lag = _lag(pair[1])
@@ -211,8 +219,13 @@ def _best_reading(
         again[side] = _read_again(pair[side], reading, swap=swap, invert=invert, by=by)
         fit = _fit(again[0], again[1], lag)
         if fit.is_much_better_than(as_read, inverted=invert):
-            found.append((fit.total * (_CLEARLY_ELSE if side else 1), side, swap, invert))
-    return min(found)[1:] if found else None
+            unlikely = (_CLEARLY if side else 1.0) * (_CLEARLY if swap and invert else 1.0)
+            found.append((fit.total * unlikely, side, swap, invert))
+    if not found:
+        return None
+    least, *best = min(found)
+    either = any(one[1] != best[0] and one[0] < _CLEARLY**2 * least for one in found)
+    return int(best[0]), bool(best[1]), bool(best[2]), either
 
 
 def _read_again(

@@ -151,11 +151,12 @@ def columns_by_content(sample: FloatArray) -> Columns | None:
     for start in (0, 1):
         if n - start in (12, 16) and _are_matrices(sample[:, start:]):
             return Columns(0 if start else None, matrix=tuple(range(start, start + 12)))
-    if n == 12 and not _are_unit(sample[:, 4:8]):
+    # No number of a rotation is above 1: what begins with such a number begins with a time.
+    if n == 12 and not (_are_unit(sample[:, 4:8]) and np.abs(sample[:, 0]).max() > 1.01):
         return Columns(None, matrix=tuple(range(12)))
     if n == 8 or (n > 8 and _are_unit(sample[:, 4:8])):
         return timed_columns(0)
-    if n > 8 and _are_unit(sample[:, 5:9]):
+    if n > 8 and _are_unit(sample[:, 5:9]) and np.isfinite(sample[:, :2]).all():
         time = max((0, 1), key=lambda column: _looks_like_time(sample[:, column]))
         return timed_columns(time, position=2)
     return None

@@ -12,7 +12,7 @@ from orbslam2py._arguments import array_of, choice_of
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import DatasetError
 from orbslam2py.trajectory.columns import Columns, QuaternionOrder, timed_columns
-from orbslam2py.trajectory.parsing import REMEDY, columns_of, numbers_in, shortened
+from orbslam2py.trajectory.parsing import columns_of, no_trajectory, numbers_in
 from orbslam2py.trajectory.rotations import (
     inverse_poses,
     nearest_rotations,
@@ -263,18 +263,8 @@ def _xyzw(
 
 
 def _without_rows(table: TextTable, file_format: TrajectoryFormat) -> TrajectoryFile:
-    prose = next((head for head in table.heads if not head.is_comment), None)
-    if prose is not None:
-        count = len(prose.names)
-        text = " ".join(name.text for name in prose.names)
-        if file_format is TrajectoryFormat.AUTO:
-            raise DatasetError(
-                f"{table.path}:{prose.number}: {count} fields and no row of numbers "
-                f"({shortened(text)}); {REMEDY}"
-            )
-        raise DatasetError(
-            f"{table.path}:{prose.number}: {shortened(text)} is not a number; correct it"
-        )
+    if not all(head.is_comment for head in table.heads):
+        raise no_trajectory(table)
     return TrajectoryFile(
         Trajectory(np.zeros(0), np.zeros((0, 4, 4))), file_format, Reading(unit=None)
     )

@@ -54,16 +54,32 @@ def columns_of(table: TextTable, file_format: TrajectoryFormat) -> Columns:
     if file_format is TrajectoryFormat.AUTO:
         if found is not None:
             return found
-        raise DatasetError(
-            f"{table.path}:{first.number}: {n} fields ({shortened(' '.join(first.fields))}), "
-            f"{'no quaternion of length 1 among them' if n > 8 else 'too few for a pose'}; "
-            f"{REMEDY}"
-        )
+        raise no_trajectory(table)
     if n < 8:
         raise DatasetError(
             f"{table.path}:{first.number}: expected 8 numbers, found {n} fields; {REMEDY}"
         )
     return found if found is not None and found.quaternion else timed_columns(0)
+
+
+def no_trajectory(table: TextTable) -> DatasetError:
+    """Say what the first line of a file holds that is no trajectory."""
+    head = next((head for head in table.heads if not head.is_comment), None)
+    row = table.rows[0] if table.rows else None
+    if head is not None and not (row and any(is_number(field) for field in row.fields)):
+        number, fields, lacking = (
+            head.number,
+            [name.text for name in head.names],
+            "no row of numbers",
+        )
+    else:
+        assert row is not None
+        few = "no" if len(row.fields) > 8 else "too few for a"
+        number, fields, lacking = row.number, row.fields, f"{few} time, position and quaternion"
+    return DatasetError(
+        f"{table.path}:{number}: {len(fields)} fields ({shortened(' '.join(fields))}), {lacking}; "
+        f"{REMEDY}"
+    )
 
 
 def _columns_of_kitti(table: TextTable, n: int) -> Columns:
@@ -122,4 +138,6 @@ def _name_the_field(table: TextTable, line: TextLine, used: Sequence[int]) -> No
 def shortened(text: str) -> str:
     """Quote a line for a message: its beginning, without what cannot be printed."""
     shown = text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
-    return "".join(letter if letter.isprintable() else "?" for letter in shown).join("''")
+    return "".join(
+        letter if letter.isprintable() and letter != "\ufffd" else "?" for letter in shown
+    ).join("''")
