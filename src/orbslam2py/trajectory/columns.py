@@ -151,8 +151,9 @@ def columns_by_content(sample: FloatArray) -> Columns | None:
     for start in (0, 1):
         if n - start in (12, 16) and _are_matrices(sample[:, start:]):
             return Columns(0 if start else None, matrix=tuple(range(start, start + 12)))
-    # No number of a rotation is above 1: what begins with such a number begins with a time.
-    if n == 12 and not (_are_unit(sample[:, 4:8]) and np.abs(sample[:, 0]).max() > 1.01):
+    # The first numbers of rotations are not above 1 and do not grow all the time: times do.
+    grows = len(sample) > 1 and sample[-1, 0] > 1.01 and bool((np.diff(sample[:, 0]) > 0).all())
+    if n == 12 and not (grows and _are_unit(sample[:, 4:8])):
         return Columns(None, matrix=tuple(range(12)))
     if n == 8 or (n > 8 and _are_unit(sample[:, 4:8])):
         return timed_columns(0)

@@ -275,17 +275,22 @@ def _seconds(
 ) -> tuple[FloatArray, TimeUnit | None]:
     if columns.time is None:
         return np.arange(len(values), dtype=np.float64), None
-    times = values[:, 0]
+    texts = [line.fields[columns.time].strip() for line in table.rows]
+    are_whole = np.array([text.isdecimal() for text in texts])
     if file_format is not TrajectoryFormat.EUROC:
-        unit = unit_by_digits(times, columns.unit)
-        return times / unit.per_second, unit
-    for line in table.rows:
-        text = line.fields[columns.time].strip()
-        if not text.isdigit():
-            raise DatasetError(
-                f"{table.path}:{line.number}: '{text}' is not a time in ns; name another format"
-            )
-    return times / 1e9, TimeUnit.NANOSECONDS
+        unit = unit_by_digits(values[:, 0], columns.unit)
+    elif are_whole.all():
+        unit = TimeUnit.NANOSECONDS
+    else:
+        bad = int(are_whole.argmin())
+        raise DatasetError(
+            f"{table.path}:{table.rows[bad].number}: '{texts[bad]}' is not a time in ns; name "
+            "another format"
+        )
+    if unit is not TimeUnit.SECONDS and are_whole.all():
+        # Of whole numbers, which floats do not hold to the last digit, the quotient is exact.
+        return np.array([int(text) / unit.per_second for text in texts]), unit
+    return values[:, 0] / unit.per_second, unit
 
 
 def _notes(
@@ -314,7 +319,7 @@ def _notes(
 
 
 def _poses_of_matrices(path: str | Path, matrices: FloatArray) -> FloatArray:
-    if len(matrices) and np.linalg.det(matrices[:, :, :3]).min() < 0.5:
+    if (np.abs(np.linalg.det(matrices[:, :, :3]) - 1) > 0.5).any():  # mirrored, or scaled
         raise DatasetError(
             f"{path}: not all poses hold rotations; a row is the upper three rows of T_wc"
         )

@@ -31,9 +31,9 @@ class TimeUnit(str, Enum):
     NANOSECONDS = "ns"
 
     @property
-    def per_second(self) -> float:
+    def per_second(self) -> int:
         """How many of them are a second."""
-        return {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}[self.value]
+        return {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}[self.value]
 
     def __str__(self) -> str:
         return self.value
@@ -42,7 +42,7 @@ class TimeUnit(str, Enum):
 #: Longest step [s] with which a time since 1970 in this unit is believed: a time in nanoseconds
 #: since the computer was started can be as large, but its steps are then far longer.
 _BELIEVED = {
-    TimeUnit.SECONDS: np.inf,
+    TimeUnit.SECONDS: _DAY,
     TimeUnit.MILLISECONDS: 1000.0,
     TimeUnit.MICROSECONDS: 3.0,
     TimeUnit.NANOSECONDS: np.inf,
