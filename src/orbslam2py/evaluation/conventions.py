@@ -14,10 +14,12 @@ from itertools import product
 
 import numpy as np
 
+from orbslam2py._arguments import pose_of
 from orbslam2py._arrays import FloatArray
+from orbslam2py.errors import DatasetError
 from orbslam2py.evaluation.alignment import Alignment
 from orbslam2py.evaluation.matching import match_poses
-from orbslam2py.evaluation.metrics import Evaluation, evaluate_trajectory
+from orbslam2py.evaluation.metrics import Evaluation, evaluate_trajectory, require_trajectories
 from orbslam2py.trajectory import MAX_DIFFERENCE, QuaternionOrder, Reading, Trajectory, align
 from orbslam2py.trajectory.rotations import (
     inverse_poses,
@@ -157,6 +159,10 @@ def find_other_reading(
     DatasetError
         As `evaluate_trajectory`.
     """
+    alignment = Alignment.of(alignment)
+    require_trajectories(estimate, truth)
+    if T_body_camera is not None:
+        T_body_camera = pose_of(T_body_camera, "T_body_camera", DatasetError)
     readings = [
         reading or Reading(QuaternionOrder.XYZW, order_is_known=False)
         for reading in (estimate_reading, truth_reading)
@@ -178,7 +184,7 @@ def find_other_reading(
         T_wc = _read_again(trajectory.T_wc, reading, swap=swap, invert=invert, by=extrinsics)
         return Trajectory(trajectory.timestamps, T_wc, trajectory.lost, trajectory.indices)
 
-    def figures(first: Trajectory, second: Trajectory, how: Alignment | str) -> Evaluation:
+    def figures(first: Trajectory, second: Trajectory, how: Alignment) -> Evaluation:
         return evaluate_trajectory(
             *(first, second, how),
             single_camera=single_camera,
@@ -196,7 +202,7 @@ def find_other_reading(
         inverse=not readings[side].inverse if invert else None,
         either=either,
         as_read=as_read,
-        otherwise=figures(*again, alignment),
+        otherwise=figures(*again, as_read.alignment),
     )
 
 
