@@ -22,6 +22,7 @@ from orbslam2py.trajectory.writers import TrajectoryFormat
 
 _SAMPLE = 64  # rows by which columns are told
 _LONGEST = 60  # characters of a line that a message shows
+_FEWEST_COLUMNS = 7  # of a position and a quaternion: fewer are no poses at all
 REMEDY = (
     "a trajectory has 8 (time, position, quaternion: TUM, EuRoC) or 12 (KITTI), or names its "
     "columns in a head such as: timestamp x y z qx qy qz qw"
@@ -44,7 +45,7 @@ def columns_of(table: TextTable, file_format: TrajectoryFormat) -> Columns:
         columns = columns_by_names(head, n)
         if columns is not None:
             return columns
-        if not head.is_comment and len(head.names) == n:
+        if not head.is_comment and len(head.names) == n >= _FEWEST_COLUMNS:
             names = " ".join(name.text for name in head.names)
             raise DatasetError(
                 f"{table.path}:{head.number}: the head ({shortened(names)}) does not name a time, "

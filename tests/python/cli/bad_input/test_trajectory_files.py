@@ -47,6 +47,7 @@ def _files(tmp_path: Path) -> None:
         ("VERTEX_SE3:QUAT 0 1 2 3 0 0 0 1\n", "a.txt:1: 9 fields ('VERTEX_SE3", COLUMNS),
         ("1 1 0 0 0 5 6 7 1 a.png\n12 13 5\n", "a.txt:1: 10 fields ('1 1 0 0", COLUMNS),
         ('{\n  "frames": [\n', "a.txt:1: 1 fields ('{'), no row of numbers", COLUMNS),
+        ("?PNG\nIHDR?\n", "a.txt:1: 1 fields ('?PNG'), no row of numbers", COLUMNS),
         ("1 " * 13, "a.txt:1: 13 fields ('1 1 1", COLUMNS),
         ("2 0 0 0 0 2 0 0 0 0 2 0\n", "a.txt: not all poses hold rotations", "rows of T_wc"),
     ],
