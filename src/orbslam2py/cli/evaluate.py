@@ -31,12 +31,13 @@ from orbslam2py.evaluation import (
     Poses,
     ends_early,
     evaluate_trajectory,
+    find_other_reading,
     pair,
     read_estimate,
     read_truth,
 )
 from orbslam2py.settings.sensor import Sensor
-from orbslam2py.trajectory import Trajectory, TrajectoryFormat, read_times
+from orbslam2py.trajectory import QuaternionOrder, Trajectory, TrajectoryFormat, read_times
 
 _log = logging.getLogger(__name__)
 
@@ -49,10 +50,12 @@ _UNITS = (
 )
 _FEW = 0.5  # of the estimate's poses
 
+_Convention = tuple[QuaternionOrder | None, bool]  # order of quaternions, whether poses are inverse
+
 
 def evaluate(
     trajectory: Annotated[
-        Path, typer.Argument(help="The estimate: a file in TUM or KITTI format.")
+        Path, typer.Argument(help="The estimate: a file of TUM, KITTI, EuRoC or another program.")
     ],
     ground_truth: Annotated[
         Path,
@@ -78,6 +81,20 @@ def evaluate(
         float,
         typer.Option(help="Added to the time stamps of the estimate.", metavar="SECONDS"),
     ] = 0.0,
+    quaternions: Annotated[
+        QuaternionOrder | None,
+        typer.Option(help="Order in the file of the estimate [by its head, or by its format]."),
+    ] = None,
+    inverse: Annotated[
+        bool,
+        typer.Option("--inverse", help="The estimate holds poses of the world in the camera."),
+    ] = False,
+    truth_quaternions: Annotated[
+        QuaternionOrder | None, typer.Option(help="As --quaternions, for the file of the truth.")
+    ] = None,
+    truth_inverse: Annotated[
+        bool, typer.Option("--truth-inverse", help="As --inverse, for the file of the truth.")
+    ] = False,
     extrinsics: Annotated[
         Path | None,
         typer.Option(
@@ -112,32 +129,54 @@ def evaluate(
     read = [path for path in (trajectory, ground_truth, times, extrinsics) if path is not None]
     check_apart({"--json": json}, read)
     sensor = _sensor_of_run(trajectory)
-    both = _read_both(trajectory, ground_truth, file_format, times, extrinsics, sensor)
+    conventions = ((quaternions, inverse), (truth_quaternions, truth_inverse))
+    files = _read_both(
+        *(trajectory, ground_truth, file_format, conventions, times, extrinsics, sensor)
+    )
+    both = pair(*files, offset=offset)
     if offset and not both.on_clocks:
         raise DatasetError(
             f"--offset has no meaning: poses are matched by {both.by}, not by two clocks; leave it "
             "out"
         )
+    single_camera = None if sensor is None else sensor is Sensor.MONOCULAR
     result = evaluate_trajectory(
         both.estimate,
         both.truth,
         alignment,
-        single_camera=None if sensor is None else sensor is Sensor.MONOCULAR,
+        single_camera=single_camera,
         offset=offset,
         timed=both.is_timed,
     )
     figures = result.as_dict()
     check_figures(json, figures, force=force)
     Console().print(_table(figures, trajectory, ground_truth))
-    _say_what_was_compared(both, result, asked=alignment)
+    _say_what_was_compared(both, result, (trajectory, ground_truth), asked=alignment)
+    other = find_other_reading(
+        *(both.estimate, both.truth, result.alignment),
+        estimate_reading=both.readings[0],
+        truth_reading=both.readings[1],
+        T_body_camera=files[1].T_body_camera,
+        single_camera=single_camera,
+        offset=offset,
+        timed=both.is_timed,
+    )
+    if other is not None:
+        _log.warning("%s", other.message)
     if json is not None:
         with atomic_write(json) as stream:
             stream.write(json_module.dumps(figures, indent=2) + "\n")
 
 
-def _say_what_was_compared(both: Paired, result: Evaluation, *, asked: Alignment) -> None:
+def _say_what_was_compared(
+    both: Paired, result: Evaluation, files: tuple[Path, Path], *, asked: Alignment
+) -> None:
     matched = result.matched
     say = Console().print
+    for path, reading in zip(files, both.readings, strict=True):
+        if reading.notes:
+            text = f"Read: {path.name}: {'; '.join(reading.notes)}."
+            say(escape(text), highlight=False, soft_wrap=True)
     say(f"Compared: {matched}, by {escape(both.by)}.", highlight=False, soft_wrap=True)
     lost = int(both.estimate.lost.sum())
     if lost:
@@ -172,17 +211,29 @@ def _read_both(
     trajectory: Path,
     ground_truth: Path,
     file_format: TrajectoryFormat,
+    conventions: tuple[_Convention, _Convention],
     times_file: Path | None,
     extrinsics: Path | None,
     sensor: Sensor | None,
-) -> Paired:
+) -> tuple[Poses, Poses]:
     times = None if times_file is None else read_times(times_file)
     T_body_camera = None if extrinsics is None else read_extrinsics(extrinsics)
-    estimate = read_estimate(trajectory, file_format, times=times)
+    order, inverse = conventions[0]
+    estimate = read_estimate(
+        trajectory, file_format, times=times, quaternions=order, inverse=inverse
+    )
+    order, inverse = conventions[1]
     if ground_truth.is_dir() or is_recording(ground_truth):
+        if order is not None or inverse:
+            raise DatasetError(
+                f"{ground_truth} is a sequence, and how its poses are written is known; leave out "
+                "--truth-quaternions and --truth-inverse"
+            )
         truth = _truth_of_sequence(ground_truth, sensor, T_body_camera)
     else:
-        truth = read_truth(ground_truth, file_format, times=times)
+        truth = read_truth(
+            ground_truth, file_format, times=times, quaternions=order, inverse=inverse
+        )
         truth = _of_camera(ground_truth, truth, T_body_camera)
     if times is not None:
         _see_that_they_fit(times_file, times, (estimate, truth))
@@ -193,7 +244,7 @@ def _read_both(
             "%s has %d poses for %d times; frames after these are not compared",
             *(truth.source, n, len(truth.frame_times)),
         )
-    return pair(estimate, truth)
+    return estimate, truth
 
 
 def _see_that_they_fit(path: Path | None, times: FloatArray, files: tuple[Poses, ...]) -> None:
@@ -240,7 +291,8 @@ def _of_camera(path: Path, body: Poses, extrinsics: FloatArray | None) -> Poses:
             return body
         extrinsics = read_sensor_yaml(calibration).T_BS
     poses = body.trajectory
-    return replace(body, trajectory=Trajectory(poses.timestamps, poses.T_wc @ extrinsics))
+    moved = Trajectory(poses.timestamps, poses.T_wc @ extrinsics)
+    return replace(body, trajectory=moved, T_body_camera=extrinsics)
 
 
 def _sensor_of_run(trajectory: Path) -> Sensor | None:

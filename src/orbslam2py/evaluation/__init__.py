@@ -2,6 +2,7 @@
 """How far an estimate is from the truth: paths, laps, poses found in a map, closed loops."""
 
 from orbslam2py.evaluation.alignment import Alignment, FitByTime, differ_in_unit, fit_by_time
+from orbslam2py.evaluation.conventions import OtherReading, find_other_reading
 from orbslam2py.evaluation.keyframes import (
     PoseError,
     errors_through_keyframes,
@@ -39,6 +40,7 @@ __all__ = [
     "LapError",
     "LoopError",
     "Matched",
+    "OtherReading",
     "Paired",
     "PoseError",
     "Poses",
@@ -51,6 +53,7 @@ __all__ = [
     "ends_early",
     "errors_through_keyframes",
     "evaluate_trajectory",
+    "find_other_reading",
     "find_revisits",
     "fit_by_time",
     "lap_error",

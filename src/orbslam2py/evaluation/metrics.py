@@ -197,10 +197,7 @@ def evaluate_trajectory(
         If no time stamps match, or a pose is none: not finite, or without a rotation.
     """
     alignment = Alignment.of(alignment)
-    for name, trajectory in (("estimate", estimate), ("truth", truth)):
-        if not isinstance(trajectory, Trajectory):
-            raise DatasetError(f"the {name} is {shown(trajectory)}; give an orbslam2py.Trajectory")
-        require_poses(trajectory.T_wc, ~trajectory.lost, f"the {name}")
+    require_trajectories(estimate, truth)
     offset = finite_number(offset, "the offset", "a number of seconds", DatasetError)
     estimate = estimate.select(~estimate.lost).shifted(offset)
     truth = truth.select(~truth.lost)
@@ -225,6 +222,21 @@ def evaluate_trajectory(
         unit_factor=unit_factor,
         **figures,
     )
+
+
+def require_trajectories(estimate: Trajectory, truth: Trajectory) -> None:
+    """See that both can be compared.
+
+    Raises
+    ------
+    DatasetError
+        If one is no trajectory, or a pose that is not lost is none: not finite, or without a
+        rotation.
+    """
+    for name, trajectory in (("estimate", estimate), ("truth", truth)):
+        if not isinstance(trajectory, Trajectory):
+            raise DatasetError(f"the {name} is {shown(trajectory)}; give an orbslam2py.Trajectory")
+        require_poses(trajectory.T_wc, ~trajectory.lost, f"the {name}")
 
 
 def finite(value: float | None) -> float | None:

@@ -18,15 +18,19 @@ from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.errors import DatasetError
 from orbslam2py.trajectory import (
     FrameTable,
+    QuaternionOrder,
+    Reading,
     Trajectory,
     TrajectoryFormat,
     read_frame_table,
     read_times,
-    read_trajectory,
+    read_trajectory_file,
+    unit_by_other,
 )
 from orbslam2py.trajectory.frame_times import is_frame_table
 
 _SAME_TIME = 1e-6  # [s]
+_OF_NO_FILE = Reading(is_file=False)
 _END = 0.02  # part of a sequence that may be without a true pose at its end
 
 
@@ -50,6 +54,11 @@ class Poses:
         Time of every frame of the sequence [s], (n,); None if it is not known.
     frame_table
         The run's ``frames.csv`` beside the file, which tells `frames`; None if there is none.
+    reading
+        How the file was understood.
+    T_body_camera
+        What poses of a body were multiplied by to get those of the camera, float64 (4, 4); None if
+        they were not.
     """
 
     source: str
@@ -59,6 +68,8 @@ class Poses:
     frames: FrameTable | None = None
     frame_times: FloatArray | None = None
     frame_table: Path | None = None
+    reading: Reading = _OF_NO_FILE
+    T_body_camera: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +86,8 @@ class Paired:
         Whether the time stamps are seconds; numbers of rows else.
     on_clocks
         Whether each has time stamps of its own, so that an offset makes sense.
+    readings
+        How the files of the estimate and of the truth were understood.
     """
 
     estimate: Trajectory
@@ -82,6 +95,7 @@ class Paired:
     by: str
     is_timed: bool = True
     on_clocks: bool = True
+    readings: tuple[Reading, Reading] = (_OF_NO_FILE, _OF_NO_FILE)
 
 
 def read_estimate(
@@ -89,6 +103,8 @@ def read_estimate(
     file_format: TrajectoryFormat = TrajectoryFormat.AUTO,
     *,
     times: FloatArray | None = None,
+    quaternions: QuaternionOrder | None = None,
+    inverse: bool = False,
 ) -> Poses:
     """Read an estimate, with ``frames.csv`` or ``times.txt`` beside it.
 
@@ -103,25 +119,35 @@ def read_estimate(
         The file, and what it is.
     times
         Times of the frames [s], (n,); used if there are as many as rows and no ``frames.csv``.
+    quaternions, inverse
+        Order of the quaternions, and whether poses are those of the world in the camera; as of
+        `read_trajectory_file`.
 
     Raises
     ------
     DatasetError
         If a file is missing or malformed.
     """
-    trajectory, file_format = read_trajectory(path, file_format)
+    read = read_trajectory_file(path, file_format, quaternions=quaternions, inverse=inverse)
+    trajectory, file_format, reading = read.trajectory, read.file_format, read.reading
     beside = path.parent / "frames.csv"
     table = beside if is_frame_table(beside) else None
     if file_format is not TrajectoryFormat.KITTI:
-        return Poses(str(path), trajectory, file_format, frame_table=table)
+        return Poses(str(path), trajectory, file_format, frame_table=table, reading=reading)
     frames = None if table is None else read_frame_table(table)
     if frames is not None and len(frames) == len(trajectory):
         lost = ~frames.has_pose | _before_the_map(trajectory.T_wc)
         trajectory = Trajectory(frames.timestamps, trajectory.T_wc, lost, frames.indices)
-        return Poses(str(path), trajectory, file_format, frames=frames, frame_table=table)
+        return Poses(
+            *(str(path), trajectory, file_format),
+            frames=frames,
+            frame_table=table,
+            reading=reading,
+        )
     lost = rows_without_pose(trajectory.T_wc)
     trajectory = Trajectory(trajectory.timestamps, trajectory.T_wc, lost)
-    return _with_times(Poses(str(path), trajectory, file_format, is_timed=False), path, times)
+    poses = Poses(str(path), trajectory, file_format, is_timed=False, reading=reading)
+    return _with_times(poses, path, times)
 
 
 def read_truth(
@@ -129,6 +155,8 @@ def read_truth(
     file_format: TrajectoryFormat = TrajectoryFormat.AUTO,
     *,
     times: FloatArray | None = None,
+    quaternions: QuaternionOrder | None = None,
+    inverse: bool = False,
 ) -> Poses:
     """Read true poses, with ``times.txt`` beside them or where KITTI's benchmark has it.
 
@@ -138,26 +166,44 @@ def read_truth(
         The file, and what it is.
     times
         Times of its poses [s], (n,); used if there are as many as rows of KITTI's format.
+    quaternions, inverse
+        As of `read_estimate`.
 
     Raises
     ------
     DatasetError
         If a file is missing or malformed.
     """
-    trajectory, file_format = read_trajectory(path, file_format)
+    read = read_trajectory_file(path, file_format, quaternions=quaternions, inverse=inverse)
+    trajectory, file_format, reading = read.trajectory, read.file_format, read.reading
     timed = file_format is not TrajectoryFormat.KITTI
-    poses = Poses(str(path), trajectory, file_format, timed)
+    poses = Poses(str(path), trajectory, file_format, timed, reading=reading)
     return _with_times(poses, path, times, may_end_early=True)
 
 
-def pair(estimate: Poses, truth: Poses) -> Paired:
+def pair(estimate: Poses, truth: Poses, *, offset: float = 0.0) -> Paired:
     """Put an estimate and the truth on one clock.
+
+    Times of a file that make no sense beside those of the other one are taken for times in another
+    unit (s, ms, us, ns), if one of them makes both cover the same time.
+
+    Parameters
+    ----------
+    estimate, truth
+        From `read_estimate` and `read_truth`.
+    offset
+        What will be added to the times of the estimate [s].
 
     Raises
     ------
     DatasetError
         If it is not known which rows belong together: saying what to give.
     """
+    estimate, truth = _in_one_unit(estimate, truth, offset)
+    return replace(_pair(estimate, truth), readings=(estimate.reading, truth.reading))
+
+
+def _pair(estimate: Poses, truth: Poses) -> Paired:
     if not estimate.is_timed and _as_many(estimate.trajectory, truth.frame_times):
         estimate = replace(estimate, trajectory=_at(estimate, truth.frame_times), is_timed=True)
         by = "time: a row for every frame of the sequence"
@@ -174,6 +220,33 @@ def pair(estimate: Poses, truth: Poses) -> Paired:
         f"{_what_is_true(truth)}: which belong together is not known; compare trajectory.txt of "
         "the run, leave frames.csv of the run beside the file, or give the time of every row with "
         "--times"
+    )
+
+
+def _in_one_unit(estimate: Poses, truth: Poses, offset: float) -> tuple[Poses, Poses]:
+    """Read the times of a file in another unit, if only that brings both together."""
+    if not (estimate.is_timed and truth.is_timed):
+        return estimate, truth
+    changed = _in_unit_of(estimate, truth.trajectory.timestamps - offset)
+    if changed is not estimate:
+        return changed, truth
+    return estimate, _in_unit_of(truth, estimate.trajectory.timestamps + offset)
+
+
+def _in_unit_of(poses: Poses, other: FloatArray) -> Poses:
+    reading, path = poses.reading, poses.trajectory
+    if reading.unit is None:
+        return poses
+    unit = unit_by_other(path.timestamps, reading.unit, other)
+    if unit is reading.unit:
+        return poses
+    seconds = path.timestamps * reading.unit.per_second / unit.per_second
+    kept = tuple(note for note in reading.notes if not note.startswith("times in"))
+    note = f"times in {unit}, told by those of the other file"
+    return replace(
+        poses,
+        trajectory=Trajectory(seconds, path.T_wc, path.lost, path.indices),
+        reading=replace(reading, unit=unit, notes=(note, *kept)),
     )
 
 

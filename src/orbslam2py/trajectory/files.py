@@ -1,27 +1,81 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Reading trajectories in the formats of TUM, KITTI and EuRoC."""
+"""Reading trajectories as data sets and other programs write them."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from orbslam2py._arguments import array_of
+from orbslam2py._arguments import array_of, choice_of
 from orbslam2py._arrays import FloatArray
-from orbslam2py._text_lines import content_lines, numbers_of
 from orbslam2py.errors import DatasetError
+from orbslam2py.trajectory.columns import Columns, QuaternionOrder, timed_columns
+from orbslam2py.trajectory.parsing import columns_of, no_trajectory, numbers_in
 from orbslam2py.trajectory.rotations import (
+    inverse_poses,
     nearest_rotations,
     poses_from,
     rotations_from_quaternions,
 )
+from orbslam2py.trajectory.table import TextTable, read_table
+from orbslam2py.trajectory.time_units import TimeUnit, unit_by_digits
 from orbslam2py.trajectory.trajectory import Trajectory
 from orbslam2py.trajectory.writers import TrajectoryFormat
 
 
+@dataclass(frozen=True)
+class Reading:
+    """How the numbers of a trajectory file were understood.
+
+    Attributes
+    ----------
+    quaternions
+        Order of the quaternions; None for matrices, and for poses of no file.
+    order_is_known
+        Whether the order was given, or told by the head of the file.
+    inverse
+        Whether the file holds poses of the world in the camera, which were inverted.
+    unit
+        Unit of the times in the file; None if it has none.
+    is_file
+        Whether the poses are those of a file, so that they may be read otherwise.
+    notes
+        What was found in the file that is not plain TUM, KITTI or EuRoC, for people.
+    """
+
+    quaternions: QuaternionOrder | None = None
+    order_is_known: bool = True
+    inverse: bool = False
+    unit: TimeUnit | None = None
+    is_file: bool = True
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class TrajectoryFile:
+    """A trajectory, and how its file was understood.
+
+    Attributes
+    ----------
+    trajectory
+        The poses, with times in seconds.
+    file_format
+        What the file is.
+    reading
+        How its numbers were understood.
+    """
+
+    trajectory: Trajectory
+    file_format: TrajectoryFormat
+    reading: Reading
+
+
 def read_tum(path: str | Path) -> Trajectory:
     """Read ``time tx ty tz qx qy qz qw`` lines; ``#`` starts a comment.
+
+    Separators, heads, further columns and units of time are as in `read_trajectory`.
 
     Returns
     -------
@@ -33,13 +87,11 @@ def read_tum(path: str | Path) -> Trajectory:
     DatasetError
         Naming file and line.
     """
-    rows = [numbers_of(path, line, (8,)) for line in content_lines(path)]
-    table = _table(path, rows, 8)
-    return Trajectory(table[:, 0], _poses(path, table[:, 1:4], table[:, 4:8]))
+    return _read(path, TrajectoryFormat.TUM).trajectory
 
 
 def read_kitti(path: str | Path, timestamps: FloatArray | None = None) -> Trajectory:
-    """Read 12 numbers per line, the upper three rows of ``T_wc``.
+    """Read 12 numbers per line, the upper three rows of ``T_wc``; or 16, with the fourth.
 
     Parameters
     ----------
@@ -54,20 +106,14 @@ def read_kitti(path: str | Path, timestamps: FloatArray | None = None) -> Trajec
     DatasetError
         Naming file and line; also if there are more poses than time stamps.
     """
-    rows = [numbers_of(path, line, (12,)) for line in content_lines(path)]
-    table = _table(path, rows, 12).reshape(-1, 3, 4)
-    stamps = np.arange(len(table), dtype=np.float64)
-    if timestamps is not None:
-        stamps = array_of(timestamps, "timestamps", (-1,))
-    if len(table) > len(stamps):
-        raise DatasetError(f"{path}: {len(table)} poses for {len(stamps)} time stamps")
-    if len(table) and np.linalg.det(table[:, :, :3]).min() < 0.5:
-        raise DatasetError(
-            f"{path}: not all poses hold rotations; a row is the upper three rows of T_wc"
-        )
-    return Trajectory(
-        stamps[: len(table)], poses_from(nearest_rotations(table[:, :, :3]), table[:, :, 3])
-    )
+    trajectory = _read(path, TrajectoryFormat.KITTI).trajectory
+    n = len(trajectory)
+    if timestamps is None:
+        return trajectory
+    stamps = array_of(timestamps, "timestamps", (-1,))
+    if n > len(stamps):
+        raise DatasetError(f"{path}: {n} poses for {len(stamps)} time stamps")
+    return Trajectory(stamps[:n], trajectory.T_wc)
 
 
 def read_euroc(path: str | Path) -> Trajectory:
@@ -83,30 +129,22 @@ def read_euroc(path: str | Path) -> Trajectory:
     DatasetError
         Naming file and line.
     """
-    rows = []
-    for line in content_lines(path, separator=","):
-        nanoseconds = line.fields[0]
-        if not nanoseconds.isdigit():
-            raise DatasetError(
-                f"{path}:{line.number}: '{nanoseconds}' is not a time in ns; name another format"
-            )
-        rows.append(numbers_of(path, line, (8, 17))[:8])
-        rows[-1][0] = int(nanoseconds) / 1e9
-    table = _table(path, rows, 8)
-    return Trajectory(table[:, 0], _poses(path, table[:, 1:4], table[:, [5, 6, 7, 4]]))
+    return _read(path, TrajectoryFormat.EUROC).trajectory
 
 
 def read_trajectory(
-    path: str | Path, file_format: TrajectoryFormat | str = TrajectoryFormat.AUTO
+    path: str | Path,
+    file_format: TrajectoryFormat | str = TrajectoryFormat.AUTO,
+    *,
+    quaternions: QuaternionOrder | str | None = None,
+    inverse: bool = False,
 ) -> tuple[Trajectory, TrajectoryFormat]:
-    """Read a trajectory in any of the formats.
+    """Read a trajectory in any of the layouts of `TRAJECTORY_LAYOUTS`.
 
     Parameters
     ----------
-    path
-        The file.
-    file_format
-        What it is; by default told by its content.
+    path, file_format, quaternions, inverse
+        As of `read_trajectory_file`.
 
     Returns
     -------
@@ -118,45 +156,174 @@ def read_trajectory(
     Raises
     ------
     DatasetError
-        If the file is missing, empty or not in the format.
+        If the file is missing, empty or no trajectory.
+    """
+    read = read_trajectory_file(path, file_format, quaternions=quaternions, inverse=inverse)
+    return read.trajectory, read.file_format
+
+
+def read_trajectory_file(
+    path: str | Path,
+    file_format: TrajectoryFormat | str = TrajectoryFormat.AUTO,
+    *,
+    quaternions: QuaternionOrder | str | None = None,
+    inverse: bool = False,
+) -> TrajectoryFile:
+    """Read a trajectory in any of the layouts of `TRAJECTORY_LAYOUTS`, and say how.
+
+    Blanks, tabs, commas or semicolons separate. A head of names tells the order of the columns.
+    Times are in s, ms, us or ns, whichever their size shows.
+
+    Parameters
+    ----------
+    path
+        The file.
+    file_format
+        What it is; by default told by its content.
+    quaternions
+        Order of the quaternions; by default told by the head, or by the format.
+    inverse
+        The file holds poses of the world in the camera, ``T_cw``.
+
+    Raises
+    ------
+    DatasetError
+        If the file is missing, empty or no trajectory; if an order is given for matrices.
     """
     file_format = TrajectoryFormat.of(file_format)
+    order = None if quaternions is None else QuaternionOrder.of(quaternions)
+    read = _read(path, file_format, order, inverse=choice_of(inverse, "inverse"))
+    if not len(read.trajectory):
+        raise DatasetError(f"{path} holds no poses; give a file with one per line")
+    return read
+
+
+def _read(
+    path: str | Path,
+    file_format: TrajectoryFormat,
+    order: QuaternionOrder | None = None,
+    *,
+    inverse: bool = False,
+) -> TrajectoryFile:
+    table = read_table(path)
+    if not table.rows:
+        return _without_rows(table, file_format)
+    columns = columns_of(table, file_format)
+    values = numbers_in(table, columns)
+    if columns.matrix and order is not None:
+        raise DatasetError(
+            f"{path} holds matrices, no quaternions; leave out the order of the quaternions"
+        )
+    stamps, unit = _seconds(table, columns, values, file_format)
     if file_format is TrajectoryFormat.AUTO:
-        file_format = _recognise_format(path)
-    readers = {
-        TrajectoryFormat.TUM: read_tum,
-        TrajectoryFormat.KITTI: read_kitti,
-        TrajectoryFormat.EUROC: read_euroc,
-    }
-    trajectory = readers[file_format](path)
-    if not len(trajectory):
-        raise DatasetError(f"{path} holds no poses; give a file with one per line")
-    return trajectory, file_format
+        file_format = _format_of(table, columns, unit)
+    chosen = order or columns.order or _usual_order(file_format)
+    if columns.matrix:
+        T_wc = _poses_of_matrices(path, values[:, -12:].reshape(-1, 3, 4))
+    else:
+        xyzw = _xyzw(values[:, -4:], columns, chosen, is_given=order is not None)
+        T_wc = _poses(path, values[:, -7:-4], xyzw)
+    reading = Reading(
+        None if columns.matrix else chosen,
+        columns.matrix != () or order is not None or columns.order is not None,
+        inverse,
+        unit,
+        notes=_notes(columns, chosen, unit, file_format),
+    )
+    return TrajectoryFile(
+        Trajectory(stamps, inverse_poses(T_wc) if inverse else T_wc), file_format, reading
+    )
 
 
-def _recognise_format(path: str | Path) -> TrajectoryFormat:
-    first = next(iter(content_lines(path)), None)
-    if first is None:
-        raise DatasetError(f"{path} holds no poses; give a file with one per line")
-    if "," in "".join(first.fields):
+def _format_of(table: TextTable, columns: Columns, unit: TimeUnit | None) -> TrajectoryFormat:
+    """EuRoC's format is told by times in ns with commas or a head, and by w first."""
+    if columns.time is None:
+        return TrajectoryFormat.KITTI
+    in_ns = unit is TimeUnit.NANOSECONDS and (table.has_commas or columns.is_named)
+    w_first = columns.order in (None, QuaternionOrder.WXYZ)
+    if in_ns and w_first and not columns.matrix:
         return TrajectoryFormat.EUROC
-    by_count = {8: TrajectoryFormat.TUM, 12: TrajectoryFormat.KITTI}
-    if len(first.fields) not in by_count:
-        raise DatasetError(
-            f"{path}:{first.number}: {len(first.fields)} fields; a trajectory has 8 (TUM), "
-            "12 (KITTI) or comma-separated ones (EuRoC)"
-        )
-    return by_count[len(first.fields)]
+    return TrajectoryFormat.TUM
 
 
-def _table(path: str | Path, rows: list[list[float]], columns: int) -> FloatArray:
-    table = np.array(rows, dtype=np.float64).reshape(-1, columns)
-    if not np.isfinite(table).all():
-        bad = int(np.flatnonzero(~np.isfinite(table).all(axis=1))[0])
+def _usual_order(file_format: TrajectoryFormat) -> QuaternionOrder:
+    is_euroc = file_format is TrajectoryFormat.EUROC
+    return QuaternionOrder.WXYZ if is_euroc else QuaternionOrder.XYZW
+
+
+def _xyzw(
+    values: FloatArray, columns: Columns, order: QuaternionOrder, *, is_given: bool
+) -> FloatArray:
+    """Bring quaternions (n, 4) into the order x, y, z, w."""
+    if columns.order is not None:
+        if not is_given:
+            return values  # the head names each
+        values = values[:, np.argsort(columns.quaternion)]
+    return values if order is QuaternionOrder.XYZW else values[:, [1, 2, 3, 0]]
+
+
+def _without_rows(table: TextTable, file_format: TrajectoryFormat) -> TrajectoryFile:
+    if not all(head.is_comment for head in table.heads):
+        raise no_trajectory(table)
+    return TrajectoryFile(
+        Trajectory(np.zeros(0), np.zeros((0, 4, 4))), file_format, Reading(unit=None)
+    )
+
+
+def _seconds(
+    table: TextTable, columns: Columns, values: FloatArray, file_format: TrajectoryFormat
+) -> tuple[FloatArray, TimeUnit | None]:
+    if columns.time is None:
+        return np.arange(len(values), dtype=np.float64), None
+    texts = [line.fields[columns.time].strip() for line in table.rows]
+    are_whole = np.array([text.isdecimal() for text in texts])
+    if file_format is not TrajectoryFormat.EUROC:
+        unit = unit_by_digits(values[:, 0], columns.unit)
+    elif are_whole.all():
+        unit = TimeUnit.NANOSECONDS
+    else:
+        bad = int(are_whole.argmin())
         raise DatasetError(
-            f"{path}: pose {bad} holds a number that is not finite; correct it or leave it out"
+            f"{table.path}:{table.rows[bad].number}: '{texts[bad]}' is not a time in ns; name "
+            "another format"
         )
-    return table
+    if unit is not TimeUnit.SECONDS and are_whole.all():
+        # Of whole numbers, which floats do not hold to the last digit, the quotient is exact.
+        return np.array([int(text) / unit.per_second for text in texts]), unit
+    return values[:, 0] / unit.per_second, unit
+
+
+def _notes(
+    columns: Columns, order: QuaternionOrder, unit: TimeUnit | None, file_format: TrajectoryFormat
+) -> tuple[str, ...]:
+    notes = []
+    is_euroc = file_format is TrajectoryFormat.EUROC
+    usual = TimeUnit.NANOSECONDS if is_euroc else TimeUnit.SECONDS
+    if unit not in (None, usual):
+        notes.append(f"times in {unit}")
+    if columns.matrix:
+        if columns.time is not None:
+            notes.append("a time before every matrix")
+        return tuple(notes)
+    as_usual = timed_columns(0)
+    if is_euroc and not columns.is_named:
+        notes.append("times in ns and quaternions w first, as EuRoC and VINS write them")
+    elif (columns.time, columns.position) != (as_usual.time, as_usual.position) or (
+        columns.is_named and order is not _usual_order(file_format)
+    ):
+        where = ", ".join(str(column + 1) for column in sorted(columns.used))
+        told = "as its head says" if columns.is_named else "told by the numbers"
+        w = "last" if order is QuaternionOrder.XYZW else "first"
+        notes.append(f"poses in the columns {where}, w {w} ({told})")
+    return tuple(notes)
+
+
+def _poses_of_matrices(path: str | Path, matrices: FloatArray) -> FloatArray:
+    if (np.abs(np.linalg.det(matrices[:, :, :3]) - 1) > 0.5).any():  # mirrored, or scaled
+        raise DatasetError(
+            f"{path}: not all poses hold rotations; a row is the upper three rows of T_wc"
+        )
+    return poses_from(nearest_rotations(matrices[:, :, :3]), matrices[:, :, 3])
 
 
 def _poses(path: str | Path, positions: FloatArray, quaternions: FloatArray) -> FloatArray:

@@ -100,6 +100,11 @@ CALLS: dict[str, tuple[Call, set[str]]] = {
     "trajectory: format": (lambda x: THREE.save("t.txt", x), set()),
     "trajectory: read": (paths.read_trajectory, set()),
     "trajectory: read as": (lambda x: paths.read_trajectory("t.txt", x), set()),
+    "trajectory: order": (
+        lambda x: paths.read_trajectory("t.txt", quaternions=x),
+        set(),
+    ),
+    "trajectory: inverse": (lambda x: paths.read_trajectory("t.txt", inverse=x), set()),
     "trajectory: times": (paths.read_times, set()),
     "trajectory: frames": (paths.read_frame_table, set()),
     "trajectory: write": (lambda x: paths.write_tum("t.txt", x), set()),
@@ -143,6 +148,16 @@ CALLS: dict[str, tuple[Call, set[str]]] = {
     "evaluate: limit": (
         lambda x: evaluation.evaluate_trajectory(THREE, THREE, max_difference=x),
         {"fraction"},
+    ),
+    "other reading: estimate": (lambda x: evaluation.find_other_reading(x, THREE), set()),
+    "other reading: truth": (lambda x: evaluation.find_other_reading(THREE, x), set()),
+    "other reading: alignment": (
+        lambda x: evaluation.find_other_reading(THREE, THREE, x),
+        set(),
+    ),
+    "other reading: body": (
+        lambda x: evaluation.find_other_reading(THREE, THREE, T_body_camera=x),
+        {"None"},
     ),
     "evaluate: lap": (lambda x: evaluation.lap_error(x, THREE), set()),
     "align": (lambda x: evaluation.align(x, x), set()),
