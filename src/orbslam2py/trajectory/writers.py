@@ -10,17 +10,32 @@ from collections.abc import Sequence
 from decimal import Decimal
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from orbslam2py._arguments import is_whole, member_of, shown
+from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py._files import atomic_write
 from orbslam2py.errors import DatasetError
 from orbslam2py.trajectory.rotations import quaternions_from_rotations, require_poses
 
-if TYPE_CHECKING:
-    from orbslam2py.trajectory.trajectory import Trajectory
+
+class TimedPoses(Protocol):
+    """What is written of an `orbslam2py.Trajectory`; see its attributes."""
+
+    @property
+    def timestamps(self) -> FloatArray: ...  # noqa: D102
+    @property
+    def T_wc(self) -> FloatArray: ...  # noqa: D102
+    @property
+    def positions(self) -> FloatArray: ...  # noqa: D102
+    @property
+    def lost(self) -> npt.NDArray[np.bool_]: ...  # noqa: D102
+    @property
+    def indices(self) -> IntArray: ...  # noqa: D102
+    def __len__(self) -> int: ...
 
 
 _EUROC_HEADER = (
@@ -57,7 +72,7 @@ class TrajectoryFormat(str, Enum):
 
 
 def write_tum(
-    path: str | Path, trajectory: Trajectory, timestamp_texts: Sequence[str] | None = None
+    path: str | Path, trajectory: TimedPoses, timestamp_texts: Sequence[str] | None = None
 ) -> None:
     """Write ``time tx ty tz qx qy qz qw`` for every pose that is not lost.
 
@@ -91,7 +106,7 @@ def write_tum(
             stream.write(f"{stamp} {_decimals(values)}\n")
 
 
-def write_kitti(path: str | Path, trajectory: Trajectory, n_frames: int | None = None) -> None:
+def write_kitti(path: str | Path, trajectory: TimedPoses, n_frames: int | None = None) -> None:
     """Write 12 numbers per input frame: the upper three rows of ``T_wc``.
 
     KITTI's tools want one line for each frame, so the frames before the first pose get the
@@ -135,7 +150,7 @@ def write_kitti(path: str | Path, trajectory: Trajectory, n_frames: int | None =
 
 
 def write_euroc(
-    path: str | Path, trajectory: Trajectory, timestamp_texts: Sequence[str] | None = None
+    path: str | Path, trajectory: TimedPoses, timestamp_texts: Sequence[str] | None = None
 ) -> None:
     """Write ``ns, px, py, pz, qw, qx, qy, qz`` for every pose that is not lost, below a header.
 
