@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The layouts of images that are read, with an example of each: the documentation is made of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from orbslam2py.datasets.base import Layout
+
+
+@dataclass(frozen=True)
+class ReadableLayout:
+    """A layout of images on disk.
+
+    Attributes
+    ----------
+    name
+        What it is called.
+    sensors
+        What it can hold images for.
+    description
+        How it is recognised, and what is special about it.
+    example
+        Files or lines of it.
+    layouts
+        Names of these layouts in reports.
+    """
+
+    name: str
+    sensors: str
+    description: str
+    example: str
+    layouts: tuple[Layout, ...] = ()
+
+
+READABLE_LAYOUTS = (
+    ReadableLayout(
+        "TUM RGB-D",
+        "mono, rgbd",
+        "`rgb.txt`, and `depth.txt` or `associations.txt`: lines of time stamp and path.",
+        "rgb.txt: 1305031102.175304 rgb/1305031102.175304.png",
+        (Layout.TUM,),
+    ),
+    ReadableLayout(
+        "KITTI odometry",
+        "mono, stereo",
+        "`times.txt`, `calib.txt` and numbered images; grey (0, 1) or colour (2, 3).",
+        "image_0/000000.png  image_1/000000.png  times.txt  calib.txt",
+        (Layout.KITTI,),
+    ),
+    ReadableLayout(
+        "EuRoC",
+        "mono, stereo",
+        "`mav0/cam0` and `cam1` with `data.csv` and `sensor.yaml`; TUM-VI as well.",
+        "mav0/cam0/data/1403636579763555584.png  mav0/cam0/data.csv  mav0/cam0/sensor.yaml",
+        (Layout.EUROC,),
+    ),
+    ReadableLayout(
+        "ICL-NUIM",
+        "mono, rgbd",
+        "The TUM-compatible form, with its negative focal length.",
+        "associations.txt  rgb/0.png  depth/0.png",
+        (Layout.ICL_NUIM,),
+    ),
+    ReadableLayout(
+        "7-Scenes",
+        "mono, rgbd",
+        "Colour, depth and pose files of one number.",
+        "frame-000000.color.png  frame-000000.depth.png  frame-000000.pose.txt",
+        (Layout.SEVEN_SCENES,),
+    ),
+    ReadableLayout(
+        "Bonn RGB-D dynamic",
+        "mono, rgbd",
+        "As TUM RGB-D, recognised by its folder's name.",
+        "rgbd_bonn_balloon/rgb.txt  rgbd_bonn_balloon/depth.txt",
+        (Layout.BONN,),
+    ),
+    ReadableLayout(
+        "Replica (NICE-SLAM)",
+        "mono, rgbd",
+        "Rendered images with the camera in the folder above.",
+        "results/frame000000.jpg  results/depth000000.png  traj.txt  ../cam_params.json",
+        (Layout.REPLICA,),
+    ),
+    ReadableLayout(
+        "OpenLORIS-Scene",
+        "mono, rgbd",
+        "Colour with aligned depth, and its sensors' file.",
+        "color.txt  aligned_depth.txt  sensors.yaml",
+        (Layout.OPENLORIS,),
+    ),
+    ReadableLayout(
+        "bag of ROS 1",
+        "mono, stereo, rgbd",
+        "A `.bag`, also of the RealSense Viewer; topics are chosen by types and names.",
+        "drive.bag with /camera/color/image_raw (sensor_msgs/Image)",
+        (Layout.ROSBAG1,),
+    ),
+    ReadableLayout(
+        "bag of ROS 2",
+        "mono, stereo, rgbd",
+        "A `.db3` with or without `metadata.yaml`, also of the RealSense SDK; or its folder.",
+        "recording/metadata.yaml  recording/recording_0.db3",
+        (Layout.ROSBAG2,),
+    ),
+    ReadableLayout(
+        "MCAP",
+        "mono, stereo, rgbd",
+        "A `.mcap` with messages of ROS 1 or ROS 2.",
+        "drive.mcap",
+        (Layout.MCAP,),
+    ),
+    ReadableLayout(
+        "folder of images",
+        "mono",
+        "PNG, JPEG and others in the order of their names; times by `--fps`, `--times` or names.",
+        "photos/000000.jpg",
+    ),
+    ReadableLayout(
+        "folder of colour and folder of depth",
+        "rgbd",
+        "Two folders side by side, images paired by name or number.",
+        "color/000000.jpg  depth/000000.png",
+    ),
+    ReadableLayout("video", "mono", "What OpenCV decodes.", "drive.mp4"),
+    ReadableLayout(
+        "camera", "mono", "The number of a camera that is plugged in.", "orbslam2py run 0 ..."
+    ),
+)
