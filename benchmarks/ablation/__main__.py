@@ -8,7 +8,7 @@ What has been played stands in one CSV file per variant, and is not played again
 
     python -m benchmarks.ablation --runs 300 --jobs 2
     python -m benchmarks.ablation --part recorded --runs 62
-    python -m benchmarks.ablation --off "blurred frames" "ambiguous places" --together
+    python -m benchmarks.ablation --off "ambiguous places" "keyframes of few inliers" --together
     python -m benchmarks.ablation --set tracking.map_matches=12
 """
 
