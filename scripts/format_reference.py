@@ -55,16 +55,16 @@ def _calibrations() -> str:
     ]
     head = ("`--format`", "written by", "what is read", "stereo pair", "example")
     return (
-        "## Calibrations\n\n`orbslam2py import-camera FILE --output my.yaml` recognises the format by "
-        "the content of the file. Lenses: pinhole, radial-tangential with 4 or 5 coefficients, "
+        "## Calibrations\n\n`orbslam2py import-camera FILE --output my.yaml` recognises the format "
+        "by the content of the file. Lenses: pinhole, radial-tangential with 4 or 5 coefficients, "
         "rational with 8. Fisheye lenses are refused with the reason.\n\n" + _table(head, rows)
     )
 
 
 def _settings() -> str:
     return (
-        "## Settings\n\n`--settings FILE` takes the files of ORB-SLAM2, of ORB-SLAM3 (0.x and 1.0) and "
-        "of stella_vslam as they are, for pinhole cameras: [Settings](settings.md)."
+        "## Settings\n\n`--settings FILE` takes the files of ORB-SLAM2, of ORB-SLAM3 (0.x and 1.0) "
+        "and of stella_vslam as they are, for pinhole cameras: [Settings](settings.md)."
     )
 
 
@@ -75,8 +75,8 @@ def _trajectories() -> str:
     ]
     head = ("layout", "written by", "what is special", "example")
     return (
-        "## Trajectories\n\n`orbslam2py evaluate ESTIMATE TRUTH` and `read_trajectory` recognise the "
-        "layout by the content.\n\n" + _table(head, rows)
+        "## Trajectories\n\n`orbslam2py evaluate ESTIMATE TRUTH` and `read_trajectory` recognise "
+        "the layout by the content.\n\n" + _table(head, rows)
     )
 
 
