@@ -6,7 +6,6 @@
 #include "frame/inlier_spread.hpp"
 #include "frame/match_error.hpp"
 #include "frame/rotation_alignment.hpp"
-#include "frame/sharpness.hpp"
 
 namespace orbslam::bindings {
 namespace py = pybind11;
@@ -60,25 +59,11 @@ void bind_inliers(py::module_& module) {
              "camera at `T_nw`; 0 without any. Raises StateError without a pose.");
 }
 
-void bind_sharpness(py::module_& module) {
-  module.def(
-      "sharpness", &sharpness, py::arg("frame"), py::arg("n_usual"),
-      py::call_guard<py::gil_scoped_release>(),
-      "Sum of the corners' responses on the two finest levels, grey levels: what blur takes\n"
-      "away first. To be compared with that of other frames of the same camera. Of one with\n"
-      "more than `n_usual` corners only the share of the strongest ones counts.");
-  module.def("fine_detail", &fine_detail, py::arg("frame"),
-             py::call_guard<py::gil_scoped_release>(),
-             "Mean response of the corners on the two finest levels by that of the corners from\n"
-             "level 4 on; 0 without any. Contrast and texture move both, blur takes the former.");
-}
-
 }  // namespace
 
 void bind_frame_evidence(py::module_& module) {
   bind_rotation(module);
   bind_inliers(module);
-  bind_sharpness(module);
 }
 
 }  // namespace orbslam::bindings

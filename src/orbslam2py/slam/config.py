@@ -89,9 +89,6 @@ class InitializationConfig:
     factor larger."""
     same_direction: float = 20.0
     """Two motions count as one when their directions differ by less than this, degrees."""
-    direction_deviation: float = 4.0
-    """A map begins only when the standard deviation of the direction of motion is below
-    this, degrees."""
     compare_views: bool = True
     """Begin a map only when all kept views together prefer one motion."""
     further_draws: int = 5

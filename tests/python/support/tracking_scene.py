@@ -154,7 +154,6 @@ class FakeCore:
     motion: deque[int] = field(default_factory=deque)
     words: deque[int] = field(default_factory=deque)
     inliers: deque[int] = field(default_factory=deque)
-    sharpnesses: deque[float] = field(default_factory=deque)
     n_reference: int = 100
     local_reference: int = 4
     calls: list[str] = field(default_factory=list)
@@ -172,7 +171,6 @@ class FakeCore:
     n_cells: int = 30
     correlation: float = 1.0
     match_error: float = 0.6
-    fine_detail_of_images: float = 1.4
     #: Pixels that the points moved in the image since the last frame.
     displacement: float = 0.0
     #: Of what the motion model finds, in localization mode.
@@ -204,9 +202,6 @@ class FakeCore:
     def median_match_error(self, frame: FakeFrame) -> float:
         return self.match_error
 
-    def fine_detail(self, features: object) -> float:
-        return self.fine_detail_of_images
-
     def median_displacement(self, frame: FakeFrame, T_nw: _core.Pose) -> float:
         return self.displacement
 
@@ -228,10 +223,6 @@ class FakeCore:
     def anchor_frame(self, world: FakeMap, frame: FakeFrame, keyframe: int) -> None:
         frame.anchor_x = world.keyframe_x
         frame.reference_keyframe = keyframe
-
-    def sharpness(self, features: object, n_usual: int) -> float:
-        assert n_usual == N_FEATURES
-        return self.sharpnesses.popleft() if self.sharpnesses else 1000.0
 
     def add_temporary_points(self, last: FakeFrame, points: str) -> int:
         return 0

@@ -17,7 +17,6 @@ from orbslam2py.slam.config import InitializationConfig
 from orbslam2py.slam.initialization.earlier_frames import EarlierFrames
 from orbslam2py.slam.initialization.initial_map_validation import InitialMapValidation
 from orbslam2py.slam.initialization.initial_views import InitialViews, View
-from orbslam2py.slam.initialization.motion_uncertainty import direction_deviation
 from orbslam2py.slam.initialization.multi_view_model_selection import MultiViewModelSelection
 from orbslam2py.slam.initialization.third_view import (
     Candidate,
@@ -213,10 +212,7 @@ class MonocularInitializer:
             if best is None:
                 reason = Reason.AMBIGUOUS_MOTION
                 continue
-            deviation = direction_deviation(candidate.view, frame.features, best)
-            if deviation <= self._limits.direction_deviation:
-                return self._build_map(candidate.view, best, frame)
-            reason = Reason.LOW_PARALLAX
+            return self._build_map(candidate.view, best, frame)
         return reason
 
     def _tried_views(self) -> list[View]:
