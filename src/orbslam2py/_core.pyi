@@ -13,7 +13,7 @@ from orbslam2py.errors import SettingsError
 from orbslam2py.errors import StateError
 from orbslam2py.errors import VocabularyError
 import typing
-__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'ChangedIds', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FrameSightings', 'FullBundleCommit', 'FullBundleOptions', 'GatheredBundle', 'ImageBounds', 'ImageError', 'ImageRotation', 'InlierSpread', 'KeyFrameIndex', 'KeyFramePoses', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapChanges', 'MapFileError', 'MapFollower', 'MapMerge', 'MapMergeResult', 'MapRestorer', 'MapSnapshot', 'MapStamp', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewMotion', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'align_rotation', 'anchor_frame', 'apply_loop_correction', 'apply_map_merge', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'changed_since', 'check_invariants', 'check_map_contents', 'choose_loop', 'choose_merge', 'commit_full_bundle', 'corridor_way', 'count_map_points', 'count_sightings', 'count_staying', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'decode_png', 'describe', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'fine_detail', 'follow_map', 'fundamental_matrix', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'keep_small_image', 'keyframes_of_seam', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'map_contents', 'match_keyframe_by_descriptors', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'match_views', 'may_be_one_place', 'median_displacement', 'median_match_error', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'place_points', 'plan_loop_correction', 'plan_map_merge', 'pose_covariance', 'poses_of_map', 'position_deviation', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'render', 'room_T_wc', 'sample_colours', 'seed_of', 'select_local_map', 'sharpness', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'spread_from_seam', 'spread_of_inliers', 'stamp_of', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'vector_units', 'verify_loop_candidate', 'widened_covariance']
+__all__: list[str] = ['BundleOptions', 'BundleSummary', 'Camera', 'CameraOptions', 'ChangedIds', 'DirectIndex', 'EdgeSnapshot', 'EpnpPose', 'Extraction', 'FIRST_TEMPORARY_POINT', 'Frame', 'FrameContext', 'FrameSightings', 'FullBundleCommit', 'FullBundleOptions', 'GatheredBundle', 'ImageBounds', 'ImageError', 'ImageRotation', 'InlierSpread', 'KeyFrameIndex', 'KeyFramePoses', 'KeyFrameSnapshot', 'LocalBundleResult', 'LocalMap', 'LocalMapMatches', 'Loop', 'LoopConsistency', 'LoopCorrection', 'LoopCorrectionResult', 'LoopDrift', 'LoopVerificationOptions', 'Map', 'MapChanges', 'MapFileError', 'MapFollower', 'MapMerge', 'MapMergeResult', 'MapRestorer', 'MapSnapshot', 'MapStamp', 'MonocularMap', 'MonocularMapFailure', 'MotionScore', 'NewPointOptions', 'ObservationSnapshot', 'OrbExtractor', 'OrbOptions', 'OrbSlamError', 'PairExtractor', 'Pinhole', 'PlaceCandidate', 'PnpOptions', 'PnpPose', 'PnpRansac', 'PointBatch', 'PointSnapshot', 'Pose', 'PoseEstimate', 'PoseGraphSummary', 'RecentPoints', 'RecordedTrajectory', 'Rectangle', 'ScalePyramid', 'Scoring', 'SettingsError', 'StateError', 'StopFlag', 'TrackedFrame', 'TrainingOptions', 'TrajectoryRecorder', 'TwoViewModel', 'TwoViewMotion', 'TwoViewOptions', 'TwoViewOutcome', 'TwoViewResult', 'Vocabulary', 'VocabularyError', 'VocabularySource', 'Way', 'Weighting', 'WordVector', 'World', 'add_temporary_points', 'align_rotation', 'anchor_frame', 'apply_loop_correction', 'apply_map_merge', 'assess_drift', 'build_monocular_frame', 'build_rgbd_frame', 'build_stereo_frame', 'changed_since', 'check_invariants', 'check_map_contents', 'choose_loop', 'choose_merge', 'commit_full_bundle', 'corridor_way', 'count_map_points', 'count_sightings', 'count_staying', 'count_tracked_points', 'create_monocular_map', 'create_new_points', 'cull_keyframes', 'cull_recent_points', 'decode_png', 'describe', 'discard_temporary', 'figure_eight_way', 'find_loop_candidates', 'find_problem', 'find_relocalization_candidates', 'follow_map', 'fundamental_matrix', 'fuse_with_neighbours', 'gather_full_bundle', 'gather_points', 'hamming_distances', 'hamming_matrix', 'index_keyframe', 'insert_keyframe', 'keep_small_image', 'keyframes_of_seam', 'local_bundle_adjustment', 'lowest_neighbour_score', 'make_corridor', 'make_figure_eight', 'make_room', 'make_street', 'make_street_lap', 'make_two_rooms', 'map_contents', 'match_keyframe_by_descriptors', 'match_keyframe_by_projection', 'match_keyframe_by_words', 'match_keyframes_by_words', 'match_last_frame', 'match_local_map', 'match_stereo', 'match_views', 'may_be_one_place', 'median_displacement', 'median_match_error', 'median_scene_depth', 'optimize_essential_graph', 'optimize_pose', 'place_points', 'plan_loop_correction', 'plan_map_merge', 'pose_covariance', 'poses_of_map', 'position_deviation', 'process_new_keyframe', 'project_into', 'reconstruct_two_views', 'render', 'room_T_wc', 'sample_colours', 'seed_of', 'select_local_map', 'similarity', 'snapshot_edges', 'snapshot_keyframes', 'snapshot_map', 'snapshot_observations', 'solve_bundle', 'solve_epnp', 'solve_full_bundle', 'spread_from_seam', 'spread_of_inliers', 'stamp_of', 'street_lap_way', 'street_way', 'to_depth_metres', 'to_grey', 'train_vocabulary', 'triangulate', 'two_rooms_way', 'vector_units', 'verify_loop_candidate', 'widened_covariance']
 class Pose:
     """
     Rigid transform. `T_ab` maps coordinates of frame b into frame a.
@@ -323,7 +323,7 @@ class CameraOptions:
     """
     What a Camera is made from.
     """
-    def __init__(self, fx: typing.SupportsFloat | typing.SupportsIndex = 0.0, fy: typing.SupportsFloat | typing.SupportsIndex = 0.0, cx: typing.SupportsFloat | typing.SupportsIndex = 0.0, cy: typing.SupportsFloat | typing.SupportsIndex = 0.0, width: typing.SupportsInt | typing.SupportsIndex = 0, height: typing.SupportsInt | typing.SupportsIndex = 0, distortion: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(5)"] = [0.0, 0.0, 0.0, 0.0, 0.0], bf: typing.SupportsFloat | typing.SupportsIndex = 0.0, depth_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+    def __init__(self, fx: typing.SupportsFloat | typing.SupportsIndex = 0.0, fy: typing.SupportsFloat | typing.SupportsIndex = 0.0, cx: typing.SupportsFloat | typing.SupportsIndex = 0.0, cy: typing.SupportsFloat | typing.SupportsIndex = 0.0, width: typing.SupportsInt | typing.SupportsIndex = 0, height: typing.SupportsInt | typing.SupportsIndex = 0, distortion: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], bf: typing.SupportsFloat | typing.SupportsIndex = 0.0, depth_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         """
         Nothing is checked before a Camera is made.
         """
@@ -360,12 +360,12 @@ class CameraOptions:
     def depth_ratio(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
-    def distortion(self) -> typing.Annotated[list[float], "FixedSize(5)"]:
+    def distortion(self) -> typing.Annotated[list[float], "FixedSize(8)"]:
         """
-        k1, k2, p1, p2, k3; zeros for rectified images.
+        k1, k2, p1, p2[, k3[, k4, k5, k6]]; zeros for rectified images.
         """
     @distortion.setter
-    def distortion(self, arg0: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(5)"]) -> None:
+    def distortion(self, arg1: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
         ...
     @property
     def fx(self) -> float:
@@ -3011,11 +3011,6 @@ def find_relocalization_candidates(index: KeyFrameIndex, map: Map, frame: Frame)
     """
     Keyframes that look like a described frame, by ascending id.
     """
-def fine_detail(frame: Frame) -> float:
-    """
-    Mean response of the corners on the two finest levels by that of the corners from
-    level 4 on; 0 without any. Contrast and texture move both, blur takes the former.
-    """
 def follow_map(map: Map, frame: TrackedFrame) -> tuple[PointBatch, float]:
     """
     Bring an earlier frame up to date: its pose follows its keyframe, replaced points their
@@ -3292,12 +3287,6 @@ def seed_of(seed: typing.SupportsInt | typing.SupportsIndex, first: typing.Suppo
 def select_local_map(map: Map, frame: TrackedFrame) -> LocalMap:
     """
     Keyframes voted for by the frame's points, extended, and all their points.
-    """
-def sharpness(frame: Frame, n_usual: typing.SupportsInt | typing.SupportsIndex) -> float:
-    """
-    Sum of the corners' responses on the two finest levels, grey levels: what blur takes
-    away first. To be compared with that of other frames of the same camera. Of one with
-    more than `n_usual` corners only the share of the strongest ones counts.
     """
 def similarity(a: WordVector, b: WordVector) -> float:
     """
