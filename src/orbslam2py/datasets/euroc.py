@@ -9,13 +9,15 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from orbslam2py._arguments import index_of
-from orbslam2py._arrays import ByteArray
+from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py._text_lines import content_lines
 from orbslam2py.datasets.base import Images, Layout, Stamps, require_frames
 from orbslam2py.datasets.choose_settings import SettingsChoice
+from orbslam2py.datasets.clock import read_clock, text_of
 from orbslam2py.datasets.euroc_calibration import (
     monocular_settings,
     read_sensor_yaml,
@@ -26,9 +28,14 @@ from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.datasets.rectification import Rectifier
 from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.settings import Sensor, Settings, StereoRectification
-from orbslam2py.trajectory import Trajectory, read_euroc
+from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory, associate, read_euroc
 
 _log = logging.getLogger(__name__)
+
+#: Images per second where no calibration tells them.
+_USUAL_RATE = 20.0
+#: Names of images whose usual step is at most this are counts of frames and no times.
+_LARGEST_COUNT = 1000
 
 
 def find_root(folder: Path) -> Path | None:
@@ -41,11 +48,17 @@ def find_root(folder: Path) -> Path | None:
 
 @dataclass(frozen=True)
 class _CameraList:
-    """Image files by time stamp [ns], in the order of the list, and where each was listed."""
+    """Image files in the order of time [ns], and where each was listed."""
 
     source: Path
-    paths: dict[int, Path]
-    lines: dict[int, int]
+    nanoseconds: tuple[int, ...]
+    texts: tuple[str, ...]
+    paths: list[Path]
+    lines: list[int]
+
+    def since(self, first: int) -> FloatArray:
+        """Times [s] from a moment on: small numbers keep all digits."""
+        return np.array([time - first for time in self.nanoseconds], dtype=np.int64) / 1e9
 
 
 class EurocSequence(RecordedSequence):
@@ -97,30 +110,26 @@ class EurocSequence(RecordedSequence):
             self.name = folder.resolve().parent.name
         if self._chosen is not None and self.sensor is Sensor.STEREO:
             _ = self._rectification  # tells at once if the chosen settings have none
-        left = _list_images(root / "cam0")
-        kept = list(left.paths)
-        self._right: dict[int, Path] = {}
+        rate = self.known_rate() or _USUAL_RATE
+        left = _list_images(root / "cam0", rate)
+        kept = np.arange(len(left.paths))
+        self._right: list[Path] = []
         if self.sensor is Sensor.STEREO:
-            self._right = _list_images(root / "cam1").paths
-            kept = [stamp for stamp in kept if stamp in self._right]
-            alone = len(left.paths) + len(self._right) - 2 * len(kept)
-            if alone:
-                _log.warning("%s: %d images have no partner, left out", root, alone)
-            if not kept and left.paths:
-                raise DatasetError(f"{root}: cam0 and cam1 have no time stamp in common")
+            right = _list_images(root / "cam1", rate)
+            kept, partners = _pair(root, left, right)
+            self._right = [right.paths[place] for place in partners]
         require_frames(left.source, len(kept))
         self._list_path = left.source
-        self._nanoseconds, self._left = kept, left.paths
+        self._left = [left.paths[place] for place in kept]
         self._stamps = Stamps(
-            np.array([stamp / 1e9 for stamp in kept], dtype=np.float64),
-            tuple(f"{stamp // 10**9}.{stamp % 10**9:09d}" for stamp in kept),
-            tuple(left.lines[stamp] for stamp in kept),
+            np.array([left.nanoseconds[place] / 1e9 for place in kept], dtype=np.float64),
+            tuple(left.texts[place] for place in kept),
+            tuple(left.lines[place] for place in kept),
         )
-        self._stamps.warn_unless_increasing(left.source)
 
     def image_path(self, index: int, /) -> Path:
         """Return the file of the left image of a frame."""
-        return self._left[self._nanoseconds[index]]
+        return self._left[index]
 
     def load(self, index: int, /) -> Images:
         """Read and rectify the images of a frame; see `datasets.base.Sequence.load`."""
@@ -135,10 +144,9 @@ class EurocSequence(RecordedSequence):
         return Images(left, right=right)
 
     def _files(self, index: int) -> tuple[Path, ...]:
-        stamp = self._nanoseconds[index]
         if self.sensor is Sensor.MONOCULAR:
-            return (self._left[stamp],)
-        return self._left[stamp], self._right[stamp]
+            return (self._left[index],)
+        return self._left[index], self._right[index]
 
     def ground_truth(self) -> Trajectory | None:
         """Read the body's poses and move them to the (rectified) left camera.
@@ -206,23 +214,53 @@ def has_camera(root: Path, camera: str) -> bool:
     return (root / camera / "data").is_dir()
 
 
-def _list_images(camera: Path) -> _CameraList:
+def _pair(
+    root: Path, left: _CameraList, right: _CameraList
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """Pair images by the nearest time, at most half a step apart."""
+    first = left.nanoseconds[0] if left.nanoseconds else 0
+    times, others = left.since(first), right.since(first)
+    step = float(np.median(np.diff(times))) if len(times) > 1 else 2 * MAX_DIFFERENCE
+    limit = min(MAX_DIFFERENCE, step / 2)
+    i, j = associate(times, others, limit)
+    alone = len(times) + len(others) - 2 * len(i)
+    if not len(i) and left.paths:
+        raise DatasetError(
+            f"{root}: no images of cam0 and cam1 were taken within {limit * 1e3:.3g} ms of each "
+            "other; see whether both lists are of one recording"
+        )
+    if alone:
+        _log.warning("%s: %d images have no partner, left out", root, alone)
+    worst = float(np.abs(times[i] - others[j]).max(initial=0.0))
+    if worst > 0:
+        _log.warning("%s: images of a pair were taken up to %.3g ms apart", root, worst * 1e3)
+    return i, j
+
+
+def _list_images(camera: Path, rate: float) -> _CameraList:
     source = camera / "data.csv"
     if not source.is_file():
-        return _list_folder(camera / "data")
-    listed = _CameraList(source, {}, {})
+        return _list_folder(camera / "data", rate)
+    listed: dict[str, tuple[Path, int]] = {}
     for line in content_lines(source, separator=","):
         text = line.fields[0]
         if not text.isdigit():
             raise DatasetError(f"{source}:{line.number}: '{text}' is not a time stamp in ns")
-        stamp = int(text)
-        if stamp in listed.paths:
+        if text in listed:
             _log.warning("%s:%d: time stamp %s is there twice, left out", source, line.number, text)
             continue
         name = line.fields[1] if len(line.fields) > 1 else ""
-        listed.paths[stamp] = camera / "data" / name if name else _guess_path(camera, text)
-        listed.lines[stamp] = line.number
-    return listed
+        path = camera / "data" / name if name else _guess_path(camera, text)
+        listed[text] = path, line.number
+    clock = read_clock(source, list(listed), rate)
+    found = list(listed.values())
+    return _CameraList(
+        source,
+        clock.nanoseconds,
+        tuple(map(text_of, clock.nanoseconds)),
+        [found[place][0] for place in clock.order],
+        [found[place][1] for place in clock.order],
+    )
 
 
 def _guess_path(camera: Path, stamp: str) -> Path:
@@ -230,8 +268,8 @@ def _guess_path(camera: Path, stamp: str) -> Path:
     return next((path for path in candidates if path.is_file()), candidates[0])
 
 
-def _list_folder(folder: Path) -> _CameraList:
-    """Images named by their time stamps, for copies without ``data.csv``."""
+def _list_folder(folder: Path, rate: float) -> _CameraList:
+    """Images named by their time stamps, or counted, for copies without ``data.csv``."""
     if not folder.is_dir():
         raise DatasetError(f"cannot open {folder}: no such folder")
     found = sorted(
@@ -239,4 +277,15 @@ def _list_folder(folder: Path) -> _CameraList:
         for path in folder.iterdir()
         if path.suffix.lower() in IMAGE_SUFFIXES and path.stem.isdigit() and not path.is_dir()
     )
-    return _CameraList(folder, dict(found), {stamp: k for k, (stamp, _) in enumerate(found, 1)})
+    numbers = [number for number, _ in found]
+    if len(numbers) > 1 and np.median(np.diff(numbers)) <= _LARGEST_COUNT:
+        _log.warning(
+            "%s: the names of the images are no times; they count frames at %g Hz", folder, rate
+        )
+        times = tuple(round((number - numbers[0]) * 1e9 / rate) for number in numbers)
+    else:
+        times = read_clock(folder, [path.stem for _, path in found], rate).nanoseconds
+    paths = [path for _, path in found]
+    return _CameraList(
+        folder, times, tuple(map(text_of, times)), paths, list(range(1, len(paths) + 1))
+    )

@@ -15,6 +15,7 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py._text_lines import content_lines, number_of
 from orbslam2py.datasets.base import Images, Layout, Stamps, rate_of, require_frames
 from orbslam2py.datasets.choose_settings import SettingsChoice
+from orbslam2py.datasets.clock import read_clock, time_of
 from orbslam2py.datasets.images import read_image
 from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.errors import DatasetError, ImageError, SettingsError
@@ -86,11 +87,14 @@ class KittiSequence(RecordedSequence):
         super().__init__(folder, available, sensor, settings)
         times = self.folder / "times.txt"
         self._list_path = times
-        self._stamps = _read_times(times)
+        chosen = None if self._chosen is None else self._chosen.camera.fps
+        self._stamps = _read_times(times, chosen or _USUAL_RATE)
         require_frames(times, len(self))
-        self._stamps.warn_unless_increasing(times)
         folders = [self.folder / f"image_{camera}" for camera in self._cameras()]
-        _check_number_of_times(times, len(self), folders)
+        #: Numbers of the images, where they do not begin at 0.
+        self._numbers = _numbers_of_a_piece(times, len(self), folders)
+        if self._numbers is None:
+            _check_number_of_times(times, len(self), folders)
 
     def image_path(self, index: int, /) -> Path:
         """Return the file of the left image of a frame."""
@@ -127,7 +131,8 @@ class KittiSequence(RecordedSequence):
     def _path(self, camera: int, index: int) -> Path:
         index = index_of(index, len(self))
         folder = self.folder / f"image_{camera}"
-        path = folder / f"{index:06d}.png"
+        number = index if self._numbers is None else self._numbers[index]
+        path = folder / f"{number:06d}.png"
         if not path.is_file() and path.with_suffix(".jpg").is_file():
             path = path.with_suffix(".jpg")
         return path
@@ -225,18 +230,30 @@ def _choose_cameras(folder: Path, sensor: Sensor | None) -> tuple[int, int, bool
     return left, right, bool(whole)
 
 
-def _read_times(path: Path) -> Stamps:
+def _read_times(path: Path, fps: float | None) -> Stamps:
     lines = content_lines(path)
     for line in lines:
-        if len(line.fields) != 1:
-            raise DatasetError(
-                f"{path}:{line.number}: expected one time stamp, found {len(line.fields)} fields"
-            )
-    return Stamps(
-        np.array([number_of(path, line, line.fields[0]) for line in lines], dtype=np.float64),
-        tuple(line.fields[0] for line in lines),
-        tuple(line.number for line in lines),
+        time_of(path, line, " ".join(line.fields))
+    clock = read_clock(path, [" ".join(line.fields) for line in lines], fps)
+    if list(clock.order) != sorted(clock.order):
+        raise DatasetError(
+            f"{path}: time must grow from line to line, since the lines belong to the images in "
+            "order; correct the list"
+        )
+    return clock.stamps([line.number for line in lines])
+
+
+def _numbers_of_a_piece(times: Path, n: int, folders: list[Path]) -> list[int] | None:
+    """Numbers of the images of a piece of a sequence, as many as times; None if it begins at 0."""
+    found = [_numbers_of_images(folder) for folder in folders]
+    numbers = found[0]
+    if len(numbers) != n or not numbers or numbers[0] == 0 or any(f != numbers for f in found):
+        return None
+    _log.warning(
+        "%s: the images have the numbers %06d to %06d; line by line they belong to its %d times",
+        *(times, numbers[0], numbers[-1], n),
     )
+    return numbers
 
 
 def _check_number_of_times(times: Path, n: int, folders: list[Path]) -> None:

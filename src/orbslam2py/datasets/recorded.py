@@ -19,7 +19,7 @@ from orbslam2py.datasets.base import (
 )
 from orbslam2py.datasets.choose_settings import SettingsChoice, choose_settings
 from orbslam2py.datasets.frames import FramesInOrder
-from orbslam2py.errors import DatasetError
+from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.settings import Sensor, Settings, resolve_settings
 from orbslam2py.trajectory import Trajectory
 
@@ -86,6 +86,13 @@ class RecordedSequence(FramesInOrder, ABC):
         return choose_settings(
             self.sensor, self._settings_folders(), self._from_calibration, self._missing_calibration
         )
+
+    def known_rate(self) -> float | None:
+        """Images per second of the settings; None if nothing tells them."""
+        try:
+            return self.settings.camera.fps
+        except (SettingsError, DatasetError):
+            return None
 
     def __len__(self) -> int:
         return len(self._stamps.texts)

@@ -5,15 +5,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
-from orbslam2py._text_lines import TextLine, content_lines, number_of
+from orbslam2py._text_lines import TextLine, content_lines
 from orbslam2py.datasets.base import Stamps
+from orbslam2py.datasets.clock import is_time, read_clock, time_of, value_of
 from orbslam2py.errors import DatasetError
-from orbslam2py.trajectory.frame_times import in_seconds
 
 #: Whole numbers with so many digits are a time since 1970, in so many parts of a second.
 _PARTS_OF_SECOND = {19: 9, 16: 6, 13: 3}
@@ -74,11 +75,13 @@ def seconds_of_name(stem: str) -> str | None:
     return f"{stem[:-digits]}.{stem[-digits:]}"
 
 
-def read_time_file(path: Path, n: int, names: Sequence[str] | None = None) -> Stamps:
-    """Read one time stamp per image: decimal seconds, or whole nanoseconds.
+def read_time_file(
+    path: Path, n: int, names: Sequence[str] | None = None, fps: float | None = None
+) -> Stamps:
+    """Read one time stamp per image: seconds, milli-, micro- or nanoseconds, or dates.
 
-    A file of whole numbers holds nanoseconds if they make no sense as seconds (see `in_seconds`).
-    Empty lines and lines starting with ``#`` are left out.
+    The unit is the one that fits the frame rate; see `orbslam2py.datasets.clock`. Empty lines and
+    lines starting with ``#`` are left out.
 
     Lists with the images' files in the second field are read as well, such as ``rgb.txt`` and
     associations of TUM RGB-D, or EuRoC's ``data.csv``. The names of the files count then, without
@@ -92,6 +95,8 @@ def read_time_file(path: Path, n: int, names: Sequence[str] | None = None) -> St
         Number of images.
     names
         Names of their files; None if they have none (a video).
+    fps
+        Images per second by the settings, if they are known.
 
     Raises
     ------
@@ -102,19 +107,20 @@ def read_time_file(path: Path, n: int, names: Sequence[str] | None = None) -> St
     if names is not None and lines and len(lines[0].fields) > 1:
         lines = _lines_of(path, lines, names)
     for line in lines:
-        number_of(path, line, line.fields[0])
+        time_of(path, line, line.fields[0])
     if len(lines) != n:
         raise DatasetError(
             f"{path} holds {len(lines)} time stamps, but there are {n} images; give one for each"
         )
-    texts = in_seconds([line.fields[0] for line in lines])
-    seconds = np.array([float(text) for text in texts], dtype=np.float64)
-    for i in np.flatnonzero(np.diff(seconds) <= 0).tolist():
-        raise DatasetError(
-            f"{path}:{lines[i + 1].number}: time stamp {texts[i + 1]} is not after the one before "
-            f"it, {texts[i]}; time must grow from image to image"
-        )
-    return Stamps(seconds, tuple(texts), tuple(line.number for line in lines))
+    texts = [line.fields[0] for line in lines]
+    values = [value_of(path, text) for text in texts]
+    for i, (earlier, later) in enumerate(pairwise(values)):
+        if later <= earlier:
+            raise DatasetError(
+                f"{path}:{lines[i + 1].number}: time stamp {texts[i + 1]} is not after the one "
+                f"before it, {texts[i]}; time must grow from image to image"
+            )
+    return read_clock(path, texts, fps).stamps([line.number for line in lines])
 
 
 def _uniform_lines(path: Path) -> list[TextLine]:
@@ -122,6 +128,9 @@ def _uniform_lines(path: Path) -> list[TextLine]:
     lines = content_lines(path)
     if any("," in field for line in lines for field in line.fields):
         lines = content_lines(path, separator=",")
+    lines = [_with_date_joined(line) for line in lines]
+    if len(lines) > 1 and not is_time(lines[0].fields[0]) and is_time(lines[1].fields[0]):
+        lines = lines[1:]  # a head of names
     counts = {len(line.fields) for line in lines}
     if len(counts) > 1 or not counts <= _FIELDS:
         odd = next(line for line in lines if len(line.fields) != 1)
@@ -130,6 +139,14 @@ def _uniform_lines(path: Path) -> list[TextLine]:
             f"every line, found {len(odd.fields)} fields"
         )
     return lines
+
+
+def _with_date_joined(line: TextLine) -> TextLine:
+    """Join the two parts of a date that begins a line."""
+    joined = " ".join(line.fields[:2])
+    if len(line.fields) > 1 and is_time(joined):
+        return TextLine(line.number, [joined, *line.fields[2:]])
+    return line
 
 
 def _lines_of(path: Path, lines: list[TextLine], names: Sequence[str]) -> list[TextLine]:

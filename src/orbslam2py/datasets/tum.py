@@ -4,15 +4,18 @@
 from __future__ import annotations
 
 import logging
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from orbslam2py._arguments import index_of
-from orbslam2py._text_lines import TextLine, content_lines, number_of
+from orbslam2py._text_lines import TextLine, content_lines
 from orbslam2py.datasets.base import Images, Layout, Stamps, require_frames
 from orbslam2py.datasets.choose_settings import SettingsChoice
+from orbslam2py.datasets.clock import Clock, is_time, read_clock, time_of
 from orbslam2py.datasets.images import read_depth, read_image
 from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.errors import DatasetError
@@ -85,19 +88,19 @@ class TumSequence(RecordedSequence):
         available = (Sensor.RGBD, Sensor.MONOCULAR) if has_depth else (Sensor.MONOCULAR,)
         super().__init__(folder, available, sensor, settings)
         self._depth_paths: tuple[str, ...] | None = None
+        fps = self.known_rate()
         if self.sensor is Sensor.RGBD:
             source = found or self.folder / "rgb.txt"
             colour, self._depth_paths = (
-                _read_association(found) if found else _associate_lists(self.folder)
+                _read_association(found, fps) if found else _associate_lists(self.folder, fps)
             )
         elif (self.folder / "rgb.txt").is_file() or found is None:
             source = self.folder / "rgb.txt"
-            colour = read_image_list(source)
+            colour = read_image_list(source, fps)
         else:
             source = found
-            colour, _ = _read_association(found)
+            colour, _ = _read_association(found, fps)
         require_frames(source, len(colour.paths))
-        colour.stamps.warn_unless_increasing(source)
         self._list_path = source
         self._colour_paths, self._stamps = colour.paths, colour.stamps
 
@@ -130,15 +133,15 @@ def find_association(folder: Path) -> Path | None:
     return found[0] if found else None
 
 
-def _record(path: Path, line: TextLine, count: int, meaning: str) -> None:
-    if len(line.fields) != count:
-        raise DatasetError(
-            f"{path}:{line.number}: expected {meaning}, found {len(line.fields)} fields"
-        )
+def read_image_list(path: Path, fps: float | None = None) -> ImageList:
+    """Read ``time path`` lines; everything after the first blank is the path.
 
-
-def read_image_list(path: Path) -> ImageList:
-    """Read ``time path`` lines.
+    Parameters
+    ----------
+    path
+        The list.
+    fps
+        Images per second by the settings, if they are known.
 
     Raises
     ------
@@ -147,30 +150,85 @@ def read_image_list(path: Path) -> ImageList:
     """
     lines = content_lines(path)
     for line in lines:
-        _record(path, line, 2, "'timestamp path'")
-    return _image_list(path, lines, 0)
-
-
-def _read_association(path: Path) -> tuple[ImageList, tuple[str, ...]]:
-    lines = content_lines(path)
-    for line in lines:
-        _record(path, line, 4, "'t_rgb path_rgb t_depth path_depth'")
-        number_of(path, line, line.fields[2])
-    return _image_list(path, lines, 0), tuple(line.fields[3] for line in lines)
-
-
-def _image_list(path: Path, lines: list[TextLine], first: int) -> ImageList:
-    seconds = [number_of(path, line, line.fields[first]) for line in lines]
-    stamps = Stamps(
-        np.array(seconds, dtype=np.float64),
-        tuple(line.fields[first] for line in lines),
-        tuple(line.number for line in lines),
+        if len(line.fields) < 2:
+            raise DatasetError(f"{path}:{line.number}: expected 'timestamp path', found 1 field")
+    clock = _clock(path, lines, 0, fps)
+    return ImageList(
+        clock.stamps([line.number for line in lines]),
+        _found_here(path, [" ".join(lines[place].fields[1:]) for place in clock.order]),
     )
-    return ImageList(stamps, tuple(line.fields[first + 1] for line in lines))
 
 
-def _associate_lists(folder: Path) -> tuple[ImageList, tuple[str, ...]]:
-    colour, depth = read_image_list(folder / "rgb.txt"), read_image_list(folder / "depth.txt")
+def _read_association(path: Path, fps: float | None) -> tuple[ImageList, tuple[str, ...]]:
+    lines = content_lines(path)
+    pairs = [_split_association(path, line) for line in lines]
+    clock = _clock(path, lines, 0, fps)
+    first = _found_here(path, [pairs[place][0] for place in clock.order])
+    second = _found_here(path, [pairs[place][1] for place in clock.order])
+    if first and _is_depth_first(path.parent, first[0], second[0]):
+        _log.warning("%s: the depth images stand first, the colour images second", path)
+        first, second = second, first
+    return ImageList(clock.stamps([line.number for line in lines]), first), second
+
+
+def _clock(path: Path, lines: list[TextLine], field: int, fps: float | None) -> Clock:
+    for line in lines:
+        time_of(path, line, line.fields[field])
+    return read_clock(path, [line.fields[field] for line in lines], fps)
+
+
+def _split_association(path: Path, line: TextLine) -> tuple[str, str]:
+    """Split ``time path time path``, whose paths may hold blanks."""
+    fields = line.fields
+    between = [k for k in range(2, len(fields) - 1) if is_time(fields[k])]
+    if not between:
+        raise DatasetError(
+            f"{path}:{line.number}: expected 't_rgb path_rgb t_depth path_depth', found "
+            f"{len(fields)} fields"
+        )
+    return " ".join(fields[1 : between[0]]), " ".join(fields[between[0] + 1 :])
+
+
+def _is_depth_first(folder: Path, first: str, second: str) -> bool:
+    """Whether the first image of an association is the depth: by the folders' names, or pixels."""
+    names = [Path(one).parent.name.lower() or Path(one).name.lower() for one in (first, second)]
+    tells = ["depth" in name for name in names]
+    if tells[0] != tells[1]:
+        return tells[0]
+    pixels = [cv2.imread(str(folder / one), cv2.IMREAD_UNCHANGED) for one in (first, second)]
+    is_deep = [
+        image is not None and image.ndim == 2 and image.dtype != np.uint8 for image in pixels
+    ]
+    return is_deep == [True, False]
+
+
+def _found_here(source: Path, listed: list[str]) -> tuple[str, ...]:
+    """Return the paths of a list as they lie below its folder.
+
+    A list of another computer names images by paths that are not here: their last parts are.
+    """
+    folder = source.parent
+    if not listed or (folder / listed[0]).exists():
+        return tuple(listed)
+    parts = [_parts_of(one) for one in listed]
+    for count in range(len(parts[0]), 0, -1):
+        if (folder / Path(*parts[0][-count:])).exists():
+            _log.warning(
+                "%s names its images by paths of another computer; %s is taken for %s",
+                *(source, Path(*parts[0][-count:]), listed[0]),
+            )
+            return tuple(str(Path(*one[-count:])) for one in parts)
+    return tuple(listed)
+
+
+def _parts_of(path: str) -> list[str]:
+    """Split a path of any system, without its root."""
+    return [part for part in re.split(r"[/\\\\]+", path) if part and not part.endswith(":")]
+
+
+def _associate_lists(folder: Path, fps: float | None) -> tuple[ImageList, tuple[str, ...]]:
+    colour = read_image_list(folder / "rgb.txt", fps)
+    depth = read_image_list(folder / "depth.txt", fps)
     require_frames(folder / "rgb.txt", len(colour.paths))
     require_frames(folder / "depth.txt", len(depth.paths))
     i, j = associate(colour.stamps.seconds, depth.stamps.seconds)

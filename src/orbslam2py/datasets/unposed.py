@@ -123,6 +123,7 @@ def chosen_stamps(
     times: str | Path | None,
     otherwise: Stamps | float,
     names: Sequence[str] | None = None,
+    rate: float | None = None,
 ) -> Stamps:
     """Choose the time stamps of images: from a rate, from a file, or else their own.
 
@@ -138,6 +139,8 @@ def chosen_stamps(
         Time stamps, or a rate, if neither is given.
     names
         Names of the images' files, if they have any.
+    rate
+        Images per second by the settings, if they are known.
 
     Raises
     ------
@@ -151,7 +154,7 @@ def chosen_stamps(
             "--fps and --times exclude each other: both tell the time stamps; give one of them"
         )
     if times is not None:
-        return read_time_file(Path(times), n, names)
+        return read_time_file(Path(times), n, names, rate)
     if fps is not None:
         return stamps_of_rate(n, checked_rate(fps))
     return otherwise if isinstance(otherwise, Stamps) else stamps_of_rate(n, otherwise)

@@ -13,6 +13,7 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py.datasets.bags.bag import Bag, Message, Topic
 from orbslam2py.datasets.bags.messages import HEAD_SIZE, read_head
 from orbslam2py.datasets.base import Stamps
+from orbslam2py.datasets.clock import was_set_back
 from orbslam2py.errors import DatasetError
 from orbslam2py.trajectory import MAX_DIFFERENCE, associate
 
@@ -88,6 +89,12 @@ def time_messages(bag: Bag, topic: Topic) -> TimedMessages:
     if len(found) > 1 and len({stamp for stamp, _ in found}) == 1:
         _log.warning(
             "%s: all images of %s have the same stamp; the times of recording are taken",
+            *(bag.path, topic.name),
+        )
+        found = [(message.recorded, message) for _, message in found]
+    if was_set_back([stamp for stamp, _ in found]):
+        _log.warning(
+            "%s: the clock of %s was set back while it recorded; the times of recording are taken",
             *(bag.path, topic.name),
         )
         found = [(message.recorded, message) for _, message in found]

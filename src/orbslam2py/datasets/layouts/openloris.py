@@ -79,7 +79,6 @@ class OpenLorisSequence(DepthSequence):
 
 def _read_list(path: Path) -> tuple[Stamps, list[Path]]:
     listed = read_image_list(path)
-    listed.stamps.warn_unless_increasing(path)
     return listed.stamps, [path.parent / name for name in listed.paths]
 
 
