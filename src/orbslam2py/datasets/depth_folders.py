@@ -15,7 +15,7 @@ from orbslam2py._arguments import index_of
 from orbslam2py.datasets.base import Images, Stamps
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.image_folder import image_files
-from orbslam2py.datasets.images import read_any, read_depth, read_image
+from orbslam2py.datasets.images import read_any, read_depth
 from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.datasets.time_files import seconds_of_name, stamps_of_names
 from orbslam2py.datasets.unposed import chosen_stamps, with_rate
@@ -78,6 +78,11 @@ def folder_kinds(folder: Path) -> list[FolderKind]:
     """
     inner = sorted(child for child in folder.iterdir() if child.is_dir())
     return [_kind_of(child, files) for child in inner if (files := image_files(child))]
+
+
+def is_depth_name(name: str) -> bool:
+    """Tell whether a folder is called as if it held depth."""
+    return _DEPTH_NAME.search(name) is not None
 
 
 def find_depth_pair(folder: Path) -> DepthPair | None:
@@ -151,7 +156,7 @@ class DepthFolders(RecordedSequence):
             raise no_depth_pair(folder, folder_kinds(folder))
         super().__init__(folder, (Sensor.RGBD, Sensor.MONOCULAR), sensor, settings)
         self._fps = fps
-        images = _files_in_time(pair.colour.path)
+        images = files_in_time(pair.colour.path)
         self._depth_paths: list[Path] | None = None
         how = "images alone"
         if self.sensor is Sensor.RGBD:
@@ -188,7 +193,7 @@ class DepthFolders(RecordedSequence):
     def load(self, index: int, /) -> Images:
         """Read the images of a frame; see `datasets.base.Sequence.load`."""
         image_path, *depth_path = self._files(index_of(index, len(self)))
-        image = read_image(image_path, rgb=self.settings.camera.rgb)
+        image = self._read(image_path)
         return Images(image, depth=read_depth(depth_path[0])) if depth_path else Images(image)
 
     def ground_truth(self) -> Trajectory | None:
@@ -237,7 +242,7 @@ def _paired(
     folder: Path, pair: DepthPair, images: list[Path]
 ) -> tuple[list[Path], list[Path], str]:
     """Return images, the depth of each, and how they were paired."""
-    depths = _files_in_time(pair.depth.path)
+    depths = files_in_time(pair.depth.path)
     colour_stamps, depth_stamps = stamps_of_names(images), stamps_of_names(depths)
     by_name = {path.stem: path for path in depths}
     named = [path for path in images if path.stem in by_name]
@@ -265,7 +270,7 @@ def _paired(
     return [image for image, _ in both], [depth for _, depth in both], how
 
 
-def _files_in_time(folder: Path) -> list[Path]:
+def files_in_time(folder: Path) -> list[Path]:
     """Images by their time if their names are times, where 0.25 is before 0.5, else by name."""
     files = image_files(folder)
     if any(seconds_of_name(path.stem) is None for path in files):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from orbslam2py.datasets.bags.bag import Bag, Topic
-from orbslam2py.datasets.bags.image_topics import ImageTopic, rank_of, side_of_pair
+from orbslam2py.datasets.bags.image_topics import ImageTopic, rank_of
 from orbslam2py.datasets.bags.messages import (
     CAMERA_INFO,
     COMPRESSED_IMAGE,
@@ -19,6 +19,7 @@ from orbslam2py.datasets.bags.messages import (
     read_message,
 )
 from orbslam2py.datasets.bags.pixels import base_encoding, decode_depth, decode_image, is_depth
+from orbslam2py.datasets.pair_names import side_of_pair
 from orbslam2py.errors import DatasetError, OrbSlamError
 from orbslam2py.settings import Sensor
 
