@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from orbslam2py._arguments import index_of
+from orbslam2py._depth_size import depth_size_problem
 from orbslam2py.datasets.base import Images, Stamps
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.image_folder import image_files
@@ -101,8 +102,12 @@ def told_by_names(folder: Path) -> bool:
 
 def no_depth_pair(folder: Path, kinds: list[FolderKind]) -> DatasetError:
     """Say what is in a folder that should have had images and depth, and what to do."""
+    has = ", ".join(map(str, kinds))
+    only_depth = len(kinds) > 1 and all(one.kind == "depth" for one in kinds)
+    if only_depth:
+        has += "; all look like depth images (16 bits, one channel), none like images of the camera"
     return DatasetError(
-        f"cannot tell images and depth in {folder}: it has {', '.join(map(str, kinds))}; keep one "
+        f"cannot tell images and depth in {folder}: it has {has}; keep one "
         "folder of 8-bit images, such as color, and one of 16-bit depth, such as depth, or list "
         "the files in rgb.txt and depth.txt ('time path' in every line)"
     )
@@ -160,7 +165,7 @@ class DepthFolders(RecordedSequence):
         self._depth_paths: list[Path] | None = None
         how = "images alone"
         if self.sensor is Sensor.RGBD:
-            _require_equal_size(pair)
+            _require_equal_view(pair)
             images, self._depth_paths, how = _paired(folder, pair, images)
         self._paths, self._list_path = images, pair.colour.path
         own = stamps_of_names(images)
@@ -229,13 +234,11 @@ def _only(candidates: list[FolderKind], name: re.Pattern[str]) -> FolderKind | N
     return candidates[0] if len(candidates) == 1 else None
 
 
-def _require_equal_size(pair: DepthPair) -> None:
-    if pair.colour.size != pair.depth.size:
-        sizes = [f"{width} x {height}" for width, height in (pair.depth.size, pair.colour.size)]
-        raise ImageError(
-            f"depth in {pair.depth.path} is {sizes[0]}, the images in {pair.colour.path} are "
-            f"{sizes[1]}; bring both to the same size and view first"
-        )
+def _require_equal_view(pair: DepthPair) -> None:
+    depth, image = (one.size[::-1] for one in (pair.depth, pair.colour))
+    problem = None if depth == image else depth_size_problem(depth, image)
+    if problem is not None:
+        raise ImageError(f"{pair.depth.path} and {pair.colour.path}: {problem}")
 
 
 def _paired(

@@ -47,8 +47,7 @@ class ImageTopic:
     @property
     def is_depth(self) -> bool:
         """Whether its pixels are distances."""
-        named = self.encoding != "mono16" or "depth" in self.topic.name.lower()
-        return is_depth(self.encoding) and named
+        return is_depth(self.encoding, self.topic.name)
 
     @property
     def base(self) -> str:
