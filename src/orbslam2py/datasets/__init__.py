@@ -20,6 +20,7 @@ from orbslam2py.datasets.kitti import KittiSequence
 from orbslam2py.datasets.layouts import (
     BonnSequence,
     IclNuimSequence,
+    KittiRawSequence,
     Loader,
     OpenLorisSequence,
     ReplicaSequence,
@@ -45,6 +46,7 @@ __all__ = [
     "ImageFolder",
     "Images",
     "IterableSequence",
+    "KittiRawSequence",
     "KittiSequence",
     "Layout",
     "LiveCamera",

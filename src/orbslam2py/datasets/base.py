@@ -26,6 +26,7 @@ class Layout(str, Enum):
 
     TUM = "tum"
     KITTI = "kitti"
+    KITTI_RAW = "kitti-raw"
     EUROC = "euroc"
     ROSBAG1 = "rosbag1"
     ROSBAG2 = "rosbag2"
