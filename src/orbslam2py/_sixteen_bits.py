@@ -19,7 +19,9 @@ _DARKEST, _BRIGHTEST = 0.1, 99.9
 #: Share of the newest image in a range that follows the images: a few seconds long.
 _FOLLOWING = 0.02
 #: The line of Python that does it, for messages.
-LINE_OF_PYTHON = "image = ((np.clip(image, low, high) - low) * (255 / (high - low))).astype('uint8')"
+LINE_OF_PYTHON = (
+    "image = ((np.clip(image, low, high) - low) * (255 / (high - low))).astype('uint8')"
+)
 #: What to do about 16 bits where no range can be known, for messages.
 REMEDY = f"scale them to 8 bits with the same low and high for all images: {LINE_OF_PYTHON}"
 

@@ -16,8 +16,9 @@ SequenceArgument = Annotated[
     str,
     typer.Argument(
         help="Folder of a TUM RGB-D, KITTI or EuRoC sequence; folder of images, or one that holds "
-        "a folder of images and one of depth, or images of a left and a right camera; bag of ROS 1 or ROS 2 (.bag, .db3, "
-        ".mcap, or its folder); video file; number of a camera (ends with Ctrl-C)."
+        "a folder of images and one of depth, or images of a left and a right camera; bag of "
+        "ROS 1 or ROS 2 (.bag, .db3, .mcap, or its folder); video file; number of a camera (ends "
+        "with Ctrl-C)."
     ),
 ]
 SensorOption = Annotated[

@@ -36,9 +36,7 @@ class GreyScale:
         Reads some images, spread over the sequence.
     """
 
-    def __init__(
-        self, what: object, sample: Callable[[], Iterable[NDArray[np.generic]]]
-    ) -> None:
+    def __init__(self, what: object, sample: Callable[[], Iterable[NDArray[np.generic]]]) -> None:
         self._what = what
         self._sample = sample
         self._range: GreyRange | None = None
@@ -71,7 +69,8 @@ class GreyScale:
 
 def spread_over(n: int) -> list[int]:
     """Places of the sample in a sequence of `n` images, ascending."""
-    return np.unique(np.linspace(0, n - 1, min(n, N_SAMPLE)).round().astype(int)).tolist()
+    places = np.linspace(0, n - 1, min(n, N_SAMPLE))
+    return [int(place) for place in np.unique(places.round())]
 
 
 def read_sample(files: Iterable[Path]) -> list[NDArray[np.generic]]:
@@ -102,12 +101,12 @@ def refuse_depth(path: Path, image: NDArray[np.generic], *, with_depth: bool) ->
     named = "depth" in path.name.lower() or "depth" in path.parent.name.lower()
     if not (with_depth or named):
         return
-    remedy = "give the colour or grey images of the camera there, 8 bits per channel"
+    remedy = "Give the colour or grey images of the camera there, 8 bits per channel"
     if with_depth:
-        remedy += f"; for grey images of 16 bits make 8 bits of them first: {LINE_OF_PYTHON}"
+        remedy += f"; of grey images of 16 bits make 8 bits first: {LINE_OF_PYTHON}"
     raise ImageError(
         f"{path} looks like a depth image (16 bits, one channel), where an image of the camera "
-        f"is needed: are images and depth exchanged? {remedy[0].upper()}{remedy[1:]}"
+        f"is needed: are images and depth exchanged? {remedy}"
     )
 
 

@@ -126,7 +126,9 @@ class ImageFolder(FramesInOrder, UnposedSource):
         super().__init__(self.folder, self.folder.resolve().name, sensor, settings, fps, split)
         names = [path.name for path in self.paths]
         # Without either, lists of images such as NCLT's: their names are their times.
-        own_times = stamps_of_names(list(map(Path, stems))) if fps is None and times is None else None
+        own_times = (
+            stamps_of_names(list(map(Path, stems))) if fps is None and times is None else None
+        )
         otherwise = own_times or self.settings.camera.fps
         self._stamps = chosen_stamps(len(names), fps, times, otherwise, names)
 

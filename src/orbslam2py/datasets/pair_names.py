@@ -19,8 +19,8 @@ _CAMERA = re.compile(
 )
 #: The same for files in one folder: there the number of an ``image`` may well be that of the frame.
 _CAMERA_WORDS = ("c", "cam", "camera", "infra")
-#: So much of the shorter series must have a partner, and so much of a folder be in both series.
-_COMMON = 0.5
+#: Most of a folder that may be in neither of two series.
+_OTHERS = 0.5
 
 
 def side_of_pair(left: str, right: str) -> int | None:
@@ -94,14 +94,9 @@ def find_series(files: Sequence[Path]) -> Series | None:
         n_others = len(files) - len(set(left.values()) | set(right.values()))
         series = Series(left, right, sides, n_others)
         alike = {_form(name) for name in left} & {_form(name) for name in right}
-        if alike and n_others <= _COMMON * len(files):
+        if alike and n_others <= _OTHERS * len(files):
             found.append(series)
     return max(found, key=lambda series: len(series.common), default=None)
-
-
-def is_paired(series: Series) -> bool:
-    """Tell whether most of the shorter series have a partner of equal name."""
-    return len(series.common) >= _COMMON * min(len(series.left), len(series.right))
 
 
 def _without_side(stem: str) -> list[tuple[str, str]]:

@@ -16,7 +16,7 @@ from orbslam2py.datasets.base import Images, Stamps
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.depth_folders import FolderKind, files_in_time, folder_kinds, is_depth_name
 from orbslam2py.datasets.image_folder import image_files
-from orbslam2py.datasets.pair_names import find_series, is_paired, side_of_pair, tells_camera
+from orbslam2py.datasets.pair_names import find_series, side_of_pair, tells_camera
 from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.datasets.rectification import Rectifier
 from orbslam2py.datasets.time_files import stamps_of_names
@@ -167,9 +167,10 @@ class StereoFolders(RecordedSequence):
         doubt = _doubt(pair, settings) if sensor is None else None
         if doubt is not None:
             sensor = Sensor.MONOCULAR
-            _log.warning("%s: %s; taking the left images alone (%s)", folder, doubt, pair.left)
+            _log.warning("%s is not taken as a pair: %s", folder, doubt)
         super().__init__(folder, (Sensor.STEREO, Sensor.MONOCULAR), sensor, settings)
         self._fps = fps
+        how = ""
         if self.sensor is Sensor.STEREO:
             frames, how = _paired(pair)
             alone = len(pair.left_files) + len(pair.right_files) - 2 * len(frames)
@@ -177,7 +178,6 @@ class StereoFolders(RecordedSequence):
                 _log.warning("%s: %d images have no partner, left out", folder, alone)
         else:
             frames = [(name, path, path) for name, path in pair.left_files.items()]
-            how = "alone"
         self._paths = [left for _, left, _ in frames]
         self._right = [right for _, _, right in frames]
         self._list_path = folder
@@ -189,10 +189,10 @@ class StereoFolders(RecordedSequence):
             told = "are their names" if own else f"count {otherwise:g} images per second"
         names = [path.name for path in self._paths]
         self._stamps = chosen_stamps(len(names), fps, times, otherwise, names)
-        what = f"{len(names)} left images ({pair.left})"
+        what = f"taking the {len(names)} left images alone ({pair.left}, not {pair.right})"
         if self.sensor is Sensor.STEREO:
-            what = f"{len(names)} left images ({pair.left}) with right ones ({pair.right})"
-        _log.info("%s: %s, %s; their times %s", folder, what, how, told)
+            what = f"{len(names)} pairs of {pair.left} and {pair.right}, {how}"
+        _log.info("%s: %s; their times %s", folder, what, told)
 
     @cached_property
     def settings(self) -> Settings:

@@ -155,8 +155,9 @@ def _difference(
 ) -> str:
     """Say in what the two cameras differ; nothing if they do not, or nobody knows."""
     if images.size != depth.size and images.size and depth.size:
-        if says_registered(depth) and depth_size_problem(depth.size[::-1], images.size[::-1]) is None:
-            return ""  # only smaller
+        problem = depth_size_problem(depth.size[::-1], images.size[::-1])
+        if says_registered(depth) and problem is None:
+            return ""  # it is only smaller
         return "{} x {} pixels against {} x {}".format(*depth.size, *images.size)
     if depth_info is None or (colour_info is None and chosen is None):
         return ""

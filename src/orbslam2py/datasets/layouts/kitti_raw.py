@@ -12,7 +12,6 @@ import numpy as np
 
 from orbslam2py._arguments import index_of
 from orbslam2py._arguments import number_of as counted
-from orbslam2py._arrays import FloatArray
 from orbslam2py._text_lines import content_lines
 from orbslam2py.datasets.base import Images, Layout, Stamps, rate_of, require_frames
 from orbslam2py.datasets.choose_settings import SettingsChoice

@@ -99,7 +99,9 @@ class DriveCalibration:
                 *self.size(camera, raw=True),
             )
         except SettingsError as error:
-            raise DatasetError(f"{self._path(CAMERAS_FILE)}, camera {camera:02d}: {error}") from error
+            raise DatasetError(
+                f"{self._path(CAMERAS_FILE)}, camera {camera:02d}: {error}"
+            ) from error
 
     def _settings(
         self,
