@@ -125,7 +125,7 @@ def _open_recorded(
     if path.is_dir() and not has_layout(path):
         if image_files(path) and split:
             return ImageFolder(path, sensor, settings=settings, fps=fps, times=times, split=True)
-        if find_image_pair(path, wanted=True) or find_depth_pair(path):
+        if split and (find_image_pair(path, wanted=True) or find_depth_pair(path)):
             _refuse_split(path, "a folder with two folders of images", split)
         opened = open_folders(path, sensor, settings, fps, times)
         if opened is not None:
