@@ -51,10 +51,10 @@ def view(
     from orbslam2py.viewer.server import LOOPBACK  # noqa: PLC0415
 
     log_to(Console(stderr=True), quiet=False)
-    run = read_run(folder)
-    images = None
     if split and sequence is None:
         raise DatasetError("--split says what --sequence holds; give it as well")
+    run = read_run(folder)
+    images = None
     if sequence is not None:
         chosen = str(folder / "settings.yaml")
         opened = open_input(sequence, run.sensor, settings=chosen, split=split)

@@ -146,8 +146,8 @@ class UnposedSource:
             raise DatasetError(
                 f"{self._what} has images of {found[0]} x {found[1]} pixels, twice as wide as "
                 f"those of the settings ({given[0]} x {given[1]}): if they hold the left and the "
-                "right view side by side, take --split (with --sensor mono for the left one "
-                "alone); else correct Camera.width in the settings"
+                "right view side by side, take --split of 'orbslam2py run' (with --sensor mono for "
+                "the left one alone); else correct Camera.width in the settings"
             )
         _log.warning(
             "%s has images of %d x %d pixels%s, but the settings are for %d x %d: "
@@ -164,7 +164,7 @@ def _choose_sensor(what: str | Path, sensor: Sensor | str | None, *, split: bool
     if not split and sensor is not None and Sensor(sensor) is Sensor.STEREO:
         raise DatasetError(
             f"{what} has no stereo images; it can be used as: mono; if every image holds the left "
-            "and the right view side by side, take --split"
+            "and the right view side by side, take --split of 'orbslam2py run'"
         )
     return choose_sensor(Path(what), sensor, available)
 

@@ -30,7 +30,7 @@ def write(folder: Path, left: str, right: str, n: int = N, right_from: int = 0) 
 
 
 def values(sequence: object) -> list[tuple[int, int]]:
-    loaded = [sequence.load(i) for i in range(len(sequence))]  # type: ignore[attr-defined, arg-type, var-annotated]
+    loaded = [sequence.load(i) for i in range(len(sequence))]  # type: ignore[attr-defined, arg-type]
     return [(int(one.image[0, 0]), int(one.right[0, 0])) for one in loaded]
 
 

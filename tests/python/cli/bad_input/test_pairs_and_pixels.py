@@ -157,6 +157,14 @@ def test_split_of_what_has_two_images(
     expect_refused(done, "--split is for images that hold two views side by side", "leave it out")
 
 
+def test_split_of_nothing(command: CommandLine, tmp_path: Path) -> None:
+    done = command("view", "nowhere", "--split")
+    expect_refused(done, "--split says what --sequence holds", "give it as well")
+    (tmp_path / "x.orbmap").write_bytes(b"no map")
+    done = command("map", "export", "colmap", tmp_path / "x.orbmap", "out", "--split")
+    expect_refused(done, "--split says what --images hold", "give these as well")
+
+
 def test_split_for_rgbd(command: CommandLine, wide: Path) -> None:
     done = run(command, wide, "rgbd", *WITH, "--split")
     expect_refused(done, "has no rgbd images; it can be used as: stereo, mono")
