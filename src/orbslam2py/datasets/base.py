@@ -26,7 +26,6 @@ class Layout(str, Enum):
 
     TUM = "tum"
     KITTI = "kitti"
-    KITTI_RAW = "kitti-raw"
     EUROC = "euroc"
     ROSBAG1 = "rosbag1"
     ROSBAG2 = "rosbag2"
@@ -36,6 +35,7 @@ class Layout(str, Enum):
     BONN = "bonn"
     REPLICA = "replica"
     OPENLORIS = "openloris"
+    KITTI_RAW = "kitti-raw"
 
     @classmethod
     def _missing_(cls, value: object) -> Layout:

@@ -33,7 +33,7 @@ _COMMON = 0.5
 A_PAIR = (
     "a pair is two folders of images, such as left and right or cam0 and cam1, or two series in "
     "one folder, such as left_0000.png and right_0000.png; for images that hold both views side "
-    "by side take --split"
+    "by side take --split of 'orbslam2py run'"
 )
 
 
