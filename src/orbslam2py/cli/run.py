@@ -40,6 +40,7 @@ from orbslam2py.cli.run_options import (
     SetOption,
     SettingsOption,
     SeveralMapsFlag,
+    SplitFlag,
     StartOption,
     StrideOption,
     TimesOption,
@@ -96,6 +97,7 @@ def run(
     times: TimesOption = None,
     mask: MaskOption = None,
     topics: TopicsOption = None,
+    split: SplitFlag = False,
     load: LoadOption = None,
     initial_pose: InitialPoseOption = None,
     allow_other_setup: AllowOtherSetupFlag = False,
@@ -146,7 +148,14 @@ def run(
             check_sensor(loaded, sensor)
         sensor, chosen = loaded.sensor, loaded.settings
     images = open_input(
-        sequence, sensor, settings=chosen, fps=fps, times=times, mask=mask, topics=topics
+        sequence,
+        sensor,
+        settings=chosen,
+        fps=fps,
+        times=times,
+        mask=mask,
+        topics=topics,
+        split=split,
     )
     if output is not None:
         check_apart({"--output": output}, [] if mask is None else [mask])

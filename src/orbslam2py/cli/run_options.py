@@ -15,9 +15,10 @@ from orbslam2py.slam.effort import Effort
 SequenceArgument = Annotated[
     str,
     typer.Argument(
-        help="Folder of a TUM RGB-D, KITTI odometry or EuRoC sequence; folder of images, "
-        "or one that holds a folder of images and one of depth; bag of ROS 1 or ROS 2 (.bag, .db3, "
-        ".mcap, or its folder); video file; number of a camera (ends with Ctrl-C)."
+        help="Folder of a TUM RGB-D, KITTI or EuRoC sequence; folder of images, or one that holds "
+        "a folder of images and one of depth, or images of a left and a right camera; bag of "
+        "ROS 1 or ROS 2 (.bag, .db3, .mcap, or its folder); video file; number of a camera (ends "
+        "with Ctrl-C)."
     ),
 ]
 SensorOption = Annotated[
@@ -56,6 +57,14 @@ TopicsOption = Annotated[
         "depth_info, truth  "
         "[guessed by types and names].",
         metavar="left=/a,right=/b",
+    ),
+]
+SplitFlag = Annotated[
+    bool,
+    typer.Option(
+        "--split",
+        help="Each image of a video, folder or camera holds two views side by side: the left half "
+        "is the left one of a stereo pair.",
     ),
 ]
 MaskOption = Annotated[

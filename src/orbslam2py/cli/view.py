@@ -31,6 +31,9 @@ def view(
             metavar="SEQUENCE",
         ),
     ] = None,
+    split: Annotated[
+        bool, typer.Option("--split", help="Of --sequence, as the run was given it.")
+    ] = False,
     viewer_port: ViewerPort = None,
     viewer_host: ViewerHost = None,
 ) -> None:
@@ -48,10 +51,13 @@ def view(
     from orbslam2py.viewer.server import LOOPBACK  # noqa: PLC0415
 
     log_to(Console(stderr=True), quiet=False)
+    if split and sequence is None:
+        raise DatasetError("--split says what --sequence holds; give it as well")
     run = read_run(folder)
     images = None
     if sequence is not None:
-        opened = open_input(sequence, run.sensor, settings=str(folder / "settings.yaml"))
+        chosen = str(folder / "settings.yaml")
+        opened = open_input(sequence, run.sensor, settings=chosen, split=split)
         if not is_sequence(opened):
             raise DatasetError("--sequence names a camera, whose images are gone; name a recording")
         images = opened

@@ -20,6 +20,7 @@ from orbslam2py.datasets.kitti import KittiSequence
 from orbslam2py.datasets.layouts import (
     BonnSequence,
     IclNuimSequence,
+    KittiRawSequence,
     Loader,
     OpenLorisSequence,
     ReplicaSequence,
@@ -30,6 +31,7 @@ from orbslam2py.datasets.masks import MaskedCamera, MaskedSequence
 from orbslam2py.datasets.open_input import open_input
 from orbslam2py.datasets.recognise import is_recording, open_sequence, recognise
 from orbslam2py.datasets.recorded import RecordedSequence
+from orbslam2py.datasets.stereo_folders import StereoFolders
 from orbslam2py.datasets.tum import TumSequence
 from orbslam2py.datasets.video import VideoReader, VideoSequence
 
@@ -44,6 +46,7 @@ __all__ = [
     "ImageFolder",
     "Images",
     "IterableSequence",
+    "KittiRawSequence",
     "KittiSequence",
     "Layout",
     "LiveCamera",
@@ -58,6 +61,7 @@ __all__ = [
     "Sequence",
     "SevenScenesSequence",
     "Source",
+    "StereoFolders",
     "TumSequence",
     "VideoReader",
     "VideoSequence",

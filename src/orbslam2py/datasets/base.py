@@ -35,6 +35,7 @@ class Layout(str, Enum):
     BONN = "bonn"
     REPLICA = "replica"
     OPENLORIS = "openloris"
+    KITTI_RAW = "kitti-raw"
 
     @classmethod
     def _missing_(cls, value: object) -> Layout:

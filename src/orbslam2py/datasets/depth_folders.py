@@ -12,10 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from orbslam2py._arguments import index_of
+from orbslam2py._depth_size import depth_size_problem
 from orbslam2py.datasets.base import Images, Stamps
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.image_folder import image_files
-from orbslam2py.datasets.images import read_any, read_depth, read_image
+from orbslam2py.datasets.images import read_any, read_depth
 from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.datasets.time_files import seconds_of_name, stamps_of_names
 from orbslam2py.datasets.unposed import chosen_stamps, with_rate
@@ -80,6 +81,11 @@ def folder_kinds(folder: Path) -> list[FolderKind]:
     return [_kind_of(child, files) for child in inner if (files := image_files(child))]
 
 
+def is_depth_name(name: str) -> bool:
+    """Tell whether a folder is called as if it held depth."""
+    return _DEPTH_NAME.search(name) is not None
+
+
 def find_depth_pair(folder: Path) -> DepthPair | None:
     """Return the two sub-folders with images and depth; None if that cannot be told."""
     kinds = folder_kinds(folder)
@@ -96,8 +102,12 @@ def told_by_names(folder: Path) -> bool:
 
 def no_depth_pair(folder: Path, kinds: list[FolderKind]) -> DatasetError:
     """Say what is in a folder that should have had images and depth, and what to do."""
+    has = ", ".join(map(str, kinds))
+    only_depth = len(kinds) > 1 and all(one.kind == "depth" for one in kinds)
+    if only_depth:
+        has += "; all look like depth images (16 bits, one channel), none like images of the camera"
     return DatasetError(
-        f"cannot tell images and depth in {folder}: it has {', '.join(map(str, kinds))}; keep one "
+        f"cannot tell images and depth in {folder}: it has {has}; keep one "
         "folder of 8-bit images, such as color, and one of 16-bit depth, such as depth, or list "
         "the files in rgb.txt and depth.txt ('time path' in every line)"
     )
@@ -151,11 +161,11 @@ class DepthFolders(RecordedSequence):
             raise no_depth_pair(folder, folder_kinds(folder))
         super().__init__(folder, (Sensor.RGBD, Sensor.MONOCULAR), sensor, settings)
         self._fps = fps
-        images = _files_in_time(pair.colour.path)
+        images = files_in_time(pair.colour.path)
         self._depth_paths: list[Path] | None = None
         how = "images alone"
         if self.sensor is Sensor.RGBD:
-            _require_equal_size(pair)
+            _require_equal_view(pair)
             images, self._depth_paths, how = _paired(folder, pair, images)
         self._paths, self._list_path = images, pair.colour.path
         own = stamps_of_names(images)
@@ -188,7 +198,7 @@ class DepthFolders(RecordedSequence):
     def load(self, index: int, /) -> Images:
         """Read the images of a frame; see `datasets.base.Sequence.load`."""
         image_path, *depth_path = self._files(index_of(index, len(self)))
-        image = read_image(image_path, rgb=self.settings.camera.rgb)
+        image = self._read(image_path)
         return Images(image, depth=read_depth(depth_path[0])) if depth_path else Images(image)
 
     def ground_truth(self) -> Trajectory | None:
@@ -224,20 +234,18 @@ def _only(candidates: list[FolderKind], name: re.Pattern[str]) -> FolderKind | N
     return candidates[0] if len(candidates) == 1 else None
 
 
-def _require_equal_size(pair: DepthPair) -> None:
-    if pair.colour.size != pair.depth.size:
-        sizes = [f"{width} x {height}" for width, height in (pair.depth.size, pair.colour.size)]
-        raise ImageError(
-            f"depth in {pair.depth.path} is {sizes[0]}, the images in {pair.colour.path} are "
-            f"{sizes[1]}; bring both to the same size and view first"
-        )
+def _require_equal_view(pair: DepthPair) -> None:
+    depth, image = (one.size[::-1] for one in (pair.depth, pair.colour))
+    problem = None if depth == image else depth_size_problem(depth, image)
+    if problem is not None:
+        raise ImageError(f"{pair.depth.path} and {pair.colour.path}: {problem}")
 
 
 def _paired(
     folder: Path, pair: DepthPair, images: list[Path]
 ) -> tuple[list[Path], list[Path], str]:
     """Return images, the depth of each, and how they were paired."""
-    depths = _files_in_time(pair.depth.path)
+    depths = files_in_time(pair.depth.path)
     colour_stamps, depth_stamps = stamps_of_names(images), stamps_of_names(depths)
     by_name = {path.stem: path for path in depths}
     named = [path for path in images if path.stem in by_name]
@@ -265,7 +273,7 @@ def _paired(
     return [image for image, _ in both], [depth for _, depth in both], how
 
 
-def _files_in_time(folder: Path) -> list[Path]:
+def files_in_time(folder: Path) -> list[Path]:
     """Images by their time if their names are times, where 0.25 is before 0.5, else by name."""
     files = image_files(folder)
     if any(seconds_of_name(path.stem) is None for path in files):

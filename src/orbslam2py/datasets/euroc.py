@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py._arguments import index_of
-from orbslam2py._arrays import ByteArray, FloatArray
+from orbslam2py._arrays import FloatArray
 from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py._text_lines import content_lines
 from orbslam2py.datasets.base import Images, Layout, Stamps, require_frames
@@ -23,7 +23,6 @@ from orbslam2py.datasets.euroc_calibration import (
     read_sensor_yaml,
     stereo_settings,
 )
-from orbslam2py.datasets.images import read_image
 from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.datasets.rectification import Rectifier
 from orbslam2py.errors import DatasetError, SettingsError
@@ -187,9 +186,6 @@ class EurocSequence(RecordedSequence):
                 "to use sensor.yaml"
             )
         return self.settings.rectification
-
-    def _read(self, path: Path) -> ByteArray:
-        return read_image(path, rgb=self.settings.camera.rgb)
 
     def _settings_folders(self) -> tuple[Path, ...]:
         return (self.folder, self._root)

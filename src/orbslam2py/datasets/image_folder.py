@@ -1,23 +1,37 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A folder of images of one camera, in the order of their names."""
+"""A folder of images, in the order of their names."""
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from orbslam2py._arguments import index_of
-from orbslam2py._arrays import FloatArray
+from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.datasets.base import Images
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.frames import FramesInOrder
+from orbslam2py.datasets.grey_scale import (
+    GreyScale,
+    read_sample,
+    refuse_depth,
+    refuse_first_depth,
+    spread_over,
+)
 from orbslam2py.datasets.images import read_image
+from orbslam2py.datasets.pair_names import find_series
 from orbslam2py.datasets.time_files import stamps_of_names
 from orbslam2py.datasets.unposed import UnposedSource, chosen_stamps
 from orbslam2py.errors import DatasetError
 from orbslam2py.settings import Sensor, Settings
+
+_log = logging.getLogger(__name__)
 
 _SETTINGS_FILE = "settings.yaml"
 
@@ -60,7 +74,7 @@ class ImageFolder(FramesInOrder, UnposedSource):
     folder
         Where the images are; its subfolders are not looked at.
     sensor
-        Monocular.
+        Monocular; if images are split also stereo, the default then.
     settings
         Settings, a file, a built-in name, or None for ``settings.yaml`` in the folder.
     fps
@@ -69,6 +83,8 @@ class ImageFolder(FramesInOrder, UnposedSource):
     times
         File with one time stamp per image, in the order of the images; or a list of images with
         their time stamps, such as ``rgb.txt`` of TUM RGB-D.
+    split
+        Whether every image holds the left view in its left half, the right view in its right half.
 
     Raises
     ------
@@ -88,9 +104,18 @@ class ImageFolder(FramesInOrder, UnposedSource):
         settings: SettingsChoice = None,
         fps: float | None = None,
         times: str | Path | None = None,
+        split: bool = False,
     ) -> None:
         self.folder = Path(folder)
         self.paths = image_files(self.folder)
+        stems = [path.stem for path in self.paths]
+        series = None if split else find_series(self.paths)
+        if series is not None:
+            stems, self.paths = list(series.left), list(series.left.values())
+            _log.warning(
+                "%s has a left and a right series (%s*, %s*); taking the %d left images alone",
+                *(self.folder, *series.sides, len(stems)),
+            )
         if not self.paths:
             raise DatasetError(
                 f"no images in {self.folder}: looked for {', '.join(sorted(IMAGE_SUFFIXES))}"
@@ -98,12 +123,20 @@ class ImageFolder(FramesInOrder, UnposedSource):
         own = self.folder / _SETTINGS_FILE
         if settings is None and own.is_file():
             settings = own
-        super().__init__(self.folder, self.folder.resolve().name, sensor, settings, fps)
+        super().__init__(self.folder, self.folder.resolve().name, sensor, settings, fps, split)
         names = [path.name for path in self.paths]
         # Without either, lists of images such as NCLT's: their names are their times.
-        own_times = stamps_of_names(self.paths) if fps is None and times is None else None
+        own_times = (
+            stamps_of_names(list(map(Path, stems))) if fps is None and times is None else None
+        )
         otherwise = own_times or self.settings.camera.fps
         self._stamps = chosen_stamps(len(names), fps, times, otherwise, names)
+
+        self._grey_scale = GreyScale(self.folder, self._sample)
+        for first in read_sample(self.paths[:1]):
+            refuse_first_depth(self.paths[0], with_depth=False)
+            self.check_size(first)
+            self._size_checked = True
 
     def __len__(self) -> int:
         return len(self.paths)
@@ -127,4 +160,12 @@ class ImageFolder(FramesInOrder, UnposedSource):
 
     def load(self, index: int, /) -> Images:
         """Read the image of a frame; see `datasets.base.Sequence.load`."""
-        return Images(self._ordered(read_image(self.paths[index_of(index, len(self))], rgb=False)))
+        path = self.paths[index_of(index, len(self))]
+        return self._delivered(read_image(path, rgb=False, to_8_bits=self._to_8_bits))
+
+    def _to_8_bits(self, image: NDArray[np.generic], path: Path) -> ByteArray:
+        refuse_depth(path, image, with_depth=False)
+        return self._grey_scale(image)
+
+    def _sample(self) -> list[NDArray[np.generic]]:
+        return read_sample(self.paths[index] for index in spread_over(len(self)))

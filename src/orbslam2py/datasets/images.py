@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from orbslam2py import _core as core
 from orbslam2py._arrays import ByteArray
 from orbslam2py._files import kind_of_special, utf8_path
+from orbslam2py._sixteen_bits import REMEDY
 from orbslam2py.errors import DatasetError, ImageError, OrbSlamError
 
 _PNG, _PNG_END = b"\x89PNG", b"IEND"
@@ -76,15 +77,21 @@ def open_video(path: Path, error: type[OrbSlamError] = DatasetError) -> cv2.Vide
         return cv2.VideoCapture(named if path.is_absolute() else f"./{named}")
 
 
-def read_image(path: Path, *, rgb: bool) -> ByteArray:
-    """Read a grey or colour image as it is.
+#: Makes 8 bits of an image of 16 bits; takes the file as well.
+To8Bits = Callable[[NDArray[np.generic], Path], ByteArray]
+
+
+def read_image(path: Path, *, rgb: bool, to_8_bits: To8Bits | None = None) -> ByteArray:
+    """Read a grey or colour image.
 
     Parameters
     ----------
     path
-        An 8-bit image file of any format OpenCV reads.
+        An image file of any format OpenCV reads.
     rgb
         Whether colour is wanted in the order RGB (True) or BGR.
+    to_8_bits
+        What is done with 16 bits per channel; None if they are refused.
 
     Returns
     -------
@@ -96,11 +103,16 @@ def read_image(path: Path, *, rgb: bool) -> ByteArray:
     DatasetError
         If there is no such file.
     ImageError
-        If it is no complete 8-bit image.
+        If it is no complete image of 8 bits (or 16, see `to_8_bits`).
     """
     decoded = read_any(path)
+    if decoded.dtype == np.uint16 and to_8_bits is not None:
+        decoded = to_8_bits(decoded, path)
     if decoded.dtype != np.uint8:
-        raise ImageError(f"{path} has {decoded.dtype} pixels; images must be 8 bits per channel")
+        remedy = f"; {REMEDY}" if decoded.dtype == np.uint16 else ""
+        raise ImageError(
+            f"{path} has {decoded.dtype} pixels; images must be 8 bits per channel{remedy}"
+        )
     image = decoded.astype(np.uint8, copy=False)
     if image.ndim == 3 and image.shape[2] == 1:
         image = image[:, :, 0]

@@ -102,8 +102,7 @@ class KittiSequence(RecordedSequence):
 
     def load(self, index: int, /) -> Images:
         """Read the images of a frame; see `datasets.base.Sequence.load`."""
-        rgb = self.settings.camera.rgb
-        image, *right = (read_image(path, rgb=rgb) for path in self._files(index))
+        image, *right = map(self._read, self._files(index))
         return Images(image, right=right[0]) if right else Images(image)
 
     def ground_truth(self) -> Trajectory | None:

@@ -12,9 +12,11 @@ from typing import Any, Protocol
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from orbslam2py._arrays import ByteArray
-from orbslam2py.datasets.base import Images, LiveFrame
+from orbslam2py._sixteen_bits import FollowingRange
+from orbslam2py.datasets.base import LiveFrame
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.images import quiet_opencv
 from orbslam2py.datasets.unposed import UnposedSource
@@ -57,13 +59,16 @@ class LiveCamera(UnposedSource):
     number
         Number of the camera among those of the machine, from 0.
     sensor
-        Monocular.
+        Monocular; if images are split also stereo, the default then.
     settings
-        Settings, a file or a built-in name. The camera is asked for their image size.
+        Settings, a file or a built-in name. The camera is asked for their image size, or for twice
+        their width if images are split.
     fps
         Images per second that the camera is asked for; by default it decides.
     open_capture
         Opens a camera by its number.
+    split
+        Whether every image holds the left view in its left half, the right view in its right half.
 
     Raises
     ------
@@ -87,8 +92,9 @@ class LiveCamera(UnposedSource):
         settings: SettingsChoice = None,
         fps: float | None = None,
         open_capture: Callable[[int], Capture] = cv2.VideoCapture,
+        split: bool = False,
     ) -> None:
-        super().__init__(f"camera {number}", f"camera{number}", sensor, settings, fps)
+        super().__init__(f"camera {number}", f"camera{number}", sensor, settings, fps, split)
         self.number = number
         self._fps = fps
         self._open_capture = open_capture
@@ -101,6 +107,7 @@ class LiveCamera(UnposedSource):
         self._failure: str | None = None
         self._stopped = False
         self._seen_at = 0.0
+        self._range: FollowingRange | None = None
 
     @property
     def n_dropped(self) -> int:
@@ -159,7 +166,7 @@ class LiveCamera(UnposedSource):
             raise DatasetError(f"camera {self.number} cannot be opened{hint}; {there}")
         camera = self.settings.camera
         if camera.width is not None and camera.height is not None:
-            capture.set(cv2.CAP_PROP_FRAME_WIDTH, camera.width)
+            capture.set(cv2.CAP_PROP_FRAME_WIDTH, (1 + self._split) * camera.width)
             capture.set(cv2.CAP_PROP_FRAME_HEIGHT, camera.height)
         if self._fps is not None:
             capture.set(cv2.CAP_PROP_FPS, self._fps)
@@ -199,7 +206,7 @@ class LiveCamera(UnposedSource):
                     )
                 return None
         timestamp, image = taken
-        return LiveFrame(timestamp, f"{timestamp:.6f}", Images(self._ordered(image)))
+        return LiveFrame(timestamp, f"{timestamp:.6f}", self._delivered(image))
 
     def __iter__(self) -> Iterator[LiveFrame]:
         """Yield the newest image again and again; see `take`."""
@@ -234,9 +241,17 @@ class LiveCamera(UnposedSource):
             last = max(round(time.perf_counter() + offset, 6), round(last + 1e-6, 6))
             with self._changed:
                 self._n_dropped += self._newest is not None
-                self._newest = (last, np.asarray(image, dtype=np.uint8))
+                self._newest = (last, self._in_8_bits(image))
                 self._seen_at = time.monotonic()
                 self._changed.notify_all()
+
+    def _in_8_bits(self, image: NDArray[np.generic]) -> ByteArray:
+        if image.dtype != np.uint16:
+            return np.asarray(image, dtype=np.uint8)
+        if self._range is None:
+            self._range = FollowingRange()
+            _log.info("%s: images of 16 bits; scaled to 8 by a range that follows them", self._what)
+        return self._range.to_8_bits(image)
 
     def _fail(self, message: str) -> None:
         with self._changed:

@@ -12,18 +12,19 @@ from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.datasets.bags import BagSequence
 from orbslam2py.datasets.base import IterableSequence, LiveSource
 from orbslam2py.datasets.choose_settings import SettingsChoice
-from orbslam2py.datasets.depth_folders import DepthFolders, find_depth_pair
+from orbslam2py.datasets.depth_folders import find_depth_pair
 from orbslam2py.datasets.image_folder import ImageFolder, image_files
 from orbslam2py.datasets.images import open_video
 from orbslam2py.datasets.live import LiveCamera
 from orbslam2py.datasets.masks import MaskedCamera, MaskedSequence
 from orbslam2py.datasets.recognise import (
     has_layout,
-    is_depth_pair,
     is_recording,
+    open_folders,
     open_sequence,
 )
 from orbslam2py.datasets.recorded import RecordedSequence
+from orbslam2py.datasets.stereo_folders import find_image_pair, no_pair
 from orbslam2py.datasets.video import VideoSequence
 from orbslam2py.errors import DatasetError
 from orbslam2py.settings import Sensor
@@ -44,14 +45,16 @@ def open_input(
     times: str | Path | None = None,
     mask: str | Path | None = None,
     topics: Mapping[str, str] | str | None = None,
+    split: bool = False,
 ) -> IterableSequence | LiveSource:
     """Open a recorded sequence, a bag, a folder of images, a video or a camera.
 
     Parameters
     ----------
     source
-        Folder of a TUM RGB-D, KITTI or EuRoC sequence, folder of images, folder with a folder of
-        images and one of depth, bag of ROS 1 or ROS 2 (file or folder), video file, or number of a
+        Folder of a sequence in a layout that `open_sequence` knows, folder of images, folder with a
+        folder of images and one of depth, or with images of a left and a right camera (two folders,
+        or two series of images), bag of ROS 1 or ROS 2 (file or folder), video file, or number of a
         camera (also as text, if there is no file of that name).
     sensor
         What to deliver images for; by default the richest there is.
@@ -66,6 +69,9 @@ def open_input(
         An image file, 0 where no keypoint may lie, or a folder with one per image.
     topics
         Of a bag: which topics are the images, as `BagSequence` takes them.
+    split
+        Of a folder of images, a video or a camera: whether every image holds the left view in its
+        left half and the right view in its right half.
 
     Returns
     -------
@@ -91,16 +97,17 @@ def open_input(
                 "--times does not go with a camera: its images get their own times; leave it out"
             )
         _refuse_topics(source, topics)
-        camera = LiveCamera(number, sensor, settings=settings, fps=fps)
+        camera = LiveCamera(number, sensor, settings=settings, fps=fps, split=split)
         live: LiveSource = camera if mask is None else MaskedCamera(camera, mask)
         live.open()
         return live
     if is_recording(named):
         sequence: IterableSequence = BagSequence(named, sensor, settings=settings, topics=topics)
         _refuse_times(named, sequence.layout, fps, times)
+        _refuse_split(named, sequence.layout, split)
     else:
         _refuse_topics(named, topics)
-        sequence = _open_recorded(named, sensor, settings, fps, times)
+        sequence = _open_recorded(named, sensor, settings, fps, times, split)
     return sequence if mask is None else MaskedSequence(sequence, mask)
 
 
@@ -110,24 +117,45 @@ def _open_recorded(
     settings: SettingsChoice,
     fps: float | None,
     times: str | Path | None,
+    split: bool,
 ) -> IterableSequence:
     if path.is_file():
         _require_video(path)
-        return VideoSequence(path, sensor, settings=settings, fps=fps, times=times)
+        return VideoSequence(path, sensor, settings=settings, fps=fps, times=times, split=split)
     if path.is_dir() and not has_layout(path):
+        if image_files(path) and split:
+            return ImageFolder(path, sensor, settings=settings, fps=fps, times=times, split=True)
+        if split and (find_image_pair(path, wanted=True) or find_depth_pair(path)):
+            _refuse_split(path, "a folder with two folders of images", split)
+        opened = open_folders(path, sensor, settings, fps, times)
+        if opened is not None:
+            return _with_images(opened)
         if image_files(path):
             _refuse_half_of_pair(path, sensor)
             return ImageFolder(path, sensor, settings=settings, fps=fps, times=times)
-        if is_depth_pair(path, sensor):
-            return DepthFolders(path, sensor, settings=settings, fps=fps, times=times)
         inner = sorted(child for child in path.iterdir() if child.is_dir() and image_files(child))
         if inner and not any(has_layout(child) for child in path.iterdir()):
+            if sensor is not None and Sensor(sensor) is Sensor.STEREO:
+                raise no_pair(path)
             raise DatasetError(f"no images in {path} itself; did you mean {inner[0]}?")
-    sequence = open_sequence(path, sensor, settings=settings)
+    sequence = _with_images(open_sequence(path, sensor, settings=settings))
+    _refuse_times(path, sequence.layout, fps, times)
+    _refuse_split(path, sequence.layout, split)
+    return sequence
+
+
+def _with_images(sequence: IterableSequence) -> IterableSequence:
     if isinstance(sequence, RecordedSequence):
         sequence.require_images()
-    _refuse_times(path, sequence.layout, fps, times)
     return sequence
+
+
+def _refuse_split(path: Path, layout: str, split: bool) -> None:
+    if split:
+        raise DatasetError(
+            "--split is for images that hold two views side by side, in a folder of images, a "
+            f"video or from a camera; {path} is {layout}: leave it out"
+        )
 
 
 def _refuse_times(path: Path, layout: str, fps: float | None, times: str | Path | None) -> None:
@@ -165,13 +193,21 @@ def _require_video(path: Path) -> None:
 
 
 def _refuse_half_of_pair(path: Path, sensor: Sensor | str | None) -> None:
-    """Name the folder above if RGB-D is wanted of one of the two folders of a pair."""
-    if sensor is None or Sensor(sensor) is not Sensor.RGBD:
+    """Name the folder above if one of the two folders of a pair is given for RGB-D or stereo."""
+    wanted = None if sensor is None else Sensor(sensor)
+    here, above = path.resolve(), path.resolve().parent
+    if wanted in (None, Sensor.MONOCULAR) or has_layout(above):
         return
-    above = path.resolve().parent
-    pair = None if has_layout(above) else find_depth_pair(above)
-    if pair is not None and path.resolve() in (pair.colour.path, pair.depth.path):
-        raise DatasetError(
-            f"{path} holds one half of a pair: images are in {pair.colour.path.name}, depth in "
-            f"{pair.depth.path.name}; give the folder of both, {above}"
-        )
+    if wanted is Sensor.RGBD:
+        pair = find_depth_pair(above)
+        if pair is None or here not in (pair.colour.path, pair.depth.path):
+            return
+        parts = f"images are in {pair.colour.path.name}, depth in {pair.depth.path.name}"
+    else:
+        sides = None if image_files(above) else find_image_pair(above, wanted=True)
+        if sides is None or here.name not in (sides.left, sides.right):
+            raise no_pair(path)
+        parts = f"left images are in {sides.left}, right ones in {sides.right}"
+    raise DatasetError(
+        f"{path} holds one half of a pair: {parts}; give the folder of both, {above}"
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from orbslam2py._arguments import path_of
 from orbslam2py.datasets.bags import BagSequence, is_bag
@@ -20,6 +21,7 @@ from orbslam2py.datasets.euroc import EurocSequence, find_root
 from orbslam2py.datasets.image_folder import image_files
 from orbslam2py.datasets.kitti import KittiSequence, find_cameras
 from orbslam2py.datasets.layouts import Loader, find_loaders, loader_of
+from orbslam2py.datasets.stereo_folders import StereoFolders, find_image_pair
 from orbslam2py.datasets.tum import TumSequence, find_association
 from orbslam2py.errors import DatasetError
 from orbslam2py.settings import Sensor
@@ -27,7 +29,8 @@ from orbslam2py.settings import Sensor
 _BAGS = (Layout.ROSBAG1, Layout.ROSBAG2, Layout.MCAP)
 _MARKS = (
     "rgb.txt or associations.txt (TUM), times.txt with image_0 or image_2 (KITTI), "
-    "mav0/cam0 or cam0 (EuRoC), and those of ICL-NUIM, 7-Scenes, Bonn, Replica and OpenLORIS"
+    "mav0/cam0 or cam0 (EuRoC), and those of KITTI raw, ICL-NUIM, 7-Scenes, "
+    "Bonn, Replica and OpenLORIS"
 )
 
 
@@ -98,6 +101,36 @@ def is_depth_pair(folder: Path, sensor: Sensor | str | None) -> bool:
     return False
 
 
+def open_folders(
+    folder: Path,
+    sensor: Sensor | str | None,
+    settings: SettingsChoice,
+    fps: float | None = None,
+    times: str | Path | None = None,
+) -> IterableSequence | None:
+    """Open images without any list: with depth, or of a pair; None if there are none of these.
+
+    Raises
+    ------
+    DatasetError
+        If RGB-D or stereo is wanted, or there is depth, and it cannot be told which are meant.
+    SettingsError
+        If there are no settings, or they are wrong.
+    """
+    if not folder.is_dir() or has_layout(folder):
+        return None
+    wanted = None if sensor is None else Sensor(sensor)
+    given: dict[str, Any] = {"settings": settings, "fps": fps, "times": times}
+    pair = None
+    if wanted is not Sensor.RGBD and not (wanted is None and find_depth_pair(folder)):
+        pair = find_image_pair(folder, wanted=wanted is Sensor.STEREO)
+    if pair is not None and not (wanted is Sensor.MONOCULAR and find_depth_pair(folder)):
+        return StereoFolders(folder, sensor, **given)
+    if not image_files(folder) and is_depth_pair(folder, sensor):
+        return DepthFolders(folder, sensor, **given)
+    return None
+
+
 def open_sequence(
     folder: str | Path,
     sensor: Sensor | str | None = None,
@@ -112,10 +145,11 @@ def open_sequence(
     Parameters
     ----------
     folder
-        TUM RGB-D, KITTI odometry, EuRoC (the sequence or its ``mav0``), ICL-NUIM, 7-Scenes, Bonn,
-        Replica or OpenLORIS, what a loader of another package recognises, a folder with a folder
-        of images and a folder of depth images, or a bag of ROS 1 or ROS 2 (a file, or the folder of
-        a recording).
+        TUM RGB-D, KITTI odometry or a drive of KITTI raw, EuRoC (the sequence or its ``mav0``),
+        ICL-NUIM, 7-Scenes, Bonn, Replica or OpenLORIS, what a loader of another package recognises,
+        a folder with a folder of images and a folder of depth images, a folder with images of a
+        left and a right camera (two folders or two series), or a bag of ROS 1 or ROS 2 (a file, or
+        the folder of a recording).
     sensor
         What to deliver images for; by default the richest the folder has images for.
     settings
@@ -153,8 +187,10 @@ def open_sequence(
         loader = loader or _one_of(folder, find_loaders(folder))
     if loader is not None:
         return loader(folder, sensor, settings=settings)
-    if layout is None and association is None and is_depth_pair(folder, sensor):
-        return DepthFolders(folder, sensor, settings=settings)
+    if layout is None and association is None:
+        opened = open_folders(folder, sensor, settings)
+        if opened is not None:
+            return opened
     layout = layout or Layout(recognise(folder))
     if layout is Layout.TUM:
         return TumSequence(folder, sensor, settings=settings, association=association)

@@ -8,9 +8,10 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from orbslam2py._arguments import index_of
-from orbslam2py._arrays import FloatArray
+from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py.datasets.base import (
     Images,
@@ -19,6 +20,14 @@ from orbslam2py.datasets.base import (
 )
 from orbslam2py.datasets.choose_settings import SettingsChoice, choose_settings
 from orbslam2py.datasets.frames import FramesInOrder
+from orbslam2py.datasets.grey_scale import (
+    GreyScale,
+    read_sample,
+    refuse_depth,
+    refuse_first_depth,
+    spread_over,
+)
+from orbslam2py.datasets.images import read_image
 from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.settings import Sensor, Settings, resolve_settings
 from orbslam2py.trajectory import Trajectory
@@ -70,6 +79,7 @@ class RecordedSequence(FramesInOrder, ABC):
         self._stamps = Stamps(np.zeros(0), (), ())
         #: What tells the images, for messages.
         self._list_path = folder
+        self._grey_scale = GreyScale(folder, self._sample)
 
     @cached_property
     def settings(self) -> Settings:
@@ -107,13 +117,15 @@ class RecordedSequence(FramesInOrder, ABC):
         return self._stamps.texts[index_of(index, len(self))]
 
     def require_images(self) -> None:
-        """See that at least one of the first frames has its images.
+        """See that at least one of the first frames has its images, and that they are no depth.
 
         Raises
         ------
         DatasetError
             If none has, so that no run skips a thousand frames one after the other.
         """
+        if len(self):
+            refuse_first_depth(self._files(0)[0], with_depth=self.sensor is Sensor.RGBD)
         n = min(_FIRST, len(self))
         for missing in zip(*(self._files(index) for index in range(n)), strict=True):
             if not any(path.exists() for path in missing):
@@ -134,6 +146,18 @@ class RecordedSequence(FramesInOrder, ABC):
     @abstractmethod
     def ground_truth(self) -> Trajectory | None:
         """Read the true poses; see `datasets.base.Sequence.ground_truth`."""
+
+    def _read(self, path: Path) -> ByteArray:
+        """Read an image in the colour order of the settings; 16 bits become 8."""
+        return read_image(path, rgb=self.settings.camera.rgb, to_8_bits=self._to_8_bits)
+
+    def _to_8_bits(self, image: NDArray[np.generic], path: Path) -> ByteArray:
+        refuse_depth(path, image, with_depth=self.sensor is Sensor.RGBD)
+        return self._grey_scale(image)
+
+    def _sample(self) -> list[NDArray[np.generic]]:
+        """Images of the (left) camera, spread over the sequence."""
+        return read_sample(self._files(index)[0] for index in spread_over(len(self)))
 
     def _settings_folders(self) -> tuple[Path, ...]:
         return (self.folder,)

@@ -16,7 +16,7 @@ from orbslam2py._text_lines import TextLine, content_lines
 from orbslam2py.datasets.base import Images, Layout, Stamps, require_frames
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.clock import Clock, is_time, read_clock, time_of
-from orbslam2py.datasets.images import read_depth, read_image
+from orbslam2py.datasets.images import read_depth
 from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.errors import DatasetError
 from orbslam2py.settings import Sensor
@@ -111,7 +111,7 @@ class TumSequence(RecordedSequence):
     def load(self, index: int, /) -> Images:
         """Read the images of a frame; see `datasets.base.Sequence.load`."""
         image_path, *depth_path = self._files(index_of(index, len(self)))
-        image = read_image(image_path, rgb=self.settings.camera.rgb)
+        image = self._read(image_path)
         return Images(image, depth=read_depth(depth_path[0])) if depth_path else Images(image)
 
     def _files(self, index: int) -> tuple[Path, ...]:

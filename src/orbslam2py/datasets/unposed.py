@@ -1,21 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What images of one camera without any other data have in common."""
+"""What images without any other data have in common: of a camera, or of a pair side by side."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from orbslam2py._arrays import ByteArray
-from orbslam2py.datasets.base import Stamps, choose_sensor
+from orbslam2py.datasets.base import Images, Stamps, choose_sensor
 from orbslam2py.datasets.choose_settings import SettingsChoice
+from orbslam2py.datasets.rectification import Rectifier
 from orbslam2py.datasets.time_files import read_time_file, stamps_of_rate
-from orbslam2py.errors import DatasetError, SettingsError
+from orbslam2py.errors import DatasetError, ImageError, SettingsError
 from orbslam2py.settings import BUILTIN_NAMES, CameraSettings, Sensor, Settings, resolve_settings
 from orbslam2py.trajectory import Trajectory
 
@@ -23,7 +26,7 @@ _log = logging.getLogger(__name__)
 
 
 class UnposedSource:
-    """Images of a single camera without true poses and without calibration.
+    """Images without true poses and without calibration.
 
     Parameters
     ----------
@@ -32,11 +35,13 @@ class UnposedSource:
     name
         Name of the source for results.
     sensor
-        Must be monocular if given.
+        Monocular, or stereo if images are split; by default the latter if they are.
     settings
         Settings, a file or a built-in name.
     fps
         Images per second; replaces that of the settings if given.
+    split
+        Whether every image holds the left view in its left half, the right view in its right half.
 
     Raises
     ------
@@ -53,9 +58,11 @@ class UnposedSource:
         sensor: Sensor | str | None,
         settings: SettingsChoice,
         fps: float | None,
+        split: bool = False,
     ) -> None:
         self.name = name
-        self.sensor = choose_sensor(Path(what), sensor, (Sensor.MONOCULAR,))
+        self._split = split
+        self.sensor = _choose_sensor(what, sensor, split=split)
         if settings is None:
             raise SettingsError(
                 f"no settings for {what}: nothing tells what camera it is from. Give --settings "
@@ -76,26 +83,90 @@ class UnposedSource:
         """Return None: there are no true poses."""
         return None
 
-    def _ordered(self, image: ByteArray) -> ByteArray:
-        """Give OpenCV's image the colour order of the settings; look at the size of the first."""
+    def _delivered(self, image: ByteArray) -> Images:
+        """Make what is tracked of OpenCV's image: halves, colour order, rectification.
+
+        Raises
+        ------
+        DatasetError
+            If it holds two views side by side, and they shall not be split.
+        ImageError
+            If it cannot be split.
+        """
+        halves = self._halves(image)
         if not self._size_checked:
             self._size_checked = True
-            self._warn_of_size(image)
+            self.check_size(image)
+        if self.sensor is not Sensor.STEREO:
+            return Images(self._ordered(halves[0]))
+        left, right = map(self._ordered, halves)
+        if self._rectifiers is not None:
+            left = self._rectifiers[0].rectify(left, f"the left half of {self._what}")
+            right = self._rectifiers[1].rectify(right, f"the right half of {self._what}")
+        return Images(left, right=right)
+
+    def _halves(self, image: ByteArray) -> tuple[ByteArray, ...]:
+        if not self._split:
+            return (image,)
+        width = image.shape[1]
+        if width % 2:
+            raise ImageError(
+                f"{self._what} has an image {width} pixels wide: no two halves of equal width; "
+                "leave out --split if it does not hold two views side by side"
+            )
+        return image[:, : width // 2], image[:, width // 2 :]
+
+    def _ordered(self, image: ByteArray) -> ByteArray:
+        """Give OpenCV's image the colour order of the settings."""
         if image.ndim == 3 and self.settings.camera.rgb:
             image = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), dtype=np.uint8)
         return np.ascontiguousarray(image)
 
-    def _warn_of_size(self, image: ByteArray) -> None:
+    @cached_property
+    def _rectifiers(self) -> tuple[Rectifier, Rectifier] | None:
+        rectification = self.settings.rectification
+        if rectification is None:
+            return None
+        return Rectifier(rectification.left), Rectifier(rectification.right)
+
+    def check_size(self, image: NDArray[np.generic]) -> None:
+        """Compare the size of an image as it is stored with the one of the settings.
+
+        Raises
+        ------
+        DatasetError
+            If it is twice as wide: it holds two views. Other sizes are warned of.
+        """
         camera = self.settings.camera
-        given, found = (camera.width, camera.height), (image.shape[1], image.shape[0])
-        if None not in given and given != found:
-            _log.warning(
-                "%s has images of %d x %d pixels, but the settings are for %d x %d: "
-                "focal lengths and distortion do not fit",
-                self._what,
-                *found,
-                *given,
+        width = image.shape[1] // 2 if self._split else image.shape[1]
+        given, found = (camera.width, camera.height), (width, image.shape[0])
+        if camera.width is None or camera.height is None or given == found:
+            return
+        if found == (2 * camera.width, camera.height) and not self._split:
+            raise DatasetError(
+                f"{self._what} has images of {found[0]} x {found[1]} pixels, twice as wide as "
+                f"those of the settings ({given[0]} x {given[1]}): if they hold the left and the "
+                "right view side by side, take --split of 'orbslam2py run' (with --sensor mono for "
+                "the left one alone); else correct Camera.width in the settings"
             )
+        _log.warning(
+            "%s has images of %d x %d pixels%s, but the settings are for %d x %d: "
+            "focal lengths and distortion do not fit",
+            self._what,
+            *found,
+            " in each half" if self._split else "",
+            *given,
+        )
+
+
+def _choose_sensor(what: str | Path, sensor: Sensor | str | None, *, split: bool) -> Sensor:
+    available = (Sensor.STEREO, Sensor.MONOCULAR) if split else (Sensor.MONOCULAR,)
+    if not split and sensor is not None and Sensor(sensor) is Sensor.STEREO:
+        raise DatasetError(
+            f"{what} has no stereo images; it can be used as: mono; if every image holds the left "
+            "and the right view side by side, take --split of 'orbslam2py run'"
+        )
+    return choose_sensor(Path(what), sensor, available)
 
 
 def with_rate(camera: CameraSettings, fps: float) -> CameraSettings:

@@ -191,13 +191,15 @@ class VideoSequence(FramesInOrder, UnposedSource):
     path
         The file.
     sensor
-        Monocular.
+        Monocular; if frames are split also stereo, the default then.
     settings
         Settings, a file or a built-in name.
     fps
         Frames per second; by default the time stamps of the file count.
     times
         File with one time stamp per frame.
+    split
+        Whether every frame holds the left view in its left half, the right view in its right half.
 
     Raises
     ------
@@ -217,11 +219,14 @@ class VideoSequence(FramesInOrder, UnposedSource):
         settings: SettingsChoice = None,
         fps: float | None = None,
         times: str | Path | None = None,
+        split: bool = False,
     ) -> None:
         self._reader = VideoReader(path)
         self.path = self._reader.path
-        super().__init__(self.path, self.path.stem, sensor, settings, fps)
+        super().__init__(self.path, self.path.stem, sensor, settings, fps, split)
         own = self._reader.scan()
+        self.check_size(self._reader.read(0))
+        self._size_checked = True
         if fps is None and times is None:
             self._stamps = self._own_stamps(own)
         else:
@@ -245,7 +250,7 @@ class VideoSequence(FramesInOrder, UnposedSource):
 
     def load(self, index: int, /) -> Images:
         """Decode a frame; see `datasets.base.Sequence.load`. Fast only in order."""
-        return Images(self._ordered(self._reader.read(index_of(index, len(self)))))
+        return self._delivered(self._reader.read(index_of(index, len(self))))
 
     def _own_stamps(self, seconds: FloatArray) -> Stamps:
         if np.isfinite(seconds).all() and (np.diff(seconds) > 0).all():

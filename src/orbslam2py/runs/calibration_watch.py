@@ -179,9 +179,10 @@ class CalibrationWatch:
         first, second = pair.points.first[chosen], pair.points.second[chosen]
         images = self._begun[pair.frames[0]]
         if self._sensor is Sensor.RGBD and images.depth is not None:
-            height, width = images.depth.shape
-            columns, rows = np.rint(first).astype(np.int64).T
-            rows, columns = np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)
+            shape = np.array(images.image.shape[:2])
+            pixels = np.clip(np.rint(first[:, ::-1]).astype(np.int64), 0, shape - 1)
+            # Depth may be smaller than its image: that of the pixel which covers this one.
+            rows, columns = (pixels * np.array(images.depth.shape) // shape).T
             depths = images.depth[rows, columns]
             known = np.where(is_known(depths), depths, 0).astype(np.float64)
             return PointPair(first, second, known)

@@ -9,6 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from orbslam2py import _core as core
+from orbslam2py._depth_size import depth_size_problem, enlarged_depth
+from orbslam2py._sixteen_bits import REMEDY
 from orbslam2py._timing import StageTimer
 from orbslam2py.errors import ImageError
 from orbslam2py.settings.depth_check import DepthCheck
@@ -56,6 +58,7 @@ class FrontEnd:
         self._extractors = {1: self._extractor}
         self._pair_extractor = core.PairExtractor(options) if sensor is Sensor.STEREO else None
         self._check_calibration = check_calibration
+        self._told_depth_size = False
         self.depth_check = DepthCheck(settings.depth_factor)
         self.pair_check = PairCheck()
 
@@ -153,13 +156,9 @@ class FrontEnd:
             raise ImageError(f"depth must be an array of shape (height, width), got {shape}")
         # Where a masked array hides the depth there is none; nor may a matrix's own rules count.
         depth = np.asarray(np.ma.filled(depth, 0))
-        if depth.shape != image.shape[:2]:
-            raise ImageError(
-                f"depth has size {_size_text(depth)}, the image {_size_text(image)}; depth must be "
-                "registered to the image"
-            )
         if depth.dtype.kind not in "uif" or depth.dtype.itemsize > _LARGEST_NUMBER:
             raise ImageError(f"depth must hold numbers (uint16, float32...), got {depth.dtype}")
+        depth = self._enlarged(depth, image)
         _check_mask(mask, image, "mask")
         if not self.depth_check.done:
             self.depth_check.look(depth)
@@ -172,6 +171,24 @@ class FrontEnd:
                 context, frame_id, timestamp, extraction, depth, self._settings.depth_factor
             )
             return self._finished(frame, image, grey)
+
+    def _enlarged(
+        self, depth: npt.NDArray[np.generic], image: npt.NDArray[np.uint8]
+    ) -> npt.NDArray[np.generic]:
+        """Depth in the size of the image, by nearest neighbour."""
+        if depth.shape == image.shape[:2]:
+            return depth
+        problem = depth_size_problem(depth.shape, image.shape)
+        if problem is not None:
+            raise ImageError(problem)
+        if not self._told_depth_size:
+            self._told_depth_size = True
+            _log.warning(
+                "depth is %s, the images %s: enlarged by nearest neighbour; this is right only if "
+                "both show the same view (depth registered to the image)",
+                *(_size_text(depth), _size_text(image)),
+            )
+        return enlarged_depth(depth, image.shape)
 
     def _finished(
         self, frame: core.Frame, image: npt.NDArray[np.uint8], grey: npt.NDArray[np.uint8]
@@ -186,7 +203,8 @@ class FrontEnd:
             raise ImageError(f"{what} must be a NumPy array, got {type(image).__name__}")
         _refuse_masked(image, what)
         if image.dtype != np.uint8:
-            raise ImageError(f"{what} must be uint8, got {image.dtype}")
+            remedy = f"; {REMEDY}" if image.dtype == np.uint16 else ""
+            raise ImageError(f"{what} must be uint8, got {image.dtype}{remedy}")
         if image.size == 0:
             raise ImageError(f"{what} is empty, shape {image.shape}")
         if not (image.ndim == 2 or (image.ndim == 3 and image.shape[2] in (1, 3, 4))):

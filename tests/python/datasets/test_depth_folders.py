@@ -123,8 +123,8 @@ def test_counts_that_differ(tmp_path: Path) -> None:
 def test_sizes_that_differ(tmp_path: Path) -> None:
     folder = phone(tmp_path / "p", names("color/%d.png", 2), [])
     for k in range(2):
-        save(folder / f"depth/{k}.png", np.full((24, 32), 1000, np.uint16))
-    with pytest.raises(ImageError, match=r"32 x 24, .* 64 x 48; bring both"):
+        save(folder / f"depth/{k}.png", np.full((20, 32), 1000, np.uint16))
+    with pytest.raises(ImageError, match=r"32x20, the image 64x48: .* register depth"):
         open_sequence(folder, settings=SETTINGS)
 
 

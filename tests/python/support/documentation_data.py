@@ -68,6 +68,7 @@ def make_data(folder: Path) -> None:
         write_kitti(folder / name, truth)
     (folder / "times.txt").write_text("".join(f"{t:.9f}\n" for t in truth.timestamps))
     write_video(folder / "video.mp4", images, 20)
+    _write_pair(folder)
     (folder / "photographs").mkdir()
     for i, image in enumerate(images):
         write_image(folder / f"photographs/{i:03d}.png", image)
@@ -98,6 +99,20 @@ def _write_recording(path: Path) -> None:
     left = sdk_stream("Infrared_1", left_images, camera.fx, T_stream_reference=np.eye(4))
     other = sdk_stream("Infrared_2", right_images, camera.fx, T_stream_reference=right)
     write_sdk(path, [*left, *other])
+
+
+def _write_pair(folder: Path) -> None:
+    """A pair as two folders, and as images with both views."""
+    sequence = _walk("stereo")
+    for name in ("pair/left", "pair/right", "wide"):
+        (folder / name).mkdir(parents=True)
+    for k in range(len(sequence)):
+        images = sequence.load(k)
+        assert images.right is not None
+        write_image(folder / f"pair/left/{k:04d}.png", images.image)
+        write_image(folder / f"pair/right/{k:04d}.png", images.right)
+        write_image(folder / f"wide/{k:04d}.png", np.hstack([images.image, images.right]))
+    sequence.settings.save(folder / "pair_settings.yaml")
 
 
 def _write_phone(folder: Path) -> None:

@@ -98,6 +98,9 @@ def export(
     times: Annotated[
         Path | None, typer.Option(help="Of --images, as the run was given it.")
     ] = None,
+    split: Annotated[
+        bool, typer.Option("--split", help="Of --images, as the run was given it.")
+    ] = False,
     without_images: Annotated[
         bool, typer.Option("--without-images", help="Use no images, also if the map file has some.")
     ] = False,
@@ -113,13 +116,15 @@ def export(
 ) -> None:
     """Write a map for another program: Gaussian splatting, NeRF, photogrammetry, viewers, tools."""
     _refuse_what_does_nothing(file_format, images, fps, times, without_images, frames)
+    if split and images is None:
+        raise DatasetError("--split says what --images hold; give these as well")
     log_to(Console(stderr=True), quiet=quiet)
     saved = take_map(load_map(file, images=images is None and not without_images), number)
     if file_format not in _FOLDERS:
         check_target(output, force=force)
         check_apart({"the output": output}, [file, *([] if times is None else [times])])
     console = Console(quiet=quiet, highlight=False, soft_wrap=True)
-    source = None if without_images else _image_source(saved, images, fps, times)
+    source = None if without_images else _image_source(saved, images, fps, times, split)
     with _progress(console) as bar:
         _write(saved, file_format, output, source, bar, frames=frames, force=force)
     console.print(f"{_what(saved, file_format)} is in [bold]{escape(str(output))}[/]")
@@ -148,10 +153,12 @@ def _refuse_what_does_nothing(
 
 
 def _image_source(
-    saved: SavedMap, images: str | None, fps: float | None, times: Path | None
+    saved: SavedMap, images: str | None, fps: float | None, times: Path | None, split: bool
 ) -> ImageOfKeyframe | None:
     if images is not None:
-        sequence = open_input(images, saved.sensor, settings=saved.settings, fps=fps, times=times)
+        sequence = open_input(
+            images, saved.sensor, settings=saved.settings, fps=fps, times=times, split=split
+        )
         if not is_sequence(sequence):
             raise DatasetError(f"--images {images} is a camera; give what it recorded")
         return images_of(saved.contents, sequence)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from orbslam2py._arrays import FloatArray
+from orbslam2py._depth_size import depth_size_problem
 from orbslam2py.datasets.bags.bag import Bag
 from orbslam2py.datasets.bags.calibration import CameraInfo
 from orbslam2py.datasets.bags.image_topics import ImageTopic
@@ -154,6 +155,9 @@ def _difference(
 ) -> str:
     """Say in what the two cameras differ; nothing if they do not, or nobody knows."""
     if images.size != depth.size and images.size and depth.size:
+        problem = depth_size_problem(depth.size[::-1], images.size[::-1])
+        if says_registered(depth) and problem is None:
+            return ""  # it is only smaller
         return "{} x {} pixels against {} x {}".format(*depth.size, *images.size)
     if depth_info is None or (colour_info is None and chosen is None):
         return ""

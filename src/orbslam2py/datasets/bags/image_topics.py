@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 
 from orbslam2py.datasets.bags.bag import Topic
@@ -17,10 +16,6 @@ _OF_ONE_CAMERA = (
     *("image_rect", "image_rect_color", "image_rect_raw"),
     *("image_mono", "image_raw", "image_color", "image"),
 )
-#: Words and numbers that names of the left and the right camera differ in, the clearest first.
-_SIDES = (("left", "right"), ("l", "r"), ("0", "1"), ("1", "2"))
-#: Words (also those of ``cameraLeft``), numbers, and what stands between them.
-_TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[0-9]+|[^A-Za-z0-9]+")
 
 
 @dataclass(frozen=True)
@@ -52,8 +47,7 @@ class ImageTopic:
     @property
     def is_depth(self) -> bool:
         """Whether its pixels are distances."""
-        named = self.encoding != "mono16" or "depth" in self.topic.name.lower()
-        return is_depth(self.encoding) and named
+        return is_depth(self.encoding, self.topic.name)
 
     @property
     def base(self) -> str:
@@ -83,22 +77,3 @@ def rank_of(one: ImageTopic) -> tuple[bool, int, bool]:
     last = one.base.rpartition("/")[2]
     place = _OF_ONE_CAMERA.index(last) if last in _OF_ONE_CAMERA else 0
     return (not one.is_rectified, place, one.is_compressed)
-
-
-def side_of_pair(left: str, right: str) -> int | None:
-    """Tell whether two names are those of the left and the right camera of a pair.
-
-    They are if they differ in nothing but one word or number, which is ``left`` and ``right``,
-    ``l`` and ``r``, 0 and 1, or 1 and 2: ``/infra1/image`` and ``/infra2/image``.
-
-    Returns
-    -------
-    int or None
-        Which of these it is, the clearest first; None if they are no such names.
-    """
-    ours, theirs = _TOKEN.findall(left), _TOKEN.findall(right)
-    if len(ours) != len(theirs):
-        return None
-    both = zip(ours, theirs, strict=True)
-    found = {(a.lower(), b.lower()) for a, b in both if a != b}
-    return _SIDES.index(found.pop()) if len(found) == 1 and found <= set(_SIDES) else None

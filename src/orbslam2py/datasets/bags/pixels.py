@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable
 from typing import Any
 
 import cv2
@@ -34,6 +35,8 @@ _SEEN: dict[str, tuple[int, int | None]] = {
     "yuv422_yuy2": (2, cv2.COLOR_YUV2BGR_YUY2),
     "yuyv": (2, cv2.COLOR_YUV2BGR_YUY2),
 }
+#: Encodings of grey images of 16 bits; topics with 16UC1 are depth unless the user says otherwise.
+_SEEN_16 = ("mono16", "16UC1")
 #: Encodings of depth: type of the pixels, and units per metre (REP 118).
 _DEPTHS: dict[str, tuple[str, float]] = {
     "16UC1": ("u2", 1000.0),
@@ -44,9 +47,10 @@ _DEPTHS: dict[str, tuple[str, float]] = {
 _DEPTH_HEAD = struct.Struct("<iff")
 
 
-def is_depth(encoding: str) -> bool:
-    """Tell whether pixels of an encoding are distances (16 bits may be grey as well)."""
-    return base_encoding(encoding) in _DEPTHS
+def is_depth(encoding: str, topic: str) -> bool:
+    """Tell whether pixels are distances: mono16 are grey values unless the topic's name says so."""
+    base = base_encoding(encoding)
+    return base in _DEPTHS and (base != "mono16" or "depth" in topic.lower())
 
 
 def units_per_metre(encoding: str) -> float:
@@ -67,7 +71,13 @@ def _is_packed(text: str) -> bool:
     return any(name in text.lower() for name in ("jpeg", "jpg", "png", "compressed"))
 
 
-def decode_image(message: Any, *, compressed: bool, rgb: bool) -> ByteArray:
+def decode_image(
+    message: Any,
+    *,
+    compressed: bool,
+    rgb: bool,
+    to_8_bits: Callable[[NDArray[np.generic]], ByteArray],
+) -> ByteArray:
     """Decode an image for eyes.
 
     Parameters
@@ -78,6 +88,8 @@ def decode_image(message: Any, *, compressed: bool, rgb: bool) -> ByteArray:
         Which of the two.
     rgb
         Whether colour is wanted in the order RGB (True) or BGR.
+    to_8_bits
+        Scales images of 16 bits.
 
     Returns
     -------
@@ -89,18 +101,27 @@ def decode_image(message: Any, *, compressed: bool, rgb: bool) -> ByteArray:
     ImageError
         If it is damaged, or not for eyes; without the bag's name.
     """
-    if compressed:
-        decoded = decode_any(message.data.tobytes(), "the message")
-        if decoded.dtype != np.uint8:
-            raise ImageError(f"it has {decoded.dtype} pixels; images must be 8 bits per channel")
-        image = np.asarray(decoded, dtype=np.uint8)
-        if image.ndim == 3 and image.shape[2] == 4:
-            image = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGRA2BGR), dtype=np.uint8)
-    else:
-        image = _raw_image(message)
+    pixels = decode_pixels(message, compressed=compressed)
+    image = to_8_bits(pixels) if pixels.dtype == np.uint16 else np.asarray(pixels, dtype=np.uint8)
     if image.ndim == 3 and rgb:
         image = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2RGB), dtype=np.uint8)
     return np.ascontiguousarray(image)
+
+
+def decode_pixels(message: Any, *, compressed: bool) -> NDArray[np.generic]:
+    """Decode an image for eyes as it is: uint8 or uint16, (h, w) or (h, w, 3) in the order BGR.
+
+    Raises
+    ------
+    ImageError
+        If it is damaged, or not for eyes; without the bag's name.
+    """
+    if not compressed:
+        return _raw_image(message)
+    image = decode_any(message.data.tobytes(), "the message")
+    if image.dtype not in (np.uint8, np.uint16):
+        raise ImageError(f"it has {image.dtype} pixels; images have 8 or 16 bits per channel")
+    return image[:, :, :3] if image.ndim == 3 else image
 
 
 def decode_depth(message: Any, *, compressed: bool) -> NDArray[np.generic]:
@@ -119,13 +140,15 @@ def decode_depth(message: Any, *, compressed: bool) -> NDArray[np.generic]:
     return _rows(message, np.dtype(_DEPTHS[encoding][0]), 1)[:, :, 0]
 
 
-def _raw_image(message: Any) -> ByteArray:
+def _raw_image(message: Any) -> NDArray[np.generic]:
     told = str(message.encoding)
+    if told in _SEEN_16:
+        return _rows(message, np.dtype(np.uint16), 1)[:, :, 0]
     encoding = told if told in _SEEN else told.lower()  # the RealSense SDK writes YUYV
     if encoding not in _SEEN:
         raise ImageError(
-            f"its encoding is {told or 'not told'}; known are {', '.join(_SEEN)}; convert it "
-            "to mono8"
+            f"its encoding is {told or 'not told'}; known are {', '.join(_SEEN)} and mono16; "
+            "convert it to mono8"
         )
     channels, way = _SEEN[encoding]
     pixels = np.asarray(_rows(message, np.dtype(np.uint8), channels), dtype=np.uint8)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 from collections.abc import Mapping
 from functools import cached_property
@@ -14,13 +15,19 @@ from numpy.typing import NDArray
 
 from orbslam2py._arguments import index_of
 from orbslam2py._arrays import ByteArray, FloatArray
+from orbslam2py._depth_size import depth_size_problem
 from orbslam2py.datasets.bags.bag import Bag, Message
 from orbslam2py.datasets.bags.calibration import settings_of_camera, settings_of_pair
 from orbslam2py.datasets.bags.depth_cameras import find_depth_camera
 from orbslam2py.datasets.bags.image_topics import ImageTopic
 from orbslam2py.datasets.bags.infos import read_info
 from orbslam2py.datasets.bags.messages import read_message
-from orbslam2py.datasets.bags.pixels import decode_depth, decode_image, units_per_metre
+from orbslam2py.datasets.bags.pixels import (
+    decode_depth,
+    decode_image,
+    decode_pixels,
+    units_per_metre,
+)
 from orbslam2py.datasets.bags.poses import read_poses
 from orbslam2py.datasets.bags.realsense import camera_times, units_per_metre_of
 from orbslam2py.datasets.bags.timing import (
@@ -35,6 +42,7 @@ from orbslam2py.datasets.bags.transforms import Transforms, names_of_coordinates
 from orbslam2py.datasets.base import Images, choose_sensor, rate_of
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.frames import FramesInOrder
+from orbslam2py.datasets.grey_scale import GreyScale, spread_over
 from orbslam2py.datasets.rectification import Rectifier
 from orbslam2py.datasets.registration import DepthRegistration
 from orbslam2py.errors import DatasetError, ImageError
@@ -98,6 +106,7 @@ class BagSequence(FramesInOrder):
         self.sensor = choose_sensor(self.path, sensor, choice.sensors)
         self.topics = choice.choose(self.sensor)
         self._chosen = None if settings is None else resolve_settings(settings, self.sensor)
+        self._grey_scale = GreyScale(self.path, self._sample)
         self._list_images()
         self._stamps = stamps_of(self._nanoseconds)
         warn_of_gaps(self.path, self.timestamps)
@@ -227,7 +236,9 @@ class BagSequence(FramesInOrder):
         rgb = self.settings.camera.rgb
         try:
             read = self._message(one, message)
-            image = decode_image(read, compressed=one.is_compressed, rgb=rgb)
+            image = decode_image(
+                read, compressed=one.is_compressed, rgb=rgb, to_8_bits=self._grey_scale
+            )
         except ImageError as error:
             raise ImageError(f"{self._where(one)}: {error}") from error
         size = (image.shape[1], image.shape[0])
@@ -240,6 +251,15 @@ class BagSequence(FramesInOrder):
             return self._rectifiers[camera].rectify(image, f"an image of {self._where(one)}")
         return image
 
+    def _sample(self) -> list[NDArray[np.generic]]:
+        """Images of the (left) camera, spread over the bag."""
+        one, found = self.topics.left, []
+        for index in spread_over(len(self)):
+            with contextlib.suppress(ImageError):  # said when the run comes to it
+                message = self._message(one, self._messages[0][index])
+                found.append(decode_pixels(message, compressed=one.is_compressed))
+        return found
+
     def _depth(self, one: ImageTopic, message: Message, image: ByteArray) -> NDArray[np.generic]:
         try:
             depth = decode_depth(self._message(one, message), compressed=one.is_compressed)
@@ -247,11 +267,9 @@ class BagSequence(FramesInOrder):
                 depth = self._registration.register(depth)
         except ImageError as error:
             raise ImageError(f"{self._where(one)}: {error}") from error
-        if depth.shape != image.shape[:2]:
-            raise ImageError(
-                f"depth of {self._where(one)} is {depth.shape[1]} x {depth.shape[0]}, its image "
-                f"{image.shape[1]} x {image.shape[0]}"
-            )
+        problem = depth_size_problem(depth.shape, image.shape)
+        if problem is not None:
+            raise ImageError(f"{self._where(one)}: {problem}")
         return depth
 
     @cached_property

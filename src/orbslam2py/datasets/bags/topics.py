@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from orbslam2py.datasets.bags.bag import Bag, Topic
-from orbslam2py.datasets.bags.image_topics import ImageTopic, rank_of, side_of_pair
+from orbslam2py.datasets.bags.image_topics import ImageTopic, rank_of
 from orbslam2py.datasets.bags.messages import (
     CAMERA_INFO,
     COMPRESSED_IMAGE,
@@ -18,7 +18,8 @@ from orbslam2py.datasets.bags.messages import (
     POSES,
     read_message,
 )
-from orbslam2py.datasets.bags.pixels import base_encoding, decode_depth, decode_image, is_depth
+from orbslam2py.datasets.bags.pixels import base_encoding, decode_depth, decode_pixels, is_depth
+from orbslam2py.datasets.pair_names import side_of_pair
 from orbslam2py.errors import DatasetError, OrbSlamError
 from orbslam2py.settings import Sensor
 
@@ -163,7 +164,7 @@ class TopicChoice:
         """Images for eyes, the best of each camera."""
         best: dict[str, ImageTopic] = {}
         for one in self._all:
-            if one.size is None or is_depth(one.encoding):
+            if one.size is None or one.is_depth:
                 continue
             if one.camera not in best or rank_of(one) < rank_of(best[one.camera]):
                 best[one.camera] = one
@@ -259,15 +260,12 @@ class TopicChoice:
                 raise DatasetError("all its messages are cut off")
             first = read_message(self._bag.read(messages[0]), topic.kind, topic.encoding)
             encoding = base_encoding(str(first.format if compressed else first.encoding))
-            depth = is_depth(encoding)
-            image = (
-                decode_depth(first, compressed=compressed)
-                if depth
-                else decode_image(first, compressed=compressed, rgb=False)
-            )
+            depth = is_depth(encoding, topic.name)
+            decode = decode_depth if depth else decode_pixels
+            image = decode(first, compressed=compressed)
             size = (int(image.shape[1]), int(image.shape[0]))
             if compressed and image.ndim == 2 and not depth:
-                encoding = "mono8"
+                encoding = "mono8" if image.dtype.itemsize == 1 else "mono16"
         except OrbSlamError as error:
             problem = str(error)  # told if nothing else can be read
         return ImageTopic(topic, encoding, size, problem)

@@ -3,6 +3,7 @@
 
 from orbslam2py.datasets.layouts.bonn import BonnSequence
 from orbslam2py.datasets.layouts.icl_nuim import IclNuimSequence
+from orbslam2py.datasets.layouts.kitti_raw import KittiRawSequence
 from orbslam2py.datasets.layouts.loaders import ENTRY_POINTS, Loader, find_loaders, loader_of
 from orbslam2py.datasets.layouts.openloris import OpenLorisSequence
 from orbslam2py.datasets.layouts.replica import ReplicaSequence
@@ -12,6 +13,7 @@ __all__ = [
     "ENTRY_POINTS",
     "BonnSequence",
     "IclNuimSequence",
+    "KittiRawSequence",
     "Loader",
     "OpenLorisSequence",
     "ReplicaSequence",

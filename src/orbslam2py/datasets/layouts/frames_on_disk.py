@@ -14,7 +14,7 @@ from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py._text_lines import content_lines, number_of
 from orbslam2py.datasets.base import Images, Stamps, require_frames
 from orbslam2py.datasets.choose_settings import SettingsChoice
-from orbslam2py.datasets.images import read_depth, read_image
+from orbslam2py.datasets.images import read_depth
 from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.settings import CameraSettings, Sensor, Settings, settings_for_camera
@@ -67,7 +67,7 @@ class DepthSequence(RecordedSequence):
     def load(self, index: int, /) -> Images:
         """Read the images of a frame; see `datasets.base.Sequence.load`."""
         index = index_of(index, len(self))
-        image: ByteArray = read_image(self._images[index], rgb=self.settings.camera.rgb)
+        image: ByteArray = self._read(self._images[index])
         if self.sensor is not Sensor.RGBD:
             return Images(image)
         return Images(image, depth=self._depth(self._depths[index]))

@@ -11,6 +11,7 @@ from orbslam2py.datasets.base import IterableSequence
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.layouts.bonn import BonnSequence
 from orbslam2py.datasets.layouts.icl_nuim import IclNuimSequence
+from orbslam2py.datasets.layouts.kitti_raw import KittiRawSequence
 from orbslam2py.datasets.layouts.openloris import OpenLorisSequence
 from orbslam2py.datasets.layouts.replica import ReplicaSequence
 from orbslam2py.datasets.layouts.seven_scenes import SevenScenesSequence
@@ -59,7 +60,7 @@ OWN: dict[str, Loader] = {
     str(kind.layout): kind
     for kind in (
         *(IclNuimSequence, SevenScenesSequence, BonnSequence, ReplicaSequence),
-        OpenLorisSequence,
+        *(OpenLorisSequence, KittiRawSequence),
     )
 }
 

@@ -91,8 +91,9 @@ def test_sizes_are_told_as_everywhere_and_with_the_file(command: CommandLine, rg
     assert done.err.splitlines() == [
         "Warning: frame 3 skipped: image has size 300x200, the first image had 320x240; give "
         f"images of one size (it is {colour})",
-        "Warning: frame 5 skipped: depth has size 300x200, the image 320x240; depth must be "
-        f"registered to the image (it is {beside})",
+        "Warning: frame 5 skipped: depth has size 300x200, the image 320x240: width and height "
+        "have another ratio (1.500 and 1.333), so they do not show the same view; register depth "
+        f"to the image (it is {beside})",
     ]
     frames = Results(Path("r")).frames
     assert frames[5]["reason"].startswith("depth has size"), "equal ones are counted together"

@@ -199,3 +199,49 @@ def test_an_image_of_another_size_is_left_out(tmp_path: Path) -> None:
     sequence.load(2)
     with pytest.raises(orb.ImageError, match="is 32 x 20, the first one 32 x 24"):
         sequence.load(1)
+
+
+# ---- 16 bits of grey -----------------------------------------------------------------------------
+@pytest.mark.parametrize("packed", [False, True])
+def test_grey_values_of_16_bits(
+    tmp_path: Path, kind: str, packed: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The only topic is mono16: an image, and all of the bag are scaled alike."""
+    stored = [GREY.astype(np.uint16) * 40 + np.uint16(1000 * i) for i in range(4)]
+    messages = [
+        bags.packed_image("/i", stamp, bags.encoded(image, ".png"), "mono16; png compressed")
+        if packed
+        else bags.raw_image("/i", stamp, image, "mono16", big_endian=True)
+        for stamp, image in ((bags.START + i * bags.STEP, one) for i, one in enumerate(stored))
+    ]
+    sequence = BagSequence(bags.write(tmp_path / "b", kind, messages), settings=settings("mono"))
+    with caplog.at_level("INFO"):
+        images = [sequence.load(i).image for i in (3, 0)]
+    low, high = 0, 255 * 40 + 3000
+    for image, raw in zip(images, (stored[3], stored[0]), strict=True):
+        assert image.dtype == np.uint8
+        expected = (raw.astype(float) - low) * 255 / (high - low)
+        assert np.abs(image - expected).max() < 4
+    assert caplog.text.count("images of 16 bits; grey values") == 1
+
+
+def test_16UC1_is_depth_unless_it_is_named_as_the_image(tmp_path: Path) -> None:
+    messages = [bags.raw_image("/thermal", bags.START, MILLIMETRES, "16UC1")]
+    bag = bags.write(tmp_path / "b", "mcap", messages)
+    with pytest.raises(orb.DatasetError, match=r"/thermal \(sensor_msgs/msg/Image, 16UC1"):
+        BagSequence(bag, "mono", settings=settings("mono"))
+    sequence = BagSequence(bag, "mono", settings=settings("mono"), topics="image=/thermal")
+    image = sequence.load(0).image
+    assert image.dtype == np.uint8
+    assert np.corrcoef(image.reshape(-1), MILLIMETRES.reshape(-1))[0, 1] > 0.999
+
+
+def test_registered_depth_may_be_smaller(tmp_path: Path) -> None:
+    small = np.ascontiguousarray(MILLIMETRES[::2, ::2])
+    messages = [
+        bags.raw_image("/rgb/image", bags.START, RGB, "rgb8"),
+        bags.raw_image("/depth_registered/image", bags.START, small, "16UC1"),
+    ]
+    bag = bags.write(tmp_path / "b", "mcap", messages)
+    loaded = BagSequence(bag, "rgbd", settings=settings("rgbd")).load(0)
+    assert np.array_equal(loaded.depth, small)  # type: ignore[arg-type]

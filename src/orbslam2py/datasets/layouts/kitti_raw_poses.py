@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Poses of KITTI raw: latitude, longitude, altitude, roll, pitch, yaw of the car's navigation."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from orbslam2py._arrays import FloatArray
+from orbslam2py._text_lines import content_lines, number_of
+from orbslam2py.errors import DatasetError
+from orbslam2py.trajectory.rotations import poses_from
+
+_EARTH_RADIUS = 6378137.0  # metres, WGS 84
+_FIELDS = 6
+
+
+def read_oxts(folder: Path, n_times: int) -> tuple[list[int], FloatArray]:
+    """Read the packets of a drive.
+
+    Parameters
+    ----------
+    folder
+        ``oxts/data``, with a file per packet: ``0000000000.txt``.
+    n_times
+        Number of time stamps there are.
+
+    Returns
+    -------
+    numbers, T_w_imu
+        Numbers of the packets, and the poses (n, 4, 4) of the IMU (x forward, y left, z up) in a
+        world of metres: x east, y north, z up, from the first position on.
+
+    Raises
+    ------
+    DatasetError
+        Naming the file.
+    """
+    files = sorted(path for path in folder.glob("*.txt") if path.stem.isdecimal())
+    if not files:
+        raise DatasetError(f"{folder} has no packets (0000000000.txt ...); take oxts away")
+    numbers = [int(path.stem) for path in files]
+    if numbers[-1] >= n_times:
+        raise DatasetError(
+            f"{folder.parent / 'timestamps.txt'} holds {n_times} time stamps, but there is "
+            f"{files[-1]}; copy the drive's own file there, or take oxts away"
+        )
+    values = np.array([_values(path) for path in files])
+    latitude, longitude = np.radians(values[:, 0]), np.radians(values[:, 1])
+    scale = _EARTH_RADIUS * np.cos(latitude[0])
+    east, north = scale * longitude, scale * np.log(np.tan(np.pi / 4 + latitude / 2))
+    positions = np.column_stack([east, north, values[:, 2]])
+    roll, pitch, yaw = values[:, 3:6].T
+    R = _about(2, yaw) @ _about(1, pitch) @ _about(0, roll)
+    return numbers, poses_from(R, positions - positions[0])
+
+
+def _values(path: Path) -> list[float]:
+    for line in content_lines(path)[:1]:
+        if len(line.fields) >= _FIELDS:
+            return [number_of(path, line, field) for field in line.fields[:_FIELDS]]
+    raise DatasetError(
+        f"{path} does not begin with latitude, longitude, altitude, roll, pitch and yaw; copy it "
+        "anew, or take oxts away"
+    )
+
+
+def _about(axis: int, angles: FloatArray) -> FloatArray:
+    """Rotations (n, 3, 3) about an axis [rad]."""
+    a, b = [(1, 2), (2, 0), (0, 1)][axis]
+    R = np.zeros((len(angles), 3, 3))
+    R[:, axis, axis] = 1.0
+    R[:, a, a] = R[:, b, b] = np.cos(angles)
+    R[:, a, b], R[:, b, a] = -np.sin(angles), np.sin(angles)
+    return R
