@@ -75,7 +75,9 @@ class Clock:
         return Stamps(seconds, self.texts, numbers)
 
 
-def read_clock(source: Path | str, texts: Sequence[str], fps: float | None) -> Clock:
+def read_clock(
+    source: Path | str, texts: Sequence[str], fps: float | None, *, usual_unit: int = 0
+) -> Clock:
     """Understand the times of a list.
 
     Parameters
@@ -86,6 +88,9 @@ def read_clock(source: Path | str, texts: Sequence[str], fps: float | None) -> C
         Times in the order of the list: numbers or dates (``2011-09-26 13:02:25.964389445``).
     fps
         Images per second by the settings, if they are known.
+    usual_unit
+        Digits of a second that the times of such lists count, so that nothing is said of it: 9 for
+        nanoseconds.
 
     Raises
     ------
@@ -94,8 +99,10 @@ def read_clock(source: Path | str, texts: Sequence[str], fps: float | None) -> C
     """
     values = [value_of(source, text) for text in texts]
     digits = 0 if any(map(_is_date, texts)) else unit_of(values, fps)
-    if digits:
-        _log.warning("%s: the time stamps are taken for %s", source, _UNITS[digits])
+    if digits != usual_unit and not any(map(_is_date, texts)):
+        # Times since 1970 leave no doubt.
+        level = logging.INFO if _is_since_1970(values) else logging.WARNING
+        _log.log(level, "%s: the time stamps are taken for %s", source, _UNITS[digits])
     nanoseconds = [int((value * 10 ** (9 - digits)).to_integral_value()) for value in values]
     _warn_of_rate(source, nanoseconds, fps)
     order = list(range(len(texts)))
@@ -172,7 +179,7 @@ def unit_of(values: Sequence[Decimal], fps: float | None) -> int:
     The unit is the one in which the usual step fits the frame rate. Images may have been left out:
     long steps stay seconds as long as another unit does not fit far better.
     """
-    largest = max((abs(value) for value in values), default=Decimal(0))
+    largest = _largest(values)
     for digits, least in _SINCE_1970.items():
         if largest >= least:
             return digits
@@ -185,6 +192,14 @@ def unit_of(values: Sequence[Decimal], fps: float | None) -> int:
     if step * fps <= _MOST_FRAMES_LEFT_OUT:
         return 0
     return min(_UNITS, key=lambda digits: abs(math.log(step * fps / 10**digits)))
+
+
+def _largest(values: Sequence[Decimal]) -> Decimal:
+    return max((abs(value) for value in values), default=Decimal(0))
+
+
+def _is_since_1970(values: Sequence[Decimal]) -> bool:
+    return _largest(values) >= min(_SINCE_1970.values())
 
 
 def was_set_back(times: Sequence[int]) -> bool:

@@ -176,7 +176,9 @@ class DepthFolders(RecordedSequence):
             otherwise = own or self.settings.camera.fps
             told = "are their names" if own else f"count {otherwise:g} images per second"
         names = [path.name for path in images]
-        self._stamps = chosen_stamps(len(images), fps, times, otherwise, names)
+        self._stamps = chosen_stamps(
+            len(images), fps, times, otherwise, names, None if times is None else self.known_rate()
+        )
         if self._depth_paths is not None:
             _log.info(
                 "%s: %d images in %s go with depth in %s %s; their times %s",

@@ -248,7 +248,7 @@ def _list_images(camera: Path, rate: float) -> _CameraList:
         name = line.fields[1] if len(line.fields) > 1 else ""
         path = camera / "data" / name if name else _guess_path(camera, text)
         listed[text] = path, line.number
-    clock = read_clock(source, list(listed), rate)
+    clock = read_clock(source, list(listed), rate, usual_unit=9)
     found = list(listed.values())
     return _CameraList(
         source,
@@ -280,7 +280,8 @@ def _list_folder(folder: Path, rate: float) -> _CameraList:
         )
         times = tuple(round((number - numbers[0]) * 1e9 / rate) for number in numbers)
     else:
-        times = read_clock(folder, [path.stem for _, path in found], rate).nanoseconds
+        names = [path.stem for _, path in found]
+        times = read_clock(folder, names, rate, usual_unit=9).nanoseconds
     paths = [path for _, path in found]
     return _CameraList(
         folder, times, tuple(map(text_of, times)), paths, list(range(1, len(paths) + 1))

@@ -130,7 +130,9 @@ class ImageFolder(FramesInOrder, UnposedSource):
             stamps_of_names(list(map(Path, stems))) if fps is None and times is None else None
         )
         otherwise = own_times or self.settings.camera.fps
-        self._stamps = chosen_stamps(len(names), fps, times, otherwise, names)
+        self._stamps = chosen_stamps(
+            len(names), fps, times, otherwise, names, self.settings.camera.fps
+        )
 
         self._grey_scale = GreyScale(self.folder, self._sample)
         for first in read_sample(self.paths[:1]):

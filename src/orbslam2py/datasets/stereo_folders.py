@@ -188,7 +188,9 @@ class StereoFolders(RecordedSequence):
             otherwise = own or self.settings.camera.fps
             told = "are their names" if own else f"count {otherwise:g} images per second"
         names = [path.name for path in self._paths]
-        self._stamps = chosen_stamps(len(names), fps, times, otherwise, names)
+        self._stamps = chosen_stamps(
+            len(names), fps, times, otherwise, names, None if times is None else self.known_rate()
+        )
         what = f"taking the {len(names)} left images alone ({pair.left}, not {pair.right})"
         if self.sensor is Sensor.STEREO:
             what = f"{len(names)} pairs of {pair.left} and {pair.right}, {how}"

@@ -129,8 +129,8 @@ def _uniform_lines(path: Path) -> list[TextLine]:
     if any("," in field for line in lines for field in line.fields):
         lines = content_lines(path, separator=",")
     lines = [_with_date_joined(line) for line in lines]
-    if len(lines) > 1 and not is_time(lines[0].fields[0]) and is_time(lines[1].fields[0]):
-        lines = lines[1:]  # a head of names
+    if len(lines) > 1 and not any(map(is_time, lines[0].fields)):
+        lines = _as_the_head_says(lines[0], lines[1:])
     counts = {len(line.fields) for line in lines}
     if len(counts) > 1 or not counts <= _FIELDS:
         odd = next(line for line in lines if len(line.fields) != 1)
@@ -139,6 +139,16 @@ def _uniform_lines(path: Path) -> list[TextLine]:
             f"every line, found {len(odd.fields)} fields"
         )
     return lines
+
+
+def _as_the_head_says(head: TextLine, lines: list[TextLine]) -> list[TextLine]:
+    """Take time and file by the names of the columns; all columns if no name tells the time."""
+    names = [name.lower() for name in head.fields]
+    time = next((k for k, name in enumerate(names) if "time" in name or "stamp" in name), None)
+    if time is None or any(len(line.fields) != len(names) for line in lines):
+        return [head, *lines]
+    file = [k for k, name in enumerate(names) if "file" in name or "path" in name]
+    return [TextLine(one.number, [one.fields[k] for k in (time, *file[:1])]) for one in lines]
 
 
 def _with_date_joined(line: TextLine) -> TextLine:

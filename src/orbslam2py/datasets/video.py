@@ -230,7 +230,7 @@ class VideoSequence(FramesInOrder, UnposedSource):
         if fps is None and times is None:
             self._stamps = self._own_stamps(own)
         else:
-            self._stamps = chosen_stamps(len(own), fps, times, 0.0)
+            self._stamps = chosen_stamps(len(own), fps, times, 0.0, rate=self.settings.camera.fps)
 
     def __len__(self) -> int:
         return len(self._stamps.texts)

@@ -79,7 +79,7 @@ def test_euroc_keeps_what_both_cameras_saw(euroc: Path, caplog: pytest.LogCaptur
     assert [sequence.timestamp_text(k)[-9:] for k in range(2)] == ["262142976", "362142976"]
     assert "1 images have no partner" in caplog.text
     path.write_text("#nothing\n")
-    with pytest.raises(DatasetError, match="no time stamp in common"):
+    with pytest.raises(DatasetError, match=r"were taken within .* of each other"):
         open_sequence(euroc)
 
 
@@ -117,7 +117,7 @@ def test_euroc_stamp_twice_or_backwards(euroc: Path, caplog: pytest.LogCaptureFi
     path.write_text("".join(f"{STAMPS[k]},{STAMPS[k]}.png\n" for k in (1, 1, 0)))
     assert len(open_sequence(euroc, Sensor.MONOCULAR)) == 2
     assert "data.csv:2: time stamp 1403715273312143104 is there twice" in caplog.text
-    assert "data.csv:3: time stamp 1403715273.262142976 is not after" in caplog.text
+    assert "are not in the order of time; they are sorted" in caplog.text
 
 
 @pytest.mark.parametrize(

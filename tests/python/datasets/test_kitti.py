@@ -94,7 +94,8 @@ def test_kitti_index_out_of_range(kitti: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "expected"), [("0\nx\n", "times.txt:2: 'x'"), ("0 1\n", "times.txt:1: expected one")]
+    ("text", "expected"),
+    [("0\nx\n", "times.txt:2: 'x'"), ("0 1\n", "times.txt:1: '0 1' is not a number")],
 )
 def test_kitti_bad_times(kitti: Path, text: str, expected: str) -> None:
     (kitti / "times.txt").write_text(text)
