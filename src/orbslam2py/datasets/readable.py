@@ -49,6 +49,13 @@ READABLE_LAYOUTS = (
         (Layout.KITTI,),
     ),
     ReadableLayout(
+        "KITTI raw",
+        "mono, stereo",
+        "A drive as it is unpacked, with the calibration in the folder of its day.",
+        "2011_09_26/2011_09_26_drive_0001_sync/image_00/data  2011_09_26/calib_cam_to_cam.txt",
+        (Layout.KITTI_RAW,),
+    ),
+    ReadableLayout(
         "EuRoC",
         "mono, stereo",
         "`mav0/cam0` and `cam1` with `data.csv` and `sensor.yaml`; TUM-VI as well.",
@@ -122,6 +129,18 @@ READABLE_LAYOUTS = (
         "rgbd",
         "Two folders side by side, images paired by name or number.",
         "color/000000.jpg  depth/000000.png",
+    ),
+    ReadableLayout(
+        "pair in two folders, or in one",
+        "mono, stereo",
+        "Names that differ in left and right, l and r, 0 and 1, 1 and 2, or 2 and 3.",
+        "left/0000.png  right/0000.png\nleft_0000.png  right_0000.png",
+    ),
+    ReadableLayout(
+        "images with both views side by side",
+        "stereo",
+        "Videos, folders and cameras, with `--split`.",
+        "orbslam2py run wide.mp4 --sensor stereo --split ...",
     ),
     ReadableLayout("video", "mono", "What OpenCV decodes.", "drive.mp4"),
     ReadableLayout(
