@@ -323,7 +323,7 @@ class CameraOptions:
     """
     What a Camera is made from.
     """
-    def __init__(self, fx: typing.SupportsFloat | typing.SupportsIndex = 0.0, fy: typing.SupportsFloat | typing.SupportsIndex = 0.0, cx: typing.SupportsFloat | typing.SupportsIndex = 0.0, cy: typing.SupportsFloat | typing.SupportsIndex = 0.0, width: typing.SupportsInt | typing.SupportsIndex = 0, height: typing.SupportsInt | typing.SupportsIndex = 0, distortion: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(5)"] = [0.0, 0.0, 0.0, 0.0, 0.0], bf: typing.SupportsFloat | typing.SupportsIndex = 0.0, depth_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
+    def __init__(self, fx: typing.SupportsFloat | typing.SupportsIndex = 0.0, fy: typing.SupportsFloat | typing.SupportsIndex = 0.0, cx: typing.SupportsFloat | typing.SupportsIndex = 0.0, cy: typing.SupportsFloat | typing.SupportsIndex = 0.0, width: typing.SupportsInt | typing.SupportsIndex = 0, height: typing.SupportsInt | typing.SupportsIndex = 0, distortion: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex] = [], bf: typing.SupportsFloat | typing.SupportsIndex = 0.0, depth_ratio: typing.SupportsFloat | typing.SupportsIndex = 0.0) -> None:
         """
         Nothing is checked before a Camera is made.
         """
@@ -360,12 +360,12 @@ class CameraOptions:
     def depth_ratio(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None:
         ...
     @property
-    def distortion(self) -> typing.Annotated[list[float], "FixedSize(5)"]:
+    def distortion(self) -> typing.Annotated[list[float], "FixedSize(8)"]:
         """
-        k1, k2, p1, p2, k3; zeros for rectified images.
+        k1, k2, p1, p2[, k3[, k4, k5, k6]]; zeros for rectified images.
         """
     @distortion.setter
-    def distortion(self, arg0: typing.Annotated[collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex], "FixedSize(5)"]) -> None:
+    def distortion(self, arg1: collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]) -> None:
         ...
     @property
     def fx(self) -> float:
@@ -401,19 +401,34 @@ class CameraOptions:
         ...
 class Camera:
     """
-    A calibrated camera: pinhole, lens, (virtual) right camera, bounds.
+    A calibrated camera, which owns its image plane: projection, lens, bounds and (virtual)
+    right camera. The plane has undistorted pixels; those of the image itself are called raw.
     """
     def __init__(self, options: CameraOptions) -> None:
         """
         Raises SettingsError when an option is out of range.
         """
+    def from_image(self, raw: typing.Annotated[numpy.typing.ArrayLike, numpy.float32]) -> numpy.typing.NDArray[numpy.float32]:
+        """
+        Undistorted pixels (n, 2) float32 of raw pixels (n, 2).
+        """
+    def project(self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Undistorted pixels (n, 2) float64 of points (n, 3) in the camera frame; NaN for those
+        that are not in front of the camera. Bounds are not asked.
+        """
+    def rays(self, pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Directions (n, 3) float64 in which undistorted pixels (n, 2) look, as points at depth
+        1 in the camera frame.
+        """
     def right_column(self, u: typing.SupportsFloat | typing.SupportsIndex, z: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """
         Column in the (virtual) right image of a point at column u and depth z [m].
         """
-    def undistort(self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float32]) -> numpy.typing.NDArray[numpy.float32]:
+    def to_image(self, pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Undistorted pixels (n, 2) float32 of raw pixels (n, 2).
+        Raw pixels (n, 2) float64 of undistorted pixels (n, 2).
         """
     @property
     def baseline(self) -> float:
@@ -449,6 +464,11 @@ class Camera:
     @property
     def pinhole(self) -> Pinhole:
         ...
+    @property
+    def pixels_per_radian(self) -> float:
+        """
+        Pixels that the image moves in its middle per radian of turning.
+        """
 class Frame:
     """
     What one image (pair) says: features, depths, words. Arrays are copies; n keypoints.
