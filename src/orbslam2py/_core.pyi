@@ -401,19 +401,34 @@ class CameraOptions:
         ...
 class Camera:
     """
-    A calibrated camera: pinhole, lens, (virtual) right camera, bounds.
+    A calibrated camera, which owns its image plane: projection, lens, bounds and (virtual)
+    right camera. The plane has undistorted pixels; those of the image itself are called raw.
     """
     def __init__(self, options: CameraOptions) -> None:
         """
         Raises SettingsError when an option is out of range.
         """
+    def from_image(self, raw: typing.Annotated[numpy.typing.ArrayLike, numpy.float32]) -> numpy.typing.NDArray[numpy.float32]:
+        """
+        Undistorted pixels (n, 2) float32 of raw pixels (n, 2).
+        """
+    def project(self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Undistorted pixels (n, 2) float64 of points (n, 3) in the camera frame; NaN for those
+        that are not in front of the camera. Bounds are not asked.
+        """
+    def rays(self, pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
+        """
+        Directions (n, 3) float64 in which undistorted pixels (n, 2) look, as points at depth
+        1 in the camera frame.
+        """
     def right_column(self, u: typing.SupportsFloat | typing.SupportsIndex, z: typing.SupportsFloat | typing.SupportsIndex) -> float:
         """
         Column in the (virtual) right image of a point at column u and depth z [m].
         """
-    def undistort(self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float32]) -> numpy.typing.NDArray[numpy.float32]:
+    def to_image(self, pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> numpy.typing.NDArray[numpy.float64]:
         """
-        Undistorted pixels (n, 2) float32 of raw pixels (n, 2).
+        Raw pixels (n, 2) float64 of undistorted pixels (n, 2).
         """
     @property
     def baseline(self) -> float:
@@ -449,6 +464,11 @@ class Camera:
     @property
     def pinhole(self) -> Pinhole:
         ...
+    @property
+    def pixels_per_radian(self) -> float:
+        """
+        Pixels that the image moves in its middle per radian of turning.
+        """
 class Frame:
     """
     What one image (pair) says: features, depths, words. Arrays are copies; n keypoints.

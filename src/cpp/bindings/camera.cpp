@@ -5,6 +5,7 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,17 +16,56 @@
 namespace orbslam::bindings {
 namespace {
 
-py::array_t<float> undistort(const Camera& camera,
-                             const py::array_t<float, py::array::c_style>& points) {
-  if (points.ndim() != 2 || points.shape(1) != 2) {
-    throw py::value_error("points must have the shape (n, 2)");
+using Matrix2Xf = Eigen::Matrix<float, 2, Eigen::Dynamic>;
+
+template <class Item>
+using Rows = py::array_t<Item, py::array::c_style>;
+
+void check_columns(const py::array& points, py::ssize_t width, const char* name) {
+  if (points.ndim() != 2 || points.shape(1) != width) {
+    throw py::value_error(std::string(name) + " must have the shape (n, " + std::to_string(width) +
+                          ")");
   }
-  std::vector<float> xy(points.data(), points.data() + points.size());
+}
+
+py::array_t<float> from_image(const Camera& camera, const Rows<float>& raw) {
+  check_columns(raw, 2, "raw");
+  Matrix2Xf pixels = Eigen::Map<const Matrix2Xf>(raw.data(), 2, raw.shape(0));
   {
     const py::gil_scoped_release release;
-    camera.lens().undistort(camera.pinhole(), xy);
+    for (Eigen::Index i = 0; i < pixels.cols(); ++i)
+      pixels.col(i) = camera.from_image(pixels.col(i));
   }
-  return copy_to_array<float>(xy.data(), {points.shape(0), 2});
+  return copy_to_array<float>(pixels.data(), {raw.shape(0), 2});
+}
+
+py::array_t<double> to_image(const Camera& camera, const Rows<double>& pixels) {
+  check_columns(pixels, 2, "pixels");
+  Eigen::Matrix2Xd raw = Eigen::Map<const Eigen::Matrix2Xd>(pixels.data(), 2, pixels.shape(0));
+  for (Eigen::Index i = 0; i < raw.cols(); ++i) raw.col(i) = camera.to_image(raw.col(i));
+  return copy_to_array<double>(raw.data(), {pixels.shape(0), 2});
+}
+
+py::array_t<double> project(const Camera& camera, const Rows<double>& points) {
+  check_columns(points, 3, "points");
+  Eigen::Matrix2Xd pixels =
+      Eigen::Matrix2Xd::Constant(2, points.shape(0), std::numeric_limits<double>::quiet_NaN());
+  const Eigen::Map<const Eigen::Matrix3Xd> p_c(points.data(), 3, points.shape(0));
+  for (Eigen::Index i = 0; i < pixels.cols(); ++i) {
+    Eigen::Vector2d uv;
+    if (camera.project(p_c.col(i), uv)) pixels.col(i) = uv;
+  }
+  return copy_to_array<double>(pixels.data(), {points.shape(0), 2});
+}
+
+py::array_t<double> rays(const Camera& camera, const Rows<double>& pixels) {
+  check_columns(pixels, 2, "pixels");
+  const Eigen::Map<const Eigen::Matrix2Xd> uv(pixels.data(), 2, pixels.shape(0));
+  Eigen::Matrix3Xd directions(3, uv.cols());
+  for (Eigen::Index i = 0; i < uv.cols(); ++i) {
+    directions.col(i) = camera.ray(uv(0, i), uv(1, i));
+  }
+  return copy_to_array<double>(directions.data(), {pixels.shape(0), 3});
 }
 
 void bind_pinhole(py::module_& module) {
@@ -103,7 +143,9 @@ void bind_camera(py::module_& module) {
   bind_camera_options(module);
 
   py::class_<Camera, std::shared_ptr<Camera>>(
-      module, "Camera", "A calibrated camera: pinhole, lens, (virtual) right camera, bounds.")
+      module, "Camera",
+      "A calibrated camera, which owns its image plane: projection, lens, bounds and (virtual)\n"
+      "right camera. The plane has undistorted pixels; those of the image itself are called raw.")
       .def(py::init<const CameraOptions&>(), py::arg("options"),
            "Raises SettingsError when an option is out of range.")
       .def_property_readonly("pinhole", &Camera::pinhole)
@@ -115,7 +157,7 @@ void bind_camera(py::module_& module) {
           },
           "(width, height) [px].")
       .def_property_readonly(
-          "is_rectified", [](const Camera& camera) { return camera.lens().is_identity(); },
+          "is_rectified", [](const Camera& camera) { return !camera.distorts(); },
           "True when the lens does not distort.")
       .def_property_readonly("has_baseline", &Camera::has_baseline)
       .def_property_readonly("bf", &Camera::bf, "Baseline times fx [px m].")
@@ -125,8 +167,18 @@ void bind_camera(py::module_& module) {
                              "baseline.")
       .def("right_column", &Camera::right_column, py::arg("u"), py::arg("z"),
            "Column in the (virtual) right image of a point at column u and depth z [m].")
-      .def("undistort", &undistort, py::arg("points"),
-           "Undistorted pixels (n, 2) float32 of raw pixels (n, 2).");
+      .def_property_readonly("pixels_per_radian", &Camera::pixels_per_radian,
+                             "Pixels that the image moves in its middle per radian of turning.")
+      .def("project", &project, py::arg("points"),
+           "Undistorted pixels (n, 2) float64 of points (n, 3) in the camera frame; NaN for those\n"
+           "that are not in front of the camera. Bounds are not asked.")
+      .def("rays", &rays, py::arg("pixels"),
+           "Directions (n, 3) float64 in which undistorted pixels (n, 2) look, as points at depth\n"
+           "1 in the camera frame.")
+      .def("from_image", &from_image, py::arg("raw"),
+           "Undistorted pixels (n, 2) float32 of raw pixels (n, 2).")
+      .def("to_image", &to_image, py::arg("pixels"),
+           "Raw pixels (n, 2) float64 of undistorted pixels (n, 2).");
 }
 
 }  // namespace orbslam::bindings

@@ -23,7 +23,7 @@ void bind_rotation(py::module_& module) {
       "align_rotation",
       [](const Frame& first, const Frame& second) {
         const py::gil_scoped_release release;
-        return align_rotation(first.small_image, second.small_image, second.camera->pinhole());
+        return align_rotation(first.small_image, second.small_image, *second.camera);
       },
       py::arg("first"), py::arg("second"),
       "How the camera turned between two frames, by their small images alone: ImageRotation, or\n"

@@ -76,7 +76,7 @@ void put_keypoints(py::dict& arrays, const std::vector<std::shared_ptr<const Fra
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const std::size_t n = is_known[i] ? 0 : frames[i]->size();
     offsets.push_back(offsets.back() + static_cast<std::int64_t>(n));
-    distorts |= !frames[i]->camera->lens().is_identity();
+    distorts |= frames[i]->camera->distorts();
     has_colours.push_back(frames[i]->colours.empty() ? 0 : 1);
     has_any_colours |= !frames[i]->colours.empty();
     all_described &= frames[i]->described;

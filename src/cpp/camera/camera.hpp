@@ -2,18 +2,15 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <limits>
-#include <memory>
-#include <optional>
-#include <vector>
 
 #include "base/scale_pyramid.hpp"
+#include "camera/lens.hpp"
 
 namespace orbslam {
 
-/// Pinhole intrinsics in pixels. Everything behind the frame works on undistorted pixels, so
-/// matching and optimisation know no other projection.
+/// Pinhole intrinsics in pixels, by which a Camera projects. Algorithms that hold for a pinhole
+/// alone (linear equations in pixels, kernels on the plane at unit depth) take them from a Camera.
 struct Pinhole {
   double fx = 0, fy = 0, cx = 0, cy = 0;
 
@@ -34,38 +31,6 @@ struct Pinhole {
   }
 };
 
-/// How raw pixels become pixels of the pinhole. New lenses (fisheye) implement this interface.
-class LensModel {
- public:
-  virtual ~LensModel() = default;
-  virtual bool is_identity() const = 0;
-  /// Replaces raw pixel coordinates by undistorted ones (interleaved x, y).
-  virtual void undistort(const Pinhole& pinhole, std::vector<float>& xy) const = 0;
-};
-
-/// The lens of rectified images.
-class NoDistortion final : public LensModel {
- public:
-  bool is_identity() const override { return true; }
-  void undistort(const Pinhole&, std::vector<float>&) const override {}
-};
-
-/// OpenCV's coefficients k1, k2, p1, p2, k3, and k4, k5, k6 of the rational model; zeros: unused.
-using Distortion = std::array<double, 8>;
-
-/// OpenCV's radial-tangential lens: with k4, k5 or k6 the rational model.
-class RadialTangential final : public LensModel {
- public:
-  explicit RadialTangential(const Distortion& coefficients) : coefficients_(coefficients) {}
-  bool is_identity() const override;
-  void undistort(const Pinhole& pinhole, std::vector<float>& xy) const override;
-
- private:
-  void undistort_rational(const Pinhole& pinhole, std::vector<float>& xy) const;
-
-  Distortion coefficients_;
-};
-
 /// Limits of undistorted pixel coordinates.
 struct ImageBounds {
   float min_x = 0, max_x = 0, min_y = 0, max_y = 0;
@@ -83,13 +48,20 @@ struct ImageBounds {
 struct CameraOptions {
   Pinhole pinhole;
   Distortion distortion{};  ///< k1, k2, p1, p2, k3, k4, k5, k6; all zero for rectified images
-  double bf = 0;                       ///< baseline times fx [pixel metre]; 0 for a single camera
-  double depth_ratio = 0;              ///< close/far limit in multiples of the baseline (ThDepth)
-  ImageSize image_size;                ///< of the first image
+  double bf = 0;            ///< baseline times fx [pixel metre]; 0 for a single camera
+  double depth_ratio = 0;   ///< close/far limit in multiples of the baseline (ThDepth)
+  ImageSize image_size;     ///< of the first image
 };
 
-/// A calibrated camera: pinhole, lens, (virtual) right camera and the image bounds that follow
-/// from them. Immutable, shared by all frames of a system; nothing of it is global.
+/// Where a camera shows a point, and how that moves with the point.
+struct Seen {
+  Eigen::Vector2d uv;             ///< undistorted pixel
+  Eigen::Matrix<double, 2, 3> J;  ///< d uv / d p_c
+};
+
+/// A calibrated camera, which owns its image plane: projection, lens, bounds and (virtual) right
+/// camera. The plane has undistorted pixels; those of the image itself are called raw. Immutable,
+/// shared by all frames of a system; nothing of it is global.
 class Camera {
  public:
   /// Throws SettingsError when a focal length or the image size is not positive, a coefficient is
@@ -97,27 +69,53 @@ class Camera {
   explicit Camera(const CameraOptions& options);
 
   const CameraOptions& options() const { return options_; }
-  const Pinhole& pinhole() const { return pinhole_; }
-  const LensModel& lens() const { return *lens_; }
-  const ImageBounds& bounds() const { return bounds_; }
-  ImageSize image_size() const { return image_size_; }
+  ImageSize image_size() const { return options_.image_size; }
 
-  bool has_baseline() const { return bf_ > 0; }
-  double bf() const { return bf_; }                      ///< pixel metre
-  double baseline() const { return bf_ / pinhole_.fx; }  ///< metres
+  /// What the image plane is made of, for algorithms of the pinhole alone.
+  const Pinhole& pinhole() const { return options_.pinhole; }
+  /// Pixel of a point in the camera frame. False, and `uv` stays, for a point that cannot be seen:
+  /// one that is not in front of the camera, or with NaN for its depth. Bounds are not asked.
+  bool project(const Eigen::Vector3d& p_c, Eigen::Vector2d& uv) const {
+    if (!can_see(p_c)) return false;
+    uv = pinhole().project(p_c);
+    return true;
+  }
+  /// The same with the derivative.
+  bool project(const Eigen::Vector3d& p_c, Seen& seen) const;
+  /// The point is where the projection is defined.
+  bool can_see(const Eigen::Vector3d& p_c) const { return p_c.z() > 0; }
+  /// Direction in which pixel (u, v) looks, as the point at depth 1.
+  Eigen::Vector3d ray(double u, double v) const { return pinhole().unproject(u, v, 1.0); }
+  /// The point at depth z [m] along the optical axis, seen at pixel (u, v).
+  Eigen::Vector3d unproject(double u, double v, double z) const {
+    return pinhole().unproject(u, v, z);
+  }
+  /// Pixels that the image moves in its middle per radian that the camera turns.
+  double pixels_per_radian() const { return pinhole().fx; }
+  /// What undistorted pixels of the image can be.
+  const ImageBounds& bounds() const { return bounds_; }
+
+  /// The lens bends: raw pixels and those of the plane differ.
+  bool distorts() const { return lens_.distorts(); }
+  /// Undistorted pixel of a raw one; the same one without a lens. A raw pixel at which the lens can
+  /// show nothing, because its model folds over there, stays as it is.
+  Eigen::Vector2f from_image(const Eigen::Vector2f& raw) const;
+  /// Raw pixel of an undistorted one.
+  Eigen::Vector2d to_image(const Eigen::Vector2d& uv) const;
+
+  bool has_baseline() const { return options_.bf > 0; }
+  double bf() const { return options_.bf; }                       ///< pixel metre
+  double baseline() const { return options_.bf / pinhole().fx; }  ///< metres
   /// Depths below this [m] are trusted from one view; infinite without a baseline.
   double close_depth() const { return close_depth_; }
 
   /// Column in the (virtual) right image of a point at column u and depth z.
-  double right_column(double u, double z) const { return u - bf_ / z; }
+  double right_column(double u, double z) const { return u - options_.bf / z; }
 
  private:
   CameraOptions options_;
-  Pinhole pinhole_;
-  std::shared_ptr<const LensModel> lens_;
+  Lens lens_;
   ImageBounds bounds_;
-  ImageSize image_size_;
-  double bf_ = 0;
   double close_depth_ = std::numeric_limits<double>::infinity();
 };
 

@@ -16,17 +16,11 @@ namespace {
 constexpr float kUnknown = -1.0F;
 
 std::vector<Keypoint> undistorted(const Camera& camera, const std::vector<Keypoint>& raw) {
-  std::vector<float> xy;
-  xy.reserve(2 * raw.size());
-  for (const Keypoint& keypoint : raw) {
-    xy.push_back(keypoint.x);
-    xy.push_back(keypoint.y);
-  }
-  camera.lens().undistort(camera.pinhole(), xy);
   std::vector<Keypoint> keypoints = raw;
-  for (std::size_t i = 0; i < keypoints.size(); ++i) {
-    keypoints[i].x = xy[2 * i];
-    keypoints[i].y = xy[2 * i + 1];
+  for (Keypoint& keypoint : keypoints) {
+    const Eigen::Vector2f uv = camera.from_image({keypoint.x, keypoint.y});
+    keypoint.x = uv.x();
+    keypoint.y = uv.y();
   }
   return keypoints;
 }
@@ -40,7 +34,7 @@ std::shared_ptr<Frame> frame_of(const FrameContext& context, FrameId id, double 
   frame->camera = context.camera;
   frame->scales = context.scales;
   frame->descriptors = std::move(features.descriptors);
-  if (context.camera->lens().is_identity()) {
+  if (!context.camera->distorts()) {
     frame->keypoints = std::move(features.keypoints);
   } else {
     frame->keypoints = undistorted(*context.camera, features.keypoints);

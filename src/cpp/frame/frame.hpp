@@ -48,7 +48,7 @@ struct Frame {
   }
   /// Keypoint i at its measured depth in the camera frame; depth must be known.
   Eigen::Vector3d unproject(std::size_t i) const {
-    return camera->pinhole().unproject(keypoints[i].x, keypoints[i].y, depth[i]);
+    return camera->unproject(keypoints[i].x, keypoints[i].y, depth[i]);
   }
 };
 

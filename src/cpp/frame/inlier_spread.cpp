@@ -55,7 +55,7 @@ InlierSpread spread_of_inliers(const TrackedFrame& tracked) {
   const ImageBounds& bounds = frame.camera->bounds();
   const float across = kSpreadColumns / (bounds.max_x - bounds.min_x);
   const float down = kSpreadRows / (bounds.max_y - bounds.min_y);
-  const Pinhole& pinhole = frame.camera->pinhole();
+  const Camera& camera = *frame.camera;
   const Eigen::Matrix3d R = tracked.T_cw->rotation_matrix();
 
   constexpr int kOctaves = 64;
@@ -76,11 +76,12 @@ InlierSpread spread_of_inliers(const TrackedFrame& tracked) {
                                  std::clamp(column, 0, kSpreadColumns - 1));
     cells.set(cell);
     const Eigen::Vector3d p = R * tracked.positions[i] + tracked.T_cw->translation();
-    if (!(p.z() > 0)) continue;
+    Eigen::Vector2d pixel;
+    if (!camera.project(p, pixel)) continue;
     octaves.set(
         static_cast<std::size_t>(std::clamp(std::ilogb(p.z()) + kOctaves / 2, 0, kOctaves - 1)));
     const double weight = std::sqrt(frame.scales->inverse_sigma2(keypoint.level));
-    residuals[cell].add(weight * (pinhole.project(p) - Eigen::Vector2d(keypoint.x, keypoint.y)));
+    residuals[cell].add(weight * (pixel - Eigen::Vector2d(keypoint.x, keypoint.y)));
   }
   return {static_cast<int>(cells.count()), static_cast<int>(octaves.count()),
           correlation(residuals), n > 0 ? variances / n : 0};
@@ -88,15 +89,15 @@ InlierSpread spread_of_inliers(const TrackedFrame& tracked) {
 
 int count_staying(const TrackedFrame& tracked, const Pose& T_nw) {
   const Frame& frame = *tracked.frame;
-  const ImageBounds& bounds = frame.camera->bounds();
-  const Pinhole& pinhole = frame.camera->pinhole();
+  const Camera& camera = *frame.camera;
+  const ImageBounds& bounds = camera.bounds();
   const Eigen::Matrix3d R = T_nw.rotation_matrix();
   int n = 0;
   for (std::size_t i = 0; i < frame.size(); ++i) {
     if (!tracked.map_points[i].valid() || tracked.outlier[i]) continue;
     const Eigen::Vector3d p = R * tracked.positions[i] + T_nw.translation();
-    if (!(p.z() > 0)) continue;
-    const Eigen::Vector2d pixel = pinhole.project(p);
+    Eigen::Vector2d pixel;
+    if (!camera.project(p, pixel)) continue;
     n += bounds.contains(pixel.x(), pixel.y()) ? 1 : 0;
   }
   return n;
@@ -107,7 +108,7 @@ double median_displacement(const TrackedFrame& tracked, const Pose& T_nw) {
     throw StateError("median_displacement: the frame has no pose; set T_cw first");
   }
   const Frame& frame = *tracked.frame;
-  const Pinhole& pinhole = frame.camera->pinhole();
+  const Camera& camera = *frame.camera;
   const Eigen::Matrix3d R_cw = tracked.T_cw->rotation_matrix(), R_nw = T_nw.rotation_matrix();
   static thread_local std::vector<double> distances;  // calls after the first allocate nothing
   distances.clear();
@@ -115,8 +116,9 @@ double median_displacement(const TrackedFrame& tracked, const Pose& T_nw) {
     if (!tracked.map_points[i].valid() || tracked.outlier[i]) continue;
     const Eigen::Vector3d here = R_cw * tracked.positions[i] + tracked.T_cw->translation();
     const Eigen::Vector3d there = R_nw * tracked.positions[i] + T_nw.translation();
-    if (!(here.z() > 0) || !(there.z() > 0)) continue;
-    const double distance = (pinhole.project(there) - pinhole.project(here)).norm();
+    Eigen::Vector2d from, to;
+    if (!camera.project(here, from) || !camera.project(there, to)) continue;
+    const double distance = (to - from).norm();
     if (std::isfinite(distance)) distances.push_back(distance);
   }
   if (distances.empty()) return 0;

@@ -15,7 +15,7 @@ double median_match_error(const TrackedFrame& tracked) {
     throw StateError("median_match_error: the frame has no pose; errors belong to one");
   }
   const Frame& frame = *tracked.frame;
-  const Pinhole& pinhole = frame.camera->pinhole();
+  const Camera& camera = *frame.camera;
   const Eigen::Matrix3d R = tracked.T_cw->rotation_matrix();
   std::vector<double> squared;
   squared.reserve(frame.size());
@@ -23,11 +23,12 @@ double median_match_error(const TrackedFrame& tracked) {
     if (!tracked.map_points[i].valid()) continue;
     const Keypoint& keypoint = frame.keypoints[i];
     const Eigen::Vector3d p = R * tracked.positions[i] + tracked.T_cw->translation();
-    if (!(p.z() > 0)) {
+    Eigen::Vector2d pixel;
+    if (!camera.project(p, pixel)) {
       squared.push_back(std::numeric_limits<double>::infinity());
       continue;
     }
-    const Eigen::Vector2d off = pinhole.project(p) - Eigen::Vector2d(keypoint.x, keypoint.y);
+    const Eigen::Vector2d off = pixel - Eigen::Vector2d(keypoint.x, keypoint.y);
     const double weight = frame.scales->inverse_sigma2(keypoint.level);
     squared.push_back(weight * off.squaredNorm());
   }

@@ -176,11 +176,11 @@ Fit linearise(const cv::Mat1f& first, const cv::Mat1f& second, const SmallPlane&
 }  // namespace
 
 std::optional<ImageRotation> align_rotation(const SmallImage& first, const SmallImage& second,
-                                            const Pinhole& pinhole) {
+                                            const Camera& camera) {
   if (first.empty() || first.width != second.width || first.height != second.height) return {};
   const cv::Mat1f a = blurred(first), b = blurred(second);
   double correlation = -1;
-  const SmallPlane plane(pinhole, first.shrink);
+  const SmallPlane plane(camera.pinhole(), first.shrink);
   Eigen::Matrix3d R_21 = plane.turned_by(best_shift(a, b, correlation));
   if (!(correlation > 0)) return {};
   double gain = 1, offset = 0;

@@ -19,10 +19,10 @@ struct ImageRotation {
 /// sees: the shift with the best correlation first, then Gauss-Newton over the rotation, gain and
 /// offset of the grey values (Klein and Murray 2008, sections 3 and 4.2; Benhimane and Malis 2004).
 /// None when the images are missing or of different sizes, have no contrast, or the iterations
-/// leave the image. `pinhole` is that of the whole image; the lens is not undistorted. Near things
+/// leave the image. `camera` is that of the whole image; its lens is left out. Near things
 /// that move by parallax pull the result; it says where to search, never where the camera is. See
 /// docs/method/tracking.md#harder-search.
 std::optional<ImageRotation> align_rotation(const SmallImage& first, const SmallImage& second,
-                                            const Pinhole& pinhole);
+                                            const Camera& camera);
 
 }  // namespace orbslam

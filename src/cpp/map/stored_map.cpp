@@ -183,7 +183,7 @@ std::shared_ptr<Frame> restore_frame(
     keypoint.angle = columns.angle[first + i];
     keypoint.response = columns.response[first + i];
   }
-  if (!frame->camera->lens().is_identity()) {
+  if (frame->camera->distorts()) {
     frame->raw_keypoints = frame->keypoints;
     for (std::size_t i = 0; i < n; ++i) {
       frame->raw_keypoints[i].x = columns.raw_keypoints[2 * (first + i)];

@@ -301,7 +301,7 @@ void check_stored_keypoints(const StoredMap& stored, const StoredKeypoints& keyp
   const auto& offsets = stored.keyframes.offsets;
   const bool any = offsets[keypoints.end_row] > offsets[keypoints.first_row];
   for (const auto& camera : restore_cameras(stored)) {
-    if (!camera->lens().is_identity() && !keypoints.columns.raw_keypoints && any) {
+    if (camera->distorts() && !keypoints.columns.raw_keypoints && any) {
       refuse("the raw keypoints of a camera with a distorting lens are missing");
     }
   }

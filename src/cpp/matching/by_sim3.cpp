@@ -77,11 +77,10 @@ std::int32_t best_keypoint(const Frame& frame, const Search& search, const Descr
 std::vector<std::int32_t> search_one_way(const Side& from, const Frame& to, const Similarity& S,
                                          float radius_factor) {
   std::vector<std::int32_t> found(from.frame->size(), kNoMatch);
-  const Pinhole& pinhole = to.camera->pinhole();
   for (std::size_t i = 0; i < from.points.size(); ++i) {
     const Eigen::Vector3d p = S * (from.T_cw * from.points.positions[i]);
-    if (!(p.z() > 0)) continue;
-    const Eigen::Vector2d pixel = pinhole.project(p);
+    Eigen::Vector2d pixel;
+    if (!to.camera->project(p, pixel)) continue;
     if (!to.camera->bounds().contains_half_open(pixel.x(), pixel.y())) continue;
     // In the units of the map that the point comes from, like its scale range.
     const double distance = p.norm() / S.scale();

@@ -42,11 +42,11 @@ std::optional<FreeFeatures> gather(const Map& map, KeyFrameId id) {
 class EpipolarGeometry {
  public:
   EpipolarGeometry(const FreeFeatures& a, const FreeFeatures& b) : scales_(*b.frame->scales) {
-    const Pinhole& pinhole_b = b.frame->camera->pinhole();
-    F_ =
-        fundamental_matrix(a.T_cw, b.T_cw, a.frame->camera->pinhole().matrix(), pinhole_b.matrix());
-    const Eigen::Vector3d center = b.T_cw * a.T_cw.center();
-    if (center.z() > 0) epipole_ = pinhole_b.project(center);
+    const Camera &camera_a = *a.frame->camera, &camera_b = *b.frame->camera;
+    F_ = fundamental_matrix(a.T_cw, b.T_cw, camera_a.pinhole().matrix(),
+                            camera_b.pinhole().matrix());
+    Eigen::Vector2d epipole;
+    if (camera_b.project(b.T_cw * a.T_cw.center(), epipole)) epipole_ = epipole;
   }
 
   void select(const Keypoint& feature_1) {

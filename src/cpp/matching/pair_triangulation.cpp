@@ -21,7 +21,7 @@ PairTriangulation::PairTriangulation(const Frame& frame_1, const Pose& T_1w, con
     : view_1_{&frame_1, T_1w, T_1w.inverse()}, view_2_{&frame_2, T_2w, T_2w.inverse()} {}
 
 Eigen::Vector3d PairTriangulation::View::ray(std::size_t i) const {
-  return frame->camera->pinhole().unproject(frame->keypoints[i].x, frame->keypoints[i].y, 1.0);
+  return frame->camera->ray(frame->keypoints[i].x, frame->keypoints[i].y);
 }
 
 // Cosine of the angle under which the baseline is seen from the measured depth.
@@ -32,9 +32,9 @@ double PairTriangulation::View::depth_parallax(std::size_t i, double none) const
 
 bool PairTriangulation::View::sees(const Eigen::Vector3d& point, std::size_t i) const {
   const Eigen::Vector3d p_c = T_cw * point;
-  if (!(p_c.z() > 0)) return false;
+  Eigen::Vector2d uv;
+  if (!frame->camera->project(p_c, uv)) return false;
   const Keypoint& keypoint = frame->keypoints[i];
-  const Eigen::Vector2d uv = frame->camera->pinhole().project(p_c);
   const double error_u = uv.x() - keypoint.x;
   const double error_v = uv.y() - keypoint.y;
   double error = error_u * error_u + error_v * error_v;

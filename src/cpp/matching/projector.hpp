@@ -12,7 +12,8 @@ struct ImagePoint {
   double u = 0, v = 0, right_u = 0, z = 0;
 };
 
-/// Projects many world points into one frame; points on or behind the camera's plane are refused.
+/// Projects many world points into one frame, which must outlive it; points that its camera cannot
+/// see are refused.
 /// All tests are written so that NaN fails them. See
 /// docs/method/tracking.md#matching-the-local-map.
 class Projector {
@@ -21,39 +22,36 @@ class Projector {
       : rotation_(T_cw.rotation_matrix()),
         translation_(T_cw.translation()),
         center_(T_cw.center()),
-        pinhole_(frame.camera->pinhole()),
-        bounds_(frame.camera->bounds()),
-        bf_(frame.camera->bf()) {}
+        camera_(*frame.camera) {}
 
   const Eigen::Vector3d& center() const { return center_; }
 
   /// Frames accept both ends of the image bounds.
   bool project_into_frame(const Eigen::Vector3d& p_w, ImagePoint& image) const {
-    return project(p_w, image) && bounds_.contains(image.u, image.v);
+    return project(p_w, image) && camera_.bounds().contains(image.u, image.v);
   }
   /// Keyframes exclude the upper ends.
   bool project_into_keyframe(const Eigen::Vector3d& p_w, ImagePoint& image) const {
-    return project(p_w, image) && bounds_.contains_half_open(image.u, image.v);
+    return project(p_w, image) && camera_.bounds().contains_half_open(image.u, image.v);
   }
 
  private:
   bool project(const Eigen::Vector3d& p_w, ImagePoint& image) const {
-    image.z = rotation_.row(2).dot(p_w) + translation_.z();
-    if (!(image.z > 0)) return false;
-    const double inverse_z = 1.0 / image.z;
-    const double x = rotation_.row(0).dot(p_w) + translation_.x();
-    const double y = rotation_.row(1).dot(p_w) + translation_.y();
-    image.u = pinhole_.fx * x * inverse_z + pinhole_.cx;
-    image.v = pinhole_.fy * y * inverse_z + pinhole_.cy;
-    image.right_u = image.u - bf_ * inverse_z;
+    const Eigen::Vector3d p_c(rotation_.row(0).dot(p_w) + translation_.x(),
+                              rotation_.row(1).dot(p_w) + translation_.y(),
+                              rotation_.row(2).dot(p_w) + translation_.z());
+    Eigen::Vector2d uv;
+    if (!camera_.project(p_c, uv)) return false;
+    image.u = uv.x();
+    image.v = uv.y();
+    image.z = p_c.z();
+    image.right_u = image.u - camera_.bf() * (1.0 / image.z);
     return true;
   }
 
   Eigen::Matrix3d rotation_;
   Eigen::Vector3d translation_, center_;
-  Pinhole pinhole_;
-  ImageBounds bounds_;
-  double bf_;
+  const Camera& camera_;
 };
 
 inline constexpr double kNearestFactor = 0.8;   ///< of a point's min_distance

@@ -38,22 +38,30 @@ CameraOptions rectified_options() {
   return options;
 }
 
+/// Interleaved x, y of raw pixels as the camera undistorts them.
+std::vector<float> undistorted(const Camera& camera, std::vector<float> xy) {
+  for (std::size_t i = 0; i + 1 < xy.size(); i += 2) {
+    const Eigen::Vector2f uv = camera.from_image({xy[i], xy[i + 1]});
+    xy[i] = uv.x();
+    xy[i + 1] = uv.y();
+  }
+  return xy;
+}
+
 // The forward model, written from its formula.
 std::pair<double, double> distort(const Pinhole& k, const Distortion& d, double u, double v) {
   const double x = (u - k.cx) / k.fx, y = (v - k.cy) / k.fy, r2 = x * x + y * y;
-  const double radial = (1 + r2 * (d[0] + r2 * (d[1] + r2 * d[4]))) /
-                        (1 + r2 * (d[5] + r2 * (d[6] + r2 * d[7])));
+  const double radial =
+      (1 + r2 * (d[0] + r2 * (d[1] + r2 * d[4]))) / (1 + r2 * (d[5] + r2 * (d[6] + r2 * d[7])));
   return {k.fx * (x * radial + 2 * d[2] * x * y + d[3] * (r2 + 2 * x * x)) + k.cx,
           k.fy * (y * radial + d[2] * (r2 + 2 * y * y) + 2 * d[3] * x * y) + k.cy};
 }
 
 TEST(Camera, UndistortionEqualsTheGoldenGridAndKeypointsBitByBit) {
   const Camera camera(golden_options());
-  ASSERT_FALSE(camera.lens().is_identity());
+  ASSERT_TRUE(camera.distorts());
   for (const auto& [raw, expected] : {std::pair("grid", "out_grid_un"), {"out_kp", "out_kpun"}}) {
-    auto xy = golden(raw).values;
-    camera.lens().undistort(camera.pinhole(), xy);
-    EXPECT_EQ(xy, golden(expected).values) << raw;
+    EXPECT_EQ(undistorted(camera, golden(raw).values), golden(expected).values) << raw;
   }
 }
 
@@ -72,50 +80,81 @@ TEST(Camera, DistortingAgainReturnsTheRawPixels) {
   const Camera camera(options);
   for (int v = 16; v <= 464; v += 16) {
     for (int u = 16; u <= 624; u += 16) {
-      std::vector<float> xy = {static_cast<float>(u), static_cast<float>(v)};
-      camera.lens().undistort(camera.pinhole(), xy);
-      const auto [x, y] = distort(options.pinhole, options.distortion, xy[0], xy[1]);
+      const Eigen::Vector2f uv = camera.from_image(Eigen::Vector2i(u, v).cast<float>());
+      const auto [x, y] = distort(options.pinhole, options.distortion, uv.x(), uv.y());
       EXPECT_NEAR(x, u, 0.05);
       EXPECT_NEAR(y, v, 0.05);
     }
   }
 }
 
-// The lens of an Azure Kinect's colour camera, by its factory calibration.
-CameraOptions rational_options() {
+// Lenses of the rational model, by the factory calibrations of cameras.
+CameraOptions rational_options(int which) {
   CameraOptions options;
-  options.pinhole = {611.5, 611.3, 639.2, 367.1};
-  options.distortion = {0.46, -2.63, 0.0006, -0.0003, 1.52, 0.34, -2.45, 1.45};
   options.image_size = {1280, 720};
+  if (which == 0) {  // colour camera of an Azure Kinect
+    options.pinhole = {611.5, 611.3, 639.2, 367.1};
+    options.distortion = {0.46, -2.63, 0.0006, -0.0003, 1.52, 0.34, -2.45, 1.45};
+  } else if (which == 1) {  // its wide depth camera
+    options.pinhole = {252.3, 252.4, 256.1, 258.3};
+    options.distortion = {5.2, 3.3, -6e-5, 8e-5, 0.18, 5.5, 5.1, 0.94};
+    options.image_size = {512, 512};
+  } else {  // grey camera of an OAK-D
+    options.pinhole = {800.2, 800.5, 652.3, 355.7};
+    options.distortion = {-10.4, 67.5, 0.0012, -0.0008, -19.2, -10.5, 67.9, -20.3};
+  }
   return options;
 }
 
-TEST(Camera, TheRationalLensIsUndistortedOverTheWholeImage) {
-  const CameraOptions options = rational_options();
-  const Camera camera(options);
-  for (int v = 0; v <= 720; v += 16) {
-    for (int u = 0; u <= 1280; u += 16) {
-      std::vector<float> xy = {static_cast<float>(u), static_cast<float>(v)};
-      camera.lens().undistort(camera.pinhole(), xy);
-      const auto [x, y] = distort(options.pinhole, options.distortion, xy[0], xy[1]);
-      EXPECT_NEAR(x, u, 2e-4) << u << ' ' << v;
-      EXPECT_NEAR(y, v, 2e-4) << u << ' ' << v;
+TEST(Camera, RationalLensesAreUndistortedOverTheWholeImage) {
+  for (int which = 0; which < 3; ++which) {
+    const CameraOptions options = rational_options(which);
+    const Camera camera(options);
+    for (int v = 0; v <= options.image_size.height; v += 16) {
+      for (int u = 0; u <= options.image_size.width; u += 16) {
+        const Eigen::Vector2f uv = camera.from_image(Eigen::Vector2i(u, v).cast<float>());
+        const auto [x, y] = distort(options.pinhole, options.distortion, uv.x(), uv.y());
+        EXPECT_NEAR(x, u, 1e-4) << which << ": " << u << ' ' << v;
+        EXPECT_NEAR(y, v, 1e-4) << which << ": " << u << ' ' << v;
+      }
     }
   }
 }
 
+TEST(Camera, ThroughTheLensIsByTheFormula) {
+  for (int which = 0; which < 3; ++which) {
+    const CameraOptions options = rational_options(which);
+    const auto [u, v] = distort(options.pinhole, options.distortion, 200.25, 310.5);
+    EXPECT_TRUE(Camera(options).to_image({200.25, 310.5}).isApprox(Eigen::Vector2d(u, v), 1e-12));
+  }
+  const Eigen::Vector2d pixel(1.5, 2.5);
+  EXPECT_EQ(Camera(rectified_options()).to_image(pixel), pixel);
+  EXPECT_EQ(Camera(rectified_options()).from_image({1.5F, 2.5F}), Eigen::Vector2f(1.5F, 2.5F));
+}
+
+// r / (1 + r^2) is at most 1/2: farther out the lens shows nothing.
+TEST(Camera, WhereARationalLensShowsNothingPixelsStay) {
+  CameraOptions options = rectified_options();
+  options.pinhole = {400, 400, 320, 240};
+  options.distortion[5] = 1;
+  const Camera camera(options);
+  const Eigen::Vector2f raw(320 + 201, 240);
+  EXPECT_TRUE(camera.from_image(raw).isApprox(raw, 1e-6F));
+  EXPECT_NEAR(camera.from_image({320 + 199.0F, 240}).x(), 320 + 400 * 0.9048, 0.2);
+}
+
 TEST(Camera, ARationalLensWithoutItsDenominatorIsTheRadialOne) {
   CameraOptions options = golden_options();
-  auto radial = golden("grid").values, rational = radial;
-  Camera(options).lens().undistort(options.pinhole, radial);
+  const auto grid = golden("grid").values;
+  const auto radial = undistorted(Camera(options), grid);
   options.distortion[7] = 1e-15;  // not 0: Newton's method
-  Camera(options).lens().undistort(options.pinhole, rational);
+  const auto rational = undistorted(Camera(options), grid);
   for (std::size_t i = 0; i < radial.size(); ++i) EXPECT_NEAR(radial[i], rational[i], 0.4);
 }
 
 TEST(Camera, RectifiedBoundsAreTheImageRectangle) {
   const Camera camera(rectified_options());
-  EXPECT_TRUE(camera.lens().is_identity());
+  EXPECT_FALSE(camera.distorts());
   EXPECT_EQ(camera.bounds().min_x, 0.0F);
   EXPECT_EQ(camera.bounds().max_x, 640.0F);
   EXPECT_EQ(camera.bounds().min_y, 0.0F);
@@ -138,15 +177,8 @@ TEST(Camera, AnyCoefficientMakesALens) {
   for (std::size_t i = 0; i < 8; ++i) {
     CameraOptions options = rectified_options();
     options.distortion[i] = 0.01;
-    EXPECT_FALSE(Camera(options).lens().is_identity()) << "coefficient " << i;
+    EXPECT_TRUE(Camera(options).distorts()) << "coefficient " << i;
   }
-}
-
-TEST(Camera, NoPointsToUndistortIsFine) {
-  std::vector<float> none;
-  const Camera camera(golden_options());
-  camera.lens().undistort(camera.pinhole(), none);
-  EXPECT_TRUE(none.empty());
 }
 
 // OD-4: a single camera has a limit of close points, too: infinity.
@@ -164,11 +196,48 @@ TEST(Camera, BaselineAndCloseDepthFollowFromBf) {
 }
 
 TEST(Camera, ProjectionAndUnprojectionAreInverse) {
-  const Pinhole pinhole = rectified_options().pinhole;
+  const Camera camera(rectified_options());
   const Eigen::Vector3d point(0.3, -0.4, 2.5);
-  const Eigen::Vector2d pixel = pinhole.project(point);
+  Eigen::Vector2d pixel;
+  ASSERT_TRUE(camera.project(point, pixel));
   EXPECT_DOUBLE_EQ(pixel.x(), 380);
-  EXPECT_TRUE(pinhole.unproject(pixel.x(), pixel.y(), 2.5).isApprox(point, 1e-14));
+  EXPECT_TRUE(camera.unproject(pixel.x(), pixel.y(), 2.5).isApprox(point, 1e-14));
+  EXPECT_TRUE(camera.ray(pixel.x(), pixel.y()).isApprox(point / 2.5, 1e-14));
+}
+
+TEST(Camera, PointsThatAreNotInFrontHaveNoPixel) {
+  const Camera camera(rectified_options());
+  for (const double z : {0.0, -1.0, static_cast<double>(NAN)}) {
+    const Eigen::Vector3d point(0.3, -0.4, z);
+    Eigen::Vector2d pixel(7, 8);
+    Seen seen;
+    EXPECT_FALSE(camera.can_see(point));
+    EXPECT_FALSE(camera.project(point, pixel));
+    EXPECT_FALSE(camera.project(point, seen));
+    EXPECT_EQ(pixel, Eigen::Vector2d(7, 8));
+  }
+}
+
+TEST(Camera, TheJacobianIsTheDerivativeOfTheProjection) {
+  const Camera camera(rectified_options());
+  const Eigen::Vector3d point(0.3, -0.4, 2.5);
+  constexpr double kStep = 1e-6;
+  Seen seen;
+  Eigen::Vector2d pixel, above, below;
+  ASSERT_TRUE(camera.project(point, seen) && camera.project(point, pixel));
+  EXPECT_EQ(seen.uv, pixel);
+  for (int axis = 0; axis < 3; ++axis) {
+    const Eigen::Vector3d shift = kStep * Eigen::Vector3d::Unit(axis);
+    ASSERT_TRUE(camera.project(point + shift, above) && camera.project(point - shift, below));
+    EXPECT_TRUE(seen.J.col(axis).isApprox((above - below) / (2 * kStep), 1e-7)) << axis;
+  }
+}
+
+TEST(Camera, ASmallTurnMovesTheMiddleByPixelsPerRadian) {
+  const Camera camera(rectified_options());
+  Eigen::Vector2d pixel;
+  ASSERT_TRUE(camera.project({std::sin(1e-3), 0, std::cos(1e-3)}, pixel));
+  EXPECT_NEAR(pixel.x() - 320, 1e-3 * camera.pixels_per_radian(), 1e-6);
 }
 
 struct WrongOption {

@@ -6,11 +6,13 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "support/cameras.hpp"
+
 namespace orbslam {
 namespace {
 
 constexpr double kDegree = M_PI / 180;
-const Pinhole kCamera{400, 400, 319.5, 239.5};
+const Camera kCamera = *testing::make_camera({400, 400, 319.5, 239.5});
 
 /// Patches of random grey all around, seen by a camera that is turned by R_cw.
 cv::Mat1b look(const Eigen::Matrix3d& R_cw, double gain = 1, double offset = 0) {

@@ -39,8 +39,8 @@ def test_camera_options_can_be_set_one_by_one() -> None:
     assert camera.close_depth == pytest.approx(2.8)
     assert not camera.is_rectified
     centre = np.array([[320.0, 240.0]], dtype=np.float32)
-    np.testing.assert_array_equal(camera.undistort(centre), centre)
-    assert camera.undistort(np.zeros((0, 2), dtype=np.float32)).shape == (0, 2)
+    np.testing.assert_array_equal(camera.from_image(centre), centre)
+    assert camera.from_image(np.zeros((0, 2), dtype=np.float32)).shape == (0, 2)
 
 
 def test_wrong_camera_options_name_the_setting() -> None:
@@ -247,7 +247,7 @@ def test_monocular_frame_of_a_distorting_lens() -> None:
         context(distortion=[0.2, -0.5, 0.0, 0.0, 0.0], bf=0.0), 0, 0.0, found
     )
     np.testing.assert_array_equal(frame.raw_keypoints, found.keypoints[:, :2])
-    np.testing.assert_array_equal(frame.keypoints, frame.camera.undistort(frame.raw_keypoints))
+    np.testing.assert_array_equal(frame.keypoints, frame.camera.from_image(frame.raw_keypoints))
     assert np.abs(frame.keypoints - frame.raw_keypoints).max() > 0.5
     assert (frame.depth == -1).all()
 

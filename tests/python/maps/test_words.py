@@ -26,7 +26,7 @@ from orbslam2py.maps import (
 from orbslam2py.maps.map_rows import all_rows, keypoint_rows
 from orbslam2py.maps.map_writer import MapWriter
 from support import small_sequences
-from support.saved_maps import edit, small_map, written, written_as_version_1
+from support.saved_maps import edit, small_map, written, written_as_version
 
 #: A feature of a stopped word.
 STOPPED = 2**32 - 1
@@ -89,10 +89,12 @@ def test_known_words_are_not_searched_again() -> None:
     assert take_contents(restored).keyframes.words[7] == 5
 
 
-def test_a_map_of_the_first_version_is_used_like_any(tmp_path: Path) -> None:
-    old, new = written_as_version_1(tmp_path), written(tmp_path)
+@pytest.mark.parametrize("version", [1, 2])
+def test_a_map_of_an_earlier_version_is_used_like_any(tmp_path: Path, version: int) -> None:
+    old, new = written_as_version(version, tmp_path), written(tmp_path)
     saved = load_map(old)
-    assert not len(saved.contents.keyframes.words)
+    assert bool(len(saved.contents.keyframes.words)) == (version > 1)
+    assert saved.contents.cameras.distortion.tolist() == [[0.0] * 8]
     assert small_map().contents.first_difference(saved.contents) is None
     assert np.array_equal(_poses_in(old), _poses_in(new))
     save_map(saved, tmp_path / "again.orbmap")

@@ -26,6 +26,8 @@ from orbslam2py.trajectory.rotations import (
 
 FX, FY, CX, CY, WIDTH, HEIGHT = 300.0, 310.0, 158.25, 121.5, 320, 240
 LENS = (-0.21, 0.05, 0.001, -0.002, 0.0)
+#: That of an Azure Kinect's colour camera.
+RATIONAL_LENS = (0.46, -2.63, 0.0006, -0.0003, 1.52, 0.34, -2.45, 1.45)
 SCALE_FACTOR, N_LEVELS, BF = 1.2, 8, 30.0
 UNMATCHED = 5  # keypoints of every keyframe that show no point
 FIRST_TIME, STEP = 1305031102.175304, 0.5
@@ -235,7 +237,7 @@ def _right(
 def _camera(lens: tuple[float, ...] | None, bf: float) -> Cameras:
     return Cameras(
         *(np.array([value]) for value in (FX, FY, CX, CY)),
-        distortion=np.array([lens or (0.0,) * 5]),
+        distortion=np.array([(*(lens or ()), *(0.0,) * 8)[:8]]),
         bf=np.array([bf]),
         depth_ratio=np.array([40.0 if bf else 0.0]),
         width=np.array([WIDTH]),

@@ -18,6 +18,7 @@ from orbslam2py.maps import (
     save_map,
 )
 from orbslam2py.settings import CameraSettings, DepthSettings
+from orbslam2py.settings.groups import DISTORTION_FIELDS
 from support.made_up_map import BF, FX, FY, HEIGHT, LENS, WIDTH, made_up_map
 
 FRAMES_PER_KEYFRAME = 3
@@ -26,11 +27,11 @@ FRAMES_PER_KEYFRAME = 3
 def settings_of(contents: MapContents) -> Settings:
     """Settings of the camera that a made-up map has; depth makes it one with depth images."""
     cameras = contents.cameras
-    k1, k2, p1, p2, k3 = cameras.distortion[0].tolist()
+    lens = dict(zip(DISTORTION_FIELDS, cameras.distortion[0].tolist(), strict=True))
     depth = bool(cameras.bf[0] > 0)
     camera = CameraSettings(
-        FX, FY, float(cameras.cx[0]), float(cameras.cy[0]), k1, k2, p1, p2, k3, WIDTH, HEIGHT,
-        bf=BF if depth else 0.0,
+        FX, FY, float(cameras.cx[0]), float(cameras.cy[0]), width=WIDTH, height=HEIGHT,
+        bf=BF if depth else 0.0, **lens,
     )  # fmt: skip
     sensor = Sensor.RGBD if depth else Sensor.MONOCULAR
     return Settings(sensor, camera, depth=DepthSettings(40.0, 1000.0) if depth else None)

@@ -33,17 +33,20 @@ def written(folder: Path, sensor: Sensor = Sensor.RGBD) -> Path:
     return path
 
 
-def written_as_version_1(folder: Path) -> Path:
-    """The small map as the first version of the format had it: no words, a short hash of them."""
-    path = folder / "old.orbmap"
+def written_as_version(version: int, folder: Path) -> Path:
+    """The small map as an earlier version of the format had it.
+
+    Version 2 had no rational lenses; version 1 no words, and a short hash of the vocabulary.
+    """
+    path = folder / f"version_{version}.orbmap"
     sums: dict[str, list[int]] = {name: [] for name in TABLES}
     with closing(sqlite3.connect(path)) as connection, connection:
-        connection.executescript(create_script(1))
+        connection.executescript(create_script(version))
         for name, present in all_rows(small_map()):
-            row = present[:-1] if name == "keypoints" else present
+            row = present[:-1] if name == "keypoints" and version < 2 else present
             if name == "cameras":
                 row = (*present[:10], *present[13:])
-            if name == "vocabulary":
+            if name == "vocabulary" and version < 2:
                 row = (1, "", f"{load_vocabulary().hash:016x}", "")
             sums[name].append(checksum(row))
             marks = ", ".join("?" * (len(row) + 1))

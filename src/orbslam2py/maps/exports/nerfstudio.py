@@ -73,7 +73,8 @@ def export_nerfstudio(
     Raises
     ------
     DatasetError
-        If the folder holds something that must stay, or no keyframe has an image.
+        If the folder holds something that must stay, no keyframe has an image, or images that are
+        not written were taken through a rational lens, which nerfstudio does not know.
     ImageError
         If an image is not one that fits its camera.
     MapFileError
@@ -138,8 +139,8 @@ def _camera(contents: MapContents, view: View) -> dict[str, float]:
     k1, k2, p1, p2, k3, *rational = lens.tolist()
     if any(rational):
         raise DatasetError(
-            "nerfstudio's transforms.json cannot hold a rational lens (k4 to k6); export the "
-            "images as well, which are then undistorted"
+            "nerfstudio's transforms.json cannot hold a rational lens (k4 to k6); give the images "
+            "(--images, images=...), which are written undistorted"
         )
     return {
         "w": view.width,

@@ -16,7 +16,18 @@ from hypothesis import strategies as st
 from orbslam2py import DatasetError, MapFileError
 from orbslam2py._arrays import ByteArray
 from orbslam2py.maps import MapContents, export_colmap
-from support.made_up_map import BF, CX, CY, FX, FY, HEIGHT, LENS, WIDTH, made_up_map
+from support.made_up_map import (
+    BF,
+    CX,
+    CY,
+    FX,
+    FY,
+    HEIGHT,
+    LENS,
+    RATIONAL_LENS,
+    WIDTH,
+    made_up_map,
+)
 
 WIDE = (*LENS[:4], -0.03)
 BINARY = pytest.mark.parametrize("binary", [True, False], ids=["binary", "text"])
@@ -72,6 +83,7 @@ def check_errors(model: pycolmap.Reconstruction, atol: float = 1e-6) -> float:
         (None, "PINHOLE", ()),
         (LENS, "OPENCV", LENS[:4]),
         (WIDE, "FULL_OPENCV", (*WIDE, 0, 0, 0)),
+        (RATIONAL_LENS, "FULL_OPENCV", RATIONAL_LENS),
     ],
 )
 def test_everything_is_read_back(
@@ -99,7 +111,7 @@ def test_everything_is_read_back(
 
 
 @BINARY
-@pytest.mark.parametrize("lens", [None, LENS, WIDE])
+@pytest.mark.parametrize("lens", [None, LENS, WIDE, RATIONAL_LENS])
 def test_exact_projections_have_no_error(
     tmp_path: Path, binary: bool, lens: tuple[float, ...] | None
 ) -> None:
@@ -116,7 +128,7 @@ def test_a_grey_image_may_have_a_channel_of_its_own(tmp_path: Path) -> None:
         assert same.read_bytes() == path.read_bytes()
 
 
-@pytest.mark.parametrize("lens", [None, LENS])
+@pytest.mark.parametrize("lens", [None, LENS, RATIONAL_LENS])
 def test_with_images_the_camera_is_a_pinhole(
     tmp_path: Path, lens: tuple[float, ...] | None
 ) -> None:
@@ -134,9 +146,10 @@ def test_with_images_the_camera_is_a_pinhole(
         assert written[HEIGHT // 2, WIDTH // 2] == image.image_id - 1
 
 
-def test_straight_lines_are_straight_in_the_images(tmp_path: Path) -> None:
+@pytest.mark.parametrize("lens", [LENS, RATIONAL_LENS])
+def test_straight_lines_are_straight_in_the_images(tmp_path: Path, lens: tuple[float, ...]) -> None:
     """A dot drawn where the lens shows a point appears where the model says it is."""
-    contents = made_up_map(n_keyframes=3, n_points=6, lens=LENS, seed=3)
+    contents = made_up_map(n_keyframes=3, n_points=6, lens=lens, seed=3)
     keyframes = contents.keyframes
 
     def dotted(keyframe_id: int) -> ByteArray:

@@ -17,7 +17,17 @@ from orbslam2py import _core as core
 from orbslam2py._arrays import ByteArray, FloatArray
 from orbslam2py.maps import MapContents, export_nerfstudio, take_contents
 from orbslam2py.maps.exports.nerfstudio import camera_to_world
-from support.made_up_map import CX, CY, FX, FY, HEIGHT, LENS, WIDTH, made_up_map
+from support.made_up_map import (
+    CX,
+    CY,
+    FX,
+    FY,
+    HEIGHT,
+    LENS,
+    RATIONAL_LENS,
+    WIDTH,
+    made_up_map,
+)
 
 
 def transforms(folder: Path) -> dict[str, Any]:
@@ -57,7 +67,7 @@ def check_pixels(contents: MapContents, folder: Path, keypoints: FloatArray) -> 
         np.testing.assert_allclose(found, wanted, atol=2e-3)  # points are float32
 
 
-@pytest.mark.parametrize("lens", [None, LENS])
+@pytest.mark.parametrize("lens", [None, LENS, RATIONAL_LENS])
 def test_points_are_where_the_images_show_them(
     tmp_path: Path, lens: tuple[float, ...] | None
 ) -> None:
@@ -81,6 +91,14 @@ def test_without_images_the_lens_is_told(tmp_path: Path) -> None:
     assert [data[key] for key in ("k1", "k2", "p1", "p2", "k3")] == list(LENS)
     assert [frame["file_path"] for frame in data["frames"]] == list(names.values())
     assert not (tmp_path / "out" / "images").exists()
+
+
+def test_a_rational_lens_is_refused_where_its_images_are_not_written(tmp_path: Path) -> None:
+    contents = made_up_map(2, lens=RATIONAL_LENS)
+    for names in (None, {0: "first.jpg"}):
+        with pytest.raises(DatasetError, match=r"rational lens \(k4 to k6\); give the images"):
+            export_nerfstudio(contents, tmp_path / "out", image_names=names)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_world_stands_upright(tmp_path: Path) -> None:
