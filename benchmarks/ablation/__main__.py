@@ -58,7 +58,7 @@ def variants_of(arguments: argparse.Namespace) -> dict[str, Changes]:
     """Return the changes of each variant by its name; the full method is the first."""
     variants: dict[str, Changes] = {USUAL: {}}
     names = arguments.off or ([] if arguments.set else list(MECHANISMS))
-    if arguments.together:
+    if arguments.together and names:
         variants[" and ".join(names)] = merged(names)
     else:
         variants |= {name: MECHANISMS[name] for name in names}

@@ -40,12 +40,13 @@ def main() -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     console = console_of(arguments)
-    path: Path = arguments.csv or CHECKOUT / "build" / "starts" / f"{version()}.csv"
+    changes = dict(map(read_change, arguments.set))
+    name = "-".join([version(), *(f"{key}={value}" for key, value in changes.items())])
+    path: Path = arguments.csv or CHECKOUT / "build" / "starts" / f"{name}.csv"
     cases = list(start_cases(arguments.seeds, arguments.only))
     rows = read_rows(path)
     write_rows(path, rows.values())
     missing = [case for case in cases if case.key not in rows]
-    changes = dict(map(read_change, arguments.set))
     for row in all_rows(missing, arguments.jobs, changes):
         rows[row["key"]] = row
         append_row(path, row)
