@@ -10,12 +10,13 @@
 #include "geometry/pnp_ransac.hpp"
 #include "geometry/two_view.hpp"
 #include "measure.hpp"
+#include "support/cameras.hpp"
 
 namespace {
 
 using namespace orbslam;
 
-const Pinhole pinhole{520, 525, 320, 240};
+const auto camera = testing::make_camera({520, 525, 320, 240});
 
 double uniform(RandomIntegers& random, double low, double high) {
   return low + (high - low) * static_cast<double>(random.below(1U << 30U)) / (1U << 30U);
@@ -30,7 +31,7 @@ void BM_ReconstructTwoViews(benchmark::State& state, bool planar) {
   for (int i = 0; i < 2000; ++i) {
     const double u = uniform(random, 0, 640), v = uniform(random, 0, 480);
     const double depth = planar ? 4 + u / 200 : uniform(random, 3, 9);
-    const Eigen::Vector2d x = pinhole.project(T_21 * pinhole.unproject(u, v, depth));
+    const Eigen::Vector2d x = camera->pinhole().project(T_21 * camera->unproject(u, v, depth));
     const auto noisy = [&](double value) {
       return static_cast<float>(value + uniform(random, -0.6, 0.6));
     };
@@ -44,7 +45,7 @@ void BM_ReconstructTwoViews(benchmark::State& state, bool planar) {
   WorkerThread* const helper = state.range(0) == 2 ? &worker : nullptr;
   TwoViewResult result;
   measure(state, [&] {
-    result = reconstruct_two_views({initial, current, matches, pinhole}, {}, 1, helper);
+    result = reconstruct_two_views({initial, current, matches, *camera}, {}, 1, helper);
   });
   state.SetLabel(to_string(result.outcome));
 }
@@ -62,13 +63,13 @@ BENCHMARK_CAPTURE(BM_ReconstructTwoViews, planar, true)
 PnpProblem make_problem(int n, double outlier_share) {
   RandomIntegers random(2);
   PnpProblem problem;
-  problem.pinhole = pinhole;
+  problem.camera = camera;
   problem.points.resize(3, n);
   problem.pixels.resize(2, n);
   problem.sigma2 = Eigen::VectorXd::Ones(n);
   for (int i = 0; i < n; ++i) {
     const double u = uniform(random, 0, 640), v = uniform(random, 0, 480);
-    problem.points.col(i) = pinhole.unproject(u, v, uniform(random, 2, 8));
+    problem.points.col(i) = camera->unproject(u, v, uniform(random, 2, 8));
     problem.pixels.col(i) << u + uniform(random, -1, 1), v + uniform(random, -1, 1);
     if (uniform(random, 0, 1) < outlier_share) {
       problem.pixels.col(i) << uniform(random, 0, 640), uniform(random, 0, 480);
@@ -80,7 +81,7 @@ PnpProblem make_problem(int n, double outlier_share) {
 void BM_SolveEpnp(benchmark::State& state) {
   const PnpProblem problem = make_problem(static_cast<int>(state.range(0)), 0);
   measure(state, [&] {
-    benchmark::DoNotOptimize(solve_epnp(problem.points, problem.pixels, problem.pinhole));
+    benchmark::DoNotOptimize(solve_epnp(problem.points, problem.pixels, *problem.camera));
   });
 }
 BENCHMARK(BM_SolveEpnp)->Arg(4)->Arg(100)->Unit(benchmark::kMicrosecond);

@@ -17,7 +17,7 @@ void BM_OptimizePose(benchmark::State& state, const char* set) {
   const testing::PoseProblem problem = testing::golden_pose_problem(set);
   measure(state, [&] {
     benchmark::DoNotOptimize(
-        optimize_pose(problem.T_cw_initial, problem.pinhole, problem.bf, problem.observations));
+        optimize_pose(problem.T_cw_initial, *problem.camera, problem.observations));
   });
 }
 BENCHMARK_CAPTURE(BM_OptimizePose, mono_200, "poseopt_mono")->Unit(benchmark::kMillisecond);

@@ -110,14 +110,21 @@ def _pixels(uv: np.ndarray, right_u: np.ndarray) -> np.ndarray:
     return np.column_stack([uv, np.where(right_u >= 0, right_u, np.nan)]).astype(np.float64)
 
 
+def _camera(K: np.ndarray) -> core.Camera:
+    """A camera with fx, fy, cx, cy, bf; optimisation does not ask its size."""
+    fx, fy, cx, cy, bf = K.astype(np.float64).tolist()
+    size = {"width": 640, "height": 480}
+    return core.Camera(
+        core.CameraOptions(fx=fx, fy=fy, cx=cx, cy=cy, **size, bf=bf, depth_ratio=40.0)
+    )
+
+
 def pose_rows(yardstick: Yardstick) -> Iterator[Row]:
     for name, figure in reference.POSE.items():
         arrays = golden(name)
-        K = arrays["K"].astype(np.float64)
         arguments = (
             core.Pose.from_matrix(arrays["Tcw_init"].astype(np.float64)),
-            K[:4],
-            float(K[4]),
+            _camera(arrays["K"]),
             arrays["X"].astype(np.float64),
             _pixels(arrays["uv"], arrays["ur"]),
             inverse_sigma2(arrays["octave"]),
@@ -139,15 +146,13 @@ class GoldenBundle:
     @staticmethod
     def load(name: str) -> GoldenBundle:
         arrays = golden(name)
-        K = arrays["K"].astype(np.float64)
         T_cw = [core.Pose.from_matrix(T) for T in arrays["Tcw_init"].astype(np.float64)]
         first_local = int(arrays["local_from"][0])
         uvr = arrays["obs_uvr"]
         arguments = (
             T_cw,
             [i < first_local or i == 0 for i in range(len(T_cw))],
-            K[:4],
-            float(K[4]),
+            _camera(arrays["K"]),
             arrays["X_init"].astype(np.float64),
             arrays["obs_kf"].astype(np.int64),
             arrays["obs_pt"].astype(np.int64),
@@ -158,13 +163,13 @@ class GoldenBundle:
 
     def cost(self) -> float:
         """Sum of squared whitened residuals of our solution, over the kept observations."""
-        _, _, K, bf, _, camera, point, pixels, weight = self.arguments
+        _, _, model, _, camera, point, pixels, weight = self.arguments
         poses, points, _ = core.solve_bundle(*self.arguments)
         matrices = np.stack([pose.matrix for pose in poses])
         seen = matrices[camera, :3, :3] @ points[point][:, :, None]
-        x, y, z = (seen[:, :, 0] + matrices[camera, :3, 3]).T
-        u, v = K[0] * x / z + K[2], K[1] * y / z + K[3]
-        projected = np.column_stack([u, v, u - bf / z])
+        there = seen[:, :, 0] + matrices[camera, :3, 3]
+        uv = model.project(there)
+        projected = np.column_stack([uv, uv[:, 0] - model.bf / there[:, 2]])
         squares = np.nansum((pixels - projected) ** 2, axis=1) * weight
         return float(squares[self.kept].sum())
 

@@ -2005,11 +2005,10 @@ class PnpRansac:
     """
     RANSAC over EPnP in slices, so that several candidates can take turns.
     """
-    def __init__(self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], sigma2: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], intrinsics: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 1]"], seed: typing.SupportsInt | typing.SupportsIndex = 0, options: PnpOptions = ...) -> None:
+    def __init__(self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], sigma2: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], camera: Camera, seed: typing.SupportsInt | typing.SupportsIndex = 0, options: PnpOptions = ...) -> None:
         """
         `points`: (n, 3) float64 world. `pixels`: (n, 2) float64 undistorted. `sigma2`: (n,)
-        [pixels^2]. `intrinsics`: fx, fy, cx, cy [pixels]. Raises ValueError for bad shapes or
-        options.
+        [pixels^2]. `camera`: a Camera. Raises ValueError for bad shapes or options.
         """
     def iterate(self, n: typing.SupportsInt | typing.SupportsIndex) -> PnpPose | None:
         """
@@ -3216,15 +3215,15 @@ def optimize_pose(frame: TrackedFrame) -> PoseEstimate:
     inliers. Raises StateError when the frame has no pose.
     """
 @typing.overload
-def optimize_pose(T_cw: Pose, intrinsics: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 1]"], bf: typing.SupportsFloat | typing.SupportsIndex, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], inverse_sigma2: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> PoseEstimate:
+def optimize_pose(T_cw: Pose, camera: Camera, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], inverse_sigma2: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]) -> PoseEstimate:
     """
     The same from arrays.
 
-    `intrinsics`: fx, fy, cx, cy [pixels]. `bf`: baseline times fx [pixel metre]. `points`:
-    (n, 3) float64, world. `pixels`: (n, 3) float64, undistorted u, v and the right column,
-    NaN without depth. `inverse_sigma2`: (n,) [pixels^-2]. Raises ValueError for bad shapes.
+    `camera`: a Camera. `points`: (n, 3) float64, world. `pixels`: (n, 3) float64, undistorted
+    u, v and the right column, NaN without depth. `inverse_sigma2`: (n,) [pixels^-2]. Raises
+    ValueError for bad shapes.
     """
-def place_points(initial: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], current: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], matches: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], intrinsics: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 1]"], T_21: Pose, sigma: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> TwoViewMotion:
+def place_points(initial: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], current: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], matches: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], camera: Camera, T_21: Pose, sigma: typing.SupportsFloat | typing.SupportsIndex = 1.0) -> TwoViewMotion:
     """
     What a motion that is known already places: a TwoViewMotion with all matches that fit it,
     by the rules of reconstruct_two_views. `T_21`: Pose, camera 1 to camera 2; the length of
@@ -3277,12 +3276,12 @@ def project_into(frame: TrackedFrame, points: PointBatch) -> tuple[numpy.typing.
     the right image; (n,) float32; (n,) int32 predicted level; (n,) bool. The others are only
     meaningful where visible. Raises StateError without a pose.
     """
-def reconstruct_two_views(initial: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], current: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], matches: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], intrinsics: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 1]"], seed: typing.SupportsInt | typing.SupportsIndex = 0, options: TwoViewOptions = ..., samples: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, two_threads: bool = True) -> TwoViewResult:
+def reconstruct_two_views(initial: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], current: typing.Annotated[numpy.typing.ArrayLike, numpy.float32], matches: typing.Annotated[numpy.typing.ArrayLike, numpy.int32], camera: Camera, seed: typing.SupportsInt | typing.SupportsIndex = 0, options: TwoViewOptions = ..., samples: typing.Annotated[numpy.typing.ArrayLike, numpy.int32] | None = None, two_threads: bool = True) -> TwoViewResult:
     """
     Motion and points from two views, up to scale.
 
     `initial`, `current`: (n, 2), (m, 2) float32 undistorted pixels of all keypoints.
-    `matches`: (n,) int32 index in `current` or -1. `intrinsics`: fx, fy, cx, cy [pixels].
+    `matches`: (n,) int32 index in `current` or -1. `camera`: a Camera.
     `samples`: (k, 8) int32 indices into the matches, ascending by initial keypoint, instead
     of those drawn from `seed`. `two_threads` does not change the result. Raises ValueError
     for bad shapes, indices or options.
@@ -3329,21 +3328,21 @@ def snapshot_observations(map: Map, which: typing.SupportsInt | typing.SupportsI
     """
     Copy who observes what, as compressed rows, of a map (-1: the active one).
     """
-def solve_bundle(T_cw: collections.abc.Sequence[Pose], fixed: collections.abc.Sequence[bool], intrinsics: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 1]"], bf: typing.SupportsFloat | typing.SupportsIndex, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], camera_index: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], point_index: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], inverse_sigma2: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], options: BundleOptions = ..., abort: StopFlag | None = None) -> tuple:
+def solve_bundle(T_cw: collections.abc.Sequence[Pose], fixed: collections.abc.Sequence[bool], camera: Camera, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], camera_index: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], point_index: typing.Annotated[numpy.typing.ArrayLike, numpy.int64], pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], inverse_sigma2: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], options: BundleOptions = ..., abort: StopFlag | None = None) -> tuple:
     """
     Bundle adjustment of arrays. Returns (poses, points (m, 3) float64, BundleSummary).
 
-    `T_cw`: list of Pose; `fixed`: list of bool. `intrinsics`: fx, fy, cx, cy [pixels], `bf`
-    [pixel metre], of all cameras. `points`: (m, 3) float64, world. `camera_index`,
-    `point_index`: (n,) int64. `pixels`: (n, 3) undistorted u, v and the right column, NaN
-    without depth. `inverse_sigma2`: (n,) [pixels^-2]. `abort`: StopFlag or None. Raises
-    ValueError for bad shapes or indices.
+    `T_cw`: list of Pose; `fixed`: list of bool. `camera`: the Camera that sees from all
+    poses. `points`: (m, 3) float64, world. `camera_index`, `point_index`: (n,) int64.
+    `pixels`: (n, 3) undistorted u, v and the right column, NaN without depth.
+    `inverse_sigma2`: (n,) [pixels^-2]. `abort`: StopFlag or None. Raises ValueError for bad
+    shapes or indices.
     """
-def solve_epnp(points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], intrinsics: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 1]"]) -> EpnpPose | None:
+def solve_epnp(points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], pixels: typing.Annotated[numpy.typing.ArrayLike, numpy.float64], camera: Camera) -> EpnpPose | None:
     """
     Pose from (n, 3) float64 world points and (n, 2) float64 undistorted pixels, n >= 4.
 
-    `intrinsics`: fx, fy, cx, cy [pixels]. Returns an EpnpPose, or None for collinear points.
+    `camera`: a Camera. Returns an EpnpPose, or None for collinear points.
     All points count as inliers. Raises ValueError for bad shapes.
     """
 def solve_full_bundle(bundle: GatheredBundle, options: FullBundleOptions = ..., abort: StopFlag | None = None, n_threads: typing.SupportsInt | typing.SupportsIndex = 1) -> BundleSummary:

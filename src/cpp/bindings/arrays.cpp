@@ -58,8 +58,4 @@ std::vector<MapPointId> to_point_ids(const IdArray& array) {
   return ids;
 }
 
-Pinhole pinhole_of(const Eigen::Vector4d& intrinsics) {
-  return {intrinsics[0], intrinsics[1], intrinsics[2], intrinsics[3]};
-}
-
 }  // namespace orbslam::bindings

@@ -25,9 +25,6 @@ std::size_t rows_of(const py::array& array, py::ssize_t columns, const char* nam
 
 std::vector<MapPointId> to_point_ids(const IdArray& array);
 
-/// From fx, fy, cx, cy.
-Pinhole pinhole_of(const Eigen::Vector4d& intrinsics);
-
 /// A new NumPy array of the given shape holding a copy of `count` items.
 template <class Item>
 py::array_t<Item> copy_to_array(const void* data, std::vector<py::ssize_t> shape) {

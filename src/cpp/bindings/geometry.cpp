@@ -137,7 +137,7 @@ void bind_two_view(py::module_& module) {
   module.def(
       "reconstruct_two_views",
       [](const Input<float>& initial, const Input<float>& current,
-         const Input<std::int32_t>& matches, const Eigen::Vector4d& intrinsics, std::uint64_t seed,
+         const Input<std::int32_t>& matches, const Camera& camera, std::uint64_t seed,
          const TwoViewOptions& options, const std::optional<Input<std::int32_t>>& samples,
          bool two_threads) {
         if (matches.ndim() != 1) throw py::value_error("matches must have the shape (n,)");
@@ -146,18 +146,18 @@ void bind_two_view(py::module_& module) {
         const std::vector<int> indices(matches.data(), matches.data() + matches.size());
         std::optional<std::vector<EightPairs>> given;
         if (samples) given = samples_of(*samples);
-        const TwoViewInput input{points_1, points_2, indices, pinhole_of(intrinsics)};
+        const TwoViewInput input{points_1, points_2, indices, camera};
         const py::gil_scoped_release release;
         const auto helper = two_threads ? std::make_unique<WorkerThread>() : nullptr;
         return given ? reconstruct_two_views(input, options, *given, helper.get())
                      : reconstruct_two_views(input, options, seed, helper.get());
       },
-      "initial"_a, "current"_a, "matches"_a, "intrinsics"_a, "seed"_a = 0,
+      "initial"_a, "current"_a, "matches"_a, "camera"_a, "seed"_a = 0,
       py::arg_v("options", TwoViewOptions(), "TwoViewOptions()"), "samples"_a = py::none(),
       "two_threads"_a = true,
       "Motion and points from two views, up to scale.\n\n"
       "`initial`, `current`: (n, 2), (m, 2) float32 undistorted pixels of all keypoints.\n"
-      "`matches`: (n,) int32 index in `current` or -1. `intrinsics`: fx, fy, cx, cy [pixels].\n"
+      "`matches`: (n,) int32 index in `current` or -1. `camera`: a Camera.\n"
       "`samples`: (k, 8) int32 indices into the matches, ascending by initial keypoint, instead\n"
       "of those drawn from `seed`. `two_threads` does not change the result. Raises ValueError\n"
       "for bad shapes, indices or options.");
@@ -167,17 +167,16 @@ void bind_place_points(py::module_& module) {
   module.def(
       "place_points",
       [](const Input<float>& initial, const Input<float>& current,
-         const Input<std::int32_t>& matches, const Eigen::Vector4d& intrinsics, const Pose& T_21,
-         double sigma) {
+         const Input<std::int32_t>& matches, const Camera& camera, const Pose& T_21, double sigma) {
         if (matches.ndim() != 1) throw py::value_error("matches must have the shape (n,)");
         const auto points_1 = positions_of(initial, "initial");
         const auto points_2 = positions_of(current, "current");
         const std::vector<int> indices(matches.data(), matches.data() + matches.size());
-        const TwoViewInput input{points_1, points_2, indices, pinhole_of(intrinsics)};
+        const TwoViewInput input{points_1, points_2, indices, camera};
         const py::gil_scoped_release release;
         return place_points(input, T_21, sigma);
       },
-      "initial"_a, "current"_a, "matches"_a, "intrinsics"_a, "T_21"_a, "sigma"_a = 1.0,
+      "initial"_a, "current"_a, "matches"_a, "camera"_a, "T_21"_a, "sigma"_a = 1.0,
       "What a motion that is known already places: a TwoViewMotion with all matches that fit it,\n"
       "by the rules of reconstruct_two_views. `T_21`: Pose, camera 1 to camera 2; the length of\n"
       "its translation becomes 1. The others as there. Raises ValueError for bad shapes or\n"
@@ -185,7 +184,7 @@ void bind_place_points(py::module_& module) {
 }
 
 PnpProblem pnp_problem(const Input<double>& points, const Input<double>& pixels,
-                       const Input<double>& sigma2, const Eigen::Vector4d& intrinsics) {
+                       const Input<double>& sigma2, const std::shared_ptr<const Camera>& camera) {
   const auto n = static_cast<Eigen::Index>(rows_of(points, 3, "points"));
   const auto n_pixels = static_cast<Eigen::Index>(rows_of(pixels, 2, "pixels"));
   if (sigma2.ndim() != 1) throw py::value_error("sigma2 must have the shape (n,)");
@@ -194,7 +193,7 @@ PnpProblem pnp_problem(const Input<double>& points, const Input<double>& pixels,
   problem.points = Eigen::Map<const Eigen::Matrix3Xd>(points.data(), 3, n);
   problem.pixels = Eigen::Map<const Eigen::Matrix2Xd>(pixels.data(), 2, n_pixels);
   problem.sigma2 = Eigen::Map<const Eigen::VectorXd>(sigma2.data(), sigma2.size());
-  problem.pinhole = pinhole_of(intrinsics);
+  problem.camera = camera;
   return problem;
 }
 
@@ -204,18 +203,17 @@ void bind_epnp(py::module_& module) {
       .def_readonly("mean_error", &EpnpPose::mean_error, "Mean reprojection error [pixels].");
   module.def(
       "solve_epnp",
-      [](const Input<double>& points, const Input<double>& pixels,
-         const Eigen::Vector4d& intrinsics) {
+      [](const Input<double>& points, const Input<double>& pixels, const Camera& camera) {
         const auto n = static_cast<Eigen::Index>(rows_of(points, 3, "points"));
         const auto n_pixels = static_cast<Eigen::Index>(rows_of(pixels, 2, "pixels"));
         const Eigen::Map<const Eigen::Matrix3Xd> world(points.data(), 3, n);
         const Eigen::Map<const Eigen::Matrix2Xd> image(pixels.data(), 2, n_pixels);
         const py::gil_scoped_release release;
-        return solve_epnp(world, image, pinhole_of(intrinsics));
+        return solve_epnp(world, image, camera);
       },
-      "points"_a, "pixels"_a, "intrinsics"_a,
+      "points"_a, "pixels"_a, "camera"_a,
       "Pose from (n, 3) float64 world points and (n, 2) float64 undistorted pixels, n >= 4.\n\n"
-      "`intrinsics`: fx, fy, cx, cy [pixels]. Returns an EpnpPose, or None for collinear points.\n"
+      "`camera`: a Camera. Returns an EpnpPose, or None for collinear points.\n"
       "All points count as inliers. Raises ValueError for bad shapes.");
 }
 
@@ -239,18 +237,16 @@ void bind_pnp_ransac(py::module_& module) {
       .def_readonly("refined", &PnpPose::refined, "Estimated from all inliers of a sample's pose.");
   py::class_<PnpRansac>(module, "PnpRansac",
                         "RANSAC over EPnP in slices, so that several candidates can take turns.")
-      .def(
-          py::init([](const Input<double>& points, const Input<double>& pixels,
-                      const Input<double>& sigma2, const Eigen::Vector4d& intrinsics,
-                      std::uint64_t seed, const PnpOptions& options) {
-            return std::make_unique<PnpRansac>(pnp_problem(points, pixels, sigma2, intrinsics),
-                                               options, seed);
-          }),
-          "points"_a, "pixels"_a, "sigma2"_a, "intrinsics"_a, "seed"_a = 0,
-          py::arg_v("options", PnpOptions(), "PnpOptions()"),
-          "`points`: (n, 3) float64 world. `pixels`: (n, 2) float64 undistorted. `sigma2`: (n,)\n"
-          "[pixels^2]. `intrinsics`: fx, fy, cx, cy [pixels]. Raises ValueError for bad shapes or\n"
-          "options.")
+      .def(py::init([](const Input<double>& points, const Input<double>& pixels,
+                       const Input<double>& sigma2, const std::shared_ptr<Camera>& camera,
+                       std::uint64_t seed, const PnpOptions& options) {
+             return std::make_unique<PnpRansac>(pnp_problem(points, pixels, sigma2, camera),
+                                                options, seed);
+           }),
+           "points"_a, "pixels"_a, "sigma2"_a, "camera"_a.none(false), "seed"_a = 0,
+           py::arg_v("options", PnpOptions(), "PnpOptions()"),
+           "`points`: (n, 3) float64 world. `pixels`: (n, 2) float64 undistorted. `sigma2`: (n,)\n"
+           "[pixels^2]. `camera`: a Camera. Raises ValueError for bad shapes or options.")
       .def("iterate", &PnpRansac::iterate, "n"_a, py::call_guard<py::gil_scoped_release>(),
            "At most n further iterations. Returns a PnpPose as soon as one is good enough, the\n"
            "best one when the iterations are used up, or None.")

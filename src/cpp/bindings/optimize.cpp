@@ -94,18 +94,17 @@ void bind_pose_optimization(py::module_& module) {
       "StateError when the frame has no pose.");
   module.def(
       "optimize_pose",
-      [](const Pose& T_cw, const Eigen::Vector4d& intrinsics, double bf,
-         const Input<double>& points, const Input<double>& pixels,
-         const Input<double>& inverse_sigma2) {
+      [](const Pose& T_cw, const Camera& camera, const Input<double>& points,
+         const Input<double>& pixels, const Input<double>& inverse_sigma2) {
         const auto observations = pose_observations(points, pixels, inverse_sigma2);
         const py::gil_scoped_release release;
-        return optimize_pose(T_cw, pinhole_of(intrinsics), bf, observations);
+        return optimize_pose(T_cw, camera, observations);
       },
-      "T_cw"_a, "intrinsics"_a, "bf"_a, "points"_a, "pixels"_a, "inverse_sigma2"_a,
+      "T_cw"_a, "camera"_a, "points"_a, "pixels"_a, "inverse_sigma2"_a,
       "The same from arrays.\n\n"
-      "`intrinsics`: fx, fy, cx, cy [pixels]. `bf`: baseline times fx [pixel metre]. `points`:\n"
-      "(n, 3) float64, world. `pixels`: (n, 3) float64, undistorted u, v and the right column,\n"
-      "NaN without depth. `inverse_sigma2`: (n,) [pixels^-2]. Raises ValueError for bad shapes.");
+      "`camera`: a Camera. `points`: (n, 3) float64, world. `pixels`: (n, 3) float64, undistorted\n"
+      "u, v and the right column, NaN without depth. `inverse_sigma2`: (n,) [pixels^-2]. Raises\n"
+      "ValueError for bad shapes.");
 }
 
 struct BundleArrays {
@@ -114,12 +113,12 @@ struct BundleArrays {
 };
 
 BundleProblem bundle_problem(const std::vector<Pose>& T_cw, const std::vector<bool>& fixed,
-                             const Eigen::Vector4d& intrinsics, double bf,
-                             const Input<double>& points, const BundleArrays& observed) {
+                             const std::shared_ptr<Camera>& model, const Input<double>& points,
+                             const BundleArrays& observed) {
   check_rows(fixed.size(), T_cw.size(), "fixed");
   BundleProblem problem;
   for (std::size_t i = 0; i < T_cw.size(); ++i) {
-    problem.cameras.push_back({T_cw[i], pinhole_of(intrinsics), bf, fixed[i]});
+    problem.cameras.push_back({T_cw[i], model, fixed[i]});
   }
   const std::size_t n_points = rows_of(points, 3, "points");
   const auto X = points.unchecked<2>();
@@ -154,12 +153,12 @@ BundleProblem bundle_problem(const std::vector<Pose>& T_cw, const std::vector<bo
 }
 
 py::tuple solve_bundle_arrays(const std::vector<Pose>& T_cw, const std::vector<bool>& fixed,
-                              const Eigen::Vector4d& intrinsics, double bf,
-                              const Input<double>& points, const Input<std::int64_t>& camera_index,
+                              const std::shared_ptr<Camera>& model, const Input<double>& points,
+                              const Input<std::int64_t>& camera_index,
                               const Input<std::int64_t>& point_index, const Input<double>& pixels,
                               const Input<double>& inverse_sigma2, const BundleOptions& options,
                               const std::shared_ptr<StopFlag>& abort) {
-  BundleProblem problem = bundle_problem(T_cw, fixed, intrinsics, bf, points,
+  BundleProblem problem = bundle_problem(T_cw, fixed, model, points,
                                          {camera_index, point_index, pixels, inverse_sigma2});
   BundleSummary summary;
   {
@@ -225,15 +224,15 @@ void bind_bundle(py::module_& module) {
           "outlier", [](const BundleSummary& s) { return to_array(s.outlier); },
           "Per observation (n,) uint8, judged at the final estimate.");
   module.def(
-      "solve_bundle", &solve_bundle_arrays, "T_cw"_a, "fixed"_a, "intrinsics"_a, "bf"_a, "points"_a,
+      "solve_bundle", &solve_bundle_arrays, "T_cw"_a, "fixed"_a, "camera"_a.none(false), "points"_a,
       "camera_index"_a, "point_index"_a, "pixels"_a, "inverse_sigma2"_a,
       py::arg_v("options", BundleOptions(), "BundleOptions()"), "abort"_a = py::none(),
       "Bundle adjustment of arrays. Returns (poses, points (m, 3) float64, BundleSummary).\n\n"
-      "`T_cw`: list of Pose; `fixed`: list of bool. `intrinsics`: fx, fy, cx, cy [pixels], `bf`\n"
-      "[pixel metre], of all cameras. `points`: (m, 3) float64, world. `camera_index`,\n"
-      "`point_index`: (n,) int64. `pixels`: (n, 3) undistorted u, v and the right column, NaN\n"
-      "without depth. `inverse_sigma2`: (n,) [pixels^-2]. `abort`: StopFlag or None. Raises\n"
-      "ValueError for bad shapes or indices.");
+      "`T_cw`: list of Pose; `fixed`: list of bool. `camera`: the Camera that sees from all\n"
+      "poses. `points`: (m, 3) float64, world. `camera_index`, `point_index`: (n,) int64.\n"
+      "`pixels`: (n, 3) undistorted u, v and the right column, NaN without depth.\n"
+      "`inverse_sigma2`: (n,) [pixels^-2]. `abort`: StopFlag or None. Raises ValueError for bad\n"
+      "shapes or indices.");
 }
 
 void bind_local_bundle(py::module_& module) {

@@ -69,7 +69,8 @@ std::optional<ControlFrame> control_frame(const Points& points) {
 
 /// M^T M of the projection equations in the camera coordinates of the control points.
 Eigen::Matrix<double, 12, 12> normal_matrix(const ControlFrame& frame, const Pixels& pixels,
-                                            const Pinhole& k) {
+                                            const Camera& camera) {
+  const Pinhole& k = camera.pinhole();
   Eigen::Matrix<double, 12, 12> normal = Eigen::Matrix<double, 12, 12>::Zero();
   for (Eigen::Index i = 0; i < pixels.cols(); ++i) {
     Eigen::Matrix<double, 2, 3> ray;
@@ -86,8 +87,8 @@ Eigen::Matrix<double, 12, 12> normal_matrix(const ControlFrame& frame, const Pix
 }
 
 /// The control points of the four smallest singular values.
-KernelBasis kernel_basis(const ControlFrame& frame, const Pixels& pixels, const Pinhole& pinhole) {
-  const SmallMatrix normal = normal_matrix(frame, pixels, pinhole);
+KernelBasis kernel_basis(const ControlFrame& frame, const Pixels& pixels, const Camera& camera) {
+  const SmallMatrix normal = normal_matrix(frame, pixels, camera);
   KernelBasis basis;
   if (frame.planar) {
     const SmallMatrix vectors = symmetric_eigen(normal.topLeftCorner(9, 9)).vectors;
@@ -205,12 +206,12 @@ Pose absolute_orientation(const Points& points, const Eigen::Matrix3Xd& camera_p
 }
 
 double mean_error(const Pose& T_cw, const Points& points, const Pixels& pixels,
-                  const Pinhole& pinhole) {
+                  const Camera& camera) {
   const Eigen::Matrix3d R = T_cw.rotation_matrix();
   double sum = 0;
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
     const Eigen::Vector3d p_c = R * points.col(i) + T_cw.translation();
-    sum += (pinhole.project(p_c) - pixels.col(i)).norm();
+    sum += (camera.pinhole().project(p_c) - pixels.col(i)).norm();
   }
   return sum / static_cast<double>(points.cols());
 }
@@ -218,14 +219,14 @@ double mean_error(const Pose& T_cw, const Points& points, const Pixels& pixels,
 }  // namespace
 
 std::optional<EpnpPose> solve_epnp(const Points& points, const Pixels& pixels,
-                                   const Pinhole& pinhole) {
+                                   const Camera& camera) {
   if (points.cols() < 4 || points.cols() != pixels.cols()) {
     throw std::invalid_argument("EPnP needs at least 4 points and a pixel for each");
   }
   if (!points.allFinite() || !pixels.allFinite()) return std::nullopt;
   const std::optional<ControlFrame> frame = control_frame(points);
   if (!frame) return std::nullopt;
-  const KernelBasis basis = kernel_basis(*frame, pixels, pinhole);
+  const KernelBasis basis = kernel_basis(*frame, pixels, camera);
   const DistanceForms forms = distance_forms(basis);
   const Distances rho = squared_distances(frame->control);
 
@@ -240,7 +241,7 @@ std::optional<EpnpPose> solve_epnp(const Points& points, const Pixels& pixels,
     if (!camera_points.allFinite()) continue;
     if (camera_points(2, 0) < 0) camera_points = -camera_points;
     const Pose T_cw = absolute_orientation(points, camera_points);
-    const double error = mean_error(T_cw, points, pixels, pinhole);
+    const double error = mean_error(T_cw, points, pixels, camera);
     if (!std::isfinite(error) || (best && !(error < best->mean_error))) continue;
     best = EpnpPose{T_cw, error};
   }

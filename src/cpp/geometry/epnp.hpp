@@ -22,6 +22,6 @@ struct EpnpPose {
 /// docs/method/relocalization.md#pose-from-points.
 std::optional<EpnpPose> solve_epnp(const Eigen::Ref<const Eigen::Matrix3Xd>& points,
                                    const Eigen::Ref<const Eigen::Matrix2Xd>& pixels,
-                                   const Pinhole& pinhole);
+                                   const Camera& camera);
 
 }  // namespace orbslam

@@ -15,8 +15,8 @@ constexpr std::size_t parallax_rank = 50;
 
 /// Two cameras with the same intrinsics; camera 1 is the world.
 struct CameraPair {
-  CameraPair(const Motion& motion, const Pinhole& camera)
-      : pinhole(camera), R(motion.R), t(motion.t) {
+  CameraPair(const Motion& motion, const Camera& camera)
+      : pinhole(camera.pinhole()), R(motion.R), t(motion.t) {
     P.leftCols<3>() = R;
     P.col(3) = t;
     center_2 = -R.transpose() * t;
@@ -81,9 +81,9 @@ double parallax_of(std::vector<double>& cosines) {
 }  // namespace
 
 MotionSupport check_motion(const Motion& motion, const PointPairs& pairs,
-                           const std::vector<std::uint8_t>& inliers, const Pinhole& pinhole,
+                           const std::vector<std::uint8_t>& inliers, const Camera& camera,
                            double max_squared_error) {
-  const CameraPair cameras(motion, pinhole);
+  const CameraPair cameras(motion, camera);
   MotionSupport support;
   support.points.assign(pairs.size(), Eigen::Vector3d::Zero());
   support.good.assign(pairs.size(), 0);

@@ -24,7 +24,7 @@ struct MotionSupport {
 /// where there is next to no parallax the sign of a depth says nothing and is not asked for. See
 /// docs/method/start.md#choosing-the-motion.
 MotionSupport check_motion(const Motion& motion, const PointPairs& pairs,
-                           const std::vector<std::uint8_t>& inliers, const Pinhole& pinhole,
+                           const std::vector<std::uint8_t>& inliers, const Camera& camera,
                            double max_squared_error);
 
 }  // namespace orbslam

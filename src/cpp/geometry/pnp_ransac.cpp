@@ -17,6 +17,7 @@ void check(const PnpProblem& problem, const PnpOptions& options) {
   if (problem.pixels.cols() != n || problem.sigma2.size() != n) {
     throw std::invalid_argument("points, pixels and sigma2 must have the same length");
   }
+  if (!problem.camera) throw std::invalid_argument("the camera is missing");
   check(options.ransac, options.max_chi2, "PnP options");
 }
 
@@ -43,8 +44,9 @@ PnpPose PnpRansac::judge(const Pose& T_cw) const {
   for (std::size_t i = 0; i < pose.inliers.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
     const Eigen::Vector3d p_c = R * problem_.points.col(k) + T_cw.translation();
-    if (!(p_c.z() > 0)) continue;
-    const double error = (problem_.pinhole.project(p_c) - problem_.pixels.col(k)).squaredNorm();
+    Eigen::Vector2d pixel;
+    if (!problem_.camera->project(p_c, pixel)) continue;
+    const double error = (pixel - problem_.pixels.col(k)).squaredNorm();
     if (!(error < max_chi2_ * problem_.sigma2[k])) continue;
     pose.inliers[i] = 1;
     ++pose.n_inliers;
@@ -61,7 +63,7 @@ std::optional<PnpPose> PnpRansac::pose_of_sample() {
     points.col(k) = problem_.points.col(sample[i]);
     pixels.col(k) = problem_.pixels.col(sample[i]);
   }
-  const auto estimate = solve_epnp(points, pixels, problem_.pinhole);
+  const auto estimate = solve_epnp(points, pixels, *problem_.camera);
   if (!estimate) return std::nullopt;
   return judge(estimate->T_cw);
 }
@@ -76,7 +78,7 @@ std::optional<PnpPose> PnpRansac::refine_best() const {
     points.col(column) = problem_.points.col(static_cast<Eigen::Index>(i));
     pixels.col(column++) = problem_.pixels.col(static_cast<Eigen::Index>(i));
   }
-  const auto estimate = solve_epnp(points, pixels, problem_.pinhole);
+  const auto estimate = solve_epnp(points, pixels, *problem_.camera);
   if (!estimate) return std::nullopt;
   PnpPose refined = judge(estimate->T_cw);
   refined.refined = true;

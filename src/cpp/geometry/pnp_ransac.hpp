@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -18,7 +19,7 @@ struct PnpProblem {
   Eigen::Matrix3Xd points;  ///< world
   Eigen::Matrix2Xd pixels;  ///< undistorted
   Eigen::VectorXd sigma2;   ///< variance of each pixel [pixels^2]
-  Pinhole pinhole;
+  std::shared_ptr<const Camera> camera;
 };
 
 inline constexpr std::size_t kPnpMinInliers = 10;  ///< fewest inliers that make a pose
@@ -40,7 +41,8 @@ struct PnpPose {
 /// docs/method/relocalization.md#pose-from-points.
 class PnpRansac {
  public:
-  /// Throws std::invalid_argument when the arrays differ in length, or an option is out of range.
+  /// Throws std::invalid_argument when the arrays differ in length, there is no camera, or an
+  /// option is out of range.
   PnpRansac(PnpProblem problem, const PnpOptions& options, std::uint64_t seed);
 
   /// Runs at most n further iterations. Returns the pose refined on the inliers of a new best

@@ -18,24 +18,27 @@ void check(const Sim3Problem& problem, const Sim3Options& options) {
     throw std::invalid_argument(
         "points_1, points_2, sigma2_1 and sigma2_2 must have the same length");
   }
+  if (!problem.camera_1 || !problem.camera_2) throw std::invalid_argument("a camera is missing");
   check(options.ransac, options.max_chi2, "Sim3 options");
 }
 
 /// Pixels and gates of a camera's own points.
-void project(const Eigen::Matrix3Xd& points, const Pinhole& pinhole, const Eigen::VectorXd& sigma2,
+void project(const Eigen::Matrix3Xd& points, const Camera& camera, const Eigen::VectorXd& sigma2,
              double max_chi2, Eigen::Matrix2Xd& pixels, Eigen::VectorXd& gates) {
   pixels.setZero(2, points.cols());
   gates.setConstant(points.cols(), -1);
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
-    if (!(points(2, i) > 0)) continue;
-    pixels.col(i) = pinhole.project(points.col(i));
+    Eigen::Vector2d pixel;
+    if (!camera.project(points.col(i), pixel)) continue;
+    pixels.col(i) = pixel;
     gates[i] = max_chi2 * sigma2[i];
   }
 }
 
-bool near_pixel(const Eigen::Vector3d& p_c, const Pinhole& pinhole, const Eigen::Vector2d& pixel,
+bool near_pixel(const Eigen::Vector3d& p_c, const Camera& camera, const Eigen::Vector2d& pixel,
                 double gate) {
-  return p_c.z() > 0 && (pinhole.project(p_c) - pixel).squaredNorm() < gate;
+  Eigen::Vector2d uv;
+  return camera.project(p_c, uv) && (uv - pixel).squaredNorm() < gate;
 }
 
 }  // namespace
@@ -46,9 +49,9 @@ Sim3Ransac::Sim3Ransac(const Sim3Problem& problem, const Sim3Options& options, s
       fix_scale_(options.fix_scale),
       sampler_(static_cast<std::size_t>(problem.points_1.cols()), seed) {
   check(problem_, options);
-  project(problem_.points_1, problem_.pinhole_1, problem_.sigma2_1, options.max_chi2, pixels_1_,
+  project(problem_.points_1, *problem_.camera_1, problem_.sigma2_1, options.max_chi2, pixels_1_,
           gates_1_);
-  project(problem_.points_2, problem_.pinhole_2, problem_.sigma2_2, options.max_chi2, pixels_2_,
+  project(problem_.points_2, *problem_.camera_2, problem_.sigma2_2, options.max_chi2, pixels_2_,
           gates_2_);
   RansacOptions ransac = options.ransac;
   ransac.min_inliers = min_inliers_;
@@ -65,9 +68,9 @@ Sim3Estimate Sim3Ransac::judge(const Similarity& S_12) const {
   for (std::size_t i = 0; i < estimate.inliers.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
     const Eigen::Vector3d in_1 = sR_12 * problem_.points_2.col(k) + S_12.translation();
-    if (!near_pixel(in_1, problem_.pinhole_1, pixels_1_.col(k), gates_1_[k])) continue;
+    if (!near_pixel(in_1, *problem_.camera_1, pixels_1_.col(k), gates_1_[k])) continue;
     const Eigen::Vector3d in_2 = sR_21 * (problem_.points_1.col(k) - S_12.translation());
-    if (!near_pixel(in_2, problem_.pinhole_2, pixels_2_.col(k), gates_2_[k])) continue;
+    if (!near_pixel(in_2, *problem_.camera_2, pixels_2_.col(k), gates_2_[k])) continue;
     estimate.inliers[i] = 1;
     ++estimate.n_inliers;
   }

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -18,7 +19,7 @@ struct Sim3Problem {
   Eigen::Matrix3Xd points_2;  ///< camera 2, its own point
   Eigen::VectorXd sigma2_1;   ///< variance of the keypoint in keyframe 1 [pixels^2]
   Eigen::VectorXd sigma2_2;   ///< the same in keyframe 2
-  Pinhole pinhole_1, pinhole_2;
+  std::shared_ptr<const Camera> camera_1, camera_2;
 };
 
 struct Sim3Options {
@@ -39,7 +40,8 @@ struct Sim3Estimate {
 /// change what is found. See docs/method/loops.md#verification.
 class Sim3Ransac {
  public:
-  /// Throws std::invalid_argument when the arrays differ in length, or an option is out of range.
+  /// Throws std::invalid_argument when the arrays differ in length, a camera is missing, or an
+  /// option is out of range.
   Sim3Ransac(const Sim3Problem& problem, const Sim3Options& options, std::uint64_t seed);
 
   /// Runs at most n further iterations. Returns the first similarity with more than min_inliers

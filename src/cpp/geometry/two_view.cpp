@@ -81,12 +81,11 @@ Models estimate_models(const PointPairs& pairs, const std::vector<EightPairs>& s
 std::vector<MotionSupport> check_motions(const std::vector<Motion>& motions,
                                          const PointPairs& pairs,
                                          const std::vector<std::uint8_t>& inliers,
-                                         const Pinhole& pinhole, double sigma,
-                                         WorkerThread* helper) {
+                                         const Camera& camera, double sigma, WorkerThread* helper) {
   std::vector<MotionSupport> supports(motions.size());
   const auto check_every_second = [&](std::size_t first) {
     for (std::size_t i = first; i < motions.size(); i += 2) {
-      supports[i] = check_motion(motions[i], pairs, inliers, pinhole, max_chi2 * sigma * sigma);
+      supports[i] = check_motion(motions[i], pairs, inliers, camera, max_chi2 * sigma * sigma);
     }
   };
   run_both(
@@ -141,7 +140,7 @@ std::vector<TwoViewMotion> alternatives(const std::vector<Motion>& motions,
 /// Chooses among the motions of the chosen model and completes the result.
 void recover_motion(const Models& models, const PointPairs& pairs, const TwoViewInput& input,
                     const TwoViewOptions& options, WorkerThread* helper, TwoViewResult& result) {
-  const Eigen::Matrix3d K = input.pinhole.matrix();
+  const Eigen::Matrix3d K = input.camera.pinhole().matrix();
   const bool planar = result.model == TwoViewModel::homography;
   const ScoredModel& model = planar ? models.homography : models.fundamental;
   const std::vector<Motion> motions =
@@ -151,7 +150,7 @@ void recover_motion(const Models& models, const PointPairs& pairs, const TwoView
     return;
   }
   const std::vector<MotionSupport> supports =
-      check_motions(motions, pairs, model.inliers, input.pinhole, options.sigma, helper);
+      check_motions(motions, pairs, model.inliers, input.camera, options.sigma, helper);
   for (const MotionSupport& support : supports) {
     result.hypotheses.push_back({support.n_good, support.parallax});
   }
@@ -252,7 +251,7 @@ TwoViewMotion place_points(const TwoViewInput& input, const Pose& T_21, double s
   const Motion motion{T_21.rotation().toRotationMatrix(), T_21.translation() / length};
   const std::vector<std::uint8_t> all(pairs.size(), 1);
   const MotionSupport support =
-      check_motion(motion, pairs, all, input.pinhole, max_chi2 * sigma * sigma);
+      check_motion(motion, pairs, all, input.camera, max_chi2 * sigma * sigma);
   return placed(motion, support, input.matches);
 }
 

@@ -22,12 +22,12 @@ struct TwoViewOptions {
   MotionLimits limits;
 };
 
-/// Two views and what is known about them. The arrays must outlive the call.
+/// Two views and what is known about them. All must outlive the call.
 struct TwoViewInput {
   const std::vector<Eigen::Vector2f>& initial;  ///< all keypoints of view 1, undistorted pixels
   const std::vector<Eigen::Vector2f>& current;  ///< all keypoints of view 2
   const std::vector<int>& matches;              ///< per initial keypoint: index in current, or -1
-  Pinhole pinhole;                              ///< of both views
+  const Camera& camera;                         ///< of both views
 };
 
 /// A motion that explains the matches, and what it places.

@@ -29,7 +29,7 @@ using MatchedPoints = std::vector<MapPointId>;
 struct Correspondences {
   std::vector<std::uint32_t> keypoints;  ///< of `current`, ascending
   std::vector<SimilarityMatch> matches;  ///< 1: current, 2: candidate
-  Pinhole pinhole_1, pinhole_2;
+  std::shared_ptr<const Camera> camera_1, camera_2;
   Pose T_mw;  ///< candidate
 };
 
@@ -81,8 +81,8 @@ std::optional<Correspondences> gather(const Map& map, KeyFrameId current, KeyFra
   const KeyFrame* keyframe_2 = map.find(candidate);
   if (!keyframe_1 || !keyframe_2) return std::nullopt;
   Correspondences gathered;
-  gathered.pinhole_1 = keyframe_1->frame->camera->pinhole();
-  gathered.pinhole_2 = keyframe_2->frame->camera->pinhole();
+  gathered.camera_1 = keyframe_1->frame->camera;
+  gathered.camera_2 = keyframe_2->frame->camera;
   gathered.T_mw = keyframe_2->T_cw;
   for (std::size_t i = 0; i < matched.size(); ++i) {
     if (!matched[i].valid()) continue;
@@ -119,8 +119,8 @@ Sim3Problem to_problem(const Correspondences& gathered) {
   problem.points_2.resize(3, n);
   problem.sigma2_1.resize(n);
   problem.sigma2_2.resize(n);
-  problem.pinhole_1 = gathered.pinhole_1;
-  problem.pinhole_2 = gathered.pinhole_2;
+  problem.camera_1 = gathered.camera_1;
+  problem.camera_2 = gathered.camera_2;
   for (Eigen::Index k = 0; k < n; ++k) {
     const SimilarityMatch& match = gathered.matches[static_cast<std::size_t>(k)];
     problem.points_1.col(k) = match.point_1;
@@ -239,7 +239,7 @@ class Verification {
   SimilarityEstimate optimize(const Similarity& S_cm, const Correspondences& gathered) const {
     SimilarityOptions options;
     options.fix_scale = options_.fix_scale;
-    return optimize_similarity(S_cm, gathered.pinhole_1, gathered.pinhole_2, gathered.matches,
+    return optimize_similarity(S_cm, *gathered.camera_1, *gathered.camera_2, gathered.matches,
                                options);
   }
 

@@ -148,16 +148,17 @@ void BlockBundle::fill(const BundleProblem& problem) {
   for (std::size_t i = 0; i < slot_.size(); ++i) {
     if (slot_[i] == kNone) continue;
     const auto& o = problem.observations[i];
-    const auto& camera = problem.cameras[o.camera];
+    const Camera& camera = *problem.cameras[o.camera].model;
+    const Pinhole& k = camera.pinhole();
     const std::uint32_t view = view_of_[o.camera];
     Slots& slots = view < n_free() ? free_ : fixed_;
     const std::uint32_t slot = slot_[i];
     slots.view[slot] = view;
     slots.point[slot] = o.point;
-    slots.u[slot] = (o.u - camera.pinhole.cx) / camera.pinhole.fx;
-    slots.v[slot] = (o.v - camera.pinhole.cy) / camera.pinhole.fy;
-    slots.right_u[slot] = o.has_depth ? (o.right_u - camera.pinhole.cx) / camera.pinhole.fx : 0.0;
-    slots.base[slot] = o.has_depth ? camera.bf / camera.pinhole.fx : 0.0;
+    slots.u[slot] = (o.u - k.cx) / k.fx;
+    slots.v[slot] = (o.v - k.cy) / k.fy;
+    slots.right_u[slot] = o.has_depth ? (o.right_u - k.cx) / k.fx : 0.0;
+    slots.base[slot] = o.has_depth ? camera.bf() / k.fx : 0.0;
   }
 }
 
@@ -165,12 +166,12 @@ void BlockBundle::set_weights(const BundleProblem& problem, const std::vector<st
   for (std::size_t i = 0; i < slot_.size(); ++i) {
     if (slot_[i] == kNone) continue;
     const auto& o = problem.observations[i];
-    const Pinhole& pinhole = problem.cameras[o.camera].pinhole;
+    const Pinhole& k = problem.cameras[o.camera].model->pinhole();
     Slots& slots = view_of_[o.camera] < n_free() ? free_ : fixed_;
     const double weight = off[i] != 0 ? 0.0 : static_cast<double>(o.inverse_sigma2);
     const std::uint32_t slot = slot_[i];
-    slots.weight_u[slot] = weight * (pinhole.fx * pinhole.fx);
-    slots.weight_v[slot] = weight * (pinhole.fy * pinhole.fy);
+    slots.weight_u[slot] = weight * (k.fx * k.fx);
+    slots.weight_v[slot] = weight * (k.fy * k.fy);
     slots.weight_right[slot] = o.has_depth ? slots.weight_u[slot] : 0.0;
   }
 }

@@ -27,8 +27,8 @@ void check_indices(const BundleProblem& problem) {
   }
 }
 
-/// Squared whitened residual of every observation; infinite when its point is not in front of the
-/// camera or a number is not finite.
+/// Squared whitened residual of every observation; infinite when the camera cannot see its
+/// point or a number is not finite.
 std::vector<double> judge(const BundleProblem& problem) {
   std::vector<Eigen::Matrix3d> rotations;
   rotations.reserve(problem.cameras.size());
@@ -39,15 +39,18 @@ std::vector<double> judge(const BundleProblem& problem) {
     const BundleProblem::Camera& camera = problem.cameras[o.camera];
     const Eigen::Vector3d p =
         rotations[o.camera] * problem.points[o.point] + camera.T_cw.translation();
-    const Eigen::Vector2d pixel = camera.pinhole.project(p);
+    Eigen::Vector2d pixel;
+    if (!camera.model->project(p, pixel)) {
+      chi2.push_back(std::numeric_limits<double>::infinity());
+      continue;
+    }
     double squared = (Eigen::Vector2d(o.u, o.v) - pixel).squaredNorm();
     if (o.has_depth) {
-      const double error = o.right_u - (pixel.x() - camera.bf / p.z());
+      const double error = o.right_u - (pixel.x() - camera.model->bf() / p.z());
       squared += error * error;
     }
     const double whitened = static_cast<double>(o.inverse_sigma2) * squared;
-    const bool usable = p.z() > 0 && std::isfinite(whitened);
-    chi2.push_back(usable ? whitened : std::numeric_limits<double>::infinity());
+    chi2.push_back(std::isfinite(whitened) ? whitened : std::numeric_limits<double>::infinity());
   }
   return chi2;
 }

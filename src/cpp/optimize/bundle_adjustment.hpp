@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <memory>
 #include <vector>
 
 #include "base/pose.hpp"
@@ -13,8 +14,7 @@ namespace orbslam {
 struct BundleProblem {
   struct Camera {
     Pose T_cw;
-    Pinhole pinhole;
-    double bf = 0;
+    std::shared_ptr<const orbslam::Camera> model;
     bool fixed = false;
   };
   struct Observation {
@@ -62,9 +62,9 @@ struct BundleSummary {
 };
 
 /// Solves in place (points eliminated by Schur complement, analytic Jacobians). `abort` is polled
-/// once per iteration; nullptr: never. Observations behind their camera or with NaN or infinite
-/// numbers at the start take no part in the first stage. Throws StateError when an observation
-/// names a camera or point that does not exist, or for options that exclude each other.
+/// once per iteration; nullptr: never. Observations that their camera cannot see or with NaN or
+/// infinite numbers at the start take no part in the first stage. Throws StateError when an
+/// observation names a camera or point that does not exist, or for options that exclude each other.
 BundleSummary solve_bundle(BundleProblem& problem, const BundleOptions& options,
                            const std::atomic<bool>* abort);
 

@@ -87,7 +87,7 @@ class CeresMinimiser final : public BundleMinimiser, public ceres::EvaluationCal
 
   void make_views() {
     for (const BundleProblem::Camera& camera : bundle_.cameras) {
-      views_.emplace_back(camera.T_cw, camera.pinhole, camera.bf);
+      views_.emplace_back(camera.T_cw, *camera.model);
     }
     parameters_.assign(views_.size() * BundleView::kParameters, 0.0);
   }

@@ -30,10 +30,9 @@ void add_observation(GatheredBundle& bundle, std::uint32_t camera, std::uint32_t
 }  // namespace
 
 void GatheredBundle::add_camera(const KeyFrame& keyframe, bool fixed) {
-  const Camera& camera = *keyframe.frame->camera;
   camera_of.emplace(keyframe.id, static_cast<std::uint32_t>(keyframes.size()));
   keyframes.push_back(keyframe.id);
-  problem.cameras.push_back({keyframe.T_cw, camera.pinhole(), camera.bf(), fixed});
+  problem.cameras.push_back({keyframe.T_cw, keyframe.frame->camera, fixed});
 }
 
 void GatheredBundle::add_point(const MapPoint& point, const Map& map) {

@@ -17,16 +17,16 @@ struct CameraRow {
 };
 
 CameraRow row_u(const BundleMeasurement& m) {
-  const double a = m.factor * m.view->pinhole().fx * m.inverse_z;
+  const double a = m.factor * m.view->camera().pinhole().fx * m.inverse_z;
   return {a, 0, -a * m.p_c[0] * m.inverse_z};
 }
 CameraRow row_v(const BundleMeasurement& m) {
-  const double b = m.factor * m.view->pinhole().fy * m.inverse_z;
+  const double b = m.factor * m.view->camera().pinhole().fy * m.inverse_z;
   return {0, b, -b * m.p_c[1] * m.inverse_z};
 }
 CameraRow row_right(const BundleMeasurement& m) {
   const CameraRow row = row_u(m);
-  return {row.a, 0, row.c + m.factor * m.view->bf() * m.inverse_z * m.inverse_z};
+  return {row.a, 0, row.c + m.factor * m.view->camera().bf() * m.inverse_z * m.inverse_z};
 }
 
 /// Derivative of the residual (minus the prediction) with respect to the six camera parameters.
@@ -71,8 +71,7 @@ void write_rows(const BundleMeasurement& m, const CameraRow& first, const Camera
 
 }  // namespace
 
-BundleView::BundleView(const Pose& T_cw, const Pinhole& pinhole, double bf)
-    : start_(T_cw), pinhole_(pinhole), bf_(bf) {
+BundleView::BundleView(const Pose& T_cw, const Camera& camera) : start_(T_cw), camera_(&camera) {
   const double origin[kParameters] = {};
   move(origin);
 }
@@ -103,11 +102,12 @@ double BundleMeasurement::evaluate() {
   }
   inverse_z = 1 / p_c[2];
   factor = scale;
-  const Pinhole& k = view->pinhole();
+  const Pinhole& k = view->camera().pinhole();
   const double predicted_u = k.fx * p_c[0] * inverse_z + k.cx;
   residual[0] = factor * (u - predicted_u);
   residual[1] = factor * (v - (k.fy * p_c[1] * inverse_z + k.cy));
-  residual[2] = has_depth ? factor * (right_u - (predicted_u - view->bf() * inverse_z)) : 0.0;
+  residual[2] =
+      has_depth ? factor * (right_u - (predicted_u - view->camera().bf() * inverse_z)) : 0.0;
   if (huber == 0) return 0;
   const double q =
       residual[0] * residual[0] + residual[1] * residual[1] + residual[2] * residual[2];

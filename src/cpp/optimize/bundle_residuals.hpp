@@ -19,7 +19,8 @@ class BundleView {
  public:
   static constexpr int kParameters = 6;
 
-  BundleView(const Pose& T_cw, const Pinhole& pinhole, double bf);
+  /// `camera` must outlive the view.
+  BundleView(const Pose& T_cw, const Camera& camera);
   /// Moves to the given parameters.
   void move(const double* parameters);
 
@@ -29,13 +30,11 @@ class BundleView {
   const Eigen::Vector3d& shift() const { return shift_; }  ///< v
   /// Left Jacobian of SO(3) at w: exp(w + d) = exp(left_jacobian * d) exp(w) to first order.
   const Eigen::Matrix3d& left_jacobian() const { return left_jacobian_; }
-  const Pinhole& pinhole() const { return pinhole_; }
-  double bf() const { return bf_; }
+  const Camera& camera() const { return *camera_; }
 
  private:
   Pose start_;
-  Pinhole pinhole_;
-  double bf_;
+  const Camera* camera_;
   Eigen::Quaterniond rotation_;
   Eigen::Matrix3d R_cw_, left_jacobian_;
   Eigen::Vector3d t_cw_, shift_;

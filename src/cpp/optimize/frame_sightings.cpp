@@ -96,8 +96,7 @@ std::optional<Pose> FrameSightings::settled_pose(const Map& map, const Trajector
   const auto enough = std::max(static_cast<double>(kFewestSightings),
                                kInlierShare * static_cast<double>(sightings.seen.size()));
   if (static_cast<double>(observations.size()) < enough) return std::nullopt;
-  const Camera& camera = *sightings.camera;
-  const PoseEstimate estimate = optimize_pose(*T_cw, camera.pinhole(), camera.bf(), observations);
+  const PoseEstimate estimate = optimize_pose(*T_cw, *sightings.camera, observations);
   if (estimate.n_inliers < enough || !is_elsewhere(*T_cw, estimate)) return std::nullopt;
   return estimate.T_cw;
 }

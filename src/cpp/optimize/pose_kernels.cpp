@@ -11,9 +11,8 @@
 namespace orbslam::pose_kernels {
 namespace {
 
-pose_sums::Task task_of(const Group& group, const Projection& projection, const Pose& T_cw,
-                        double huber) {
-  const Pinhole& k = projection.pinhole;
+pose_sums::Task task_of(const Group& group, const Camera& camera, const Pose& T_cw, double huber) {
+  const Pinhole& k = camera.pinhole();
   pose_sums::Task task{group.x.size(),
                        group.x.data(),
                        group.y.data(),
@@ -28,7 +27,7 @@ pose_sums::Task task_of(const Group& group, const Projection& projection, const 
                        k.fy,
                        k.cx,
                        k.cy,
-                       projection.bf / k.fx,
+                       camera.bf() / k.fx,
                        huber};
   const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> R = T_cw.rotation_matrix();
   std::copy_n(R.data(), 9, std::begin(task.rotation));
@@ -36,10 +35,10 @@ pose_sums::Task task_of(const Group& group, const Projection& projection, const 
   return task;
 }
 
-double accumulate(pose_sums::Accumulate kernel, const Group& group, const Projection& projection,
+double accumulate(pose_sums::Accumulate kernel, const Group& group, const Camera& camera,
                   const Pose& T_cw, double huber, NormalEquations* equations) {
   if (group.x.empty()) return 0;
-  const pose_sums::Task task = task_of(group, projection, T_cw, huber);
+  const pose_sums::Task task = task_of(group, camera, T_cw, huber);
   if (equations == nullptr) return kernel(task, nullptr);
   std::array<double, pose_sums::kSystemSize> system;
   const double cost = kernel(task, system.data());
@@ -88,25 +87,25 @@ void Group::pad() {
   }
 }
 
-double accumulate_mono(const Group& group, const Projection& projection, const Pose& T_cw,
-                       double huber, NormalEquations* equations) {
-  return accumulate(kernels().mono, group, projection, T_cw, huber, equations);
+double accumulate_mono(const Group& group, const Camera& camera, const Pose& T_cw, double huber,
+                       NormalEquations* equations) {
+  return accumulate(kernels().mono, group, camera, T_cw, huber, equations);
 }
 
-double accumulate_stereo(const Group& group, const Projection& projection, const Pose& T_cw,
-                         double huber, NormalEquations* equations) {
-  return accumulate(kernels().stereo, group, projection, T_cw, huber, equations);
+double accumulate_stereo(const Group& group, const Camera& camera, const Pose& T_cw, double huber,
+                         NormalEquations* equations) {
+  return accumulate(kernels().stereo, group, camera, T_cw, huber, equations);
 }
 
-double chi2(const Group& group, std::size_t i, bool stereo, const Projection& projection,
+double chi2(const Group& group, std::size_t i, bool stereo, const Camera& camera,
             const Eigen::Matrix3d& R_cw, const Eigen::Vector3d& t_cw) {
   const Eigen::Vector3d p = R_cw * Eigen::Vector3d(group.x[i], group.y[i], group.z[i]) + t_cw;
   if (!(p.z() > kTinyDepth)) return std::numeric_limits<double>::infinity();
-  const Eigen::Vector2d pixel = projection.pinhole.project(p);
+  const Eigen::Vector2d pixel = camera.pinhole().project(p);
   const double error_u = group.u[i] - pixel.x(), error_v = group.v[i] - pixel.y();
   double squared = error_u * error_u + error_v * error_v;
   if (stereo) {
-    const double error_r = group.right_u[i] - (pixel.x() - projection.bf / p.z());
+    const double error_r = group.right_u[i] - (pixel.x() - camera.bf() / p.z());
     squared += error_r * error_r;
   }
   return group.inverse_sigma2[i] * squared;

@@ -30,12 +30,6 @@ struct Group {
   void pad();
 };
 
-/// The pinhole with the stereo base, as the kernels want it.
-struct Projection {
-  Pinhole pinhole;
-  double bf = 0;
-};
-
 /// Normal equations H x = b of the weighted least squares problem in the left tangent of T_cw.
 struct NormalEquations {
   Matrix6d H = Matrix6d::Zero();
@@ -46,14 +40,14 @@ struct NormalEquations {
 /// the (robustified) sum of squares and add the group's part to `equations` if given. Points on the
 /// camera's plane take no part. Summation order is fixed. See
 /// docs/method/adjustment.md#pose-of-a-frame.
-double accumulate_mono(const Group& group, const Projection& projection, const Pose& T_cw,
-                       double huber, NormalEquations* equations);
-double accumulate_stereo(const Group& group, const Projection& projection, const Pose& T_cw,
-                         double huber, NormalEquations* equations);
+double accumulate_mono(const Group& group, const Camera& camera, const Pose& T_cw, double huber,
+                       NormalEquations* equations);
+double accumulate_stereo(const Group& group, const Camera& camera, const Pose& T_cw, double huber,
+                         NormalEquations* equations);
 
 /// Squared whitened residual of observation i, infinite when the point is not in front of the
 /// camera.
-double chi2(const Group& group, std::size_t i, bool stereo, const Projection& projection,
+double chi2(const Group& group, std::size_t i, bool stereo, const Camera& camera,
             const Eigen::Matrix3d& R_cw, const Eigen::Vector3d& t_cw);
 
 }  // namespace orbslam::pose_kernels

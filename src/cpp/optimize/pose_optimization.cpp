@@ -14,7 +14,6 @@ namespace {
 
 using pose_kernels::Group;
 using pose_kernels::NormalEquations;
-using pose_kernels::Projection;
 
 constexpr int kRounds = 4;
 constexpr int kPlainRound = 3;  // the round without kernel
@@ -58,19 +57,19 @@ Workspace& workspace() {
   return instance;
 }
 
-double evaluate(const Workspace& w, const Projection& projection, const Pose& T_cw, bool robust,
+double evaluate(const Workspace& w, const Camera& camera, const Pose& T_cw, bool robust,
                 NormalEquations* equations) {
   if (equations != nullptr) *equations = NormalEquations();
-  return accumulate_mono(w.mono, projection, T_cw, robust ? kHuberMono : 0.0, equations) +
-         accumulate_stereo(w.stereo, projection, T_cw, robust ? kHuberStereo : 0.0, equations);
+  return accumulate_mono(w.mono, camera, T_cw, robust ? kHuberMono : 0.0, equations) +
+         accumulate_stereo(w.stereo, camera, T_cw, robust ? kHuberStereo : 0.0, equations);
 }
 
 /// One iteration's trials: looks for a damping with which the cost falls. On success `T_cw`, `cost`
 /// and `equations` are those of the new pose.
 class DampedStep {
  public:
-  DampedStep(const Workspace& w, const Projection& projection, bool robust)
-      : workspace_(w), projection_(projection), robust_(robust) {}
+  DampedStep(const Workspace& w, const Camera& camera, bool robust)
+      : workspace_(w), camera_(camera), robust_(robust) {}
 
   void start(const NormalEquations& equations) {
     lambda_ = kFirstDamping * equations.H.diagonal().maxCoeff();
@@ -89,13 +88,13 @@ class DampedStep {
         // Nearly all first trials succeed, and then the next system is needed at this very pose.
         const bool optimistic = trial == 0;
         const double candidate_cost =
-            evaluate(workspace_, projection_, candidate, robust_, optimistic ? &next_ : nullptr);
+            evaluate(workspace_, camera_, candidate, robust_, optimistic ? &next_ : nullptr);
         const double predicted = step.dot(lambda_ * step + equations.b) + kGainOffset;
         gain = std::isfinite(candidate_cost) ? (cost - candidate_cost) / predicted : -1;
         if (gain > 0) {
           T_cw = candidate;
           cost = candidate_cost;
-          if (!optimistic) evaluate(workspace_, projection_, candidate, robust_, &next_);
+          if (!optimistic) evaluate(workspace_, camera_, candidate, robust_, &next_);
           equations = next_;
           const double cubed = std::pow(2 * gain - 1, 3);
           lambda_ *= std::max(kLeastDampingFactor, std::min(kMostDampingFactor, 1 - cubed));
@@ -113,18 +112,18 @@ class DampedStep {
 
  private:
   const Workspace& workspace_;
-  const Projection& projection_;
+  const Camera& camera_;
   bool robust_;
   double lambda_ = 0, growth_ = 2;
   NormalEquations next_;
 };
 
 /// Levenberg-Marquardt with the observations in use. Returns the number of iterations.
-int minimise(const Workspace& w, const Projection& projection, bool robust, Pose& T_cw) {
+int minimise(const Workspace& w, const Camera& camera, bool robust, Pose& T_cw) {
   NormalEquations equations;
-  double cost = evaluate(w, projection, T_cw, robust, &equations);
+  double cost = evaluate(w, camera, T_cw, robust, &equations);
   if (!std::isfinite(cost)) return 0;
-  DampedStep step(w, projection, robust);
+  DampedStep step(w, camera, robust);
   step.start(equations);
   int small_decreases = 0;
   for (int iteration = 1; iteration <= kIterations; ++iteration) {
@@ -137,13 +136,13 @@ int minimise(const Workspace& w, const Projection& projection, bool robust, Pose
 }
 
 /// Judges all observations of a group at a pose: inliers get their weight, outliers weight 0.
-int classify(Group& group, bool stereo, const Projection& projection, const Pose& T_cw,
+int classify(Group& group, bool stereo, const Camera& camera, const Pose& T_cw,
              std::uint8_t* outlier) {
   const Eigen::Matrix3d R = T_cw.rotation_matrix();
   const double gate = stereo ? kGateStereo : kGateMono;
   int n_inliers = 0;
   for (std::size_t i = 0; i < group.size(); ++i) {
-    const bool inlier = chi2(group, i, stereo, projection, R, T_cw.translation()) <= gate;
+    const bool inlier = chi2(group, i, stereo, camera, R, T_cw.translation()) <= gate;
     group.weight[i] = inlier ? group.inverse_sigma2[i] : 0.0;
     outlier[group.slot[i]] = inlier ? 0 : 1;
     n_inliers += inlier ? 1 : 0;
@@ -164,10 +163,9 @@ void leave_out_hidden(Group& group, const Pose& T_cw) {
 
 /// Inverse of the normal matrix of the observations in use, for residuals with a variance of 1;
 /// zero when undetermined. `cost` becomes their sum of squares.
-Matrix6d unit_covariance(const Workspace& w, const Projection& projection, const Pose& T_cw,
-                         double& cost) {
+Matrix6d unit_covariance(const Workspace& w, const Camera& camera, const Pose& T_cw, double& cost) {
   NormalEquations equations;
-  cost = evaluate(w, projection, T_cw, false, &equations);
+  cost = evaluate(w, camera, T_cw, false, &equations);
   const Eigen::LLT<Matrix6d> factor(equations.H);
   if (factor.info() != Eigen::Success) return Matrix6d::Zero();
   const Matrix6d inverse = factor.solve(Matrix6d::Identity());
@@ -176,19 +174,19 @@ Matrix6d unit_covariance(const Workspace& w, const Projection& projection, const
 }
 
 /// The same times the variance that the inliers' residuals have.
-Matrix6d covariance(const Workspace& w, const Projection& projection, const Pose& T_cw) {
+Matrix6d covariance(const Workspace& w, const Camera& camera, const Pose& T_cw) {
   int n_residuals = 0;
   for (const double weight : w.mono.weight) n_residuals += weight > 0 ? 2 : 0;
   for (const double weight : w.stereo.weight) n_residuals += weight > 0 ? 3 : 0;
   if (n_residuals <= 6) return Matrix6d::Zero();
   double cost = 0;
-  const Matrix6d unit = unit_covariance(w, projection, T_cw, cost);
+  const Matrix6d unit = unit_covariance(w, camera, T_cw, cost);
   return unit * (cost / (n_residuals - 6));
 }
 
 /// The rounds over a filled workspace. `outlier` has one flag per slot, preset by the caller;
 /// only those of the workspace's slots are judged.
-void run_rounds(Workspace& w, const Projection& projection, const Pose& T_cw_initial,
+void run_rounds(Workspace& w, const Camera& camera, const Pose& T_cw_initial,
                 PoseEstimate& estimate, std::uint8_t* outlier) {
   estimate.T_cw = T_cw_initial;
   const int n_observations = w.size();
@@ -201,13 +199,13 @@ void run_rounds(Workspace& w, const Projection& projection, const Pose& T_cw_ini
     leave_out_hidden(w.stereo, T_cw);
     // The same problem from the same pose ends as before.
     if (!w.note_weights() && round != kPlainRound) continue;
-    estimate.iterations += minimise(w, projection, round != kPlainRound, T_cw);
+    estimate.iterations += minimise(w, camera, round != kPlainRound, T_cw);
     estimate.T_cw = T_cw;
-    estimate.n_inliers = classify(w.mono, false, projection, T_cw, outlier) +
-                         classify(w.stereo, true, projection, T_cw, outlier);
+    estimate.n_inliers = classify(w.mono, false, camera, T_cw, outlier) +
+                         classify(w.stereo, true, camera, T_cw, outlier);
     if (n_observations < kFewObservations || estimate.n_inliers < kMinObservations) break;
   }
-  estimate.covariance = covariance(w, projection, estimate.T_cw);
+  estimate.covariance = covariance(w, camera, estimate.T_cw);
 }
 
 /// Adds what keypoint i is associated with; false, and nothing added, for broken numbers.
@@ -220,7 +218,7 @@ bool add_association(Workspace& w, const TrackedFrame& frame, std::size_t i) {
 
 }  // namespace
 
-PoseEstimate optimize_pose(const Pose& T_cw_initial, const Pinhole& pinhole, double bf,
+PoseEstimate optimize_pose(const Pose& T_cw_initial, const Camera& camera,
                            const std::vector<PoseObservation>& observations) {
   Workspace& w = workspace();
   w.clear();
@@ -231,7 +229,7 @@ PoseEstimate optimize_pose(const Pose& T_cw_initial, const Pinhole& pinhole, dou
     const bool usable = w.add(o.position, o.u, o.v, o.right_u, o.inverse_sigma2, o.has_depth, i);
     estimate.outlier[i] = usable ? 0 : 1;
   }
-  run_rounds(w, {pinhole, bf}, T_cw_initial, estimate, estimate.outlier.data());
+  run_rounds(w, camera, T_cw_initial, estimate, estimate.outlier.data());
   return estimate;
 }
 
@@ -248,7 +246,7 @@ PoseEstimate optimize_pose(TrackedFrame& frame) {
     frame.outlier[i] = add_association(w, frame, i) ? 0 : 1;
   }
   PoseEstimate estimate;
-  run_rounds(w, {f.camera->pinhole(), f.camera->bf()}, *frame.T_cw, estimate, frame.outlier.data());
+  run_rounds(w, *f.camera, *frame.T_cw, estimate, frame.outlier.data());
   frame.T_cw = estimate.T_cw;
   return estimate;
 }
@@ -267,7 +265,7 @@ Matrix6d pose_covariance(const TrackedFrame& frame) {
   w.mono.pad();
   w.stereo.pad();
   double cost = 0;
-  return unit_covariance(w, {f.camera->pinhole(), f.camera->bf()}, *frame.T_cw, cost);
+  return unit_covariance(w, *f.camera, *frame.T_cw, cost);
 }
 
 }  // namespace orbslam

@@ -34,7 +34,7 @@ struct PoseEstimate {
 /// than 3 inliers left: no further round. Fewer than 3 observations: returned unchanged, 0 inliers.
 /// Observations with NaN or infinite numbers are outliers and take no part. See
 /// docs/method/adjustment.md#pose-of-a-frame.
-PoseEstimate optimize_pose(const Pose& T_cw_initial, const Pinhole& pinhole, double bf,
+PoseEstimate optimize_pose(const Pose& T_cw_initial, const Camera& camera,
                            const std::vector<PoseObservation>& observations);
 
 /// The same for a frame's associations: starts from its pose, and writes its pose and outlier flags

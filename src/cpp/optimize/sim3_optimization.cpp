@@ -30,11 +30,11 @@ struct System {
 
 class Refinement {
  public:
-  Refinement(const Pinhole& pinhole_1, const Pinhole& pinhole_2,
+  Refinement(const Camera& camera_1, const Camera& camera_2,
              const std::vector<SimilarityMatch>& matches, const SimilarityOptions& options,
              std::vector<std::uint8_t>& outlier)
-      : pinhole_1_(pinhole_1),
-        pinhole_2_(pinhole_2),
+      : camera_1_(camera_1),
+        camera_2_(camera_2),
         matches_(matches),
         options_(options),
         width_(std::sqrt(options.max_chi2)),
@@ -63,8 +63,8 @@ class Refinement {
     for (std::size_t i = 0; i < matches_.size(); ++i) {
       if (outlier_[i]) continue;
       const bool fits =
-          passes(sim3_residuals::forward(S_12, pinhole_1_, matches_[i])) &&
-          (!matches_[i].mutual || passes(sim3_residuals::inverse(S_12, pinhole_2_, matches_[i])));
+          passes(sim3_residuals::forward(S_12, camera_1_, matches_[i])) &&
+          (!matches_[i].mutual || passes(sim3_residuals::inverse(S_12, camera_2_, matches_[i])));
       outlier_[i] = fits ? 0 : 1;
       n_inliers += outlier_[i] ? 0 : 1;
     }
@@ -90,9 +90,9 @@ class Refinement {
     System system;
     for (std::size_t i = 0; i < matches_.size(); ++i) {
       if (outlier_[i]) continue;
-      add(sim3_residuals::forward(S_12, pinhole_1_, matches_[i]), system);
+      add(sim3_residuals::forward(S_12, camera_1_, matches_[i]), system);
       if (!matches_[i].mutual) continue;
-      add(sim3_residuals::inverse(S_12, pinhole_2_, matches_[i]), system);
+      add(sim3_residuals::inverse(S_12, camera_2_, matches_[i]), system);
     }
     if (options_.fix_scale) {
       // Decouples sigma from the rest; with nothing on its right-hand side it does not move.
@@ -135,8 +135,8 @@ class Refinement {
     return false;
   }
 
-  const Pinhole& pinhole_1_;
-  const Pinhole& pinhole_2_;
+  const Camera& camera_1_;
+  const Camera& camera_2_;
   const std::vector<SimilarityMatch>& matches_;
   const SimilarityOptions& options_;
   double width_;
@@ -153,8 +153,8 @@ bool usable(const SimilarityMatch& match) {
 
 }  // namespace
 
-SimilarityEstimate optimize_similarity(const Similarity& S_12_initial, const Pinhole& pinhole_1,
-                                       const Pinhole& pinhole_2,
+SimilarityEstimate optimize_similarity(const Similarity& S_12_initial, const Camera& camera_1,
+                                       const Camera& camera_2,
                                        const std::vector<SimilarityMatch>& matches,
                                        const SimilarityOptions& options) {
   if (!(options.max_chi2 > 0)) {
@@ -168,7 +168,7 @@ SimilarityEstimate optimize_similarity(const Similarity& S_12_initial, const Pin
   const auto used =
       static_cast<int>(std::count(estimate.outlier.begin(), estimate.outlier.end(), 0));
 
-  const Refinement refinement(pinhole_1, pinhole_2, matches, options, estimate.outlier);
+  const Refinement refinement(camera_1, camera_2, matches, options, estimate.outlier);
   Similarity S_12 = S_12_initial;
   estimate.iterations = refinement.minimise(kFirstIterations, S_12);
   const int left = refinement.judge(S_12);

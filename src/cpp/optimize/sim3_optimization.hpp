@@ -42,8 +42,8 @@ struct SimilarityEstimate {
 /// at its start and n_inliers is 0. Matches with NaN or infinite numbers are outliers and take no
 /// part. Throws std::invalid_argument unless max_chi2 > 0. See
 /// docs/method/adjustment.md#similarity-of-two-keyframes.
-SimilarityEstimate optimize_similarity(const Similarity& S_12_initial, const Pinhole& pinhole_1,
-                                       const Pinhole& pinhole_2,
+SimilarityEstimate optimize_similarity(const Similarity& S_12_initial, const Camera& camera_1,
+                                       const Camera& camera_2,
                                        const std::vector<SimilarityMatch>& matches,
                                        const SimilarityOptions& options = {});
 

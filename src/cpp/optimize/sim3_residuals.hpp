@@ -18,10 +18,10 @@ struct Residual {
 };
 
 /// In image 1, of S_12 point_2. Nothing for a point on the plane of the camera.
-std::optional<Residual> forward(const Similarity& S_12, const Pinhole& pinhole_1,
+std::optional<Residual> forward(const Similarity& S_12, const Camera& camera_1,
                                 const SimilarityMatch& match);
 /// In image 2, of S_12^-1 point_1. Nothing for a point on the plane of the camera.
-std::optional<Residual> inverse(const Similarity& S_12, const Pinhole& pinhole_2,
+std::optional<Residual> inverse(const Similarity& S_12, const Camera& camera_2,
                                 const SimilarityMatch& match);
 
 }  // namespace orbslam::sim3_residuals

@@ -18,7 +18,7 @@ using testing::SyntheticPnp;
 double pose_error(const Pose& a, const Pose& b) { return (a.matrix() - b.matrix()).norm(); }
 
 std::optional<EpnpPose> solve(const SyntheticPnp& s) {
-  return solve_epnp(s.problem.points, s.problem.pixels, s.problem.pinhole);
+  return solve_epnp(s.problem.points, s.problem.pixels, *s.problem.camera);
 }
 
 TEST(Epnp, ExactWithoutNoise) {
@@ -78,7 +78,7 @@ TEST(Epnp, ThinSlabsAndNoisyPlanesGiveNumbers) {
 TEST(Epnp, NothingForCollinearEqualOrBrokenPoints) {
   const auto synthetic = make_pnp_problem(PnpShape::general, 6, 0, 0, 1);
   const auto solve_points = [&](const Eigen::Matrix3Xd& points) {
-    return solve_epnp(points, synthetic.problem.pixels, synthetic.problem.pinhole);
+    return solve_epnp(points, synthetic.problem.pixels, *synthetic.problem.camera);
   };
   Eigen::Matrix3Xd points = synthetic.problem.points;
   for (int i = 0; i < 6; ++i)
@@ -94,10 +94,10 @@ TEST(Epnp, NothingForCollinearEqualOrBrokenPoints) {
 TEST(Epnp, RefusesTooFewPoints) {
   const auto synthetic = make_pnp_problem(PnpShape::general, 6, 0, 0, 1);
   EXPECT_THROW(solve_epnp(synthetic.problem.points.leftCols(3),
-                          synthetic.problem.pixels.leftCols(3), synthetic.problem.pinhole),
+                          synthetic.problem.pixels.leftCols(3), *synthetic.problem.camera),
                std::invalid_argument);
   EXPECT_THROW(solve_epnp(synthetic.problem.points, synthetic.problem.pixels.leftCols(5),
-                          synthetic.problem.pinhole),
+                          *synthetic.problem.camera),
                std::invalid_argument);
 }
 
@@ -114,7 +114,7 @@ double golden_difference(const EpnpPose& found, const testing::Array<double>& ro
 // The golden pixels are exact but for rounding to float32, 3e-5 pixels.
 TEST(Epnp, AgreesWithTheReference) {
   const PnpProblem problem = testing::golden_pnp_problem();
-  const auto all = solve_epnp(problem.points, problem.pixels, problem.pinhole);
+  const auto all = solve_epnp(problem.points, problem.pixels, *problem.camera);
   ASSERT_TRUE(all);
   const auto expected_all = testing::golden<double>("pnp", "out_epnp_all");
   EXPECT_LT(golden_difference(*all, expected_all, 0), 1e-6);
@@ -129,7 +129,7 @@ TEST(Epnp, AgreesWithTheReference) {
       points.col(static_cast<int>(i)) = problem.points.col(sets.at(k, i));
       pixels.col(static_cast<int>(i)) = problem.pixels.col(sets.at(k, i));
     }
-    const auto found = solve_epnp(points, pixels, problem.pinhole);
+    const auto found = solve_epnp(points, pixels, *problem.camera);
     ASSERT_TRUE(found);
     EXPECT_LT(golden_difference(*found, expected, k), 1e-6) << k;
     EXPECT_NEAR(found->mean_error, expected.at(k, 12), 1e-5) << k;
@@ -157,7 +157,7 @@ TEST(Epnp, FourPointsAreSolvedAtLeastAsOftenAsByTheReference) {
       points.col(static_cast<int>(i)) = problem.points.col(sets.at(k, i));
       pixels.col(static_cast<int>(i)) = problem.pixels.col(sets.at(k, i));
     }
-    const auto found = solve_epnp(points, pixels, problem.pinhole);
+    const auto found = solve_epnp(points, pixels, *problem.camera);
     ASSERT_TRUE(found);
     // Which samples are missed depends on the arbitrary basis of the kernel.
     found_right += (found->T_cw.matrix() - T).cwiseAbs().sum() < 1e-2 ? 1 : 0;

@@ -17,14 +17,14 @@ struct CheckProblem {
   explicit CheckProblem(const testing::TwoViewScene& scene)
       : pairs(gather_pairs(scene.initial, scene.current, scene.matches)),
         inliers(scene.matches.size(), 1),
-        pinhole(scene.pinhole),
+        camera(scene.camera),
         motion{scene.T_21.rotation_matrix(), scene.T_21.translation().normalized()} {}
   MotionSupport check(double max_squared_error = 4) const {
-    return check_motion(motion, pairs, inliers, pinhole, max_squared_error);
+    return check_motion(motion, pairs, inliers, *camera, max_squared_error);
   }
   PointPairs pairs;
   std::vector<std::uint8_t> inliers;
-  Pinhole pinhole;
+  std::shared_ptr<const Camera> camera;
   Motion motion;
 };
 
@@ -116,7 +116,7 @@ TEST(CheckMotion, AgreesWithTheReferenceAtTheTrueMotion) {
     }
     motion.t = Eigen::Vector3d(T.at(0, 3), T.at(1, 3), T.at(2, 3)).normalized();
     const MotionSupport support = check_motion(motion, pairs, std::vector<std::uint8_t>(300, 1),
-                                               testing::golden_pinhole(set), 4);
+                                               *testing::golden_camera(set), 4);
     EXPECT_EQ(static_cast<int>(support.n_good),
               testing::golden<int>(set, "out_checkRT_ngood").values[0]);
     EXPECT_NEAR(support.parallax,

@@ -27,21 +27,21 @@ inline SyntheticPnp make_pnp_problem(PnpShape shape, int n, double noise, double
   synthetic.T_cw = Pose::exp(xi);
   const Pose T_wc = synthetic.T_cw.inverse();
   PnpProblem& problem = synthetic.problem;
-  problem.pinhole = {520, 525, 320, 240};
+  problem.camera = make_camera({520, 525, 320, 240});
   problem.points.resize(3, n);
   problem.pixels.resize(2, n);
   problem.sigma2 = Eigen::VectorXd::Ones(n);
   const Eigen::Vector3d normal_c(uniform(random, -0.5, 0.5), uniform(random, -0.5, 0.5), -1);
   for (int i = 0; i < n; ++i) {
     const double u = uniform(random, 0, 640), v = uniform(random, 0, 480);
-    const Eigen::Vector3d ray = problem.pinhole.unproject(u, v, 1);
+    const Eigen::Vector3d ray = problem.camera->unproject(u, v, 1);
     Eigen::Vector3d p_c = uniform(random, 2, 8) * ray;
     if (shape != PnpShape::general) p_c = -5 / normal_c.dot(ray) * ray;
     if (shape == PnpShape::slab) p_c += 1e-3 * normal(random) * normal_c.normalized();
     problem.points.col(i) = T_wc * p_c;
     synthetic.outlier.push_back(uniform(random, 0, 1) < outlier_share);
     const Eigen::Vector2d shift(noise * normal(random), noise * normal(random));
-    problem.pixels.col(i) = problem.pinhole.project(p_c) + shift;
+    problem.pixels.col(i) = problem.camera->pinhole().project(p_c) + shift;
     if (synthetic.outlier.back()) {
       problem.pixels.col(i) = Eigen::Vector2d(uniform(random, 0, 640), uniform(random, 0, 480));
     }
@@ -55,7 +55,7 @@ inline PnpProblem golden_pnp_problem() {
   const ScalePyramid scales(1.2F, 8);
   const auto n = static_cast<int>(X.rows());
   PnpProblem problem;
-  problem.pinhole = golden_pinhole("pnp");
+  problem.camera = golden_camera("pnp");
   problem.points.resize(3, n);
   problem.pixels.resize(2, n);
   problem.sigma2.resize(n);

@@ -58,7 +58,8 @@ TEST(PnpRansac, InliersAreThoseWithinTheGateInFront) {
   for (int i = 0; i < 80; ++i) {
     const Eigen::Vector3d p_c = pose->T_cw * Eigen::Vector3d(scaled.problem.points.col(i));
     const double error =
-        (scaled.problem.pinhole.project(p_c) - scaled.problem.pixels.col(i)).squaredNorm();
+        (scaled.problem.camera->pinhole().project(p_c) - scaled.problem.pixels.col(i))
+            .squaredNorm();
     const bool inlier = p_c.z() > 0 && error < 5.991 * scaled.problem.sigma2[i];
     EXPECT_EQ(pose->inliers[static_cast<std::size_t>(i)] != 0, inlier);
     count += inlier ? 1 : 0;

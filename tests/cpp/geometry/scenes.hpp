@@ -8,6 +8,7 @@
 
 #include "base/pose.hpp"
 #include "camera/camera.hpp"
+#include "support/cameras.hpp"
 #include "support/npy.hpp"
 #include "support/random_numbers.hpp"
 
@@ -31,16 +32,16 @@ Array<T> golden(const std::string& set, const std::string& array) {
   return read_npy<T>(test_data("golden/" + set + "/" + array + ".npy"));
 }
 
-inline Pinhole golden_pinhole(const std::string& set) {
+inline std::shared_ptr<const Camera> golden_camera(const std::string& set) {
   const auto K = golden<double>(set, "K");
-  return {K.values[0], K.values[1], K.values[2], K.values[3]};
+  return make_camera({K.values[0], K.values[1], K.values[2], K.values[3]});
 }
 
 enum class SceneShape { general, planar };
 
 /// Points seen by two cameras, projected with noise; keypoint i matches keypoint i.
 struct TwoViewScene {
-  Pinhole pinhole{520, 525, 320, 240};
+  std::shared_ptr<const Camera> camera = make_camera({520, 525, 320, 240});
   Pose T_21;
   std::vector<Eigen::Vector3d> points;  // frame of camera 1
   std::vector<Eigen::Vector2f> initial, current;
@@ -68,12 +69,12 @@ inline TwoViewScene make_two_view_scene(SceneShape shape, const Pose& T_21, std:
   const Eigen::Vector3d plane_normal = Eigen::Vector3d(uniform(random, -0.5, 0.5), 0.3, -1);
   while (scene.points.size() < count) {
     const double u = uniform(random, 10, 630), v = uniform(random, 10, 470);
-    const Eigen::Vector3d ray = scene.pinhole.unproject(u, v, 1);
+    const Eigen::Vector3d ray = scene.camera->unproject(u, v, 1);
     const double depth =
         shape == SceneShape::planar ? -6.0 / plane_normal.dot(ray) : uniform(random, 3, 9);
     const Eigen::Vector3d point = depth * ray, p_2 = T_21 * point;
     if (!(depth > 1 && depth < 20) || p_2.z() < 0.5) continue;
-    Eigen::Vector2d pixel_2 = scene.pinhole.project(p_2);
+    Eigen::Vector2d pixel_2 = scene.camera->pinhole().project(p_2);
     if (uniform(random, 0, 1) < outlier_share) {
       pixel_2 = {uniform(random, 0, 640), uniform(random, 0, 480)};
     }

@@ -24,24 +24,24 @@ inline SyntheticSim3 make_sim3_problem(int n, double scale, double noise, double
   const Pose motion = Pose::exp(xi);
   synthetic.S_12 = Similarity(scale, motion.rotation(), scale * motion.translation());
   Sim3Problem& problem = synthetic.problem;
-  problem.pinhole_1 = {520, 525, 320, 240};
-  problem.pinhole_2 = {500, 490, 310, 250};
+  problem.camera_1 = make_camera({520, 525, 320, 240});
+  problem.camera_2 = make_camera({500, 490, 310, 250});
   problem.points_1.resize(3, n);
   problem.points_2.resize(3, n);
   problem.sigma2_1 = problem.sigma2_2 = Eigen::VectorXd::Ones(n);
-  const auto in_sight = [&](const Pinhole& pinhole) -> Eigen::Vector3d {
-    return pinhole.unproject(uniform(random, 0, 640), uniform(random, 0, 480),
-                             uniform(random, 2, 8));
+  const auto in_sight = [&](const Camera& camera) -> Eigen::Vector3d {
+    return camera.unproject(uniform(random, 0, 640), uniform(random, 0, 480),
+                            uniform(random, 2, 8));
   };
   const auto shift = [&]() -> Eigen::Vector3d {
     return noise * Eigen::Vector3d(normal(random), normal(random), normal(random));
   };
   for (int i = 0; i < n; ++i) {
-    const Eigen::Vector3d p_2 = in_sight(problem.pinhole_2);
+    const Eigen::Vector3d p_2 = in_sight(*problem.camera_2);
     synthetic.outlier.push_back(uniform(random, 0, 1) < outlier_share);
     const Eigen::Vector3d p_1 = synthetic.S_12 * p_2;
     problem.points_2.col(i) = p_2 + shift();
-    const Eigen::Vector3d elsewhere = scale * in_sight(problem.pinhole_1);
+    const Eigen::Vector3d elsewhere = scale * in_sight(*problem.camera_1);
     const Eigen::Vector3d near_by = p_1 + scale * shift();
     problem.points_1.col(i) = synthetic.outlier.back() ? elsewhere : near_by;
   }
@@ -83,7 +83,7 @@ inline Sim3Problem golden_sim3_problem(const std::string& set) {
   problem.points_2 = golden_points(set, "X2w", golden_pose(set, "T2w"));
   problem.sigma2_1 = variances("octave1");
   problem.sigma2_2 = variances("octave2");
-  problem.pinhole_1 = problem.pinhole_2 = golden_pinhole(set);
+  problem.camera_1 = problem.camera_2 = golden_camera(set);
   return problem;
 }
 

@@ -54,8 +54,10 @@ TEST(Sim3Ransac, InliersAreThoseWithinTheGatesInFront) {
   for (int i = 0; i < 80; ++i) {
     const Eigen::Vector3d X_1 = p.points_1.col(i), X_2 = p.points_2.col(i);
     const Eigen::Vector3d in_1 = S_12 * X_2, in_2 = S_12.inverse() * X_1;
-    const double error_1 = (p.pinhole_1.project(in_1) - p.pinhole_1.project(X_1)).squaredNorm();
-    const double error_2 = (p.pinhole_2.project(in_2) - p.pinhole_2.project(X_2)).squaredNorm();
+    const double error_1 =
+        (p.camera_1->pinhole().project(in_1) - p.camera_1->pinhole().project(X_1)).squaredNorm();
+    const double error_2 =
+        (p.camera_2->pinhole().project(in_2) - p.camera_2->pinhole().project(X_2)).squaredNorm();
     const bool near_1 = in_1.z() > 0 && error_1 < 9.210 * p.sigma2_1[i];
     const bool near_2 = in_2.z() > 0 && error_2 < 9.210 * p.sigma2_2[i];
     EXPECT_EQ(estimate.inliers[static_cast<std::size_t>(i)] != 0, near_1 && near_2);
@@ -90,9 +92,9 @@ TEST(Sim3Ransac, GatesAreNotRounded) {
   SyntheticSim3 synthetic = make_sim3_problem(60, 1, 0, 0, 5);
   Sim3Problem& p = synthetic.problem;
   p.points_2 = p.points_1;
-  p.pinhole_2 = p.pinhole_1;
+  p.camera_2 = p.camera_1;
   // Squared errors of 9.1 in image 1, between 9 and 9.210.
-  const double shift = std::sqrt(9.1) / p.pinhole_1.fx;
+  const double shift = std::sqrt(9.1) / p.camera_1->pinhole().fx;
   p.sigma2_2.setConstant(100);
   for (int i = 0; i < 60; ++i) p.points_2(0, i) += shift * p.points_2(2, i);
   EXPECT_EQ(Sim3Ransac(p, {}, 1).judge(Similarity()).n_inliers, 60U);

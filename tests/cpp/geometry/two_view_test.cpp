@@ -20,7 +20,7 @@ using testing::TwoViewScene;
 
 TwoViewResult reconstruct(const TwoViewScene& scene, std::uint64_t seed = 0,
                           WorkerThread* helper = nullptr, const TwoViewOptions& options = {}) {
-  return reconstruct_two_views({scene.initial, scene.current, scene.matches, scene.pinhole},
+  return reconstruct_two_views({scene.initial, scene.current, scene.matches, *scene.camera},
                                options, seed, helper);
 }
 
@@ -159,7 +159,7 @@ TEST(TwoViews, AKnownMotionPlacesWhatTheReconstructionPlaced) {
   const auto scene = make_two_view_scene(SceneShape::general, sideways_motion(), 200, 0.3, 2);
   const TwoViewResult found = reconstruct(scene);
   ASSERT_TRUE(found.success());
-  const TwoViewInput input{scene.initial, scene.current, scene.matches, scene.pinhole};
+  const TwoViewInput input{scene.initial, scene.current, scene.matches, *scene.camera};
   // Of any length: it becomes 1.
   const Pose longer(found.T_21.rotation(), 3.0 * found.T_21.translation());
   const TwoViewMotion placed = place_points(input, longer, 1.0);
@@ -204,7 +204,7 @@ TEST(TwoViews, DegenerateInputsFailWithAReason) {
              static_cast<float>(testing::uniform(random, 0, 480))};
   }
   EXPECT_EQ(reconstruct(noise).outcome, TwoViewOutcome::too_few_points);
-  EXPECT_EQ(reconstruct_two_views({scene.initial, scene.current, scene.matches, scene.pinhole}, {},
+  EXPECT_EQ(reconstruct_two_views({scene.initial, scene.current, scene.matches, *scene.camera}, {},
                                   std::vector<EightPairs>(), nullptr)
                 .outcome,
             TwoViewOutcome::no_model);
@@ -215,7 +215,7 @@ TEST(TwoViews, RefusesBadArguments) {
   TwoViewOptions options;
   options.sigma = 0;
   EXPECT_THROW(reconstruct(scene, 0, nullptr, options), std::invalid_argument);
-  const TwoViewInput input{scene.initial, scene.current, scene.matches, scene.pinhole};
+  const TwoViewInput input{scene.initial, scene.current, scene.matches, *scene.camera};
   const std::vector<EightPairs> samples{{0, 1, 2, 3, 4, 5, 6, 150}};
   EXPECT_THROW(reconstruct_two_views(input, {}, samples, nullptr), std::invalid_argument);
 }
@@ -282,7 +282,7 @@ TEST_P(GoldenTwoViews, AgreeWithTheReference) {
 
   WorkerThread helper;
   const TwoViewResult result = reconstruct_two_views(
-      {scene.initial, scene.current, scene.matches, testing::golden_pinhole(GetParam())}, {},
+      {scene.initial, scene.current, scene.matches, *testing::golden_camera(GetParam())}, {},
       samples, &helper);
   const double S_H = golden<double>("out_SH").values[0], S_F = golden<double>("out_SF").values[0];
   EXPECT_NEAR(result.homography_score, S_H, 1e-3 * S_H);

@@ -27,9 +27,9 @@ using testing::random_bundle;
 double chi2_of(const BundleProblem& problem, const BundleProblem::Observation& o) {
   const auto& camera = problem.cameras[o.camera];
   const Eigen::Vector3d p = camera.T_cw * problem.points[o.point];
-  const Eigen::Vector2d pixel = camera.pinhole.project(p);
+  const Eigen::Vector2d pixel = camera.model->pinhole().project(p);
   double squared = (Eigen::Vector2d(o.u, o.v) - pixel).squaredNorm();
-  if (o.has_depth) squared += std::pow(o.right_u - (pixel.x() - camera.bf / p.z()), 2);
+  if (o.has_depth) squared += std::pow(o.right_u - (pixel.x() - camera.model->bf() / p.z()), 2);
   return o.inverse_sigma2 * squared;
 }
 
@@ -163,8 +163,8 @@ TEST(InverseDepths, BearPointsThatLieNowhere) {
       BundleProblem::Observation o;
       o.camera = camera;
       o.point = point;
-      const auto pixel = problem.cameras[camera].pinhole.project(problem.cameras[camera].T_cw *
-                                                                 problem.points[point]);
+      const auto pixel = problem.cameras[camera].model->pinhole().project(
+          problem.cameras[camera].T_cw * problem.points[point]);
       o.u = static_cast<float>(pixel.x()) + (camera == 1U ? -6.0F : 6.0F);
       o.v = static_cast<float>(pixel.y());
       problem.observations.push_back(o);
@@ -268,16 +268,14 @@ TEST_P(SolveBundle, PointThatComesToTheFrontTakesPartInTheSecondStage) {
   BundleProblem problem = random_bundle(14, 6, 60, 2, false);
   // A fixed camera further ahead sees a point 0.5 m away, which starts 0.2 m behind it.
   problem.cameras.push_back({Pose(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0, 0, -2.5)),
-                             {500, 500, 320, 240},
-                             40,
-                             true});
+                             problem.cameras[0].model, true});
   const Eigen::Vector3d truth(0.1, 0.05, 3.0);
   problem.points.emplace_back(0.1, 0.05, 2.3);
   for (std::uint32_t c : {0u, 1u, 2u, 3u, 4u, 5u, 6u}) {
     const Pose T_cw = c == 6
                           ? problem.cameras[6].T_cw
                           : Pose(Eigen::Quaterniond::Identity(), Eigen::Vector3d(-0.3 * c, 0, 0));
-    const Eigen::Vector2d pixel = problem.cameras[c].pinhole.project(T_cw * truth);
+    const Eigen::Vector2d pixel = problem.cameras[c].model->pinhole().project(T_cw * truth);
     BundleProblem::Observation o;
     o.camera = c;
     o.point = 60;

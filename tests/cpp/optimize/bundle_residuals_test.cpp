@@ -9,6 +9,7 @@
 
 #include "optimize/bundle_point.hpp"
 #include "optimize/gates.hpp"
+#include "support/cameras.hpp"
 #include "support/random_numbers.hpp"
 
 namespace orbslam {
@@ -20,19 +21,19 @@ using testing::uniform;
 struct Scene {
   std::array<double, 6> camera;
   std::array<double, 3> point;
-  BundleView view{Pose(), {}, 0};
+  std::shared_ptr<const Camera> model = testing::make_camera({480, 500, 320, 240}, 40);
+  BundleView view{Pose(), *model};
   BundleMeasurement measurement;
 
   Scene(std::mt19937_64& random, bool has_depth, double huber) {
     Vector6d xi;
     for (int i = 0; i < 6; ++i) xi(i) = uniform(random, -1, 1);
-    view = BundleView(Pose::exp(xi), {480, 500, 320, 240}, 40);
+    view = BundleView(Pose::exp(xi), *model);
     for (double& c : camera) c = uniform(random, -0.3, 0.3);
     view.move(camera.data());
     const double z = std::exp(uniform(random, std::log(0.5), std::log(50.0)));
     const double u = uniform(random, 0, 640), v = uniform(random, 0, 480);
-    Eigen::Map<Eigen::Vector3d>{point.data()} =
-        view.T_cw().inverse() * view.pinhole().unproject(u, v, z);
+    Eigen::Map<Eigen::Vector3d>{point.data()} = view.T_cw().inverse() * model->unproject(u, v, z);
     measurement.view = &view;
     measurement.point = point.data();
     measurement.u = u + uniform(random, -8, 8);
@@ -72,9 +73,9 @@ double huber_cost(const Scene& scene, double width) {
   const BundleMeasurement& m = scene.measurement;
   const Eigen::Vector3d p =
       scene.view.T_cw() * Eigen::Map<const Eigen::Vector3d>(scene.point.data());
-  const Eigen::Vector2d pixel = scene.view.pinhole().project(p);
+  const Eigen::Vector2d pixel = scene.model->pinhole().project(p);
   double q = (Eigen::Vector2d(m.u, m.v) - pixel).squaredNorm();
-  if (m.has_depth) q += std::pow(m.right_u - (pixel.x() - scene.view.bf() / p.z()), 2);
+  if (m.has_depth) q += std::pow(m.right_u - (pixel.x() - scene.model->bf() / p.z()), 2);
   q *= m.scale * m.scale;
   return q <= width * width ? q : 2 * width * std::sqrt(q) - width * width;
 }
@@ -206,7 +207,8 @@ TEST(BundleView, ChartStartsAtThePose) {
   Vector6d xi;
   for (int i = 0; i < 6; ++i) xi(i) = uniform(random, -2, 2);
   const Pose T_cw = Pose::exp(xi);
-  BundleView view(T_cw, {480, 500, 320, 240}, 40);
+  const auto model = testing::make_camera({480, 500, 320, 240}, 40);
+  BundleView view(T_cw, *model);
   EXPECT_LT((view.T_cw().matrix() - T_cw.matrix()).norm(), 1e-14);
   // To first order the parameters are the left tangent.
   for (int i = 0; i < 6; ++i) {

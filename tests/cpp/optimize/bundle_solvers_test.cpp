@@ -12,6 +12,7 @@
 #include "optimize/bundle_kernels.hpp"
 #include "optimize/bundle_minimiser.hpp"
 #include "random_bundles.hpp"
+#include "support/cameras.hpp"
 
 namespace orbslam {
 namespace {
@@ -41,7 +42,8 @@ BundleProblem drawn_bundle(std::uint64_t seed) {
     for (int k = 0; k < 6; ++k) xi(k) = uniform(random, -0.01, 0.01);
     const bool fixed = i < 2 || uniform(random, 0, 1) < 0.3;
     const double f = i % 2 == 0 ? 500 : 450;
-    problem.cameras.push_back({fixed ? T_cw : Pose::exp(xi) * T_cw, {f, 500, 320, 240}, 40, fixed});
+    problem.cameras.push_back(
+        {fixed ? T_cw : Pose::exp(xi) * T_cw, testing::make_camera({f, 500, 320, 240}, 40), fixed});
   }
   for (std::size_t i = 0; i < n_points; ++i) {
     const Eigen::Vector3d point(uniform(random, -1, 3), uniform(random, -2, 2),
@@ -51,7 +53,7 @@ BundleProblem drawn_bundle(std::uint64_t seed) {
     for (std::size_t c = 0; c < n_cameras; ++c) {
       if (c != surely && !(uniform(random, 0, 1) < share)) continue;
       const Eigen::Vector3d p_c = truth[c] * point;
-      const Eigen::Vector2d pixel = problem.cameras[c].pinhole.project(p_c);
+      const Eigen::Vector2d pixel = problem.cameras[c].model->pinhole().project(p_c);
       BundleProblem::Observation o;
       o.camera = static_cast<std::uint32_t>(c);
       o.point = static_cast<std::uint32_t>(i);
@@ -59,7 +61,7 @@ BundleProblem drawn_bundle(std::uint64_t seed) {
       const double off = uniform(random, 0, 1) < wrong ? uniform(random, 20, 60) : 0;
       o.u = static_cast<float>(pixel.x() + off + uniform(random, -0.7, 0.7));
       o.v = static_cast<float>(pixel.y() + uniform(random, -0.7, 0.7));
-      const double base = problem.cameras[c].bf / p_c.z();
+      const double base = problem.cameras[c].model->bf() / p_c.z();
       o.right_u = static_cast<float>(pixel.x() - base + uniform(random, -0.7, 0.7));
       o.inverse_sigma2 = i % 3 == 0 ? 0.4823F : 1.0F;
       problem.observations.push_back(o);

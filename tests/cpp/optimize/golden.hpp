@@ -7,6 +7,7 @@
 #include "base/scale_pyramid.hpp"
 #include "optimize/bundle_adjustment.hpp"
 #include "optimize/pose_optimization.hpp"
+#include "support/cameras.hpp"
 #include "support/npy.hpp"
 
 namespace orbslam::testing {
@@ -24,14 +25,14 @@ Array<T> golden(const std::string& set, const std::string& array) {
   return read_npy<T>(test_data("golden/" + set + "/" + array + ".npy"));
 }
 
-inline Pinhole golden_pinhole(const Array<double>& K) {
-  return {K.values[0], K.values[1], K.values[2], K.values[3]};
+/// From fx, fy, cx, cy, bf.
+inline std::shared_ptr<const Camera> golden_camera(const Array<double>& K) {
+  return make_camera({K.values[0], K.values[1], K.values[2], K.values[3]}, K.values[4]);
 }
 
 struct PoseProblem {
   Pose T_cw_initial;
-  Pinhole pinhole;
-  double bf = 0;
+  std::shared_ptr<const Camera> camera;
   std::vector<PoseObservation> observations;
   Pose T_cw_expected;
   std::vector<std::uint8_t> outlier_expected;
@@ -43,8 +44,7 @@ inline PoseProblem golden_pose_problem(const std::string& set) {
   const auto uv = golden<double>(set, "uv"), ur = golden<double>(set, "ur");
   const auto octave = golden<int>(set, "octave");
   PoseProblem problem;
-  problem.pinhole = golden_pinhole(K);
-  problem.bf = K.values[4];
+  problem.camera = golden_camera(K);
   problem.T_cw_initial = pose_at(golden<double>(set, "Tcw_init"), 0);
   problem.T_cw_expected = pose_at(golden<double>(set, "out_Tcw"), 0);
   problem.outlier_expected = golden<std::uint8_t>(set, "out_outlier").values;
@@ -77,13 +77,13 @@ inline GoldenBundle golden_bundle(const std::string& set) {
   const auto obs_kf = golden<int>(set, "obs_kf"), obs_pt = golden<int>(set, "obs_pt");
   const auto octave = golden<int>(set, "obs_octave");
   const auto uvr = golden<float>(set, "obs_uvr");
+  const auto model = golden_camera(K);
   GoldenBundle bundle;
   bundle.first_local = static_cast<std::size_t>(golden<int>(set, "local_from").values[0]);
   for (std::size_t i = 0; i < T_cw.shape[0]; ++i) {
     BundleProblem::Camera camera;
     camera.T_cw = pose_at(T_cw, i);
-    camera.pinhole = golden_pinhole(K);
-    camera.bf = K.values[4];
+    camera.model = model;
     camera.fixed = i < bundle.first_local || i == 0;
     bundle.problem.cameras.push_back(camera);
     bundle.T_cw_expected.push_back(pose_at(T_out, i));

@@ -15,6 +15,7 @@
 #include "optimize/pose_graph_residuals.hpp"
 #include "optimize/pose_kernels.hpp"
 #include "optimize/sim3_residuals.hpp"
+#include "support/cameras.hpp"
 #include "support/random_numbers.hpp"
 
 namespace orbslam {
@@ -104,22 +105,21 @@ TEST(Jacobians, BundleResiduals) {
   std::mt19937_64 random(1);
   for (const double size : kSizes) {
     for (int trial = 0; trial < kTrials; ++trial) {
-      const Pinhole pinhole{480, 500, 320, 240};
-      const double bf = 40;
-      BundleView view(Pose::exp(random_vector(random, 6, 1)), pinhole, bf);
+      const auto camera_model = testing::make_camera({480, 500, 320, 240}, 40);
+      BundleView view(Pose::exp(random_vector(random, 6, 1)), *camera_model);
       const Blocks blocks = {random_vector(random, 6, size), Eigen::VectorXd(3)};
       view.move(blocks[0].data());
       const double z = random_depth(random);
       const double u = uniform(random, 0, 640), v = uniform(random, 0, 480);
       const Eigen::VectorXd camera = blocks[0],
-                            point = view.T_cw().inverse() * pinhole.unproject(u, v, z);
+                            point = view.T_cw().inverse() * camera_model->unproject(u, v, z);
       Eigen::Vector3d evaluated = point;
       BundleMeasurement m;
       m.view = &view;
       m.point = evaluated.data();
       m.u = u + uniform(random, -8, 8);
       m.v = v + uniform(random, -8, 8);
-      m.right_u = u - bf / z + uniform(random, -8, 8);
+      m.right_u = u - camera_model->bf() / z + uniform(random, -8, 8);
       m.has_depth = true;
       m.scale = uniform(random, 0.3, 1);
       const auto free = [&](const Blocks& at) {
@@ -182,7 +182,7 @@ TEST(Jacobians, PoseGraphEdgesWithScalesKept) { check_pose_graph_edges<6>(3); }
 // OD-114: derivatives of similarities are analytic.
 TEST(Jacobians, Sim3Residuals) {
   std::mt19937_64 random(4);
-  const Pinhole pinhole{500, 510, 320, 240};
+  const auto camera = testing::make_camera({500, 510, 320, 240});
   for (const double size : kSizes) {
     for (int trial = 0; trial < kTrials; ++trial) {
       const Similarity S_12 = Similarity::exp(random_vector(random, 7, size));
@@ -192,7 +192,7 @@ TEST(Jacobians, Sim3Residuals) {
       m.pixel_1 = {uniform(random, 0, 640), uniform(random, 0, 480)};
       m.pixel_2 = {uniform(random, 0, 640), uniform(random, 0, 480)};
       const auto projected = [&](const Eigen::Vector2d& pixel) {
-        return pinhole.unproject(pixel.x() + uniform(random, -8, 8),
+        return camera->unproject(pixel.x() + uniform(random, -8, 8),
                                  pixel.y() + uniform(random, -8, 8), random_depth(random));
       };
       m.point_1 = S_12 * projected(m.pixel_2);
@@ -200,8 +200,8 @@ TEST(Jacobians, Sim3Residuals) {
       for (const bool forward : {true, false}) {
         const auto evaluate = [&](const Blocks& at, std::vector<Matrix>* jacobians) {
           const Similarity moved = Similarity::exp(at[0]) * S_12;
-          const auto result = forward ? sim3_residuals::forward(moved, pinhole, m)
-                                      : sim3_residuals::inverse(moved, pinhole, m);
+          const auto result = forward ? sim3_residuals::forward(moved, *camera, m)
+                                      : sim3_residuals::inverse(moved, *camera, m);
           if (jacobians != nullptr) *jacobians = {result->jacobian};
           return Eigen::VectorXd(result->error);
         };
@@ -217,20 +217,19 @@ TEST(Jacobians, Sim3Residuals) {
 /// once more.
 TEST(Jacobians, PoseKernels) {
   std::mt19937_64 random(5);
-  const pose_kernels::Projection projection{{500, 510, 320, 240}, 40};
+  const auto camera = testing::make_camera({500, 510, 320, 240}, 40);
   const double weight = 0.7;
   for (const double size : kSizes) {
     for (int trial = 0; trial < kTrials; ++trial) {
       for (const int rows : {2, 3}) {
         const Pose T_cw = Pose::exp(random_vector(random, 6, size));
         const Eigen::Vector3d p_w =
-            T_cw.inverse() * projection.pinhole.unproject(uniform(random, 0, 640),
-                                                          uniform(random, 0, 480),
-                                                          random_depth(random));
+            T_cw.inverse() * camera->unproject(uniform(random, 0, 640), uniform(random, 0, 480),
+                                               random_depth(random));
         const auto predict = [&](const Pose& T) {
           const Eigen::Vector3d p = T * p_w;
-          const Eigen::Vector2d pixel = projection.pinhole.project(p);
-          const Eigen::Vector3d all(pixel.x(), pixel.y(), pixel.x() - projection.bf / p.z());
+          const Eigen::Vector2d pixel = camera->pinhole().project(p);
+          const Eigen::Vector3d all(pixel.x(), pixel.y(), pixel.x() - camera->bf() / p.z());
           return Eigen::VectorXd(all.head(rows));
         };
         Matrix6d H = Matrix6d::Zero();
@@ -247,7 +246,7 @@ TEST(Jacobians, PoseKernels) {
             group.pad();
             pose_kernels::NormalEquations equations;
             (rows == 3 ? pose_kernels::accumulate_stereo : pose_kernels::accumulate_mono)(
-                group, projection, T, 0, &equations);
+                group, *camera, T, 0, &equations);
             jacobian.row(row) = -equations.b.transpose() / weight;
             H = equations.H;
           }

@@ -10,6 +10,7 @@
 #include <random>
 
 #include "golden.hpp"
+#include "support/cameras.hpp"
 #include "support/random_numbers.hpp"
 
 namespace orbslam {
@@ -56,8 +57,8 @@ PoseEstimate solve_with_ceres(const PoseProblem& problem) {
       const PoseObservation& o = problem.observations[i];
       const double gate = o.has_depth ? 7.815 : 5.991;
       ceres_problem.AddResidualBlock(
-          new ceres::AutoDiffCostFunction<OracleOfProjections, 3, 6>(
-              new OracleOfProjections{o, problem.pinhole, problem.bf, problem.T_cw_initial}),
+          new ceres::AutoDiffCostFunction<OracleOfProjections, 3, 6>(new OracleOfProjections{
+              o, problem.camera->pinhole(), problem.camera->bf(), problem.T_cw_initial}),
           round < 3 ? new ceres::HuberLoss(std::sqrt(gate)) : nullptr, xi);
     }
     ceres::Solver::Options options;
@@ -76,7 +77,7 @@ PoseEstimate solve_with_ceres(const PoseProblem& problem) {
     estimate.n_inliers = 0;
     for (std::size_t i = 0; i < problem.observations.size(); ++i) {
       double residual[3];
-      OracleOfProjections{problem.observations[i], problem.pinhole, problem.bf,
+      OracleOfProjections{problem.observations[i], problem.camera->pinhole(), problem.camera->bf(),
                           problem.T_cw_initial}(xi, residual);
       const double squared =
           residual[0] * residual[0] + residual[1] * residual[1] + residual[2] * residual[2];
@@ -97,8 +98,7 @@ PoseProblem random_pose_problem(std::uint64_t seed, std::size_t n, double outlie
                                 bool with_depth) {
   std::mt19937_64 random(seed);
   PoseProblem problem;
-  problem.pinhole = {500, 510, 320, 240};
-  problem.bf = 40;
+  problem.camera = testing::make_camera({500, 510, 320, 240}, 40);
   Vector6d xi;
   for (int i = 0; i < 6; ++i) xi(i) = uniform(random, -1, 1);
   const Pose truth = Pose::exp(xi);
@@ -109,9 +109,9 @@ PoseProblem random_pose_problem(std::uint64_t seed, std::size_t n, double outlie
     PoseObservation o;
     o.u = uniform(random, 0, 640);
     o.v = uniform(random, 0, 480);
-    o.position = truth.inverse() * problem.pinhole.unproject(o.u, o.v, z);
+    o.position = truth.inverse() * problem.camera->unproject(o.u, o.v, z);
     o.has_depth = with_depth && i % 3 != 0;
-    o.right_u = o.u - problem.bf / z;
+    o.right_u = o.u - problem.camera->bf() / z;
     if (uniform(random, 0, 1) < outliers) o.u += uniform(random, 10, 60);
     o.u += uniform(random, -1, 1);
     o.v += uniform(random, -1, 1);
@@ -123,7 +123,7 @@ PoseProblem random_pose_problem(std::uint64_t seed, std::size_t n, double outlie
 }
 
 PoseEstimate solve(const PoseProblem& problem) {
-  return optimize_pose(problem.T_cw_initial, problem.pinhole, problem.bf, problem.observations);
+  return optimize_pose(problem.T_cw_initial, *problem.camera, problem.observations);
 }
 
 class PoseOptimizationGolden : public ::testing::TestWithParam<const char*> {};
@@ -245,11 +245,11 @@ TEST(PoseOptimization, CovarianceIsThatOfRepeatedMeasurements) {
   for (int run = 0; run < n_runs; ++run) {
     for (PoseObservation& o : problem.observations) {
       const Eigen::Vector3d p_c = truth * o.position;
-      const Eigen::Vector2d pixel = problem.pinhole.project(p_c);
+      const Eigen::Vector2d pixel = problem.camera->pinhole().project(p_c);
       const double scale = 1 / std::sqrt(o.inverse_sigma2);
       o.u = pixel.x() + scale * uniform(random, -1, 1);
       o.v = pixel.y() + scale * uniform(random, -1, 1);
-      o.right_u = pixel.x() - problem.bf / p_c.z() + scale * uniform(random, -1, 1);
+      o.right_u = pixel.x() - problem.camera->bf() / p_c.z() + scale * uniform(random, -1, 1);
     }
     const PoseEstimate estimate = solve(problem);
     const Vector6d error = (estimate.T_cw * truth.inverse()).log();

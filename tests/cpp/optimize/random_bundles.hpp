@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "optimize/bundle_adjustment.hpp"
+#include "support/cameras.hpp"
 #include "support/random_numbers.hpp"
 
 namespace orbslam::testing {
@@ -15,6 +16,7 @@ namespace orbslam::testing {
 inline BundleProblem random_bundle(std::uint64_t seed, std::size_t n_cameras, std::size_t n_points,
                                    std::size_t n_fixed, bool with_depth) {
   std::mt19937_64 random(seed);
+  const auto model = make_camera({500, 500, 320, 240}, 40);
   BundleProblem problem;
   std::vector<Pose> truth;
   for (std::size_t i = 0; i < n_cameras; ++i) {
@@ -24,15 +26,14 @@ inline BundleProblem random_bundle(std::uint64_t seed, std::size_t n_cameras, st
     Vector6d xi;
     for (int k = 0; k < 6; ++k) xi(k) = uniform(random, -0.01, 0.01);
     const bool fixed = i < n_fixed;
-    problem.cameras.push_back(
-        {fixed ? T_cw : Pose::exp(xi) * T_cw, {500, 500, 320, 240}, 40, fixed});
+    problem.cameras.push_back({fixed ? T_cw : Pose::exp(xi) * T_cw, model, fixed});
   }
   for (std::size_t i = 0; i < n_points; ++i) {
     const Eigen::Vector3d point(uniform(random, -1, 3), uniform(random, -2, 2),
                                 uniform(random, 3, 9));
     for (std::size_t c = 0; c < n_cameras; ++c) {
       const Eigen::Vector3d p_c = truth[c] * point;
-      const Eigen::Vector2d pixel = problem.cameras[c].pinhole.project(p_c);
+      const Eigen::Vector2d pixel = model->pinhole().project(p_c);
       BundleProblem::Observation o;
       o.camera = static_cast<std::uint32_t>(c);
       o.point = static_cast<std::uint32_t>(i);

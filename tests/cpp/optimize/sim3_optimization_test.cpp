@@ -11,6 +11,7 @@
 
 #include "golden.hpp"
 #include "optimize/sim3_residuals.hpp"
+#include "support/cameras.hpp"
 #include "support/random_numbers.hpp"
 
 namespace orbslam {
@@ -20,12 +21,13 @@ using testing::uniform;
 
 struct SimilarityProblem {
   Similarity S_12_true, S_12_initial;
-  Pinhole pinhole_1{500, 510, 320, 240}, pinhole_2{480, 470, 300, 250};
+  std::shared_ptr<const Camera> camera_1 = testing::make_camera({500, 510, 320, 240}),
+                                camera_2 = testing::make_camera({480, 470, 300, 250});
   std::vector<SimilarityMatch> matches;
   std::vector<std::uint8_t> outlier;
 
   SimilarityEstimate solve(const SimilarityOptions& options = {}) const {
-    return optimize_similarity(S_12_initial, pinhole_1, pinhole_2, matches, options);
+    return optimize_similarity(S_12_initial, *camera_1, *camera_2, matches, options);
   }
 };
 
@@ -46,10 +48,10 @@ SimilarityProblem random_sim3_problem(std::uint64_t seed, std::size_t n, double 
   while (problem.matches.size() < n) {
     SimilarityMatch m;
     m.pixel_1 = {uniform(random, 0, 640), uniform(random, 0, 480)};
-    m.point_1 = problem.pinhole_1.unproject(m.pixel_1.x(), m.pixel_1.y(), uniform(random, 1, 10));
+    m.point_1 = problem.camera_1->unproject(m.pixel_1.x(), m.pixel_1.y(), uniform(random, 1, 10));
     m.point_2 = problem.S_12_true.inverse() * m.point_1;
     if (m.point_2.z() < 0.5) continue;
-    m.pixel_2 = problem.pinhole_2.project(m.point_2);
+    m.pixel_2 = problem.camera_2->pinhole().project(m.point_2);
     m.pixel_1 += Eigen::Vector2d(uniform(random, -noise, noise), uniform(random, -noise, noise));
     m.pixel_2 += Eigen::Vector2d(uniform(random, -noise, noise), uniform(random, -noise, noise));
     m.inverse_sigma2_1 = 1 / std::pow(1.44, static_cast<double>(problem.matches.size() % 3));
@@ -73,22 +75,22 @@ double cost_without(const SimilarityProblem& problem, const std::vector<std::uin
   for (std::size_t i = 0; i < problem.matches.size(); ++i) {
     if (outlier[i]) continue;
     const SimilarityMatch& m = problem.matches[i];
-    sum += sim3_residuals::forward(S_12, problem.pinhole_1, m)->error.squaredNorm() +
-           sim3_residuals::inverse(S_12, problem.pinhole_2, m)->error.squaredNorm();
+    sum += sim3_residuals::forward(S_12, *problem.camera_1, m)->error.squaredNorm() +
+           sim3_residuals::inverse(S_12, *problem.camera_2, m)->error.squaredNorm();
   }
   return sum;
 }
 
 TEST(Sim3Residuals, DepthIsThatOfTheProjectedPoint) {
   std::mt19937_64 random(1);
-  const Pinhole pinhole{500, 510, 320, 240};
+  const auto camera = testing::make_camera({500, 510, 320, 240});
   for (const double depth : {-3.0, 0.5, 3.0, 50.0}) {
     const Similarity S_12 = Similarity::exp(random_tangent(random, 1));
     SimilarityMatch m;
-    m.point_1 = S_12 * pinhole.unproject(100, 200, depth);
-    m.point_2 = S_12.inverse() * pinhole.unproject(300, 50, depth);
-    EXPECT_NEAR(sim3_residuals::forward(S_12, pinhole, m)->depth, depth, 1e-9 * std::abs(depth));
-    EXPECT_NEAR(sim3_residuals::inverse(S_12, pinhole, m)->depth, depth, 1e-9 * std::abs(depth));
+    m.point_1 = S_12 * camera->unproject(100, 200, depth);
+    m.point_2 = S_12.inverse() * camera->unproject(300, 50, depth);
+    EXPECT_NEAR(sim3_residuals::forward(S_12, *camera, m)->depth, depth, 1e-9 * std::abs(depth));
+    EXPECT_NEAR(sim3_residuals::inverse(S_12, *camera, m)->depth, depth, 1e-9 * std::abs(depth));
   }
 }
 
@@ -108,9 +110,9 @@ TEST(OptimizeSimilarity, OutliersAreThoseBeyondTheGateInEitherImage) {
   for (std::size_t i = 0; i < problem.matches.size(); ++i) {
     const SimilarityMatch& m = problem.matches[i];
     const Eigen::Vector2d error_1 =
-        m.pixel_1 - problem.pinhole_1.project(estimate.S_12 * m.point_2);
+        m.pixel_1 - problem.camera_1->pinhole().project(estimate.S_12 * m.point_2);
     const Eigen::Vector2d error_2 =
-        m.pixel_2 - problem.pinhole_2.project(estimate.S_12.inverse() * m.point_1);
+        m.pixel_2 - problem.camera_2->pinhole().project(estimate.S_12.inverse() * m.point_1);
     const bool beyond = error_1.squaredNorm() * m.inverse_sigma2_1 > 10 ||
                         error_2.squaredNorm() * m.inverse_sigma2_2 > 10;
     // One that failed before the last iterations stays out.
@@ -197,7 +199,7 @@ TEST(OptimizeSimilarity, PointsBehindACameraAndBrokenNumbersAreOutliers) {
   for (std::size_t i = 0; i < 3; ++i) {
     problem.matches[i].point_1 *= -1;
     problem.matches[i].point_2 = S_21 * problem.matches[i].point_1;
-    problem.matches[i].pixel_2 = problem.pinhole_2.project(problem.matches[i].point_2);
+    problem.matches[i].pixel_2 = problem.camera_2->pinhole().project(problem.matches[i].point_2);
   }
   problem.matches[3].point_1.x() = std::numeric_limits<double>::quiet_NaN();
   problem.matches[4].pixel_2.y() = std::numeric_limits<double>::infinity();
@@ -215,7 +217,7 @@ SimilarityProblem golden_problem() {
   const ScalePyramid scales(1.2F, 8);
   const auto array = [&](const char* name) { return testing::golden<double>(set, name); };
   SimilarityProblem problem;
-  problem.pinhole_1 = problem.pinhole_2 = testing::golden_pinhole(array("K"));
+  problem.camera_1 = problem.camera_2 = testing::golden_camera(array("K"));
   const Pose T_1w = testing::pose_at(array("T1w"), 0), T_2w = testing::pose_at(array("T2w"), 0);
   const auto X1 = array("X1w"), X2 = array("X2w"), uv1 = array("uv1"), uv2 = array("uv2");
   const auto octave1 = testing::golden<int>(set, "octave1");

@@ -28,8 +28,10 @@ def _window() -> tuple[object, ...]:
         poses.append(core.Pose.exp(disturbed) @ core.Pose.from_matrix(matrix))
     points = true_points + random.uniform(-0.05, 0.05, true_points.shape)
     fixed = [k < 2 for k in range(6)]
-    intrinsics = np.array([FOCAL, FOCAL, 320, 240])
-    return poses, fixed, intrinsics, 40.0, points, camera, point, pixels, np.ones(len(seen))
+    options = core.CameraOptions(
+        fx=FOCAL, fy=FOCAL, cx=320, cy=240, width=640, height=480, bf=40.0, depth_ratio=40.0
+    )
+    return poses, fixed, core.Camera(options), points, camera, point, pixels, np.ones(len(seen))
 
 
 def test_both_solvers_find_one_minimum_and_the_same_outliers() -> None:

@@ -50,8 +50,13 @@ NEEDED: dict[str, Callable[[], object]] = {
         core.Map(), core.poses_of_map(core.Map(), 0), [NOBODY], True
     ),
     "solve_bundle": lambda: core.solve_bundle(
-        [NOBODY], [True], np.ones(4), 0.0, np.zeros((0, 3)), [], [], np.zeros((0, 3)), []
+        [NOBODY], [True], context().camera, np.zeros((0, 3)), [], [], np.zeros((0, 3)), []
     ),
+    "solve_bundle, camera": lambda: core.solve_bundle(
+        [], [], NOBODY, np.zeros((0, 3)), [], [], np.zeros((0, 3)), []
+    ),
+    "PnpRansac": lambda: core.PnpRansac(np.zeros((4, 3)), np.zeros((4, 2)), np.ones(4), NOBODY),
+    "solve_epnp": lambda: core.solve_epnp(np.zeros((4, 3)), np.zeros((4, 2)), NOBODY),
 }
 
 

@@ -14,7 +14,7 @@ from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py._timing import StageTimer
 from orbslam2py.slam.config import InitializationConfig
-from orbslam2py.slam.front_end import FrontEnd, intrinsics
+from orbslam2py.slam.front_end import FrontEnd
 from orbslam2py.slam.initialization import multi_view_model_selection
 from orbslam2py.slam.initialization.initial_views import InitialViews, View
 from orbslam2py.slam.initialization.multi_view_model_selection import MultiViewModelSelection
@@ -39,7 +39,7 @@ class Seen(NamedTuple):
     T_21: core.Pose
 
     def place(self, T_21: core.Pose) -> core.TwoViewMotion:
-        camera = intrinsics(self.last.camera)
+        camera = self.last.camera
         return core.place_points(
             self.view.keypoints, self.last.keypoints, self.view.matches, camera, T_21
         )
@@ -127,7 +127,7 @@ def test_a_mistaken_motion_is_adjusted_or_replaced(seen: Seen, degrees: float) -
 
 
 def test_it_is_better_than_what_a_draw_gives(seen: Seen) -> None:
-    camera = intrinsics(seen.last.camera)
+    camera = seen.last.camera
     for seed in range(5):
         drawn = core.reconstruct_two_views(
             seen.view.keypoints, seen.last.keypoints, seen.view.matches, camera, seed=seed

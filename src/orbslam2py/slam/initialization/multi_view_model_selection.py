@@ -19,7 +19,6 @@ from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py._cores import side_by_side
 from orbslam2py.slam.config import InitializationConfig
-from orbslam2py.slam.front_end import intrinsics
 from orbslam2py.slam.initialization.third_view import (
     INLIER_CHI2,
     Candidate,
@@ -99,7 +98,7 @@ class MultiViewModelSelection:
         self._view = view = candidate.view
         self._last = last
         self._limits = limits
-        self._camera = intrinsics(last.camera)
+        self._camera = last.camera
         self._keypoints = matched = np.flatnonzero(view.matches >= 0)
         every = np.arange(len(matched))
         self._sightings = [
@@ -240,7 +239,6 @@ class MultiViewModelSelection:
             poses,
             [True] + [False] * (len(poses) - 1),
             self._camera,
-            0.0,
             placed.points[rows],
             np.concatenate(cameras),
             np.concatenate(points),

@@ -69,7 +69,7 @@ def reconstruct(view: View, last: core.Frame, seed: int) -> core.TwoViewResult:
         view.keypoints,
         last.keypoints,
         view.matches,
-        intrinsics(last.camera),
+        last.camera,
         seed=seed,
         # Each model takes about a millisecond: a busy machine starts a thread no sooner.
         two_threads=False,
@@ -225,7 +225,7 @@ def _verdicts(candidate: Candidate, third: ThirdView, last: core.Frame) -> Float
             motion.points[common],
             view.keypoints[seen],
             1 / view.frame.sigma2[seen],
-            intrinsics(last.camera),
+            last.camera,
         )
         verdicts.append([np.mean(chi2 < INLIER_CHI2), np.mean(np.minimum(chi2, INLIER_CHI2))])
     return np.array(verdicts)
@@ -241,7 +241,7 @@ def pose_of_view(
     points: FloatArray,
     keypoints: npt.NDArray[np.floating],
     inverse_sigma2: npt.NDArray[np.floating],
-    camera: FloatArray,
+    camera: core.Camera,
 ) -> tuple[core.Pose, FloatArray]:
     """Pose of a view that sees points, and their squared errors (n,) in units of the variance.
 
@@ -256,14 +256,14 @@ def pose_of_view(
     inverse_sigma2
         (n,) [px^-2].
     camera
-        fx, fy, cx, cy.
+        That sees.
     """
     points = np.ascontiguousarray(points)
     pixels = np.full((len(points), 3), np.nan)
     pixels[:, :2] = keypoints
     poses, errors = [], []
     for start in starts:
-        found = core.optimize_pose(start, camera, 0.0, points, pixels, inverse_sigma2)
+        found = core.optimize_pose(start, camera, points, pixels, inverse_sigma2)
         poses.append(found.T_cw)
         errors.append(squared_errors(found.T_cw, points, keypoints, inverse_sigma2, camera))
     best = int(np.argmin([np.minimum(chi2, INLIER_CHI2).sum() for chi2 in errors]))
@@ -275,13 +275,13 @@ def squared_errors(
     points: FloatArray,
     keypoints: npt.NDArray[np.floating],
     inverse_sigma2: npt.NDArray[np.floating],
-    camera: FloatArray,
+    camera: core.Camera,
 ) -> FloatArray:
     """Squared distances (n,) of points (n, 3) from where they are seen, over the variance.
 
     Infinite behind the camera.
     """
-    fx, fy, cx, cy = camera
+    fx, fy, cx, cy = intrinsics(camera)
     x, y, z = (T_cw @ np.ascontiguousarray(points)).T
     ahead = z > 0
     z = np.where(ahead, z, 1.0)

@@ -11,7 +11,6 @@ import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py.slam.config import RelocalizationConfig
-from orbslam2py.slam.front_end import intrinsics
 
 
 def optimize(frame: core.TrackedFrame) -> int:
@@ -33,7 +32,7 @@ class Candidate:
             matches.positions[self.indices],
             features.keypoints[self.indices].astype(np.float64),
             features.sigma2[self.indices].astype(np.float64),
-            intrinsics(features.camera),
+            features.camera,
             seed=seed,
         )
 

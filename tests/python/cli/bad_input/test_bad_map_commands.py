@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from support.command_line import CommandLine
-from support.made_up_map import made_up_map
+from support.made_up_map import RATIONAL_LENS, made_up_map
 from support.made_up_saved import made_up_saved, map_file
 
 
@@ -17,6 +17,7 @@ def _files(tmp_path: Path) -> None:
     saved = made_up_saved()
     map_file(tmp_path, saved)
     map_file(tmp_path, made_up_saved(made_up_map(5, depth=True)), "metric.orbmap")
+    map_file(tmp_path, made_up_saved(made_up_map(2, lens=RATIONAL_LENS)), "rational.orbmap")
     (tmp_path / "none.orbmap").write_bytes(b"")
     (tmp_path / "text.orbmap").write_text("not a map")
     (tmp_path / "folder").mkdir()
@@ -67,6 +68,7 @@ EXPORT = "map export colmap a.orbmap out"
         (f"{CROP} --to nan", "--to is nan", "give seconds since the first keyframe"),
         (f"{CROP} --only --points", "--points needs a box", "--low and --high"),
         (f"{CROP} --only --from 1 --low 0,0,0 --high 1,1,1", "say what to keep", "either"),
+        ("map export nerfstudio rational.orbmap out", "rational lens (k4 to k6)", "--images"),
         ("map merge a.orbmap -o out", "a.orbmap alone", "name two map files or more"),
         ("map crop a.orbmap -o a.orbmap --to 1", "a.orbmap exists", "--force"),
         ("map crop a.orbmap -o nowhere/b.orbmap --to 1", "nowhere", "no such folder"),
