@@ -280,27 +280,19 @@ class Stamps:
         The same as text in seconds, all digits of the source kept.
     lines
         Line number of each in the file, from 1.
+    doubts
+        What was changed in them, or may be wrong, one sentence each.
     """
 
     seconds: FloatArray
     texts: tuple[str, ...]
     lines: tuple[int, ...]
+    doubts: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         seconds = np.array(self.seconds, dtype=np.float64)
         seconds.setflags(write=False)  # sequences hand it out
         object.__setattr__(self, "seconds", seconds)
-
-    def warn_unless_increasing(self, path: Path) -> None:
-        """Log the lines whose time stamp is not after the one before."""
-        for i in np.flatnonzero(np.diff(self.seconds) <= 0).tolist():
-            _log.warning(
-                "%s:%d: time stamp %s is not after the one before it, %s",
-                path,
-                self.lines[i + 1],
-                self.texts[i + 1],
-                self.texts[i],
-            )
 
 
 def rate_of(seconds: FloatArray, usual: float) -> float:

@@ -56,11 +56,14 @@ class Clock:
         Time of each, growing.
     texts
         The same as text in seconds; the text of the source where nothing was changed.
+    doubts
+        What was changed, or may be wrong, one sentence each. All were logged.
     """
 
     order: tuple[int, ...]
     nanoseconds: tuple[int, ...]
     texts: tuple[str, ...]
+    doubts: tuple[str, ...]
 
     def stamps(self, lines: Sequence[int] = ()) -> Stamps:
         """Return the times as stamps.
@@ -72,7 +75,7 @@ class Clock:
         """
         seconds = np.array([float(text) for text in self.texts], dtype=np.float64)
         numbers = tuple(lines[place] for place in self.order) if lines else ()
-        return Stamps(seconds, self.texts, numbers)
+        return Stamps(seconds, self.texts, numbers, self.doubts)
 
 
 def read_clock(
@@ -97,28 +100,33 @@ def read_clock(
     DatasetError
         If a text is no time.
     """
+    doubts: list[str] = []
     values = [value_of(source, text) for text in texts]
     digits = 0 if any(map(_is_date, texts)) else unit_of(values, fps)
     if digits != usual_unit and not any(map(_is_date, texts)):
-        # Times since 1970 leave no doubt.
-        level = logging.INFO if _is_since_1970(values) else logging.WARNING
-        _log.log(level, "%s: the time stamps are taken for %s", source, _UNITS[digits])
+        taken = f"{source}: the time stamps are taken for {_UNITS[digits]}"
+        if _is_since_1970(values):
+            _log.info("%s", taken)  # which leaves no doubt
+        else:
+            doubts.append(taken)
     nanoseconds = [int((value * 10 ** (9 - digits)).to_integral_value()) for value in values]
-    _warn_of_rate(source, nanoseconds, fps)
+    doubts += _doubts_of_rate(source, nanoseconds, fps)
     order = list(range(len(texts)))
     if any(later < earlier for earlier, later in pairwise(nanoseconds)):
         if was_set_back(nanoseconds):
-            nanoseconds = _continued(source, nanoseconds)
+            nanoseconds = _continued(source, nanoseconds, doubts)
         else:
-            _log.warning("%s: the lines are not in the order of time; they are sorted", source)
+            doubts.append(f"{source}: the lines are not in the order of time; they are sorted")
             order.sort(key=lambda place: nanoseconds[place])  # stable: equal ones keep their order
     in_order = [nanoseconds[place] for place in order]
-    spread = _spread(source, in_order, fps)
+    spread = _spread(source, in_order, fps, doubts)
     written = []
     for place, time in zip(order, spread, strict=True):
         is_kept = digits == 0 and Decimal(time) == values[place] * _NANO
         written.append(texts[place] if is_kept and not _is_date(texts[place]) else text_of(time))
-    return Clock(tuple(order), tuple(spread), tuple(written))
+    for doubt in doubts:
+        _log.warning("%s", doubt)
+    return Clock(tuple(order), tuple(spread), tuple(written), tuple(doubts))
 
 
 def text_of(nanoseconds: int) -> str:
@@ -223,7 +231,7 @@ def _longest_rise(times: Sequence[int]) -> int:
     return len(ends)
 
 
-def _continued(source: Path | str, times: Sequence[int]) -> list[int]:
+def _continued(source: Path | str, times: Sequence[int], doubts: list[str]) -> list[int]:
     """Let times go on where the clock was set back."""
     step = _usual_step(times)
     continued, shift = [times[0]], 0
@@ -231,10 +239,9 @@ def _continued(source: Path | str, times: Sequence[int]) -> list[int]:
         if later < earlier:
             back = earlier - later + step
             shift += back
-            _log.warning(
-                "%s: the clock was set back by some %.6g s after image %d; the order of the list "
-                "is kept and the time goes on",
-                *(source, back / _NANO, place),
+            doubts.append(
+                f"{source}: the clock was set back by some {back / _NANO:.6g} s after image "
+                f"{place}; the order of the list is kept and the time goes on"
             )
         continued.append(later + shift)
     return continued
@@ -245,7 +252,9 @@ def _usual_step(times: Sequence[int]) -> int:
     return int(statistics.median(steps)) if steps else _NANO // 30
 
 
-def _spread(source: Path | str, times: Sequence[int], fps: float | None) -> list[int]:
+def _spread(
+    source: Path | str, times: Sequence[int], fps: float | None, doubts: list[str]
+) -> list[int]:
     """Spread images of equal times until the next time."""
     groups: list[tuple[int, int]] = []  # first place, number of images
     for place, time in enumerate(times):
@@ -257,10 +266,9 @@ def _spread(source: Path | str, times: Sequence[int], fps: float | None) -> list
     if not n_equal:
         return list(times)
     frame = _NANO / fps if fps else _usual_step(times) / statistics.median(c for _, c in groups)
-    _log.warning(
-        "%s: %d images have the time stamp of another one; they are spread over the time until the "
-        "next",
-        *(source, n_equal),
+    doubts.append(
+        f"{source}: {n_equal} images have the time stamp of another one; they are spread over the "
+        "time until the next"
     )
     spread: list[int] = []
     for (place, count), following in zip(groups, [*groups[1:], None], strict=True):
@@ -271,17 +279,17 @@ def _spread(source: Path | str, times: Sequence[int], fps: float | None) -> list
     return spread
 
 
-def _warn_of_rate(source: Path | str, times: Sequence[int], fps: float | None) -> None:
+def _doubts_of_rate(source: Path | str, times: Sequence[int], fps: float | None) -> list[str]:
     steps = [abs(later - earlier) for earlier, later in pairwise(times) if later != earlier]
     if fps is None or not steps:
-        return
+        return []
     step = statistics.median(steps) / _NANO
-    if step * fps < _LEAST_STEP or step * fps > _MOST_FRAMES_LEFT_OUT:
-        _log.warning(
-            "%s: the images are %.3g s apart, but Camera.fps of the settings is %g; correct one of "
-            "them",
-            *(source, step, fps),
-        )
+    if _LEAST_STEP <= step * fps <= _MOST_FRAMES_LEFT_OUT:
+        return []
+    return [
+        f"{source}: the images are {step:.3g} s apart, but Camera.fps of the settings is {fps:g}; "
+        "correct one of them"
+    ]
 
 
 def _is_date(text: str) -> bool:

@@ -54,6 +54,7 @@ class _CameraList:
     texts: tuple[str, ...]
     paths: list[Path]
     lines: list[int]
+    doubts: tuple[str, ...]
 
     def since(self, first: int) -> FloatArray:
         """Times [s] from a moment on: small numbers keep all digits."""
@@ -113,9 +114,11 @@ class EurocSequence(RecordedSequence):
         left = _list_images(root / "cam0", rate)
         kept = np.arange(len(left.paths))
         self._right: list[Path] = []
+        doubts = left.doubts
         if self.sensor is Sensor.STEREO:
             right = _list_images(root / "cam1", rate)
-            kept, partners = _pair(root, left, right)
+            kept, partners, apart = _pair(root, left, right)
+            doubts = (*doubts, *right.doubts, *apart)
             self._right = [right.paths[place] for place in partners]
         require_frames(left.source, len(kept))
         self._list_path = left.source
@@ -124,6 +127,7 @@ class EurocSequence(RecordedSequence):
             np.array([left.nanoseconds[place] / 1e9 for place in kept], dtype=np.float64),
             tuple(left.texts[place] for place in kept),
             tuple(left.lines[place] for place in kept),
+            doubts,
         )
 
     def image_path(self, index: int, /) -> Path:
@@ -212,8 +216,8 @@ def has_camera(root: Path, camera: str) -> bool:
 
 def _pair(
     root: Path, left: _CameraList, right: _CameraList
-) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """Pair images by the nearest time, at most half a step apart."""
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], list[str]]:
+    """Pair images by the nearest time, at most half a step apart, and say what is odd of it."""
     first = left.nanoseconds[0] if left.nanoseconds else 0
     times, others = left.since(first), right.since(first)
     step = float(np.median(np.diff(times))) if len(times) > 1 else 2 * MAX_DIFFERENCE
@@ -225,12 +229,13 @@ def _pair(
             f"{root}: no images of cam0 and cam1 were taken within {limit * 1e3:.3g} ms of each "
             "other; see whether both lists are of one recording"
         )
-    if alone:
-        _log.warning("%s: %d images have no partner, left out", root, alone)
+    doubts = [f"{root}: {alone} images have no partner, left out"] if alone else []
     worst = float(np.abs(times[i] - others[j]).max(initial=0.0))
     if worst > 0:
-        _log.warning("%s: images of a pair were taken up to %.3g ms apart", root, worst * 1e3)
-    return i, j
+        doubts.append(f"{root}: images of a pair were taken up to {worst * 1e3:.3g} ms apart")
+    for doubt in doubts:
+        _log.warning("%s", doubt)
+    return i, j, doubts
 
 
 def _list_images(camera: Path, rate: float) -> _CameraList:
@@ -256,6 +261,7 @@ def _list_images(camera: Path, rate: float) -> _CameraList:
         tuple(map(text_of, clock.nanoseconds)),
         [found[place][0] for place in clock.order],
         [found[place][1] for place in clock.order],
+        clock.doubts,
     )
 
 
@@ -274,15 +280,14 @@ def _list_folder(folder: Path, rate: float) -> _CameraList:
         if path.suffix.lower() in IMAGE_SUFFIXES and path.stem.isdigit() and not path.is_dir()
     )
     numbers = [number for number, _ in found]
-    if len(numbers) > 1 and np.median(np.diff(numbers)) <= _LARGEST_COUNT:
-        _log.warning(
-            "%s: the names of the images are no times; they count frames at %g Hz", folder, rate
-        )
-        times = tuple(round((number - numbers[0]) * 1e9 / rate) for number in numbers)
-    else:
-        names = [path.stem for _, path in found]
-        times = read_clock(folder, names, rate, usual_unit=9).nanoseconds
     paths = [path for _, path in found]
-    return _CameraList(
-        folder, times, tuple(map(text_of, times)), paths, list(range(1, len(paths) + 1))
-    )
+    if len(numbers) > 1 and np.median(np.diff(numbers)) <= _LARGEST_COUNT:
+        doubt = f"{folder}: the names of the images are no times; they count frames at {rate:g} Hz"
+        _log.warning("%s", doubt)
+        times = tuple(round((number - numbers[0]) * 1e9 / rate) for number in numbers)
+        doubts: tuple[str, ...] = (doubt,)
+    else:
+        clock = read_clock(folder, [path.stem for path in paths], rate, usual_unit=9)
+        times, doubts = clock.nanoseconds, clock.doubts
+    lines = list(range(1, len(paths) + 1))
+    return _CameraList(folder, times, tuple(map(text_of, times)), paths, lines, doubts)

@@ -97,6 +97,11 @@ class RecordedSequence(FramesInOrder, ABC):
             self.sensor, self._settings_folders(), self._from_calibration, self._missing_calibration
         )
 
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What was changed in the time stamps, or may be wrong: sentences that were logged."""
+        return self._stamps.doubts
+
     def known_rate(self) -> float | None:
         """Images per second of the settings; None if nothing tells them."""
         try:

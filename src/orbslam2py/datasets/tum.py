@@ -243,6 +243,7 @@ def _associate_lists(folder: Path, fps: float | None) -> tuple[ImageList, tuple[
         colour.stamps.seconds[i],
         tuple(colour.stamps.texts[k] for k in i),
         tuple(colour.stamps.lines[k] for k in i),
+        (*colour.stamps.doubts, *depth.stamps.doubts),
     )
     paired = ImageList(stamps, tuple(colour.paths[k] for k in i))
     return paired, tuple(depth.paths[k] for k in j)

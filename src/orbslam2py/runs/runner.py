@@ -159,6 +159,7 @@ class SequenceRunner:
                 _log.warning("interrupted; saving what was done so far (%s)", seen)
             self._shut_down(system)
         self._save_map(system)
+        result.warnings += getattr(result.sequence, "doubts", ())  # logged when it was opened
         result.warnings += system.settings.doubts()  # which the system has logged
         self._judge_depth(system)
         result.calibration_warnings = self._calibration_warnings(system)

@@ -14,8 +14,6 @@ from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
-import numpy.typing as npt
-
 from orbslam2py import _core as core
 from orbslam2py._arguments import is_finite, shown
 from orbslam2py._arrays import ByteArray
@@ -149,7 +147,7 @@ class Pipeline:
     def build_frame(
         self,
         image: ByteArray,
-        second: npt.NDArray[Any] | None,
+        second: Any,
         frame_id: int,
         timestamp: float,
         timer: StageTimer,
@@ -158,10 +156,8 @@ class Pipeline:
         """Make a frame of the images of one moment; see `System.track`."""
         front_end = self.front_end
         if self._sensor is Sensor.STEREO:
-            assert second is not None
             return front_end.stereo(image, second, frame_id, timestamp, timer, mask)
         if self._sensor is Sensor.RGBD:
-            assert second is not None
             return front_end.rgbd(image, second, frame_id, timestamp, timer, mask)
         factor = self.feature_factor
         return front_end.monocular(image, frame_id, timestamp, timer, mask, feature_factor=factor)

@@ -15,6 +15,7 @@ from orbslam2py._arguments import number_of as counted
 from orbslam2py._text_lines import content_lines
 from orbslam2py.datasets.base import Images, Layout, Stamps, rate_of, require_frames
 from orbslam2py.datasets.choose_settings import SettingsChoice
+from orbslam2py.datasets.clock import read_clock
 from orbslam2py.datasets.grey_scale import read_sample
 from orbslam2py.datasets.image_folder import image_files
 from orbslam2py.datasets.layouts.kitti_raw_calibration import CAMERAS_FILE, DriveCalibration
@@ -96,7 +97,6 @@ class KittiRawSequence(RecordedSequence):
             times = _some(times, i.tolist())
         require_frames(times_path, len(self._paths))
         self._stamps = times
-        self._stamps.warn_unless_increasing(times_path)
 
     @staticmethod
     def recognises(folder: Path) -> bool:
@@ -250,5 +250,4 @@ def _read_dates(path: Path) -> Stamps:
                 "2011-09-26 13:02:25.964389445; copy the drive's own timestamps.txt there"
             ) from None
         texts.append(f"{nanoseconds // 10**9}.{nanoseconds % 10**9:09d}")
-    seconds = np.array([float(text) for text in texts], dtype=np.float64)
-    return Stamps(seconds, tuple(texts), tuple(line.number for line in lines))
+    return read_clock(path, texts, _USUAL_RATE).stamps([line.number for line in lines])
