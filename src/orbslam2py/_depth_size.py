@@ -7,6 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 
+#: Depth of phones is up to 7.5 times smaller than their images.
+_MOST_TIMES_SMALLER = 16
+
+
 def depth_size_problem(depth: tuple[int, ...], image: tuple[int, ...]) -> str | None:
     """Tell why depth cannot be brought to the size of its image; None if it can.
 
@@ -19,6 +23,8 @@ def depth_size_problem(depth: tuple[int, ...], image: tuple[int, ...]) -> str | 
     sizes = f"depth has size {w}x{h}, the image {W}x{H}"
     if min(h, w) == 0:
         return f"{sizes}; give depth images with pixels"
+    if w * _MOST_TIMES_SMALLER < W:
+        return f"{sizes}, which is too small for depth of it; give the depth image of this image"
     # A size that was divided is rounded: less than a pixel is no other aspect.
     if abs(w * H - W * h) >= max(W, H):
         return (
