@@ -6,7 +6,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-
 #: Depth of phones is up to 7.5 times smaller than their images.
 _MOST_TIMES_SMALLER = 16
 
