@@ -27,7 +27,11 @@ def _files(tmp_path: Path) -> None:
     (tmp_path / "late.txt").write_text("0 1 1 1\n99 1 1 1\n1 2 1 2\n")
     (tmp_path / "one_place.txt").write_text("0 0 0 1 1 1\n" * 4)
     (tmp_path / "rows.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n")
-    (tmp_path / "body.csv").write_text("1,0,0,0,1,0,0,0\n")
+    (tmp_path / "body.csv").write_text(
+        "#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m],"
+        "q_RS_w [],q_RS_x [],q_RS_y [],q_RS_z []\n"
+        "1403636579758555392,0,0,0,1,0,0,0\n"
+    )
     (tmp_path / "other_day.txt").write_text("1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n")
 
 
