@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import sys
+from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Protocol, runtime_checkable
@@ -77,17 +79,23 @@ def find_loaders(folder: Path) -> dict[str, Loader]:
     """
     if not folder.is_dir():
         return {}
-    installed = {point.name: _load(point) for point in entry_points(group=ENTRY_POINTS)}
+    installed = {point.name: _load(point) for point in _installed(tuple(sys.path))}
     found = {name: one for name, one in installed.items() if one.recognises(folder)}
     return found or {name: one for name, one in OWN.items() if one.recognises(folder)}
 
 
 def loader_of(name: str) -> Loader | None:
     """Return the loader of a layout, None if there is none of that name."""
-    for point in entry_points(group=ENTRY_POINTS):
+    for point in _installed(tuple(sys.path)):
         if point.name == name:
             return _load(point)
     return OWN.get(name)
+
+
+@cache
+def _installed(places: tuple[str, ...]) -> tuple[EntryPoint, ...]:
+    """Return the loaders of other packages; `places` is the path on which they are searched."""
+    return tuple(entry_points(group=ENTRY_POINTS))
 
 
 def _load(point: EntryPoint) -> Loader:
