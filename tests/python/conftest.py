@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from orbslam2py.runs import outputs
 from support.data import shared_folder
 from support.watchdog import watchdog, worker_threads
 
@@ -33,6 +34,9 @@ LONGEST_FIRST = (
     "batches",
     "slam",
 )
+
+
+PNG_BEGIN = b"\x89PNG\r\n\x1a\n"
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -60,6 +64,13 @@ def _no_hang_and_no_thread_left(request: pytest.FixtureRequest) -> Iterator[None
         if worker_threads() != before:
             gc.collect()  # ends those of a system that nobody holds; slow, hence not every time
         assert worker_threads() == before
+
+
+@pytest.fixture(autouse=True)
+def _no_picture_of_a_run(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out what takes longest in a short run, but with ``@pytest.mark.picture``."""
+    if request.node.get_closest_marker("picture") is None:
+        monkeypatch.setattr(outputs, "draw_run", lambda path, *_: path.write_bytes(PNG_BEGIN))
 
 
 @pytest.fixture(scope="session")

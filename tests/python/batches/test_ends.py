@@ -196,6 +196,7 @@ def rescue(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     return tmp_path / "temporary"
 
 
+@pytest.mark.picture
 @pytest.mark.watchdog(150)
 def test_full_disk(jobs: Path, whole: Whole, tmp_path: Path, rescue: Path) -> None:
     """Results that do not fit are kept elsewhere, and runs are made again where there is room."""

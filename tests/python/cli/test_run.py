@@ -141,6 +141,7 @@ def test_frames_csv(command: CommandLine, rgbd: Path) -> None:
     np.testing.assert_allclose(positions, online.positions, atol=2e-9)
 
 
+@pytest.mark.picture
 def test_points_and_picture(command: CommandLine, rgbd: Path) -> None:
     command("run", rgbd, "--sensor", "rgbd", "--output", "r")
     content = Path("r/points.ply").read_bytes()

@@ -107,6 +107,7 @@ def test_layouts_tell_it(tmp_path: Path, layout: str, sensor: str) -> None:
     np.testing.assert_array_equal(masked.up_in_truth, sequence.up_in_truth)
 
 
+@pytest.mark.picture
 def test_the_picture_of_a_run_uses_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     drawn: dict[str, Any] = {}
     monkeypatch.setattr(

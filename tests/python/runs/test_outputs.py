@@ -82,6 +82,7 @@ class Untold(SyntheticSequence):
         return None
 
 
+@pytest.mark.picture
 @pytest.mark.parametrize("kind", [SyntheticSequence, Untold])
 def test_lengths_of_one_camera_are_metres_only_where_the_truth_tells(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: type[SyntheticSequence]

@@ -69,6 +69,7 @@ def test_a_title_says_what_a_map_is() -> None:
     assert given_up.title == "map 3, given up: 60 poses"
 
 
+@pytest.mark.picture
 def test_a_run_with_several_maps_has_a_picture_of_them(tmp_path: Path) -> None:
     run = made_up_run(tmp_path / "r", "kkkkkkllkkkkkkkk", maps="0" * 8 + "1" * 8)
     assert seen(run / "maps.png")[:3] == [True, True, False]

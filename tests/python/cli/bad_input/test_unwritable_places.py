@@ -74,6 +74,7 @@ def fill_disk(monkeypatch: pytest.MonkeyPatch, full: Callable[[Path], bool]) -> 
     monkeypatch.setattr(_files.os, "fsync", fsync)
 
 
+@pytest.mark.picture
 def test_disk_full(
     command: CommandLine, rgbd: Path, rescue: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -134,6 +135,7 @@ def test_real_full_disk(command: CommandLine, rgbd: Path, rescue: Path, tmp_path
     assert "trajectory.png" in kept
 
 
+@pytest.mark.picture
 def test_a_picture_that_cannot_be_drawn(
     command: CommandLine, rgbd: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
