@@ -184,16 +184,16 @@ def find_other_reading(
         T_wc = _read_again(trajectory.T_wc, reading, swap=swap, invert=invert, by=extrinsics)
         return Trajectory(trajectory.timestamps, T_wc, trajectory.lost, trajectory.indices)
 
-    def figures(first: Trajectory, second: Trajectory, how: Alignment) -> Evaluation:
+    def figures(first: Trajectory, second: Trajectory) -> Evaluation:
         return evaluate_trajectory(
-            *(first, second, how),
+            *(first, second, alignment),
             single_camera=single_camera,
             max_difference=max_difference,
             offset=offset,
             timed=timed,
         )
 
-    as_read = figures(estimate, truth, alignment)
+    as_read = figures(estimate, truth)
     again = (estimate, read_again(truth)) if side else (read_again(estimate), truth)
     order = readings[side].quaternions
     return OtherReading(
@@ -202,7 +202,7 @@ def find_other_reading(
         inverse=not readings[side].inverse if invert else None,
         either=either,
         as_read=as_read,
-        otherwise=figures(*again, as_read.alignment),
+        otherwise=figures(*again),
     )
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from orbslam2py import Trajectory
-from orbslam2py.evaluation import OtherReading, find_other_reading
+from orbslam2py.evaluation import OtherReading, evaluate_trajectory, find_other_reading
 from orbslam2py.trajectory import QuaternionOrder, Reading
 from support.made_up_paths import straight, wander
 
@@ -44,7 +44,7 @@ def circle(n: int = 100) -> Trajectory:
 
 
 def estimated(
-    truth: Trajectory, seed: int = 0, *, noise: float = 1e-3, body: bool = False
+    truth: Trajectory, seed: int = 0, *, noise: float = 1e-3, body: bool = False, scale: float = 0.4
 ) -> Trajectory:
     """With noise and drift, in a world of its own and another unit; perhaps of another body."""
     random = np.random.default_rng(seed)
@@ -56,7 +56,7 @@ def estimated(
     if body:
         T = T @ random_pose(random, 0.1)
     T = random_pose(random, 3.0) @ T
-    T[:, :3, 3] *= 0.4
+    T[:, :3, 3] *= scale
     return Trajectory(truth.timestamps, T)
 
 
@@ -116,6 +116,20 @@ def test_figures_are_those_of_the_right_file() -> None:
         f"the poses of the estimate look like poses of the world in the camera: {ate}, RPE "
     )
     assert found.message.endswith("; give --inverse")
+
+
+@pytest.mark.parametrize("scale", [0.4, 1.0, 2.5])
+def test_figures_are_those_of_the_next_evaluation(scale: float) -> None:
+    """The alignment is chosen anew for the right poses: they may be in another unit."""
+    truth = handheld()
+    estimate = estimated(truth, scale=scale)
+    found = find_other_reading(inverse(estimate), truth)
+    assert found is not None
+    again = evaluate_trajectory(estimate, truth)
+    assert found.otherwise.alignment is again.alignment
+    assert found.otherwise.ate is not None
+    assert again.ate is not None
+    assert found.otherwise.ate.rmse == pytest.approx(again.ate.rmse)
 
 
 @pytest.mark.parametrize("made", [car, circle, lambda: wander(150)])
