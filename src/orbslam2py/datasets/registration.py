@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import ImageError
+from orbslam2py.settings.projection import distorted
 
 #: A hole of one pixel is filled if so many of the eight pixels around it have depth ...
 _NEIGHBOURS = 4
@@ -69,8 +70,6 @@ class DepthRegistration:
         R = T_colour_depth[:3, :3]
         self._depth_size = depth.size
         self._colour = colour
-        self._D = np.zeros(8, np.float32)
-        self._D[: len(colour.D)] = colour.D
         self._rays = (R @ _rays_of(depth)).astype(np.float32)
         self._t = (T_colour_depth[:3, 3:] * units_per_metre).astype(np.float32)
         K = colour.K.astype(np.float32)
@@ -127,10 +126,10 @@ class DepthRegistration:
             ahead = Z > 0
             raw, X, Y, Z = raw[ahead], X[ahead], Y[ahead], Z[ahead]
         x, y = X / Z, Y / Z
-        if self._D.any():
+        if self._colour.D.any():
             inside = x * x + y * y < self._reach
-            raw, x, y, Z = raw[inside], x[inside], y[inside], Z[inside]
-            x, y = distort_points(x, y, self._D)
+            raw, Z = raw[inside], Z[inside]
+            x, y = distorted(np.stack([x[inside], y[inside]], axis=1), self._colour.D).T
         width, height = self._colour.size
         fx, fy, cx, cy = self._pinhole
         scale = raw / Z
@@ -179,37 +178,10 @@ def _rays_of(lens: Lens, *, corners: bool = False) -> FloatArray:
     width, height = lens.size
     us, vs = ([0, width - 1], [0, height - 1]) if corners else (np.arange(width), np.arange(height))
     u, v = (grid.ravel().astype(np.float64) for grid in np.meshgrid(us, vs))
-    K = lens.K
-    seen_y = (v - K[1, 2]) / K[1, 1]
-    seen_x = (u - K[0, 2] - K[0, 1] * seen_y) / K[0, 0]
-    D = np.zeros(8)
-    D[: len(lens.D)] = lens.D
-    x, y = seen_x, seen_y
-    for _ in range(_STEPS if D.any() else 0):
-        found_x, found_y = distort_points(x, y, D)
-        x, y = x + seen_x - found_x, y + seen_y - found_y
-    return np.stack([x, y, np.ones_like(x)])
-
-
-def distort_points(
-    x: NDArray[np.floating], y: NDArray[np.floating], D: NDArray[np.floating]
-) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
-    """Apply a distortion to points of the image plane at z = 1.
-
-    Parameters
-    ----------
-    x, y
-        Coordinates of the points (n,).
-    D
-        k1, k2, p1, p2, k3, k4, k5, k6 as in OpenCV (8,).
-    """
-    k1, k2, p1, p2, k3, k4, k5, k6 = D
-    r2 = x * x + y * y
-    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    if k4 or k5 or k6:
-        radial /= 1 + r2 * (k4 + r2 * (k5 + r2 * k6))
-    xy = 2 * x * y
-    return (
-        x * radial + p1 * xy + p2 * (r2 + 2 * x * x),
-        y * radial + p1 * (r2 + 2 * y * y) + p2 * xy,
-    )
+    seen_y = (v - lens.K[1, 2]) / lens.K[1, 1]
+    seen_x = (u - lens.K[0, 2] - lens.K[0, 1] * seen_y) / lens.K[0, 0]
+    seen = np.stack([seen_x, seen_y], axis=1)
+    plane = seen
+    for _ in range(_STEPS if lens.D.any() else 0):
+        plane = plane + seen - distorted(plane, lens.D)
+    return np.vstack([plane.T, np.ones_like(u)])

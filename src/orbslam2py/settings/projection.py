@@ -10,10 +10,14 @@ divides that by 1 + k4 s + k5 s^2 + k6 s^3.
 from __future__ import annotations
 
 import math
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from orbslam2py._arrays import FloatArray
+
+Real = TypeVar("Real", np.float32, np.float64)
 
 #: Largest square of a radius on the plane at distance 1 that matters.
 _FARTHEST = 1e4
@@ -45,21 +49,28 @@ def on_image_plane(points: FloatArray, distortion: FloatArray | None) -> FloatAr
     return distorted(np.where(inside[:, None], plane, np.nan), distortion)
 
 
-def distorted(plane: FloatArray, distortion: FloatArray) -> FloatArray:
+def distorted(plane: NDArray[Real], distortion: FloatArray) -> NDArray[Real]:
     """Move points on the plane at distance 1 to where the lens draws them.
 
     Parameters
     ----------
     plane
-        x, y, float64 (n, 2).
+        x, y, float64 or float32 (n, 2).
     distortion
         Coefficients in OpenCV's order, float64 (4,), (5,) or (8,).
+
+    Returns
+    -------
+    NDArray[Real]
+        x, y of the same type, (n, 2).
     """
-    p1, p2 = distortion[2:4]
-    numerator, denominator = _radial_polynomials(distortion)
+    # Python's numbers keep float32, and Horner's rule needs no arrays for the zeros.
+    k1, k2, p1, p2, k3, k4, k5, k6 = _eight(distortion)
     x, y = plane[:, 0], plane[:, 1]
     s = x * x + y * y
-    radial = np.polyval(numerator, s) / np.polyval(denominator, s)
+    radial = 1.0 + s * (k1 + s * (k2 + s * k3))
+    if k4 or k5 or k6:
+        radial = radial / (1.0 + s * (k4 + s * (k5 + s * k6)))
     return np.stack(
         [
             x * radial + 2 * p1 * x * y + p2 * (s + 2 * x * x),
@@ -93,8 +104,12 @@ def largest_radius(distortion: FloatArray) -> float:
 
 def _radial_polynomials(distortion: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Numerator and denominator of the radial factor by s = r^2, the highest power first."""
-    k1, k2, _, _, k3, k4, k5, k6 = (*distortion.tolist(), *(0.0,) * 4)[:8]
+    k1, k2, _, _, k3, k4, k5, k6 = _eight(distortion)
     return np.array([k3, k2, k1, 1.0]), np.array([k6, k5, k4, 1.0])
+
+
+def _eight(distortion: FloatArray) -> tuple[float, ...]:
+    return (*distortion.tolist(), *(0.0,) * 4)[:8]
 
 
 def _positive_roots(polynomial: FloatArray) -> FloatArray:

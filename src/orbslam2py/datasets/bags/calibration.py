@@ -10,7 +10,6 @@ import numpy as np
 
 from orbslam2py._arrays import FloatArray
 from orbslam2py.datasets.rectification import rectification_of_pair
-from orbslam2py.datasets.registration import distort_points
 from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.settings import (
     CameraRectification,
@@ -20,6 +19,7 @@ from orbslam2py.settings import (
     StereoRectification,
     settings_for_camera,
 )
+from orbslam2py.settings.projection import distorted
 
 _MODELS = ("plumb_bob", "rational_polynomial", "radtan", "brown_conrady", "")
 #: Models of the RealSense SDK that are none if all coefficients are 0, as a rule.
@@ -293,9 +293,7 @@ def _inverted(K: FloatArray, D: FloatArray, size: tuple[int, int]) -> FloatArray
     """
     u, v = np.meshgrid(*(np.linspace(0, n - 1, _SAMPLES) for n in size))
     seen_x, seen_y = (u.ravel() - K[0, 2]) / K[0, 0], (v.ravel() - K[1, 2]) / K[1, 1]
-    eight = np.zeros(8)
-    eight[: min(5, D.size)] = D[:5]
-    x, y = distort_points(seen_x, seen_y, eight)
+    x, y = distorted(np.stack([seen_x, seen_y], axis=1), D[:5]).T
     r2, xy = x * x + y * y, 2 * x * y
     columns_x = (x * r2, x * r2**2, xy, r2 + 2 * x * x, x * r2**3)
     columns_y = (y * r2, y * r2**2, r2 + 2 * y * y, xy, y * r2**3)
