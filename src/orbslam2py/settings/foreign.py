@@ -306,7 +306,7 @@ def recognise_camera_file(text: str) -> str | None:
     return next((one.name for one in FORMATS if one.sign(content)), None)
 
 
-def import_line(path: Path, file_format: str, sensor: Sensor, text: str = "") -> str:
+def import_line(path: Path, file_format: str, sensor: Sensor, text: str) -> str:
     """Return the command that makes settings of such a file, of which `text` is the content."""
     kind = _BY_NAME[file_format]
     words = ["orbslam2py", "import-camera", str(path), "--sensor", str(sensor)]

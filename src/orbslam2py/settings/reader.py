@@ -189,7 +189,7 @@ def _refuse_camera_file(path: Path, text: str, sensor: Sensor) -> None:
     if file_format is not None:
         raise SettingsError(
             f"{path} is {FOREIGN_FORMATS[file_format]}, not a settings file; make one of it with\n"
-            f"    {import_line(path, file_format, sensor)}"
+            f"    {import_line(path, file_format, sensor, text)}"
         )
 
 
