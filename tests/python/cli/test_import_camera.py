@@ -266,7 +266,7 @@ def test_settings_that_are_given_as_calibration(command: CommandLine, tmp_path: 
 @pytest.mark.parametrize(
     "text",
     [
-        *(files.ROS1, files.OST, files.EUROC, files.VINS, files.STELLA, files.zed("HD"), files.OAK),
+        *(files.ROS1, files.OST, files.EUROC, files.VINS, files.zed("HD"), files.OAK),
         *(files.BASALT_PAIR, files.NERFSTUDIO, files.OPEN3D, files.REPLICA, files.RECORD3D),
         *(files.POLYCAM, files.FCA, files.SIMPLE, files.OPENCV_PAIR),
     ],

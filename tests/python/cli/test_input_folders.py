@@ -9,20 +9,12 @@ from pathlib import Path
 import pytest
 
 from orbslam2py import Sensor
-from support.command_line import CommandLine, Outcome
+from support.command_line import CommandLine, refused
 from support.files import names_in
 from support.small_folders import image, save
 from support.small_sequences import sequence
 
 pytestmark = pytest.mark.watchdog(60)
-
-
-def refused(done: Outcome, *said: str) -> None:
-    """One line, of the exit code of wrong usage."""
-    assert done.code == 2, done.out
-    assert len(done.err.strip().splitlines()) == 1, done.err
-    for text in said:
-        assert text in done.err
 
 
 @pytest.fixture
@@ -61,7 +53,7 @@ def test_a_run_of_a_sequence(command: CommandLine, street: Path) -> None:
 def test_masks_are_not_joined_by_pictures(command: CommandLine, plain: Path) -> None:
     masks = _masks()
     before = names_in(masks)
-    run = ("run", plain, "--settings", "tum1", "--force", "--mask", masks)
+    run = ("run", plain, "--settings", "tum1", "--force", "--quiet", "--mask", masks)
     refused(command(*run, "--output", masks), "--output masks is what is read")
     assert names_in(masks) == before
 

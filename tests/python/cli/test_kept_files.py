@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from orbslam2py import Sensor
-from support.command_line import RUN_FILES, CommandLine, Outcome
+from support.command_line import RUN_FILES, CommandLine, refused
 from support.files import names_in
 from support.made_up_saved import map_file
 from support.small_sequences import sequence
@@ -49,14 +49,6 @@ def _raise(kind: type[BaseException]) -> Callable[..., None]:
     return raise_it
 
 
-def refused(done: Outcome, *said: str) -> None:
-    """One line, of the exit code of wrong usage."""
-    assert done.code == 2, done.out
-    assert len(done.err.strip().splitlines()) == 1, done.err
-    for text in said:
-        assert text in done.err
-
-
 # ---- videos and recordings -----------------------------------------------------------------------
 @pytest.mark.parametrize("what", ["run", "demo"])
 def test_a_video_is_replaced_with_force_only(command: CommandLine, rgbd: Path, what: str) -> None:
@@ -75,9 +67,9 @@ def test_a_video_is_replaced_with_force_only(command: CommandLine, rgbd: Path, w
 def test_the_video_that_is_read_is_not_replaced_even_so(command: CommandLine, rgbd: Path) -> None:
     assert command("run", rgbd, "--output", "r", "--video", "a.mp4", "--quiet").code == 0
     before = Path("a.mp4").read_bytes()
-    arguments = ("--sensor", "mono", "--settings", "tum1", "--force", "--output", "again")
+    run = ("run", "a.mp4", "--sensor", "mono", "--settings", "tum1", "--force", "--quiet")
     refused(
-        command("run", "a.mp4", *arguments, "--video", "./a.mp4"),
+        command(*run, "--output", "again", "--video", "./a.mp4"),
         "--video a.mp4 is what is read; give another name",
     )
     assert Path("a.mp4").read_bytes() == before

@@ -13,7 +13,7 @@ import pytest
 from orbslam2py import Sensor
 from orbslam2py.batches.sweep_picture import write_sweep_picture
 from support import chessboards
-from support.command_line import CommandLine, Outcome
+from support.command_line import CommandLine, refused
 from support.files import names_in
 from support.made_up_saved import map_file
 from support.small_sequences import sequence
@@ -24,14 +24,6 @@ pytestmark = pytest.mark.watchdog(60)
 @pytest.fixture
 def map_of_japan(tmp_path: Path) -> Path:
     return map_file(tmp_path, name="日本.orbmap")
-
-
-def refused(done: Outcome, *said: str) -> None:
-    """One line, of the exit code of wrong usage."""
-    assert done.code == 2, done.out
-    assert len(done.err.strip().splitlines()) == 1, done.err
-    for text in said:
-        assert text in done.err
 
 
 @pytest.mark.parametrize(
@@ -71,6 +63,7 @@ def test_the_picture_of_a_calibration(command: CommandLine, tmp_path: Path) -> N
     assert cv2.imread("a.jpg").std() > 10
 
 
+@pytest.mark.picture
 def test_a_run_of_a_sequence_with_such_a_name(command: CommandLine, tmp_path: Path) -> None:
     folder = sequence(Sensor.RGBD, 12).write(tmp_path / "lap")
     shutil.move(folder, "日本")

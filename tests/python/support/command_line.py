@@ -86,6 +86,14 @@ class CommandLine:
         return Outcome(code if isinstance(code, int) else int(code or 0), printed.out, printed.err)
 
 
+def refused(done: Outcome, *said: str) -> None:
+    """See that a command ended with one line that holds these texts, and with wrong usage."""
+    assert done.code == 2, done.out
+    assert len(done.err.strip().splitlines()) == 1, done.err
+    for text in said:
+        assert text in done.err
+
+
 @dataclass(frozen=True)
 class Results:
     """What a run left in its folder."""
