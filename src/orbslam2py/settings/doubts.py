@@ -13,6 +13,8 @@ from orbslam2py.settings.sensor import Sensor
 
 #: Most tangential distortion. Lenses have up to some 0.005.
 _MOST_TANGENTIAL = 0.015
+#: Most by which rectification changes a focal length, as a factor. Usual are 0.7 to 1.3.
+_MOST_ZOOM = 3.0
 _INTRINSICS = ((0, 0), (1, 1), (0, 2), (1, 2))
 
 
@@ -55,6 +57,13 @@ def _doubts_of_rectification(groups: SettingsGroups) -> list[str]:
     if abs(camera.bf + rectification.right.P[0, 3]) > 1e-3:
         found.append("Camera.bf differs from -RIGHT.P[0,3]")
     for name, raw in (("LEFT", rectification.left), ("RIGHT", rectification.right)):
+        zoom = raw.P[0, 0] / raw.K[0, 0]
+        if not 1 / _MOST_ZOOM < zoom < _MOST_ZOOM:
+            found.append(
+                f"{name}: rectification changes the focal length from {raw.K[0, 0]:.6g} to "
+                f"{raw.P[0, 0]:.6g} pixels: is the camera matrix of the same image size "
+                f"({raw.width} x {raw.height}) as the rectification?"
+            )
         found += _doubts_of_lens(name, raw.K, raw.D, (raw.width, raw.height))
     return found
 

@@ -230,7 +230,8 @@ def _scaled(camera: CameraSettings, size: tuple[int, int], limits: FitThresholds
     return Misfit(
         _principal_point(camera, size),
         f"a calibration of larger or smaller images, of about {_text(about)}",
-        f"multiply fx, fy, cx, cy by {1 / factor:.3g}, or give images of the calibrated size",
+        f"multiply fx, fy, cx, cy of the file by {1 / factor:.3g}, or give images of the "
+        "calibrated size",
     )
 
 

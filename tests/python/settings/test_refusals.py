@@ -243,3 +243,13 @@ def test_camera_that_does_not_fit_the_rectification_is_doubted(
     Settings.load(write(tmp_path / "a.yaml", {**MONO, **DEPTH}, text), Sensor.STEREO)
     assert "differ from LEFT.P" in caplog.text
     assert "differs from -RIGHT.P[0,3]" in caplog.text
+
+
+def test_a_rectification_of_another_image_size_is_doubted(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    small = MATRIX.replace("458.654", "114.66").replace("457.296", "114.32")
+    text = small + MATRIX.replace("LEFT", "RIGHT")
+    Settings.load(write(tmp_path / "a.yaml", {**MONO, **DEPTH}, text), Sensor.STEREO)
+    assert "LEFT: rectification changes the focal length from 114.66 to 435.2" in caplog.text
+    assert "RIGHT: rectification changes" not in caplog.text
