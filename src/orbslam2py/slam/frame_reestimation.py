@@ -13,6 +13,7 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py.slam.pose_search import PoseSearch, RefinedPose
 from orbslam2py.slam.records import PoseEstimate
+from orbslam2py.slam.state import State
 
 #: Times that a frame whose pose is in doubt is matched, at most: each is nearer to where it was.
 _MOST_LOOKS = 6
@@ -75,15 +76,19 @@ class FrameReestimation:
         if refined is None:
             return followed
         if finished:
-            refined = self._search.local_map_search.rematch(refined, in_doubt=in_doubt)
+            refined = self._search.local_map_search.rematch(
+                refined, self._state(frame, wide=in_doubt).probation, in_doubt=in_doubt
+            )
         return _without_outliers(refined).frame
 
     def _look(self, frame: core.TrackedFrame, *, wide: bool) -> RefinedPose | None:
-        self._search.reset()
-        if wide:
-            self._search.proving.found_again(frame)
-        refined = self._search.in_local_map(_copy_of(frame), PoseEstimate())
+        state = self._state(frame, wide=wide)
+        refined = self._search.in_local_map(_copy_of(frame), PoseEstimate(), state)
         return _without_outliers(refined) if refined.estimate.found else None
+
+    def _state(self, frame: core.TrackedFrame, *, wide: bool) -> State:
+        state = self._search.new_state()
+        return state.relocalized(frame.id, where_expected=False) if wide else state
 
 
 def _shows_more(looked: core.TrackedFrame, found: core.TrackedFrame) -> bool:

@@ -7,28 +7,11 @@ III-E; ``docs/method/tracking.md#new-keyframes``.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from orbslam2py import _core as core
 from orbslam2py._worker import Worker
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.config import KeyframeConfig
-
-
-@dataclass
-class SinceKeyframe:
-    """What has been tracked since the last keyframe was made."""
-
-    frame_id: int = 0
-    """Of the frame that became it."""
-    keyframe: int = -1
-    """Its id; -1 if there was none."""
-    most_inliers: int = 0
-    """Of one frame; counted anew where the camera is found again."""
-
-    def saw(self, n_inliers: int) -> None:
-        """Count a tracked frame."""
-        self.most_inliers = max(self.most_inliers, n_inliers)
+from orbslam2py.slam.state import SinceKeyframe
 
 
 class KeyframeDecision:

@@ -19,17 +19,32 @@ from orbslam2py._timing import StageTimer
 from orbslam2py.slam.acceptance.pose_acceptance import PoseAcceptance
 from orbslam2py.slam.config import Config
 from orbslam2py.slam.initialization import Initializer
-from orbslam2py.slam.keyframe_decision import KeyframeDecision, SinceKeyframe
+from orbslam2py.slam.keyframe_decision import KeyframeDecision
 from orbslam2py.slam.local_mapping import LocalMapping
 from orbslam2py.slam.pose_search import (
     FirstEstimate,
     FirstEstimateInFixedMap,
     FirstEstimateInGrowingMap,
-    MotionModel,
     PoseSearch,
 )
 from orbslam2py.slam.records import PoseEstimate, Reason, TrackingResult, TrackingState
-from orbslam2py.slam.relocalization import Confirmation, LostTimer
+from orbslam2py.slam.state import Motion, State
+from orbslam2py.slam.state.transitions import (
+    ActivateMap,
+    Confirmed,
+    Event,
+    KeyframeInserted,
+    MapBegun,
+    MapDropped,
+    MapLoaded,
+    NotFound,
+    NotInitialized,
+    Relocalized,
+    RestartInitializer,
+    SearchForMap,
+    Tracked,
+    Transitions,
+)
 from orbslam2py.slam.watched_frame import accepted_keypoints
 
 _log = logging.getLogger(__name__)
@@ -87,44 +102,30 @@ class Tracking:
         self._has_depth = has_depth
         self._in_growing_map = FirstEstimateInGrowingMap(search)
         self._in_fixed_map = FirstEstimateInFixedMap(search, has_depth=has_depth)
-        self._confirmation = Confirmation(config.relocalization)
-        self._loss = LostTimer(new_map_after)
-        #: How often tracking was found again, over all maps.
-        self.n_relocalizations = 0
-        self.reset()
+        self._transitions = Transitions(config, has_depth=has_depth, new_map_after=new_map_after)
+        self._state = State.before_first_map(has_depth=has_depth)
 
+    # ---- maps that begin and end -----------------------------------------------------------------
     def restart(self) -> None:
         """Forget a map that came to nothing, but not the frames that a new one may begin from."""
         frames = self._initializer.remembered()
-        self._forget_maps()
+        self._begin_anew()
         if frames:
             # The count of the frames goes on, and the next map is young as well.
-            self._search.proving.map_begun(frames[-1].id)
+            state = self._state
+            probation = state.probation.map_begun(frames[-1].id, has_depth=self._has_depth)
+            self._state = replace(state, probation=probation)
         self._initializer.restart(frames)
 
     def reset(self) -> None:
         """Forget the map's past; the map itself is cleared by the pipeline."""
-        self._forget_maps()
+        self._begin_anew()
         self._initializer.reset()
 
-    def _forget_maps(self) -> None:
-        self.state = TrackingState.NO_IMAGES_YET
-        self._since_keyframe = SinceKeyframe()
-        # Maps that were loaded, and those that localization mode has been on in.
-        self._kept_maps: set[int] = set()
-        # Whether the initializer is shown the frames of a loss.
-        self._seeks_map = False
-        self._search.reset()
-        self._acceptance.reset()
-        self._in_fixed_map.reset()
-        self._confirmation.reset()
-        # A frame found again that becomes a keyframe with the next one.
-        self._waits_for_confirmation: core.TrackedFrame | None = None
-        self._loss.reset()
-        # Images in a row without a pose.
-        self._n_lost = 0
-        # Whether the last pose hangs on few points; unknown of a map's first one.
-        self._is_scarce = False
+    def _begin_anew(self) -> None:
+        self._state = State.before_first_map(
+            has_depth=self._has_depth, n_relocalizations=self._state.n_relocalizations
+        )
 
     def begin_in_loaded_map(self, initial_pose: core.Pose | None) -> None:
         """Start lost in the map as it is: every image is searched in it, and it is kept.
@@ -134,71 +135,73 @@ class Tracking:
         initial_pose : Pose or None
             ``T_cw`` where the camera may be; tried before all else.
         """
-        self.state = TrackingState.LOST
-        self._kept_maps = set(self._map.maps)
-        # The map's keyframes are of another run: the first frame found may be one already.
-        self._since_keyframe = SinceKeyframe(-self._keyframe_decision.spacing)
-        self._search.initial_pose = initial_pose
-        self._search.searches_loaded_map = True
+        maps = frozenset(self._map.maps)
+        self._apply(MapLoaded(maps, initial_pose, self._keyframe_decision.spacing))
 
     def go_back(self) -> None:
         """Be lost in the maps that are left: the one that had begun beside them was dropped."""
         frames = self._initializer.remembered()
-        self._leave_map()
-        self.state = TrackingState.LOST
-        # The next image that can begin a map does.
-        self._loss.be_overdue()
-        self._seeks_map = True
+        self._apply(MapDropped())
         self._initializer.restart(frames)
 
-    def _leave_map(self) -> None:
-        """Forget the frames before: what follows is in another map."""
-        self._search.reset()
-        self._acceptance.go_elsewhere()
-        self._in_fixed_map.reset()
-        self._confirmation.reset()
-        self._waits_for_confirmation = None
+    def _apply(self, event: Event) -> None:
+        """Replace the state, and carry out what follows from the event."""
+        self._state, actions = self._transitions.next_state(self._state, event)
+        for action in actions:
+            match action:
+                case RestartInitializer():
+                    self._initializer.restart([])
+                case ActivateMap():
+                    found_in = self._map.activate_map_of(action.keyframe)
+                    _log.info("found again at frame %d in map %d", action.frame_id, found_in)
+
+    # ---- what others ask -------------------------------------------------------------------------
+    @property
+    def state(self) -> TrackingState:
+        """Before the first map, tracked, or lost."""
+        return self._state.phase
 
     @property
-    def initializing(self) -> bool:
-        """Whether the next image may begin a map."""
-        return self.state in (TrackingState.NO_IMAGES_YET, TrackingState.NOT_INITIALIZED)
+    def n_relocalizations(self) -> int:
+        """How often tracking was found again, over all maps."""
+        return self._state.n_relocalizations
 
     def feature_factor(self, *, localize: bool) -> int:
         """Features that a single camera's next image needs, in multiples of the settings'.
 
-        In localization mode nobody else needs the time, and more features find more of the map; so
-        they do for a camera that is lost, or about to be. But they are harder to tell apart for a
-        lost one, and take turns.
+        In localization mode no other thread needs the time, and more features find more of the map.
+        So they do for a camera that is lost, or about to be. But more features are harder to tell
+        apart for a lost camera, so it gets them in every second image.
         """
-        if self.initializing or self._seeks_map:
+        state = self._state
+        if state.initializing or state.seeks_map:
             return self._initializer.feature_factor
-        if self.state is TrackingState.OK:
-            more = localize or self._is_scarce
+        if state.phase is TrackingState.OK:
+            more = localize or state.is_scarce
         else:
-            more = self._n_lost % 2 == 1
+            more = state.n_lost % 2 == 1
         return self._search.limits.feature_factor if more else 1
 
     @property
-    def motion(self) -> MotionModel:
-        """The last frame that had a pose, and the speed."""
-        return self._search.motion
+    def motion(self) -> Motion:
+        """The last frame that had a pose, and the velocity."""
+        return self._state.motion
 
     @property
     def reference_keyframe(self) -> int:
         """The keyframe that shares most points with the last tracked frame, -1 for none."""
-        return self._search.reference_keyframe
+        return self._state.reference_keyframe
 
     @property
     def local_points(self) -> IntArray:
         """Ids (n,) of the points that the last refined frame was matched with."""
-        local_map = self._search.local_map
+        local_map = self._state.local_map
         return np.zeros(0, np.int64) if local_map is None else local_map.points.ids
 
     @property
     def start_lines(self) -> FloatArray | None:
         """While a single camera's map begins: see `Initializer.lines`; else None."""
-        return self._initializer.lines() if self.initializing else None
+        return self._initializer.lines() if self._state.initializing else None
 
     # ---- one image -------------------------------------------------------------------------------
     def track(
@@ -225,144 +228,112 @@ class Tracking:
         details : bool
             The outcome is to say which keypoints the pose was accepted with.
         """
-        if self.initializing:
+        if self._state.initializing:
             return self._begin_map(frame, timer)
         young = self._is_small or self._initializer.watches_map
-        if young and not self._seeks_map:
+        if young and not self._state.seeks_map:
             self._initializer.remember(frame)
         estimate = self._find_pose(frame, timer, localize)
-        if estimate.found:
-            estimate = self._confirm(frame, estimate)
+        if estimate.found and self._transitions.is_contradicted(self._state, frame):
+            estimate = estimate.failed(Reason.NOT_CONFIRMED)
         if not estimate.found:
             begun = self._begin_map_beside(frame, timer, localize=localize)
             return begun or self._lose(frame, estimate)
-        if not (localize or estimate.unconfirmed):
-            with timer("keyframe"):
-                wrong = self._wrong_map(frame)
-            if wrong is not None:
-                contradicted = estimate.failed(Reason.MAP_CONTRADICTED)
-                return self._lose(frame, contradicted, wrong_map=wrong)
-
-        self.state = TrackingState.OK
-        if not estimate.unconfirmed:
-            self._stay(frame)
-        self._is_scarce = estimate.n_inliers < self._search.limits.scarce_inliers
-        self._search.motion.update_velocity(frame)
+        if self._state.is_lost:
+            estimate = replace(estimate, unconfirmed=True)
+            self._apply(Relocalized(frame, estimate.n_inliers))
+        else:
+            if self._state.unconfirmed is not None:
+                self._apply(Confirmed())
+            if not localize:
+                with timer("keyframe"):
+                    wrong = self._wrong_map(frame)
+                if wrong is not None:
+                    contradicted = estimate.failed(Reason.MAP_CONTRADICTED)
+                    return self._lose(frame, contradicted, wrong_map=wrong)
+            self._apply(Tracked(frame, estimate.n_inliers, self._map.active_map))
         # Before temporary points go, and a keyframe's keypoints become points.
         inliers = accepted_keypoints(frame) if details else None
         is_keyframe = False
         if localize:
             core.discard_temporary(frame)
-            self._waits_for_confirmation = None
+            self._state = replace(self._state, keyframe_candidate=None)
         else:
             with timer("keyframe"):
                 is_keyframe = self._extend_map(frame, estimate)
         # Outliers went into the keyframe, where bundle adjustment decides about them; the next
         # frame must not start from them.
         frame.discard_outliers()
-        self._search.motion.remember(frame)
-        return TrackingResult(self.state, estimate, is_keyframe, inliers=inliers)
+        return TrackingResult(self._state.phase, estimate, is_keyframe, inliers=inliers)
 
     def _find_pose(
         self, frame: core.TrackedFrame, timer: StageTimer, localize: bool
     ) -> PoseEstimate:
         changes_before = self._map.big_change_index
-        estimate = self._search_once(frame, timer, localize)
+        if localize:
+            kept = self._state.kept_maps | {self._map.active_map}
+            self._state = replace(self._state, kept_maps=kept)
+            self._initializer.believe_map()
+        estimate, state = self._search_once(frame, self._state, timer, localize)
         if not estimate.found and self._map.big_change_index != changes_before:
             # A loop was closed meanwhile: what was matched may be half of the old map.
             frame.clear_associations()
-            estimate = self._search_once(frame, timer, localize)
+            estimate, state = self._search_once(frame, state, timer, localize)
+        self._state = state
         return estimate
 
     def _search_once(
-        self, frame: core.TrackedFrame, timer: StageTimer, localize: bool
-    ) -> PoseEstimate:
-        lost = self.state is TrackingState.LOST
-        strategy: FirstEstimate = self._in_growing_map
-        if localize:
-            self._kept_maps.add(self._map.active_map)
-            self._initializer.believe_map()
-            strategy = self._in_fixed_map
-        self._search.map_is_fixed = localize
+        self, frame: core.TrackedFrame, state: State, timer: StageTimer, localize: bool
+    ) -> tuple[PoseEstimate, State]:
+        lost = state.is_lost
+        strategy: FirstEstimate = self._in_fixed_map if localize else self._in_growing_map
         with timer("predict"):
-            estimate = strategy.estimate(frame, lost=lost)
-        if lost and not estimate.found:
-            return estimate
-        if lost or estimate.relocalized:
-            self._search.proving.found_again(frame, where_expected=estimate.where_expected)
-            self._since_keyframe.most_inliers = 0
+            first, state = strategy.estimate(frame, state)
+        if lost and not first.found:
+            return first, state
+        if lost or first.relocalized:
+            state = state.relocalized(frame.id, where_expected=first.where_expected)
+            since = replace(state.since_keyframe, most_inliers=0)
+            state = replace(state, since_keyframe=since)
         with timer("local_map"):
-            believed = self._acceptance.refine(frame, estimate, lost=lost)
-        if believed.found:
-            strategy.believe(believed)
-        return believed
-
-    def _confirm(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> PoseEstimate:
-        """A pose found again waits for the next frame; that one confirms it, or both are wrong."""
-        confirmation = self._confirmation
-        if self.state is TrackingState.LOST:
-            self.n_relocalizations += 1
-            self._search.initial_pose = None
-            confirmation.found(frame)
-            return replace(estimate, unconfirmed=True)
-        if confirmation.waiting:
-            if not confirmation.follows(frame):
-                return estimate.failed(Reason.NOT_CONFIRMED)
-            confirmation.reset()
-            self._search.confirm()
-        return estimate
+            estimate, state = self._acceptance.refine(frame, first, state, fixed_map=localize)
+        if estimate.found:
+            state = replace(state, beyond_map=localize and estimate.visual_odometry)
+        return estimate, state
 
     def _begin_map(self, frame: core.TrackedFrame, timer: StageTimer) -> TrackingResult:
-        self.state = TrackingState.NOT_INITIALIZED
+        self._apply(NotInitialized())
         with timer("keyframe"):
             reason = self._initializer.try_initialize(frame)
         if reason is not Reason.NONE:
             spoilt = reason is Reason.INITIAL_MAP_FAILED
             given_up = self._map.active_map if spoilt else None
-            return TrackingResult(self.state, PoseEstimate(reason), given_up=given_up)
+            return TrackingResult(self._state.phase, PoseEstimate(reason), given_up=given_up)
         return self._map_begun(frame)
 
     def _begin_map_beside(
         self, frame: core.TrackedFrame, timer: StageTimer, *, localize: bool
     ) -> TrackingResult | None:
         """Begin another map with a frame that is not found; None if the time has not come."""
-        if self.state is not TrackingState.LOST or localize:
+        if localize or not self._transitions.may_begin_map(self._state, frame.timestamp):
             return None
-        if not self._loss.overdue(frame.timestamp):
-            return None
-        if not self._seeks_map:
-            self._initializer.restart([])
-            self._seeks_map = True
+        self._apply(SearchForMap())
         frame.clear_associations()
         with timer("keyframe"):
             reason = self._initializer.try_initialize(frame)
         if reason is Reason.INITIAL_MAP_FAILED:
             spoilt = self._map.active_map
-            return TrackingResult(self.state, PoseEstimate(reason), given_up=spoilt)
-        if reason is not Reason.NONE:
-            return None
-        self._leave_map()
-        # A young map has to prove itself.
-        self._search.proving.map_begun(frame.id)
-        self._seeks_map = False
-        self._loss.reset()
-        return self._map_begun(frame)
+            return TrackingResult(self._state.phase, PoseEstimate(reason), given_up=spoilt)
+        return self._map_begun(frame) if reason is Reason.NONE else None
 
     def _map_begun(self, frame: core.TrackedFrame) -> TrackingResult:
-        self.state = TrackingState.OK
         earlier = self._initializer.take_earlier()
-        self._search.reference_keyframe = frame.reference_keyframe
-        if earlier:
-            # So the speed is known: a pose that is sought from where the camera was may stay there.
-            self._search.motion.remember(earlier[-1])
-            self._search.motion.update_velocity(frame)
-        self._search.motion.remember(frame)
-        self._since_keyframe = SinceKeyframe(frame.id, frame.reference_keyframe)
+        self._apply(MapBegun(frame, earlier))
         n = frame.n_associated()
-        # It is the origin, and yet lies in its map no better than the keypoints that became points.
+        # Its pose is the origin, but its keypoints, which became points, have errors.
         covariance = core.pose_covariance(frame)
         estimate = PoseEstimate(n_matches=n, n_inliers=n, covariance=covariance)
-        return TrackingResult(self.state, estimate, is_keyframe=True, earlier=earlier)
+        return TrackingResult(self._state.phase, estimate, is_keyframe=True, earlier=earlier)
 
     def _wrong_map(self, frame: core.TrackedFrame) -> int | None:
         """The number of a map that the images contradict by now."""
@@ -374,42 +345,21 @@ class Tracking:
     def _lose(
         self, frame: core.TrackedFrame, estimate: PoseEstimate, *, wrong_map: int | None = None
     ) -> TrackingResult:
-        was_ok = self.state is TrackingState.OK
-        self._loss.lost(frame.timestamp)
-        self._n_lost += 1
-        self._is_scarce = False
-        if was_ok:
+        if not self._state.is_lost:
             _log.info("tracking lost at frame %d: %s", frame.id, estimate.reason)
-        self.state = TrackingState.LOST
-        # The last pose stays where tracking was lost: the reference keyframe is tried from there.
-        if was_ok:
-            self._search.lose(confirmed=not self._confirmation.waiting)
-        self._confirmation.reset()
-        self._waits_for_confirmation = None
-        self._in_fixed_map.reset()
+        self._apply(NotFound(frame.timestamp))
         frame.clear_associations()
         frame.T_cw = None
         # A map that was loaded, or used for localization, is the user's, however small.
         active = self._map.active_map
-        small = self._is_small and active not in self._kept_maps
-        # Others are given up for one that begins. Under a hand none does, and the camera may be
+        small = self._is_small and active not in self._state.kept_maps
+        # Other maps are dropped for one that begins. Under a hand none does, and the camera may be
         # found behind it.
         another = self._initializer.shows_enough(frame)
         given_up = wrong_map
         if given_up is None and small and another:
             given_up = active
-        return TrackingResult(self.state, estimate, given_up=given_up)
-
-    def _stay(self, frame: core.TrackedFrame) -> None:
-        """Go on in the map that a frame was found in, which may have rested."""
-        self._loss.followed(frame.timestamp)
-        self._n_lost = 0
-        if self._seeks_map:
-            self._seeks_map = False
-            self._initializer.restart([])
-        if frame.map_index != self._map.active_map:
-            found_in = self._map.activate_map_of(frame.reference_keyframe)
-            _log.info("found again at frame %d in map %d", frame.id, found_in)
+        return TrackingResult(self._state.phase, estimate, given_up=given_up)
 
     @property
     def _is_small(self) -> bool:
@@ -421,12 +371,17 @@ class Tracking:
     # ---- keyframes -------------------------------------------------------------------------------
     def _extend_map(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> bool:
         """Make a tracked frame a keyframe if the map needs one; whether it was made now."""
-        self._insert_confirmed()
-        allowed = self._acceptance.allows_keyframe(estimate.evidence)
+        candidate = self._state.keyframe_candidate
+        self._state = replace(self._state, keyframe_candidate=None)
+        if candidate is not None:
+            # Relocalized, and confirmed by now. Where the map ends it sees more of it than any
+            # frame after it.
+            self._create_keyframe(candidate)
+        allowed, self._state = self._acceptance.allows_keyframe(estimate.evidence, self._state)
         if not (allowed and self._keyframe_wanted(frame, estimate)):
             return False
         if estimate.unconfirmed:
-            self._waits_for_confirmation = frame
+            self._state = replace(self._state, keyframe_candidate=frame)
             return False
         if estimate.evidence is not None and estimate.evidence.doubted:
             # Bundle adjustment, which tries them again, would have few inliers to tell them by.
@@ -435,27 +390,15 @@ class Tracking:
         return True
 
     def _keyframe_wanted(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> bool:
-        self._since_keyframe.saw(estimate.n_inliers)
+        state = self._state
+        since = state.since_keyframe.saw(estimate.n_inliers)
+        self._state = replace(state, since_keyframe=since)
         return self._keyframe_decision.wanted(
-            frame,
-            self.reference_keyframe,
-            estimate.n_inliers,
-            self.motion.velocity,
-            self._since_keyframe,
+            frame, state.reference_keyframe, estimate.n_inliers, state.motion.velocity, since
         )
-
-    def _insert_confirmed(self) -> None:
-        """Make the frame that was found again a keyframe, now that the next one confirmed it.
-
-        Where the map ends it sees more of it than any frame after it.
-        """
-        found, self._waits_for_confirmation = self._waits_for_confirmation, None
-        if found is not None:
-            self._create_keyframe(found)
 
     def _create_keyframe(self, frame: core.TrackedFrame) -> None:
         core.describe(frame.features, self._vocabulary)
         keyframe = core.insert_keyframe(self._map, frame, create_points=self._has_depth)
-        self._search.reference_keyframe = keyframe
-        self._since_keyframe = SinceKeyframe(frame.id, keyframe)
+        self._apply(KeyframeInserted(frame.id, keyframe))
         self._mapping.insert_keyframe(keyframe)

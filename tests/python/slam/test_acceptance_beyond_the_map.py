@@ -11,6 +11,7 @@ import pytest
 from orbslam2py import Reason, Sensor, TrackingState, _core
 from orbslam2py.slam.config import AcceptanceConfig, TrackingConfig
 from orbslam2py.slam.records import PoseMethod, TrackingResult, Verdict
+from orbslam2py.slam.state import State
 from support.tracking_scene import FakeCore, FakeFrame, Scene, every_way_ends_elsewhere
 
 USUAL = 100
@@ -136,9 +137,9 @@ def test_a_weak_pose_is_searched_in_the_whole_map(
     search = scene.tracking._search
     original = search.by_relocalization
 
-    def note(frame: FakeFrame) -> object:
+    def note(frame: FakeFrame, state: State) -> object:
         searched.append(frame.id)
-        return original(frame)
+        return original(frame, state)
 
     monkeypatch.setattr(search, "by_relocalization", note)
     scene.core.n_visible = 2000  # much is in view that is not found

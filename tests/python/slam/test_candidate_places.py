@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,12 +12,8 @@ import pytest
 
 from orbslam2py import _core
 from orbslam2py.slam.config import RelocalizationConfig
-from orbslam2py.slam.relocalization import (
-    CandidatePlaces,
-    LastKnownPose,
-    candidates,
-    last_known_pose,
-)
+from orbslam2py.slam.relocalization import CandidatePlaces, candidates
+from orbslam2py.slam.state import LastKnownPose, LostSearch, loss
 
 LIMITS = RelocalizationConfig()
 FRAME: Any = SimpleNamespace()
@@ -66,15 +63,24 @@ class FakeCore:
 @pytest.fixture
 def fake(monkeypatch: pytest.MonkeyPatch) -> FakeCore:
     fake = FakeCore()
-    for module in (candidates, last_known_pose):
+    for module in (candidates, loss):
         monkeypatch.setattr(module, "core", fake)
     return fake
 
 
-def places(slam_map: FakeMap) -> CandidatePlaces:
-    given: Any = slam_map
-    index: Any = "index"
-    return CandidatePlaces(given, index, LIMITS)
+class Places:
+    """Chooses keyframes for one lost frame after the other."""
+
+    def __init__(self, slam_map: FakeMap) -> None:
+        given: Any = slam_map
+        index: Any = "index"
+        self._places = CandidatePlaces(given, index, LIMITS)
+        self._lost = LostSearch()
+
+    def of(self, place: LastKnownPose | None, failures: int) -> list[int]:
+        lost = replace(self._lost, place=place, failures=failures)
+        keyframes, self._lost = self._places.of(FRAME, lost)
+        return keyframes
 
 
 def lost_at(keyframe: int, velocity: _core.Pose | None = None) -> LastKnownPose:
@@ -84,52 +90,43 @@ def lost_at(keyframe: int, velocity: _core.Pose | None = None) -> LastKnownPose:
 
 def test_the_most_similar_come_first(fake: FakeCore) -> None:
     fake.found = {3: 0.1, 7: 0.5, 9: 0.3}
-    assert places(FakeMap()).of(FRAME, None, 0) == [7, 9, 3]
+    assert Places(FakeMap()).of(None, 0) == [7, 9, 3]
 
 
 def test_equal_ones_come_by_id(fake: FakeCore) -> None:
     fake.found = {9: 0.3, 3: 0.3}
-    assert places(FakeMap()).of(FRAME, None, 0) == [3, 9]
+    assert Places(FakeMap()).of(None, 0) == [3, 9]
 
 
 def test_what_several_frames_look_like_comes_before_what_one_does(fake: FakeCore) -> None:
-    chosen = places(FakeMap())
+    chosen = Places(FakeMap())
     fake.found = {3: 0.3, 4: 0.1}
-    chosen.of(FRAME, None, 0)
+    chosen.of(None, 0)
     fake.found = {3: 0.3, 8: 0.4}
-    assert chosen.of(FRAME, None, 1) == [3, 8, 4], "4 is remembered"
+    assert chosen.of(None, 1) == [3, 8, 4], "4 is remembered"
     fake.found = {}
     for _ in range(LIMITS.word_frames - 1):
-        remembered = chosen.of(FRAME, None, 2)
+        remembered = chosen.of(None, 2)
     assert remembered == [8, 3]
-    assert chosen.of(FRAME, None, 3) == [], "not for longer than some frames"
+    assert chosen.of(None, 3) == [], "not for longer than some frames"
 
 
 def test_the_dead_are_left_out(fake: FakeCore) -> None:
     slam_map = FakeMap()
-    chosen = places(slam_map)
+    chosen = Places(slam_map)
     fake.found = {3: 0.3, 8: 0.4}
-    chosen.of(FRAME, None, 0)
+    chosen.of(None, 0)
     slam_map.dead.add(8)
     fake.found = {}
-    assert chosen.of(FRAME, None, 1) == [3]
-
-
-def test_a_reset_forgets_the_frames_before(fake: FakeCore) -> None:
-    chosen = places(FakeMap())
-    fake.found = {3: 0.3}
-    chosen.of(FRAME, None, 0)
-    fake.found = {}
-    chosen.reset()
-    assert chosen.of(FRAME, None, 0) == []
+    assert chosen.of(None, 1) == [3]
 
 
 def test_the_number_is_bounded_and_all_are_reached_in_the_end(fake: FakeCore) -> None:
     fake.found = {k: 1.0 - k / 100 for k in range(40)}
-    chosen, place = places(FakeMap(neighbours=True)), lost_at(80)
+    chosen, place = Places(FakeMap(neighbours=True)), lost_at(80)
     reached: set[int] = set()
     for failures in range(20):
-        tried = chosen.of(FRAME, place, failures)
+        tried = chosen.of(place, failures)
         assert len(tried) <= LIMITS.word_candidates + LIMITS.near_candidates
         assert tried[:4] == [0, 1, 2, 3], "the best are tried every time"
         reached.update(tried)
@@ -138,21 +135,21 @@ def test_the_number_is_bounded_and_all_are_reached_in_the_end(fake: FakeCore) ->
 
 
 def test_the_place_of_loss_is_searched_without_any_word(fake: FakeCore) -> None:
-    assert places(FakeMap(neighbours=True)).of(FRAME, lost_at(80), 0)[:2] == [80, 79]
+    assert Places(FakeMap(neighbours=True)).of(lost_at(80), 0)[:2] == [80, 79]
 
 
 def test_few_places_bring_their_neighbours_in_turns(fake: FakeCore) -> None:
     fake.found = {20: 0.5, 50: 0.3}
-    chosen = places(FakeMap(neighbours=True))
-    assert chosen.of(FRAME, None, 0) == [20, 50, 19, 49, 18, 48, 17, 47]
-    reached = {k for failures in range(6) for k in chosen.of(FRAME, None, failures)}
+    chosen = Places(FakeMap(neighbours=True))
+    assert chosen.of(None, 0) == [20, 50, 19, 49, 18, 48, 17, 47]
+    reached = {k for failures in range(6) for k in chosen.of(None, failures)}
     assert reached == {20, 50, *range(10, 20), *range(40, 50)}
 
 
 def test_a_place_that_died_names_nothing(fake: FakeCore) -> None:
     slam_map = FakeMap()
     slam_map.dead.add(80)
-    assert places(slam_map).of(FRAME, lost_at(80), 0) == []
+    assert Places(slam_map).of(lost_at(80), 0) == []
 
 
 # ---- guesses -----------------------------------------------------------------------------------
@@ -173,6 +170,6 @@ def test_a_motion_is_stretched_with_the_map(fake: FakeCore) -> None:
     place = lost_at(80, velocity=_core.Pose([0, 0, 0, 1], [0.5, 0, 0]))
     slam_map: Any = FakeMap()
     fake.stretched = 2.0
-    place.follow_map(slam_map)
+    place = place.following(slam_map)
     assert place.velocity is not None
     assert place.velocity.translation[0] == 1.0

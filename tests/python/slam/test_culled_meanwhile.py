@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 
 from orbslam2py import Sensor, System
 from orbslam2py import _core as core
 from orbslam2py.slam.config import RelocalizationConfig
-from orbslam2py.slam.relocalization.last_known_pose import LastKnownPose
+from orbslam2py.slam.state import LastKnownPose
 from support.small_sequences import new_system, play
 
 pytestmark = pytest.mark.watchdog(60)
@@ -46,13 +47,11 @@ def test_it_looks_like_no_other(slam: System, culled: int) -> None:
     assert core.find_loop_candidates(back_end.keyframe_index, back_end.map, culled, 0.0) == []
 
 
-def test_tracking_goes_on_without_it(
-    slam: System, culled: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    search = slam.pipeline.tracking._search
-    frame = core.TrackedFrame(search.motion.last.features)
-    monkeypatch.setattr(search, "reference_keyframe", culled)
-    assert not search.by_keyframes_around(frame, 10).found
+def test_tracking_goes_on_without_it(slam: System, culled: int) -> None:
+    tracking = slam.pipeline.tracking
+    frame = core.TrackedFrame(tracking.motion.last.features)
+    state = replace(tracking._state, reference_keyframe=culled)
+    assert not tracking._search.by_keyframes_around(frame, state, 10).found
 
 
 def test_the_place_of_a_loss_is_its_parent_s(slam: System, culled: int) -> None:

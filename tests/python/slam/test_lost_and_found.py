@@ -15,7 +15,8 @@ from orbslam2py import _core as core
 from orbslam2py._timing import StageTimer
 from orbslam2py.datasets import Images
 from orbslam2py.slam.config import RelocalizationConfig
-from orbslam2py.slam.relocalization import LastKnownPose, Relocalizer
+from orbslam2py.slam.relocalization import Relocalization, Relocalizer
+from orbslam2py.slam.state import LastKnownPose, LostSearch
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
 pytestmark = pytest.mark.watchdog(120)
@@ -151,73 +152,81 @@ def relocalizer(
     )
 
 
+class Search:
+    """Searches lost frames one after the other, from a place of loss or from none."""
+
+    def __init__(
+        self,
+        world: MappedWorld,
+        limits: RelocalizationConfig | None = None,
+        *,
+        words: bool = True,
+        lost_here: bool = True,
+        with_velocity: bool = False,
+    ) -> None:
+        self._relocalizer = relocalizer(world, limits, words=words)
+        tracking = world.system.pipeline.tracking
+        motion, reference = tracking.motion, tracking.reference_keyframe
+        velocity = motion.velocity if with_velocity else None
+        place = LastKnownPose(motion.last, velocity, reference) if lost_here else None
+        self._lost = LostSearch(place)
+
+    def __call__(self, frame: core.TrackedFrame) -> Relocalization:
+        found, self._lost = self._relocalizer.relocalize(frame, self._lost)
+        return found
+
+
 def test_near_the_place_of_loss_no_word_is_needed(world: MappedWorld) -> None:
-    motion = world.system.pipeline.tracking.motion
-    found = relocalizer(world, words=False)
-    assert found.relocalize(described(world, N_MAPPED + 5)) == 0
-    reference = world.system.pipeline.tracking.reference_keyframe
-    found.lose(LastKnownPose(motion.last, motion.velocity, reference))
+    nowhere = Search(world, words=False, lost_here=False)
+    assert nowhere(described(world, N_MAPPED + 5)) == Relocalization()
     frame = described(world, N_MAPPED + 5)
-    assert found.relocalize(frame) >= 50
+    assert Search(world, words=False, with_velocity=True)(frame).n_inliers >= 50
     assert frame.T_cw is not None
-    found.reset()
-    assert found.relocalize(described(world, N_MAPPED + 5)) == 0, "the place is forgotten"
 
 
 @pytest.mark.parametrize(("frames_since", "found"), [(10, True), (11, False)])
 def test_where_its_motion_led_fewer_inliers_are_enough(
     world: MappedWorld, frames_since: int, found: bool
 ) -> None:
-    motion = world.system.pipeline.tracking.motion
     limits = RelocalizationConfig(enough=10**6, enough_near=30)
-    again = relocalizer(world, limits)
-    reference = world.system.pipeline.tracking.reference_keyframe
-    again.lose(LastKnownPose(motion.last, None, reference))
-    frame = described(world, motion.last.id + frames_since)
-    assert (again.relocalize(frame) >= 30) == found
+    last = world.system.pipeline.tracking.motion.last.id
+    again = Search(world, limits)(described(world, last + frames_since))
+    assert (again.n_inliers >= 30) == found
     assert again.where_expected == found
 
 
 def test_later_it_is_found_there_but_was_not_expected(world: MappedWorld) -> None:
-    motion = world.system.pipeline.tracking.motion
-    again = relocalizer(world, words=False)
-    again.lose(LastKnownPose(motion.last, None, world.system.pipeline.tracking.reference_keyframe))
-    assert again.relocalize(described(world, motion.last.id + 11)) >= 50
+    last = world.system.pipeline.tracking.motion.last.id
+    again = Search(world, words=False)(described(world, last + 11))
+    assert again.n_inliers >= 50
     assert not again.where_expected
 
 
 def test_found_by_likeness_it_is_not_where_it_was_expected(world: MappedWorld) -> None:
-    found = relocalizer(world)
-    assert found.relocalize(described(world, N_MAPPED + 5)) >= 50
+    found = Search(world, lost_here=False)(described(world, N_MAPPED + 5))
+    assert found.n_inliers >= 50
     assert not found.where_expected
 
 
 def test_the_window_grows_with_every_failure(world: MappedWorld) -> None:
     """Beside the path, where the first window does not reach."""
-    motion = world.system.pipeline.tracking.motion
     limits = RelocalizationConfig(
         guess_window=0.5, widening=10.0, widest=40.0, near_candidates=0, thorough_keyframes=0
     )
-    found = relocalizer(world, limits, words=False)
-    reference = world.system.pipeline.tracking.reference_keyframe
-    found.lose(LastKnownPose(motion.last, None, reference))
-    tries = [found.relocalize(described(world, N_MAPPED + 6)) for _ in range(6)]
+    search = Search(world, limits, words=False)
+    tries = [search(described(world, N_MAPPED + 6)).n_inliers for _ in range(6)]
     assert tries[0] == 0
     assert tries[-1] >= 50
 
 
 def test_where_no_window_reaches_all_keypoints_are_compared(world: MappedWorld) -> None:
-    motion = world.system.pipeline.tracking.motion
     limits = RelocalizationConfig(guess_window=0.5, widening=0.0, near_candidates=0)
-    found = relocalizer(world, limits, words=False)
-    reference = world.system.pipeline.tracking.reference_keyframe
-    found.lose(LastKnownPose(motion.last, None, reference))
     frame = described(world, N_MAPPED + 6)
-    assert found.relocalize(frame) >= limits.enough
+    assert Search(world, limits, words=False)(frame).n_inliers >= limits.enough
     assert frame.T_cw is not None
 
 
 def test_poses_that_are_verified_are_counted(world: MappedWorld) -> None:
     limits = RelocalizationConfig(verified_poses=0)
-    assert relocalizer(world).relocalize(described(world, 30)) >= 50
-    assert relocalizer(world, limits).relocalize(described(world, 30)) == 0
+    assert Search(world, lost_here=False)(described(world, 30)).n_inliers >= 50
+    assert Search(world, limits, lost_here=False)(described(world, 30)).n_inliers == 0

@@ -14,8 +14,9 @@ import pytest
 from orbslam2py import Sensor, System, TrackingState
 from orbslam2py import _core as core
 from orbslam2py.slam.config import AcceptanceConfig, TrackingConfig
-from orbslam2py.slam.pose_search import PoseSearch, RefinedPose
+from orbslam2py.slam.pose_search import LocalMapSearch, PoseSearch, RefinedPose
 from orbslam2py.slam.records import PoseEstimate, TrackingResult
+from orbslam2py.slam.state import Probation
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.vocabulary import load_vocabulary
 from support.tracking_scene import FakeCore, FakeFrame, Scene, pose
@@ -52,7 +53,13 @@ class Walk:
         return version
 
     def refined(self) -> RefinedPose:
-        return self.search.in_local_map(self.version(), PoseEstimate())
+        return self.search.in_local_map(self.version(), PoseEstimate(), self.search.new_state())
+
+    def rematch(
+        self, refined: RefinedPose, *, in_doubt: bool, probation: Probation | None = None
+    ) -> RefinedPose:
+        probation = probation or self.search.new_state().probation
+        return self.search.local_map_search.rematch(refined, probation, in_doubt=in_doubt)
 
     def turned(self, radians: float, n_inliers: int, *, metres: float = 1e-3) -> RefinedPose:
         """A pose beside the right one that so many points fit, told with so many metres."""
@@ -115,7 +122,7 @@ def test_a_pose_matched_from_nothing_does_not_hang_on_where_it_began(
     ends = []
     for radians in (-0.02, -0.005, 0.005, 0.02):
         beside = walk.held(radians, 60)
-        found = walk.search.local_map_search.rematch(beside, in_doubt=in_doubt)
+        found = walk.rematch(beside, in_doubt=in_doubt)
         assert found is not beside
         assert found.n_predicted == len(found.visible) > beside.n_predicted - 300
         assert found.n_predicted >= found.estimate.n_inliers > 60
@@ -128,8 +135,8 @@ def test_a_pose_matched_from_nothing_does_not_hang_on_where_it_began(
 
 def test_a_pose_that_lies_at_the_same_place_is_kept_unless_it_was_in_doubt(walk: Walk) -> None:
     vague = walk.held(0.005, 60, metres=1.0)
-    assert walk.search.local_map_search.rematch(vague, in_doubt=False) is vague
-    assert walk.search.local_map_search.rematch(vague, in_doubt=True) is not vague
+    assert walk.rematch(vague, in_doubt=False) is vague
+    assert walk.rematch(vague, in_doubt=True) is not vague
 
 
 @pytest.mark.parametrize("in_doubt", [False, True])
@@ -137,15 +144,13 @@ def test_a_pose_from_nothing_needs_its_share_of_inliers(
     walk: Walk, in_doubt: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     beside = walk.held(0.01, 60)
-    n = walk.search.local_map_search.rematch(beside, in_doubt=in_doubt).estimate.n_inliers
+    n = walk.rematch(beside, in_doubt=in_doubt).estimate.n_inliers
     name = "afresh_share_in_doubt" if in_doubt else "afresh_share"
     for share, is_taken in ((n / 60, True), ((n + 0.5) / 60, False)):
         monkeypatch.setattr(
             walk.search.local_map_search, "_limits", replace(LIMITS, **{name: share})
         )
-        assert (
-            walk.search.local_map_search.rematch(beside, in_doubt=in_doubt) is not beside
-        ) == is_taken
+        assert (walk.rematch(beside, in_doubt=in_doubt) is not beside) == is_taken
     assert LIMITS.afresh_share_in_doubt < LIMITS.afresh_share <= 1
 
 
@@ -153,23 +158,23 @@ def test_what_the_frame_before_measured_holds_a_pose_unless_it_was_in_doubt(walk
     """Its points are not of the map, and matching from nothing does not find them."""
     beside = walk.held(0.01, 60)
     beside = replace(beside, estimate=replace(beside.estimate, n_inliers=61))
-    assert walk.search.local_map_search.rematch(beside, in_doubt=False) is beside
-    assert walk.search.local_map_search.rematch(beside, in_doubt=True) is not beside
+    assert walk.rematch(beside, in_doubt=False) is beside
+    assert walk.rematch(beside, in_doubt=True) is not beside
 
 
-def test_nothing_to_match_from_nothing_changes_nothing(
-    walk: Walk, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_nothing_to_match_from_nothing_changes_nothing(walk: Walk) -> None:
     away = walk.held(1.5, 40)
     beyond_the_map = replace(walk.held(0.01, 60), local_map=None)
     for refined in (away, beyond_the_map):
         for in_doubt in (False, True):
-            assert walk.search.local_map_search.rematch(refined, in_doubt=in_doubt) is refined
-    monkeypatch.setattr(walk.search.proving, "inliers_asked", lambda frame: 10_000)
+            assert walk.rematch(refined, in_doubt=in_doubt) is refined
     beside = walk.held(0.01, 60)
-    assert walk.search.local_map_search.rematch(beside, in_doubt=True) is beside, (
-        "not enough for a pose"
-    )
+    n_found = walk.rematch(beside, in_doubt=True).estimate.n_inliers
+    limits = replace(LIMITS, local_map_inliers=n_found + 1)
+    stricter = LocalMapSearch(walk.map, Sensor.STEREO, 20, limits)
+    probation = walk.search.new_state().probation
+    refined = stricter.rematch(beside, probation, in_doubt=True)
+    assert refined is beside, "not enough for a pose"
 
 
 # ---- when ----------------------------------------------------------------------------------------
@@ -189,7 +194,9 @@ class FromNothing:
         self.ends: list[float] = []
         scene.search.local_map_search.rematch = self  # type: ignore[method-assign]
 
-    def __call__(self, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
+    def __call__(
+        self, refined: RefinedPose, probation: Probation, *, in_doubt: bool
+    ) -> RefinedPose:
         if not in_doubt:
             return refined
         assert refined.frame.T_cw is not None

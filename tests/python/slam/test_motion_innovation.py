@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,9 +13,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from orbslam2py import Sensor
-from orbslam2py.slam.acceptance.motion_innovation import MotionInnovation
 from orbslam2py.slam.config import AcceptanceConfig, TrackingConfig
-from orbslam2py.slam.pose_search import MotionModel
+from orbslam2py.slam.state import Motion, MotionInnovation
 from support.tracking_scene import FakeCore, FakeFrame, Scene, pose
 
 LIMITS = AcceptanceConfig()
@@ -22,24 +22,24 @@ ORDINARY = np.array([0.01, 0, 0, 0, 0.1, 0])
 
 
 def used_to(change: np.ndarray, times: int = 10) -> MotionInnovation:
-    usual = MotionInnovation(LIMITS)
+    usual = MotionInnovation()
     for _ in range(times):
-        usual.see(change)
+        usual = usual.after(change, LIMITS)
     return usual
 
 
 def test_nothing_is_unusual_before_a_few_changes_are_known() -> None:
     usual = used_to(ORDINARY, LIMITS.changes_seen - 1)
-    assert usual.beyond(100 * ORDINARY) is None
-    usual.see(ORDINARY)
-    assert usual.beyond(100 * ORDINARY) is not None
+    assert usual.excess(100 * ORDINARY, LIMITS) is None
+    usual = usual.after(ORDINARY, LIMITS)
+    assert usual.excess(100 * ORDINARY, LIMITS) is not None
 
 
 def test_up_to_some_times_the_usual_change_nothing_is_beyond_it() -> None:
     usual, most = used_to(ORDINARY), LIMITS.usual_changes
-    assert usual.beyond(0 * ORDINARY) is None
-    assert usual.beyond(0.99 * most * ORDINARY) is None
-    np.testing.assert_allclose(usual.beyond((most + 1) * ORDINARY), ORDINARY)
+    assert usual.excess(0 * ORDINARY, LIMITS) is None
+    assert usual.excess(0.99 * most * ORDINARY, LIMITS) is None
+    np.testing.assert_allclose(usual.excess((most + 1) * ORDINARY, LIMITS), ORDINARY)
 
 
 @pytest.mark.parametrize("larger", [slice(0, 3), slice(3, 6)])
@@ -47,24 +47,24 @@ def test_a_turn_or_a_way_alone_is_enough(larger: slice) -> None:
     change = ORDINARY.copy()
     change[larger] *= 8
     share = 1 - LIMITS.usual_changes / 8
-    np.testing.assert_allclose(used_to(ORDINARY).beyond(change), share * change)
+    np.testing.assert_allclose(used_to(ORDINARY).excess(change, LIMITS), share * change)
 
 
 def test_after_a_rest_any_change_is_beyond_the_usual() -> None:
-    np.testing.assert_array_equal(used_to(0 * ORDINARY).beyond(ORDINARY), ORDINARY)
+    np.testing.assert_array_equal(used_to(0 * ORDINARY).excess(ORDINARY, LIMITS), ORDINARY)
 
 
 def test_a_camera_that_was_at_rest_from_the_first_image_on_is_got_used_to() -> None:
     usual = used_to(0 * ORDINARY)
     for _ in range(30):
-        usual.see(ORDINARY)
-    assert usual.beyond(ORDINARY) is None
+        usual = usual.after(ORDINARY, LIMITS)
+    assert usual.excess(ORDINARY, LIMITS) is None
 
 
 def test_one_sudden_change_does_not_make_the_next_usual() -> None:
     usual = used_to(ORDINARY)
-    usual.see(1000 * ORDINARY)
-    beyond = usual.beyond(1000 * ORDINARY)
+    usual = usual.after(1000 * ORDINARY, LIMITS)
+    beyond = usual.excess(1000 * ORDINARY, LIMITS)
     assert beyond is not None
     assert np.linalg.norm(beyond) > 990 * np.linalg.norm(ORDINARY)
 
@@ -72,8 +72,8 @@ def test_one_sudden_change_does_not_make_the_next_usual() -> None:
 def test_a_camera_that_shakes_from_now_on_is_got_used_to() -> None:
     usual = used_to(ORDINARY)
     for _ in range(30):
-        usual.see(20 * ORDINARY)
-    assert usual.beyond(20 * ORDINARY) is None
+        usual = usual.after(20 * ORDINARY, LIMITS)
+    assert usual.excess(20 * ORDINARY, LIMITS) is None
 
 
 _CHANGES = arrays(np.float64, 6, elements=st.floats(-10, 10))
@@ -83,10 +83,10 @@ _CHANGES = arrays(np.float64, 6, elements=st.floats(-10, 10))
 def test_what_is_beyond_points_along_the_change_and_is_no_longer(
     seen: list[np.ndarray], change: np.ndarray
 ) -> None:
-    usual = MotionInnovation(LIMITS)
+    usual = MotionInnovation()
     for one in seen:
-        usual.see(one)
-    beyond = usual.beyond(change)
+        usual = usual.after(one, LIMITS)
+    beyond = usual.excess(change, LIMITS)
     if beyond is None:
         return
     assert np.isfinite(beyond).all()
@@ -97,15 +97,14 @@ def test_what_is_beyond_points_along_the_change_and_is_no_longer(
 
 
 def test_the_change_is_from_the_pose_to_where_the_motion_led() -> None:
-    motion = MotionModel()
+    motion: Any = Motion()
     frames = [FakeFrame(i) for i in range(3)]
     for frame, x in zip(frames, (0.0, 1.0, 1.5), strict=True):
         frame.T_cw = pose(x)
-    assert motion.change(frames[0]) is None
+    assert motion.innovation(frames[0]) is None
     for frame in frames[:2]:
-        motion.update_velocity(frame)
-        motion.remember(frame)
-    np.testing.assert_allclose(motion.change(frames[2]), [0, 0, 0, 0.5, 0, 0])
+        motion = motion.after(frame)
+    np.testing.assert_allclose(motion.innovation(frames[2]), [0, 0, 0, 0.5, 0, 0])
 
 
 def test_a_pose_far_from_where_the_motion_led_may_be_a_mistake(

@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from orbslam2py import Reason, TrackingState
 from orbslam2py.slam.records import PoseEstimate
+from orbslam2py.slam.relocalization import Relocalization
+from orbslam2py.slam.state import LostSearch, State
 from orbslam2py.slam.tracking import TrackingResult
 from support.tracking_scene import MAX_FRAMES, FakeFrame, Scene, lose, pose
 
@@ -110,9 +113,9 @@ def test_where_its_motion_led_nothing_has_to_be_proven(
     scene.core.n_reference = 0
     again = PoseEstimate(relocalized=True, where_expected=where_expected)
 
-    def by_relocalization(frame: FakeFrame) -> PoseEstimate:
+    def by_relocalization(frame: FakeFrame, state: State) -> tuple[PoseEstimate, State]:
         frame.T_cw = pose(0.0)
-        return again
+        return again, state
 
     # An attempt that fails changes nothing: a first pose that the local map does not confirm.
     scene.core.inliers.extend([100, 60, 29])
@@ -131,28 +134,28 @@ def test_the_search_says_whether_it_was_found_where_it_was_expected(
     scene: Scene, where_expected: bool
 ) -> None:
     class FoundThere:
-        looks_like_several = False
-
-        def __init__(self) -> None:
-            self.where_expected = where_expected
-
-        def relocalize(self, frame: FakeFrame) -> int:
-            return 40
+        def relocalize(
+            self, frame: FakeFrame, lost: LostSearch
+        ) -> tuple[Relocalization, LostSearch]:
+            return Relocalization(40, where_expected=where_expected), lost
 
     scene.run(2)
     there: Any = FoundThere()
     frame: Any = scene.last
     scene.search._relocalizer = there
-    estimate = scene.search.by_relocalization(frame)
+    estimate, state = scene.search.by_relocalization(frame, scene.search.new_state())
     assert estimate.relocalized
     assert estimate.where_expected is where_expected
-    assert scene.search.in_local_map(frame, estimate).estimate.where_expected is where_expected
+    refined = scene.search.in_local_map(frame, estimate, state)
+    assert refined.estimate.where_expected is where_expected
 
 
 def test_a_depth_sensors_other_map_has_nothing_to_prove(scene: Scene) -> None:
     """Its points are where their depths say."""
     scene.run(40)
-    scene.search.proving.map_begun(scene.last.id)
+    state = scene.tracking._state
+    begun = state.probation.map_begun(scene.last.id, has_depth=True)
+    scene.tracking._state = replace(state, probation=begun)
     scene.core.inliers.extend([100, 30])
     assert scene.track().state is TrackingState.OK
 

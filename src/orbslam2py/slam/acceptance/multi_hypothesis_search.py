@@ -13,8 +13,9 @@ from orbslam2py import _core as core
 from orbslam2py.slam.acceptance.pose_validator import PoseValidator
 from orbslam2py.slam.pose_search import PoseSearch, RefinedPose
 from orbslam2py.slam.records import Evidence, PoseEstimate, PoseMethod, Reason, Verdict
+from orbslam2py.slam.state import State
 
-Way = Callable[[core.TrackedFrame], PoseEstimate]
+Way = Callable[[core.TrackedFrame, State], PoseEstimate]
 
 
 @dataclass(frozen=True)
@@ -46,8 +47,10 @@ class MultiHypothesisSearch:
         self._search = search
         self._judge = judge
 
-    def search_again(self, frame: core.TrackedFrame, first: Hypothesis | None) -> Hypothesis | None:
-        """Find the pose for which most speaks, and whether two ways lead there.
+    def search_again(
+        self, frame: core.TrackedFrame, first: Hypothesis | None, state: State
+    ) -> tuple[Hypothesis | None, State]:
+        """Find the pose with the strongest evidence, and whether two methods agree on it.
 
         Parameters
         ----------
@@ -55,56 +58,75 @@ class MultiHypothesisSearch:
             The frame; it is not changed.
         first : Hypothesis or None
             What is in doubt; None if nothing was found.
+        state : State
+            The state before the frame.
 
         Returns
         -------
         Hypothesis or None
             The best supported one, `first` itself unless another one is clearly better; None if
             nothing was found.
+        State
+            As relocalization leaves it.
         """
         found = [] if first is None else [first]
-        for method, way in self._ways(found):
+        for method, way in self._ways(state):
             version = core.TrackedFrame(frame.features)
-            estimate = way(version)
-            if not estimate.found:
-                continue
-            refined = self._search.in_local_map(version, estimate)
-            if not refined.estimate.found:
-                continue
-            evidence = self._judge.assess(refined, self._search.motion, method)
-            hypothesis = Hypothesis(refined, method, evidence)
-            enough = self._has_enough(hypothesis, found)
-            found.append(hypothesis)
-            if enough:
-                break
-        return self._best(found) if found else None
+            if self._add(found, version, way(version, state), method, state):
+                return self._best(found), state
+        if not _any_strong(found):
+            version = core.TrackedFrame(frame.features)
+            estimate = self._search.by_all_keypoints(version, state)
+            if self._add(found, version, estimate, PoseMethod.ALL_KEYPOINTS, state):
+                return self._best(found), state
+        if not _any_strong(found):
+            version = core.TrackedFrame(frame.features)
+            estimate, state = self._search.by_relocalization(version, state)
+            self._add(found, version, estimate, PoseMethod.RELOCALIZATION, state)
+        return self._best(found) if found else None, state
 
-    def _ways(self, found: list[Hypothesis]) -> Iterator[tuple[PoseMethod, Way]]:
-        """The ways in the order of their cost; relocalization only if none is beyond doubt."""
+    def _add(
+        self,
+        found: list[Hypothesis],
+        version: core.TrackedFrame,
+        estimate: PoseEstimate,
+        method: PoseMethod,
+        state: State,
+    ) -> bool:
+        """Add the hypothesis of an estimate, if it holds; whether the search may end with it."""
+        if not estimate.found:
+            return False
+        refined = self._search.in_local_map(version, estimate, state)
+        if not refined.estimate.found:
+            return False
+        hypothesis = Hypothesis(refined, method, self._judge.assess(refined, state, method))
+        enough = self._has_enough(hypothesis, found)
+        found.append(hypothesis)
+        return enough
+
+    def _ways(self, state: State) -> Iterator[tuple[PoseMethod, Way]]:
+        """The methods near the last frame, in the order of their cost."""
         limits, search = self._judge.limits, self._search
         yield PoseMethod.ALIGNED_IMAGES, self._by_aligned_images
         yield (
             PoseMethod.KEYFRAMES_AROUND,
-            lambda v: search.by_keyframes_around(v, limits.keyframes_around),
+            lambda v, s: search.by_keyframes_around(v, s, limits.keyframes_around),
         )
-        if search.motion.velocity is not None:
+        if state.motion.velocity is not None:
             yield PoseMethod.WIDE_WINDOW, self._by_wide_window
-        if not any(hypothesis.evidence.verdict is Verdict.STRONG for hypothesis in found):
-            yield PoseMethod.ALL_KEYPOINTS, search.by_all_keypoints
-        if not any(hypothesis.evidence.verdict is Verdict.STRONG for hypothesis in found):
-            yield PoseMethod.RELOCALIZATION, search.by_relocalization
 
-    def _by_aligned_images(self, frame: core.TrackedFrame) -> PoseEstimate:
-        limits, motion = self._judge.limits, self._search.motion
+    def _by_aligned_images(self, frame: core.TrackedFrame, state: State) -> PoseEstimate:
+        limits, motion = self._judge.limits, state.motion
         aligned = core.align_rotation(motion.last.features, frame.features)
         if aligned is None or aligned.correlation < limits.aligned_correlation:
             return PoseEstimate(Reason.FEW_MATCHES_LAST_FRAME)
         motion.predict_turned(frame, aligned.quaternion_xyzw)
-        return self._search.around_prediction(frame, limits.aligned_window)
+        return self._search.around_prediction(frame, motion, limits.aligned_window)
 
-    def _by_wide_window(self, frame: core.TrackedFrame) -> PoseEstimate:
-        self._search.motion.predict(frame)
-        return self._search.around_prediction(frame, self._judge.limits.wide_window)
+    def _by_wide_window(self, frame: core.TrackedFrame, state: State) -> PoseEstimate:
+        state.motion.predict(frame)
+        window = self._judge.limits.wide_window
+        return self._search.around_prediction(frame, state.motion, window)
 
     def _has_enough(self, hypothesis: Hypothesis, others: list[Hypothesis]) -> bool:
         """Whether it is no use to look further."""
@@ -126,3 +148,7 @@ class MultiHypothesisSearch:
         if any(self._confirms(best, other) for other in found if other is not best):
             best = replace(best, evidence=self._judge.confirm(best.evidence))
         return best
+
+
+def _any_strong(found: list[Hypothesis]) -> bool:
+    return any(hypothesis.evidence.verdict is Verdict.STRONG for hypothesis in found)

@@ -10,9 +10,10 @@ from dataclasses import replace
 
 from orbslam2py import _core as core
 from orbslam2py.slam.acceptance.multi_hypothesis_search import Hypothesis, MultiHypothesisSearch
-from orbslam2py.slam.acceptance.pose_validator import PoseValidator
+from orbslam2py.slam.acceptance.pose_validator import PoseValidator, statistics_of
 from orbslam2py.slam.pose_search import PoseSearch, RefinedPose
 from orbslam2py.slam.records import Evidence, PoseEstimate, Reason, Verdict
+from orbslam2py.slam.state import State
 
 
 class PoseAcceptance:
@@ -34,113 +35,116 @@ class PoseAcceptance:
         self._search = search
         self._judge = judge
         self._harder_search = harder_search
-        self.reset()
 
-    def reset(self) -> None:
-        """Forget the frames before."""
-        self._judge.reset()
-        self._n_weak = 0
-
-    def go_elsewhere(self) -> None:
-        """What follows is in another place, or in another map."""
-        self._judge.go_elsewhere()
-        self._n_weak = 0
-
-    def refine(self, frame: core.TrackedFrame, first: PoseEstimate, *, lost: bool) -> PoseEstimate:
-        """Give a frame the pose for which most speaks, if enough does.
+    def refine(
+        self,
+        frame: core.TrackedFrame,
+        first: PoseEstimate,
+        state: State,
+        *,
+        fixed_map: bool = False,
+    ) -> tuple[PoseEstimate, State]:
+        """Give a frame the pose with the strongest evidence, if that is strong enough.
 
         Parameters
         ----------
         frame : orbslam2py._core.TrackedFrame
             With the pose and the associations of the first estimate, if that was found.
         first : PoseEstimate
-            What was found so far.
-        lost : bool
-            The frame before has no pose.
+            The first estimate.
+        state : State
+            The state before the frame.
+        fixed_map : bool
+            Localization mode: the map does not change.
         """
-        if lost or first.relocalized:
-            self.go_elsewhere()
+        if state.is_lost or first.relocalized:
+            state = state.elsewhere()
         estimate, hypothesis = first, None
         if first.found:
-            refined = self._refined(frame, first)
-            hypothesis = self._hypothesis(refined, first)
+            refined = self._refined(frame, first, state)
+            hypothesis = self._hypothesis(refined, first, state)
             estimate = refined.estimate
         doubted = first.left_map or self._is_doubted(hypothesis)
-        if doubted and not lost and self._judge.limits.search_again:
-            hypothesis = self._harder_search.search_again(frame, hypothesis)
+        if doubted and not state.is_lost and self._judge.limits.search_again:
+            hypothesis, state = self._harder_search.search_again(frame, hypothesis, state)
         if hypothesis is None:
             if first.found:
-                self._search.settle(refined)
-            return estimate
-        if self._search.map_is_fixed:
-            hypothesis = self._looked_at_afresh(hypothesis, in_doubt=doubted)
+                state = self._search.settle(refined, state, fixed_map=fixed_map)
+            return estimate, state
+        if fixed_map:
+            hypothesis = self._rematched(hypothesis, state, in_doubt=doubted)
         if doubted:
             hypothesis = replace(hypothesis, evidence=replace(hypothesis.evidence, doubted=True))
-        return self._take(frame, hypothesis)
+        return self._take(frame, hypothesis, state, fixed_map=fixed_map)
 
-    def _hypothesis(self, refined: RefinedPose, first: PoseEstimate) -> Hypothesis | None:
+    def _hypothesis(
+        self, refined: RefinedPose, first: PoseEstimate, state: State
+    ) -> Hypothesis | None:
         if not refined.estimate.found:
             return None
-        evidence = self._judge.assess(refined, self._search.motion, first.method)
+        evidence = self._judge.assess(refined, state, first.method)
         return Hypothesis(refined, first.method, evidence)
 
-    def _looked_at_afresh(self, hypothesis: Hypothesis, *, in_doubt: bool) -> Hypothesis:
-        """The same frame in the same map is to be in the same place, whatever came before it."""
+    def _rematched(self, hypothesis: Hypothesis, state: State, *, in_doubt: bool) -> Hypothesis:
+        """In a fixed map an image has one pose, whatever frame came before it."""
         refined, evidence = hypothesis.refined, hypothesis.evidence
-        afresh = self._search.local_map_search.rematch(refined, in_doubt=in_doubt)
-        if afresh is refined:
+        rematched = self._search.local_map_search.rematch(
+            refined, state.probation, in_doubt=in_doubt
+        )
+        if rematched is refined:
             return hypothesis
         if in_doubt:
-            # Much of what held the old pose was not found again.
-            evidence = self._judge.assess(afresh, self._search.motion, hypothesis.method)
-            if hypothesis.evidence.confirmed and self._judge.is_same(refined, afresh):
+            # Much of what supported the old pose was not found again.
+            evidence = self._judge.assess(rematched, state, hypothesis.method)
+            if hypothesis.evidence.confirmed and self._judge.is_same(refined, rematched):
                 evidence = self._judge.confirm(evidence)
             if evidence.verdict is Verdict.REFUSED:
                 return hypothesis
-        refined.frame.take_over(afresh.frame)
-        return replace(hypothesis, refined=replace(afresh, frame=refined.frame), evidence=evidence)
+        refined.frame.take_over(rematched.frame)
+        refined = replace(rematched, frame=refined.frame)
+        return replace(hypothesis, refined=refined, evidence=evidence)
 
     def _is_doubted(self, hypothesis: Hypothesis | None) -> bool:
         return hypothesis is None or self._judge.needs_reestimation(hypothesis.evidence)
 
-    def _refined(self, frame: core.TrackedFrame, first: PoseEstimate) -> RefinedPose:
+    def _refined(self, frame: core.TrackedFrame, first: PoseEstimate, state: State) -> RefinedPose:
         if first.visual_odometry:
-            return self._search.beyond_the_map(frame, first)
-        return self._search.in_local_map(frame, first)
+            return self._search.beyond_the_map(frame, first, state.motion)
+        return self._search.in_local_map(frame, first, state)
 
-    def _take(self, frame: core.TrackedFrame, hypothesis: Hypothesis) -> PoseEstimate:
+    def _take(
+        self, frame: core.TrackedFrame, hypothesis: Hypothesis, state: State, *, fixed_map: bool
+    ) -> tuple[PoseEstimate, State]:
         refined, evidence = hypothesis.refined, hypothesis.evidence
         if refined.frame is not frame:
             frame.take_over(refined.frame)
             refined = replace(refined, frame=frame)
             if refined.estimate.relocalized:
-                # Found without regard to where the camera was: the way from there is no speed.
+                # Found independently of the last frame: the motion from there is no velocity.
                 expected = refined.estimate.where_expected
-                self._search.proving.found_again(frame, where_expected=expected)
-                self._search.motion.jump(None)
-        self._search.settle(refined)
-        motion = self._search.motion
-        change = motion.change(frame)
-        covariance = self._judge.inflated_covariance(refined, evidence, motion, change)
+                state = state.relocalized(frame.id, where_expected=expected)
+                state = replace(state, motion=state.motion.jumped(None))
+        state = self._search.settle(refined, state, fixed_map=fixed_map)
+        innovation = state.motion.innovation(frame)
+        covariance = self._judge.inflated_covariance(refined, evidence, state, innovation)
         estimate = replace(
             refined.estimate, evidence=evidence, method=hypothesis.method, covariance=covariance
         )
         if evidence.verdict is Verdict.REFUSED:
-            return estimate.failed(Reason.WEAK_EVIDENCE)
-        self._judge.get_used_to_frame(refined, evidence, change)
-        if evidence.verdict is Verdict.STRONG or self._may_count(evidence):
-            self._judge.get_used_to(refined)
-        return estimate
+            return estimate.failed(Reason.WEAK_EVIDENCE), state
+        limits = self._judge.limits
+        scene = state.scene.with_frame(evidence.match_error, innovation, limits)
+        if evidence.verdict is Verdict.STRONG or self._may_count(evidence, state):
+            scene = scene.with_pose(statistics_of(refined), limits)
+        return estimate, replace(state, scene=scene)
 
-    def allows_keyframe(self, evidence: Evidence | None) -> bool:
-        """Whether a frame that is believed may become a keyframe; asked once for each frame."""
+    def allows_keyframe(self, evidence: Evidence | None, state: State) -> tuple[bool, State]:
+        """Whether a frame with this evidence may become a keyframe; once for each frame."""
         if evidence is None or evidence.verdict is Verdict.STRONG:
-            self._n_weak = 0
-            return True
-        allowed = self._may_count(evidence)
-        self._n_weak += 1
-        return allowed
+            return True, replace(state, n_uncertain=0)
+        allowed = self._may_count(evidence, state)
+        return allowed, replace(state, n_uncertain=state.n_uncertain + 1)
 
-    def _may_count(self, evidence: Evidence) -> bool:
-        """Whether a weak frame is the usual from now on: not the first, and confirmed."""
-        return evidence.confirmed and self._n_weak >= self._judge.limits.weak_frames
+    def _may_count(self, evidence: Evidence, state: State) -> bool:
+        """Whether a weak frame counts as usual: not the first in a row, and confirmed."""
+        return evidence.confirmed and state.n_uncertain >= self._judge.limits.weak_frames

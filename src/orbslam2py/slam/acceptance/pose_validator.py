@@ -7,31 +7,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
-from orbslam2py.slam.acceptance.motion_innovation import MotionInnovation
 from orbslam2py.slam.config import AcceptanceConfig
-from orbslam2py.slam.pose_search import MotionModel, RefinedPose
+from orbslam2py.slam.pose_search import RefinedPose
 from orbslam2py.slam.records import Evidence, PoseMethod, Verdict
-
-
-@dataclass(frozen=True)
-class RunningMeans:
-    """Running means over frames with strong evidence."""
-
-    n_inliers: float
-    found: float
-    deviation: float
-
-    def moved_to(self, other: RunningMeans, gain: float) -> RunningMeans:
-        """A step towards the figures of a newer frame."""
-        return RunningMeans(
-            self.n_inliers + gain * (other.n_inliers - self.n_inliers),
-            self.found + gain * (other.found - self.found),
-            self.deviation + gain * (other.deviation - self.deviation),
-        )
+from orbslam2py.slam.state import Motion, PoseStatistics, SceneStatistics, State
 
 
 class PoseValidator:
@@ -51,46 +34,29 @@ class PoseValidator:
         self.limits = config
         self._window = window
         self._focal_length = focal_length
-        self.reset()
 
-    def reset(self) -> None:
-        """Nothing is usual yet."""
-        self._usual: RunningMeans | None = None
-        self._usual_error: float | None = None
-        self._error_spread = 0.0
-        self._change = MotionInnovation(self.limits)
-
-    def go_elsewhere(self) -> None:
-        """What is seen is not usual any more: the place is another one.
-
-        How well it fits is: that goes by the camera and its images.
-        """
-        self._usual = None
-        # Another map of a single camera has another scale.
-        self._change = MotionInnovation(self.limits)
-
-    def assess(self, refined: RefinedPose, motion: MotionModel, method: PoseMethod) -> Evidence:
+    def assess(self, refined: RefinedPose, state: State, method: PoseMethod) -> Evidence:
         """Weigh a refined pose.
 
         Parameters
         ----------
         refined : RefinedPose
             The pose, found in the local map.
-        motion : MotionModel
-            What the camera did before.
+        state : State
+            The state before the frame.
         method : PoseMethod
             What found the pose.
         """
         frame, estimate = refined.frame, refined.estimate
         spread = refined.spread
-        figures = _figures(refined)
-        usual = self._usual or figures
-        turn, move = _changes(frame, motion)
+        figures, scene = statistics_of(refined), state.scene
+        usual = scene.usual or figures
+        turn, move = _changes(frame, state.motion)
         found_to_usual = _ratio(figures.found, usual.found)
         inliers_to_usual = _ratio(estimate.n_inliers, usual.n_inliers)
         deviation_to_usual = _ratio(figures.deviation, usual.deviation)
         match_error = core.median_match_error(frame)
-        usual_error = match_error if self._usual_error is None else self._usual_error
+        usual_error = match_error if scene.error is None else scene.error
         error_to_usual = _ratio(match_error, usual_error)
         limits = self.limits
         verdict = Verdict.STRONG
@@ -100,7 +66,7 @@ class PoseValidator:
             max(inliers_to_usual, found_to_usual) < limits.weak_share
             or spread.cells <= limits.weak_cells
             or deviation_to_usual > limits.weak_deviation
-            or self._errs_suddenly(match_error)
+            or scene.is_sudden_error(match_error, limits)
         ):
             verdict = Verdict.WEAK
         return Evidence(
@@ -149,32 +115,12 @@ class PoseValidator:
         verdict = Verdict.WEAK if refused else evidence.verdict
         return replace(evidence, confirmed=True, verdict=verdict)
 
-    def get_used_to(self, refined: RefinedPose) -> None:
-        """Let a frame that is believed move what is usual."""
-        figures = _figures(refined)
-        usual = self._usual
-        self._usual = figures if usual is None else usual.moved_to(figures, self.limits.gain)
-
-    def get_used_to_frame(
-        self, refined: RefinedPose, evidence: Evidence, change: FloatArray | None
-    ) -> None:
-        """Let a frame that is believed, strong or weak, move what is usual of image and motion."""
-        if change is not None:
-            self._change.see(change)
-        error = evidence.match_error
-        if not math.isfinite(error):
-            return
-        gain = self.limits.slow_gain if self._errs_suddenly(error) else self.limits.gain
-        usual = error if self._usual_error is None else self._usual_error
-        self._usual_error = usual + gain * (error - usual)
-        self._error_spread += gain * (abs(error - usual) - self._error_spread)
-
     def inflated_covariance(
         self,
         refined: RefinedPose,
         evidence: Evidence,
-        motion: MotionModel,
-        change: FloatArray | None,
+        state: State,
+        innovation: FloatArray | None,
     ) -> FloatArray | None:
         """The covariance that a pose is told with.
 
@@ -200,20 +146,21 @@ class PoseValidator:
         surprise = min(surprise, limits.largest_surprise)
         looseness = max(1.0, evidence.deviation_to_usual / limits.usual_deviation)
         n_inliers = max(refined.estimate.n_inliers, limits.fewest_inliers)
+        known = state.scene.innovation.is_known(limits)
         factor = (
-            self._error_factor(refined, evidence)
+            self._error_factor(refined, evidence, state.scene)
             * (1.0 + (limits.few_inliers / n_inliers) ** 4)
-            * (1.0 if self._change.is_known else self._unknown_factor(evidence))
+            * (1.0 if known else self._unknown_factor(evidence))
             * (1.0 + surprise**2)
             * looseness
         )
         errors = (
-            motion.move_of_map(refined.frame),
-            self._mistake(change),
+            state.motion.map_motion_at(refined.frame),
+            self._mistake(innovation, state.scene),
         )
-        known = [error for error in errors if error is not None]
+        present = [error for error in errors if error is not None]
         # One call: NumPy's take longer than what they do here, and in each frame.
-        return core.widened_covariance(covariance, factor, known)
+        return core.widened_covariance(covariance, factor, present)
 
     def _unknown_factor(self, evidence: Evidence) -> float:
         """How many times the variance is while it is not known what is usual.
@@ -225,7 +172,9 @@ class PoseValidator:
         found = max(evidence.found, limits.fewest_found)
         return limits.unknown_change * (1.0 + (limits.few_found / found) ** 4)
 
-    def _error_factor(self, refined: RefinedPose, evidence: Evidence) -> float:
+    def _error_factor(
+        self, refined: RefinedPose, evidence: Evidence, scene: SceneStatistics
+    ) -> float:
         """How many times the variance is by how the matches fit, and how many are independent."""
         limits = self.limits
         per_cell = refined.estimate.n_inliers / max(1, evidence.n_cells)
@@ -234,25 +183,17 @@ class PoseValidator:
         larger = max(1.0, evidence.match_error / limits.expected_error)
         larger *= max(1.0, evidence.match_error / limits.doubtful_error)
         factor = min(larger, limits.largest_error) ** 2 * together
-        if self._errs_suddenly(evidence.match_error):
+        if scene.is_sudden_error(evidence.match_error, limits):
             larger = min(evidence.error_to_usual, limits.largest_error)
             factor = max(factor, larger**2 * max(together, per_cell))
         return factor
 
-    def _mistake(self, change: FloatArray | None) -> FloatArray | None:
-        """How far (6,) the pose may be a mistake, by a change of motion that is not usual."""
-        beyond = None if change is None else self._change.beyond(change)
-        return None if beyond is None else math.sqrt(self.limits.mistaken_share) * beyond
-
-    def _errs_suddenly(self, error: float) -> bool:
-        """Whether a median error is larger than that of images before, and than it varies."""
-        usual = self._usual_error
-        if usual is None or usual <= 0:
-            return False
-        limits = self.limits
-        return error > max(
-            limits.weak_error * usual, usual + limits.weak_error_spreads * self._error_spread
-        )
+    def _mistake(self, innovation: FloatArray | None, scene: SceneStatistics) -> FloatArray | None:
+        """By how much (6,) the pose may be wrong: its motion exceeds the usual innovation."""
+        if innovation is None:
+            return None
+        excess = scene.innovation.excess(innovation, self.limits)
+        return None if excess is None else math.sqrt(self.limits.mistaken_share) * excess
 
     def _windows(self, degrees: float) -> float:
         """How far a turn moves the image, in search windows of the motion model."""
@@ -263,10 +204,11 @@ class PoseValidator:
         return self._focal_length * math.radians(degrees)
 
 
-def _figures(refined: RefinedPose) -> RunningMeans:
+def statistics_of(refined: RefinedPose) -> PoseStatistics:
+    """Return what the running means of the scene take from a pose."""
     estimate = refined.estimate
     n_inliers = estimate.n_inliers
-    return RunningMeans(
+    return PoseStatistics(
         float(n_inliers),
         min(1.0, n_inliers / max(1, refined.n_predicted)),
         refined.position_deviation,
@@ -277,9 +219,9 @@ def _ratio(value: float, usual: float) -> float:
     return value / usual if usual > 0 else 1.0
 
 
-def _changes(frame: core.TrackedFrame, motion: MotionModel) -> tuple[float, float]:
+def _changes(frame: core.TrackedFrame, motion: Motion) -> tuple[float, float]:
     """Degrees and metres by which a frame moved otherwise than the frame before it."""
-    if motion.velocity is None or not motion.has_last:
+    if motion.velocity is None or motion.last_frame is None:
         return 0.0, 0.0
     T_lw, T_cw = motion.last.T_cw, frame.T_cw
     if T_lw is None or T_cw is None:

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 
 from orbslam2py import _core as core
 from orbslam2py.slam.acceptance.pose_acceptance import PoseAcceptance
 from orbslam2py.slam.pose_search import PoseSearch
-from orbslam2py.slam.records import PoseEstimate, Verdict
+from orbslam2py.slam.records import PoseEstimate, TrackingState, Verdict
+from orbslam2py.slam.state import Motion, State
 
 _PATIENCE = 5  # frames that may be missing between those that are found
 _MOST_DEVIATION = math.radians(1.0)  # standard deviation of a rotation, all directions together
@@ -70,41 +72,47 @@ class EarlierFrames:
         """Track one frame after the other until several are not found."""
         search, acceptance = self._search, self._acceptance
         assert search is not None and acceptance is not None
-        search.reset()
-        acceptance.reset()
-        search.reference_keyframe = first.reference_keyframe
-        search.motion.remember(first)
+        state = replace(
+            search.new_state(),
+            phase=TrackingState.OK,
+            motion=Motion().remembering(first, None),
+            reference_keyframe=first.reference_keyframe,
+        )
         tracked: list[core.TrackedFrame] = []
         missed = 0
         for frame in frames:
-            if self._found(search, acceptance, frame):
+            is_found, state = self._find(search, acceptance, frame, state)
+            if is_found:
                 tracked.append(frame)
                 missed = 0
                 continue
             missed += 1
             if missed > _PATIENCE:
                 break
-            search.motion.lose()
+            state = replace(state, motion=state.motion.lost())
             frame.clear_associations()
             frame.T_cw = None
         return tracked
 
-    def _found(
-        self, search: PoseSearch, acceptance: PoseAcceptance, frame: core.TrackedFrame
-    ) -> bool:
-        search.follow_map()
-        estimate = search.by_motion_model(frame)
+    def _find(
+        self,
+        search: PoseSearch,
+        acceptance: PoseAcceptance,
+        frame: core.TrackedFrame,
+        state: State,
+    ) -> tuple[bool, State]:
+        state = state.following(search.map)
+        estimate = search.by_motion_model(frame, state)
         if not estimate.found:
             frame.clear_associations()
-            estimate = search.by_reference_keyframe(frame)
-        estimate = acceptance.refine(frame, estimate, lost=False)
+            estimate = search.by_reference_keyframe(frame, state)
+        estimate, state = acceptance.refine(frame, estimate, state)
         if not (estimate.found and _is_strong(estimate) and _is_exact(estimate)):
-            return False
+            return False, state
         frame.discard_outliers()
-        # Not update_velocity: the numbers of the frames may fall.
-        search.motion.velocity = search.motion.way(frame)
-        search.motion.remember(frame)
-        return True
+        # Not `Motion.after`: the numbers of the frames may fall.
+        velocity = state.motion.since_last(frame)
+        return True, replace(state, motion=state.motion.remembering(frame, velocity))
 
 
 def _is_strong(estimate: PoseEstimate) -> bool:

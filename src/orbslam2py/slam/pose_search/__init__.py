@@ -7,7 +7,6 @@ from orbslam2py.slam.pose_search.first_estimate import (
     FirstEstimateInGrowingMap,
 )
 from orbslam2py.slam.pose_search.local_map_search import LocalMapSearch
-from orbslam2py.slam.pose_search.motion_model import MotionModel
 from orbslam2py.slam.pose_search.refined_pose import RefinedPose
 from orbslam2py.slam.pose_search.search import PoseSearch
 
@@ -16,7 +15,6 @@ __all__ = [
     "FirstEstimateInFixedMap",
     "FirstEstimateInGrowingMap",
     "LocalMapSearch",
-    "MotionModel",
     "PoseSearch",
     "RefinedPose",
 ]

@@ -16,29 +16,29 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py.slam.pose_search.search import PoseSearch
 from orbslam2py.slam.records import PoseEstimate, Reason
+from orbslam2py.slam.state import State
 
 
 class FirstEstimate(Protocol):
     """A strategy for the first pose of a frame."""
 
-    def estimate(self, frame: core.TrackedFrame, *, lost: bool) -> PoseEstimate:
+    def estimate(self, frame: core.TrackedFrame, state: State) -> tuple[PoseEstimate, State]:
         """Find a first pose.
 
         Parameters
         ----------
         frame : orbslam2py._core.TrackedFrame
             The frame.
-        lost : bool
-            The frame before has no pose.
+        state : State
+            The state before it.
+
+        Returns
+        -------
+        PoseEstimate
+            Found or not.
+        State
+            The state as it follows the map, and as relocalization leaves it.
         """
-        ...
-
-    def reset(self) -> None:
-        """Forget the frames before: tracking was lost, or the map is another one."""
-        ...
-
-    def believe(self, estimate: PoseEstimate) -> None:
-        """Take what was made of the estimate, and is believed."""
         ...
 
 
@@ -54,39 +54,37 @@ class FirstEstimateInGrowingMap:
     def __init__(self, search: PoseSearch) -> None:
         self._search = search
 
-    def estimate(self, frame: core.TrackedFrame, *, lost: bool) -> PoseEstimate:
+    def estimate(self, frame: core.TrackedFrame, state: State) -> tuple[PoseEstimate, State]:
         """See `FirstEstimate`."""
         search = self._search
-        if lost:
-            relocalized = search.by_relocalization(frame)
-            if relocalized.found or not search.has_last_frame:
-                return relocalized
-        search.follow_map()
+        relocalized = PoseEstimate()
+        if state.is_lost:
+            relocalized, state = search.by_relocalization(frame, state)
+            if relocalized.found or state.motion.last_frame is None:
+                return relocalized, state
+        state = state.following(search.map)
         # There is none right after a relocalization, but where a map has just begun.
-        if search.motion.velocity is not None:
-            estimate = search.by_motion_model(frame)
+        if state.motion.velocity is not None:
+            estimate = search.by_motion_model(frame, state)
             if estimate.found:
-                return estimate
-        estimate = search.by_reference_keyframe(frame)
-        if not lost and not estimate.found and search.proving.has_just_begun(frame):
-            # Found again where the map ends, the frame before shows most of what this one does.
-            standing = search.by_motion_model(frame)
-            return standing if standing.found else estimate
-        if lost and not estimate.found:
-            return estimate.failed(relocalized.reason)
-        return estimate
-
-    def reset(self) -> None:
-        """Nothing is kept from frame to frame."""
-
-    def believe(self, estimate: PoseEstimate) -> None:
-        """Nothing is kept from frame to frame."""
+                return estimate, state
+        estimate = search.by_reference_keyframe(frame, state)
+        if estimate.found:
+            return estimate, state
+        if state.is_lost:
+            return estimate.failed(relocalized.reason), state
+        if state.probation.has_just_begun(frame.id, search.limits):
+            # Relocalized at the border of the map, the frame before shows most of this one.
+            standing = search.by_motion_model(frame, state)
+            if standing.found:
+                return standing, state
+        return estimate, state
 
 
 class FirstEstimateInFixedMap:
     """By the motion model or the reference keyframe, also where the map ends.
 
-    There the pose hangs on the depths of the frame before (visual odometry), while every frame is
+    There the pose depends on the depths of the last frame (visual odometry), while every frame is
     also searched in the map.
 
     Parameters
@@ -100,57 +98,49 @@ class FirstEstimateInFixedMap:
     def __init__(self, search: PoseSearch, *, has_depth: bool) -> None:
         self._search = search
         self._has_depth = has_depth
-        self.reset()
 
-    def reset(self) -> None:
-        """Forget that the last frame hung on depths more than on the map."""
-        self._beyond_the_map = False
-
-    def estimate(self, frame: core.TrackedFrame, *, lost: bool) -> PoseEstimate:
+    def estimate(self, frame: core.TrackedFrame, state: State) -> tuple[PoseEstimate, State]:
         """See `FirstEstimate`."""
         search = self._search
-        if lost:
-            return search.by_relocalization(frame)
-        search.follow_map()
-        if self._beyond_the_map:
-            estimate = self._back_into_the_map(frame)
-        elif search.motion.velocity is not None:
-            estimate = self._by_motion_model(frame)
+        if state.is_lost:
+            return search.by_relocalization(frame, state)
+        state = state.following(search.map)
+        if state.beyond_map:
+            estimate, state = self._back_into_the_map(frame, state)
+        elif state.motion.velocity is not None:
+            estimate = self._by_motion_model(frame, state)
         else:
-            estimate = search.by_reference_keyframe(frame)
-        return replace(estimate, left_map=estimate.visual_odometry and not self._beyond_the_map)
+            estimate = search.by_reference_keyframe(frame, state)
+        left_map = estimate.visual_odometry and not state.beyond_map
+        return replace(estimate, left_map=left_map), state
 
-    def believe(self, estimate: PoseEstimate) -> None:
-        """See `FirstEstimate`."""
-        self._beyond_the_map = estimate.visual_odometry
-
-    def _by_motion_model(self, frame: core.TrackedFrame) -> PoseEstimate:
+    def _by_motion_model(self, frame: core.TrackedFrame, state: State) -> PoseEstimate:
         limits = self._search.limits
-        estimate = self._search.by_motion_model(frame, beyond_the_map=self._has_depth)
+        estimate = self._search.by_motion_model(frame, state, beyond_the_map=self._has_depth)
         if not estimate.found or estimate.n_inliers <= limits.localization_matches:
             return estimate.failed(Reason.FEW_MATCHES_LAST_FRAME)
         beyond = core.count_map_points(frame) < limits.map_matches
         return replace(estimate, visual_odometry=beyond)
 
-    def _back_into_the_map(self, frame: core.TrackedFrame) -> PoseEstimate:
+    def _back_into_the_map(
+        self, frame: core.TrackedFrame, state: State
+    ) -> tuple[PoseEstimate, State]:
         """Go on with visual odometry, unless the map is in view again."""
-        search, motion = self._search, self._search.motion
         odometry = PoseEstimate(Reason.FEW_MATCHES_LAST_FRAME)
-        if motion.velocity is not None:
-            odometry = self._by_motion_model(frame)
+        if state.motion.velocity is not None:
+            odometry = self._by_motion_model(frame, state)
             if odometry.found and not odometry.visual_odometry:
-                return odometry
+                return odometry, state
         found = core.TrackedFrame(frame.features)
-        relocalized = search.by_relocalization(found)
+        relocalized, state = self._search.by_relocalization(found, state)
         if not relocalized.found or found.T_cw is None:
-            return odometry
-        # The odometry's drift ends here and is no motion: the last frame moves along.
+            return odometry, state
+        # The drift of visual odometry ends here. It is no motion: the last frame is corrected, too.
+        motion, T_lw = state.motion, None
         followed = odometry.found and found.map_index == frame.map_index
         if followed and frame.T_cw is not None and motion.last.T_cw is not None:
-            motion.jump(motion.last.T_cw @ frame.T_cw.inverse() @ found.T_cw)
-        else:
-            motion.jump(None)
+            T_lw = motion.last.T_cw @ frame.T_cw.inverse() @ found.T_cw
         frame.copy_associations(found, np.ones(len(frame.features), bool))
         frame.T_cw = found.T_cw
         frame.share_anchor(found)
-        return relocalized
+        return relocalized, replace(state, motion=motion.jumped(T_lw))

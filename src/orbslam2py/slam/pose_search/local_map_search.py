@@ -13,9 +13,9 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.config import TrackingConfig
-from orbslam2py.slam.pose_search.probation_period import ProbationPeriod
 from orbslam2py.slam.pose_search.refined_pose import RefinedPose
 from orbslam2py.slam.records import PoseEstimate, Reason
+from orbslam2py.slam.state import Probation
 
 
 class LocalMapSearch:
@@ -29,8 +29,8 @@ class LocalMapSearch:
         The map.
     sensor : Sensor
         What the images come from.
-    proving : ProbationPeriod
-        How much is asked of a frame.
+    second : int
+        Frames of one second, for the probation after a relocalization.
     config : TrackingConfig
         Limits.
     """
@@ -39,16 +39,18 @@ class LocalMapSearch:
         self,
         slam_map: core.Map,
         sensor: Sensor,
-        proving: ProbationPeriod,
+        second: int,
         config: TrackingConfig,
     ) -> None:
         self._map = slam_map
-        self._proving = proving
+        self._second = second
         self._limits = config
         is_rgbd = sensor is Sensor.RGBD
         self._usual_window = config.local_map_window_rgbd if is_rgbd else config.local_map_window
 
-    def refine(self, frame: core.TrackedFrame, first: PoseEstimate) -> RefinedPose:
+    def refine(
+        self, frame: core.TrackedFrame, first: PoseEstimate, probation: Probation
+    ) -> RefinedPose:
         """Refine a first estimate with all points around it, and see how many are found.
 
         Parameters
@@ -56,7 +58,9 @@ class LocalMapSearch:
         frame : orbslam2py._core.TrackedFrame
             With the pose and the associations of the first estimate.
         first : PoseEstimate
-            That.
+            The first estimate.
+        probation : Probation
+            How many inliers are required, and whether the search window is wide.
 
         Returns
         -------
@@ -66,21 +70,22 @@ class LocalMapSearch:
         """
         local_map = core.select_local_map(self._map, frame)
         n_held = frame.n_associated()
-        matches = core.match_local_map(
-            frame, local_map.points, first.discarded, self._window(frame)
-        )
+        window = self._usual_window
+        if probation.has_just_begun(frame.id, self._limits):
+            window = self._limits.local_map_window_after_relocalization
+        matches = core.match_local_map(frame, local_map.points, first.discarded, window)
         optimized = core.optimize_pose(frame)
         visible = matches.visible
-        found_again = self._proving.was_just_found(frame)
+        found_again = probation.was_just_found(frame.id, self._limits)
         if found_again and optimized.n_inliers >= self._limits.map_matches:
             # Wide windows find much that is wrong; where the camera is now, narrow ones find more.
             frame.discard_outliers()
             core.match_local_map(frame, local_map.points, first.discarded, self._usual_window)
             optimized = core.optimize_pose(frame)
-        estimate = self._enough_found(frame, first, optimized)
+        estimate = self._enough_found(frame, first, optimized, probation)
         return RefinedPose(frame, estimate, local_map, visible, n_held + len(visible))
 
-    def rematch(self, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
+    def rematch(self, refined: RefinedPose, probation: Probation, *, in_doubt: bool) -> RefinedPose:
         """Match a frame with the map from nothing, so that its pose does not hang on the way to it.
 
         What is matched with the frame before stays matched from frame to frame, and holds a pose
@@ -91,6 +96,8 @@ class LocalMapSearch:
         ----------
         refined : RefinedPose
             Where the search begins. It is not changed.
+        probation : Probation
+            How many inliers are required.
         in_doubt : bool
             Whether few points held the pose, or wrong ones: then it is taken from wherever the
             search leads.
@@ -119,13 +126,17 @@ class LocalMapSearch:
         elsewhere = in_doubt or _is_elsewhere(frame, refined, limits.elsewhere)
         if optimized.n_inliers < share * n_of_map or not elsewhere:
             return refined
-        estimate = self._enough_found(frame, refined.estimate, optimized)
+        estimate = self._enough_found(frame, refined.estimate, optimized, probation)
         if estimate.visual_odometry or not estimate.found:
             return refined
         return RefinedPose(frame, estimate, local_map, visible, len(visible))
 
     def _enough_found(
-        self, frame: core.TrackedFrame, first: PoseEstimate, optimized: core.PoseEstimate
+        self,
+        frame: core.TrackedFrame,
+        first: PoseEstimate,
+        optimized: core.PoseEstimate,
+        probation: Probation,
     ) -> PoseEstimate:
         """What a pose is by what was found of the local map."""
         estimate = PoseEstimate(
@@ -136,17 +147,13 @@ class LocalMapSearch:
             relocalized=first.relocalized,
             where_expected=first.where_expected,
         )
-        if estimate.n_inliers < self._proving.inliers_asked(frame):
+        required = probation.required_inliers(frame.id, self._second, self._limits)
+        if estimate.n_inliers < required:
             return estimate.failed(Reason.FEW_INLIERS_LOCAL_MAP)
         if frame.n_map_inliers() < self._limits.map_matches:
             # What the frame before measured speaks for itself, and says nothing of the map.
             return replace(estimate, visual_odometry=True)
         return estimate
-
-    def _window(self, frame: core.TrackedFrame) -> float:
-        if self._proving.has_just_begun(frame):
-            return self._limits.local_map_window_after_relocalization
-        return self._usual_window
 
 
 def _is_elsewhere(frame: core.TrackedFrame, refined: RefinedPose, deviations: float) -> bool:

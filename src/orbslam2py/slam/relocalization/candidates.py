@@ -4,11 +4,11 @@
 from __future__ import annotations
 
 import itertools
-from collections import deque
+from dataclasses import replace
 
 from orbslam2py import _core as core
 from orbslam2py.slam.config import RelocalizationConfig
-from orbslam2py.slam.relocalization.last_known_pose import LastKnownPose
+from orbslam2py.slam.state import LostSearch
 
 
 class CandidatePlaces:
@@ -33,37 +33,33 @@ class CandidatePlaces:
         self._map = slam_map
         self._keyframe_index = keyframe_index
         self._limits = config
-        self._recent: deque[dict[int, float]] = deque(maxlen=config.word_frames)
 
-    def reset(self) -> None:
-        """Forget what the frames before looked like: the camera was found, or lost anew."""
-        self._recent.clear()
-
-    def of(self, frame: core.Frame, place: LastKnownPose | None, failures: int) -> list[int]:
+    def of(self, frame: core.Frame, lost: LostSearch) -> tuple[list[int], LostSearch]:
         """Choose keyframes for a described frame.
 
         Parameters
         ----------
         frame : orbslam2py._core.Frame
             With its words.
-        place : LastKnownPose or None
-            Where tracking was lost.
-        failures : int
-            Frames that were searched in vain since.
+        lost : LostSearch
+            Where tracking was lost, and what was searched since.
 
         Returns
         -------
         list of int
-            Ids, the likeliest first, each once.
+            Ids, the most likely first, each once.
+        LostSearch
+            For the next frame.
         """
         limits = self._limits
-        named = self._by_words(frame)
+        lost = self._with_scores(frame, lost)
+        named = self._by_words(lost)
         if len(named) < limits.word_candidates:
             named += self._around(named)
-        by_words = _taken(named, limits.word_candidates, failures)
-        near = [] if place is None else place.keyframes(self._map, limits)
-        by_place = _taken(near, limits.near_candidates, failures)
-        return list(dict.fromkeys(by_words + by_place))
+        by_words = _taken(named, limits.word_candidates, lost.failures)
+        near = [] if lost.place is None else lost.place.keyframes(self._map, limits)
+        by_place = _taken(near, limits.near_candidates, lost.failures)
+        return list(dict.fromkeys(by_words + by_place)), lost
 
     def alike(self, keyframe: int) -> list[int]:
         """Keyframes that look like one of the map and share no point with it.
@@ -74,17 +70,20 @@ class CandidatePlaces:
         ranked = sorted(found, key=lambda place: (-place.group_score, place.keyframe))
         return [place.keyframe for place in ranked[: self._limits.word_candidates]]
 
-    def _by_words(self, frame: core.Frame) -> list[int]:
-        """Keyframes that look like this frame or the ones before; the likeliest first.
-
-        A camera that is lost goes on moving as others do, so what several frames look like is
-        likelier than what one does.
-        """
+    def _with_scores(self, frame: core.Frame, lost: LostSearch) -> LostSearch:
         found = core.find_relocalization_candidates(self._keyframe_index, self._map, frame)
-        self._recent.append({place.keyframe: place.group_score for place in found})
+        scores = {place.keyframe: place.group_score for place in found}
+        recent = (*lost.recent_scores, scores)[-self._limits.word_frames :]
+        return replace(lost, recent_scores=recent)
+
+    def _by_words(self, lost: LostSearch) -> list[int]:
+        """Keyframes that look like one of the last frames; the most likely first.
+
+        A lost camera moves on like any other, so scores of several frames tell more than one.
+        """
         scores: dict[int, float] = {}
-        for named in self._recent:
-            for keyframe, score in named.items():
+        for recent in lost.recent_scores:
+            for keyframe, score in recent.items():
                 scores[keyframe] = scores.get(keyframe, 0.0) + score
         living = [keyframe for keyframe in scores if self._map.has_keyframe(keyframe)]
         return sorted(living, key=lambda keyframe: (-scores[keyframe], keyframe))

@@ -7,6 +7,9 @@ Mur-Artal and Tardos, "Fast Relocalisation and Loop Closing in Keyframe-Based SL
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import NamedTuple
+
 import numpy as np
 
 from orbslam2py import _core as core
@@ -14,8 +17,19 @@ from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.slam.config import RelocalizationConfig
 from orbslam2py.slam.relocalization.ambiguity_check import AmbiguityCheck
 from orbslam2py.slam.relocalization.candidates import CandidatePlaces
-from orbslam2py.slam.relocalization.last_known_pose import LastKnownPose
-from orbslam2py.slam.relocalization.pnp_verification import Candidate, PnPVerification, optimize
+from orbslam2py.slam.relocalization.pnp_verification import PnPVerification, optimize
+from orbslam2py.slam.state import LostSearch
+
+
+class Relocalization(NamedTuple):
+    """What came of the search for a lost frame."""
+
+    n_inliers: int = 0
+    """0: not found."""
+    where_expected: bool = False
+    """Found where tracking was just lost, or where the velocity led from there."""
+    is_ambiguous: bool = False
+    """Not found, because it fits at several places."""
 
 
 class Relocalizer:
@@ -51,77 +65,79 @@ class Relocalizer:
         self._rival_places = AmbiguityCheck(
             slam_map, self._places, self._fitting, fix_scale=fix_scale, config=limits
         )
-        self.reset()
-        #: Whether the last frame fits at several places, of which none is believed.
-        self.looks_like_several = False
-        #: Whether the last frame was found where tracking was just lost, or its motion led.
-        self.where_expected = False
 
-    def reset(self) -> None:
-        """Forget where tracking was lost: it was found, or the map is another one."""
-        self._place: LastKnownPose | None = None
-        self._failures = 0
-        self._places.reset()
-
-    def lose(self, place: LastKnownPose) -> None:
-        """Take where tracking was lost; it is searched from there, wider at every failure."""
-        self.reset()
-        self._place = place
-
-    def relocalize(self, frame: core.TrackedFrame) -> int:
+    def relocalize(
+        self, frame: core.TrackedFrame, lost: LostSearch
+    ) -> tuple[Relocalization, LostSearch]:
         """Find pose and associations of a described frame.
 
-        Where tracking was lost is searched first, if it is known, then keyframes that look alike.
+        The place where tracking was lost is searched first, if it is known, then keyframes that
+        look like the frame.
+
+        Parameters
+        ----------
+        frame : orbslam2py._core.TrackedFrame
+            The frame. If it is not found, it has no associations.
+        lost : LostSearch
+            What is known of the frames before.
 
         Returns
         -------
-        int
-            Number of inliers; 0 if the frame was not found, and then it has no associations.
+        Relocalization
+            Found or not.
+        LostSearch
+            For the next frame.
         """
-        self.looks_like_several = self.where_expected = False
-        n_inliers = self._near_loss(frame)
-        if n_inliers == 0:
-            n_inliers = self._by_likeness(frame)
-        self._failures += n_inliers == 0
-        return n_inliers
+        found, lost = self._near_loss(frame, lost)
+        if found.n_inliers == 0:
+            found, lost = self._by_likeness(frame, lost)
+        if found.n_inliers == 0:
+            lost = replace(lost, failures=lost.failures + 1)
+        return found, lost
 
-    def _near_loss(self, frame: core.TrackedFrame) -> int:
+    def _near_loss(
+        self, frame: core.TrackedFrame, lost: LostSearch
+    ) -> tuple[Relocalization, LostSearch]:
         limits = self._limits
-        place = self._place
+        place = lost.place
         if place is None or frame.id - place.last.id > limits.guessed_frames:
-            return 0
-        place.follow_map(self._map)
+            return Relocalization(), lost
+        place = place.following(self._map)
+        lost = replace(lost, place=place)
         ids = np.array(place.keyframes(self._map, limits), np.int64)
         T_wc = np.array([self._map.keyframe_pose(k).inverse().matrix for k in ids])
-        wider = min(1 + limits.widening * self._failures, limits.widest)
+        wider = min(1 + limits.widening * lost.failures, limits.widest)
         just_lost = frame.id - place.last.id <= limits.motion_frames
         enough = limits.enough_near if just_lost else limits.enough
         for guess in place.guesses(frame.id, limits):
             nearest = self._nearest(guess, ids, T_wc)
             n_inliers = self._near(frame, guess, nearest, wider, enough)
             if n_inliers > 0:
-                self.where_expected = just_lost
-                return n_inliers
+                return Relocalization(n_inliers, where_expected=just_lost), lost
         if not just_lost:
-            return 0
+            return Relocalization(), lost
         likeliest = [int(keyframe) for keyframe in ids[: limits.thorough_keyframes]]
-        return self._compare_with(frame, likeliest, limits.enough)
+        return Relocalization(self._compare_with(frame, likeliest, limits.enough)), lost
 
-    def _by_likeness(self, frame: core.TrackedFrame) -> int:
-        candidates = self._candidates(frame)
+    def _by_likeness(
+        self, frame: core.TrackedFrame, lost: LostSearch
+    ) -> tuple[Relocalization, LostSearch]:
+        keyframes, lost = self._places.of(frame.features, lost)
+        candidates = self._fitting.matched(frame, keyframes)
         found = self._fitting.first_that_fits(frame, candidates, self._limits.enough)
+        is_ambiguous = False
         if found is not None:
             first, n_inliers = found
             best = self._rival_places.choose(frame, first.keyframe, candidates)
             if best is frame:
-                return n_inliers
+                return Relocalization(n_inliers), lost
             if best is not None:
                 frame.take_over(best)
-                return frame.n_associated()
-            self.looks_like_several = True
+                return Relocalization(frame.n_associated()), lost
+            is_ambiguous = True
         frame.clear_associations()
         frame.T_cw = None
-        return 0
+        return Relocalization(is_ambiguous=is_ambiguous), lost
 
     def relocalize_near(self, frame: core.TrackedFrame, T_cw: core.Pose) -> int:
         """Find pose and associations of a frame near a guess, without words.
@@ -139,9 +155,8 @@ class Relocalizer:
         Returns
         -------
         int
-            As for `relocalize`.
+            Number of inliers; 0 if the frame was not found, and then it has no associations.
         """
-        self.where_expected = False
         every = core.snapshot_keyframes(self._map)
         nearest = self._nearest(T_cw, every.ids, every.T_wc)
         return self._near(frame, T_cw, nearest, 1.0, self._limits.enough)
@@ -215,7 +230,3 @@ class Relocalizer:
         distances[cosines < self._limits.guess_cosine] = np.inf
         nearest = np.argsort(distances, kind="stable")[: self._limits.guess_keyframes]
         return [int(ids[i]) for i in nearest if np.isfinite(distances[i])]
-
-    def _candidates(self, frame: core.TrackedFrame) -> list[Candidate]:
-        keyframes = self._places.of(frame.features, self._place, self._failures)
-        return self._fitting.matched(frame, keyframes)

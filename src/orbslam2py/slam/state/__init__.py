@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The state of tracking: frozen values, and the function that replaces them."""
+
+from orbslam2py.slam.state.loss import LastKnownPose, LostSearch, LostTime, Unconfirmed
+from orbslam2py.slam.state.motion import Motion
+from orbslam2py.slam.state.probation import Probation
+from orbslam2py.slam.state.scene import MotionInnovation, PoseStatistics, SceneStatistics
+from orbslam2py.slam.state.state import SinceKeyframe, State
+
+__all__ = [
+    "LastKnownPose",
+    "LostSearch",
+    "LostTime",
+    "Motion",
+    "MotionInnovation",
+    "PoseStatistics",
+    "Probation",
+    "SceneStatistics",
+    "SinceKeyframe",
+    "State",
+    "Unconfirmed",
+]

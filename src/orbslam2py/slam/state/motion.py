@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The last frame and the camera's velocity, from which the next pose is predicted.
+
+Mur-Artal, Montiel and Tardos, 2015, section V-B; ``docs/method/tracking.md``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from orbslam2py import _core as core
+from orbslam2py._arrays import FloatArray
+
+
+def _no_points() -> core.PointBatch:
+    return core.PointBatch()
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """The last frame with a pose, and the motion since the frame before it."""
+
+    last_frame: core.TrackedFrame | None = None
+    """The last frame with a pose. It stays while the camera is lost."""
+    velocity: core.Pose | None = None
+    """Motion from one frame to the next, ``T_cl``; None where it is not known."""
+    last_points: core.PointBatch = field(default_factory=_no_points)
+    """Copies of the points that the last frame saw, as of the last `following`."""
+    is_tracked: bool = False
+    """The next frame follows the last one: the camera was not lost in between."""
+    map_motion: core.Pose | None = None
+    """Motion of the map under the last frame since it was tracked, by local bundle adjustment."""
+
+    @property
+    def last(self) -> core.TrackedFrame:
+        """The last frame with a pose, where there is one."""
+        assert self.last_frame is not None
+        return self.last_frame
+
+    # ---- what follows from it --------------------------------------------------------------------
+    def predict(self, frame: core.TrackedFrame) -> None:
+        """Set the pose of a frame by constant velocity; without one, to that of the last frame."""
+        T_lw = self.last.T_cw
+        assert T_lw is not None
+        frame.T_cw = T_lw if self.velocity is None else self.velocity @ T_lw
+        frame.share_anchor(self.last)
+
+    def predict_turned(self, frame: core.TrackedFrame, quaternion_xyzw: FloatArray) -> None:
+        """Set the pose of a frame by the translation of the velocity and a given rotation.
+
+        Parameters
+        ----------
+        frame : orbslam2py._core.TrackedFrame
+            The frame.
+        quaternion_xyzw : array of float64, (4,)
+            Rotates directions from the last camera to the frame's.
+        """
+        T_lw = self.last.T_cw
+        assert T_lw is not None
+        # Position of the new camera in the coordinates of the last one.
+        centre = np.zeros(3) if self.velocity is None else self.velocity.center
+        rotation = core.Pose(quaternion_xyzw, np.zeros(3))
+        frame.T_cw = core.Pose(quaternion_xyzw, -(rotation @ centre)) @ T_lw
+        frame.share_anchor(self.last)
+
+    def stand_still(self, frame: core.TrackedFrame) -> None:
+        """Set the pose of a frame to that of the last frame."""
+        frame.T_cw = self.last.T_cw
+        frame.share_anchor(self.last)
+
+    def since_last(self, frame: core.TrackedFrame) -> core.Pose | None:
+        """Return the motion ``T_cl`` from the last frame; None without a pose of either."""
+        T_lw = None if self.last_frame is None else self.last_frame.T_cw
+        if T_lw is None or frame.T_cw is None:
+            return None
+        return frame.T_cw @ T_lw.inverse()
+
+    def innovation(self, frame: core.TrackedFrame) -> FloatArray | None:
+        """Return the tangent (6,) from a pose to the predicted one: rotation [rad], translation.
+
+        None where no velocity is known.
+        """
+        if self.velocity is None or self.last_frame is None or frame.T_cw is None:
+            return None
+        T_lw = self.last_frame.T_cw
+        if T_lw is None:
+            return None
+        tangent: FloatArray = (self.velocity @ T_lw @ frame.T_cw.inverse()).log()
+        return tangent
+
+    def map_motion_at(self, frame: core.TrackedFrame) -> FloatArray | None:
+        """Return the motion of the map (6,), rotation [rad] and translation, in a frame's axes.
+
+        None where local bundle adjustment has not moved the last frame.
+        """
+        T_cl = self.since_last(frame)
+        if self.map_motion is None or T_cl is None:
+            return None
+        tangent: FloatArray = (T_cl @ self.map_motion @ T_cl.inverse()).log()
+        return tangent
+
+    # ---- the next one ----------------------------------------------------------------------------
+    def following(self, slam_map: core.Map) -> Motion:
+        """Move the last frame with the map, which local mapping and loop closing have moved."""
+        last = self.last
+        before, big_change = last.T_cw, last.big_change
+        points, scale_change = core.follow_map(slam_map, last)
+        moved = self.map_motion
+        if last.big_change != big_change:
+            moved = None  # by a loop, which corrects an error of long before
+        elif before is not None and last.T_cw is not None:
+            step = last.T_cw @ before.inverse()
+            moved = step if moved is None else step @ moved
+        velocity = scaled(self.velocity, scale_change)
+        return replace(self, last_points=points, velocity=velocity, map_motion=moved)
+
+    def after(self, frame: core.TrackedFrame) -> Motion:
+        """Measure the velocity, if the frame follows the last one, and make it the last one."""
+        last, velocity = self.last_frame, None
+        if last is not None and self.is_tracked:
+            follows = frame.id == last.id + 1 and frame.big_change == last.big_change
+            velocity = self.since_last(frame) if follows else None
+        return self.remembering(frame, velocity)
+
+    def remembering(self, frame: core.TrackedFrame, velocity: core.Pose | None) -> Motion:
+        """Make a tracked frame the last one, with a given velocity."""
+        return Motion(frame, velocity, self.last_points, is_tracked=True)
+
+    def lost(self) -> Motion:
+        """Forget the velocity: a frame has no pose."""
+        return replace(self, velocity=None, is_tracked=False)
+
+    def jumped(self, T_lw: core.Pose | None) -> Motion:
+        """Correct the pose of the last frame; None: the correction is not known."""
+        if T_lw is None:
+            return replace(self, is_tracked=False)
+        self.last.T_cw = T_lw
+        return self
+
+
+def scaled(velocity: core.Pose | None, scale_change: float) -> core.Pose | None:
+    """Return a velocity after a loop has corrected the scale of a single camera's map."""
+    if velocity is None or scale_change == 1.0:
+        return velocity
+    return core.Pose(velocity.quaternion_xyzw, scale_change * velocity.translation)

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""All that tracking carries from one image to the next; ``docs/method/tracking.md#states``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from orbslam2py import _core as core
+from orbslam2py.slam.records import TrackingState
+from orbslam2py.slam.state.loss import LostSearch, LostTime, Unconfirmed
+from orbslam2py.slam.state.motion import Motion
+from orbslam2py.slam.state.probation import Probation
+from orbslam2py.slam.state.scene import SceneStatistics
+
+
+@dataclass(frozen=True)
+class SinceKeyframe:
+    """What has been tracked since the last keyframe was inserted."""
+
+    frame_id: int = 0
+    """The frame that became it."""
+    keyframe: int = -1
+    """Its id; -1 if there was none."""
+    most_inliers: int = 0
+    """Most inliers of one frame since then, or since a relocalization."""
+
+    def saw(self, n_inliers: int) -> SinceKeyframe:
+        """Count a tracked frame."""
+        return replace(self, most_inliers=max(self.most_inliers, n_inliers))
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """The state of tracking: a value, which `next_state` replaces."""
+
+    phase: TrackingState
+    """Before the first map, tracked, or lost."""
+    probation: Probation
+    """Whether more inliers are required, after a relocalization or a new map."""
+    motion: Motion
+    """The last frame with a pose, and the velocity."""
+    scene: SceneStatistics = field(default_factory=SceneStatistics)
+    """What is usual in the frames before."""
+    reference_keyframe: int = -1
+    """Shares most points with the last frame that had a pose; -1 before the first."""
+    local_map: core.LocalMap | None = None
+    """Where the last frame was refined; None before the first."""
+    since_keyframe: SinceKeyframe = field(default_factory=SinceKeyframe)
+    """What has been tracked since the last keyframe."""
+    n_uncertain: int = 0
+    """Frames in a row with weak evidence."""
+    is_scarce: bool = False
+    """The last pose has few inliers."""
+    beyond_map: bool = False
+    """In localization mode: the last pose depends on the depths of the frame before it."""
+
+    lost: LostSearch = field(default_factory=LostSearch)
+    """What relocalization carries from frame to frame."""
+    lost_time: LostTime = field(default_factory=LostTime)
+    """Since when tracking is lost."""
+    n_lost: int = 0
+    """Images in a row without a pose."""
+    unconfirmed: Unconfirmed | None = None
+    """The last frame was relocalized; this one has to confirm it."""
+    keyframe_candidate: core.TrackedFrame | None = None
+    """That frame becomes a keyframe once it is confirmed."""
+    seeks_map: bool = False
+    """Lost for so long that the initializer gets the frames, too."""
+
+    kept_maps: frozenset[int] = frozenset()
+    """Maps that are never dropped: loaded ones, and those used in localization mode."""
+    in_loaded_map: bool = False
+    """The camera has not been found yet in the map that was loaded."""
+    initial_pose: core.Pose | None = None
+    """``T_cw`` in a loaded map, given by the user; used until a frame is relocalized."""
+    n_relocalizations: int = 0
+    """Relocalized frames, over all maps."""
+
+    @classmethod
+    def before_first_map(cls, *, has_depth: bool, n_relocalizations: int = 0) -> State:
+        """No image has come yet.
+
+        Parameters
+        ----------
+        has_depth : bool
+            Depths are measured: a map begins with one image and needs no probation.
+        n_relocalizations : int
+            So far, in maps that were reset.
+        """
+        return cls(
+            TrackingState.NO_IMAGES_YET,
+            Probation.of_first_map(has_depth=has_depth),
+            Motion(),
+            n_relocalizations=n_relocalizations,
+        )
+
+    @property
+    def initializing(self) -> bool:
+        """There is no map yet."""
+        return self.phase in (TrackingState.NO_IMAGES_YET, TrackingState.NOT_INITIALIZED)
+
+    @property
+    def is_lost(self) -> bool:
+        """The frame before has no pose."""
+        return self.phase is TrackingState.LOST
+
+    def following(self, slam_map: core.Map) -> State:
+        """Move the last frame with the map, and replace a culled reference keyframe."""
+        return replace(
+            self,
+            motion=self.motion.following(slam_map),
+            reference_keyframe=slam_map.living(self.reference_keyframe),
+        )
+
+    def relocalized(self, frame_id: int, *, where_expected: bool) -> State:
+        """A frame was found without its predecessor; see `Probation.relocalized`."""
+        probation = self.probation.relocalized(frame_id, where_expected=where_expected)
+        return replace(self, probation=probation)
+
+    def elsewhere(self) -> State:
+        """The camera is in another place, or in another map."""
+        return replace(self, scene=self.scene.elsewhere(), n_uncertain=0)
+
+    def in_another_map(self, *, has_depth: bool) -> State:
+        """Forget the frames before: the next ones are in another map."""
+        return replace(
+            self,
+            probation=Probation.of_first_map(has_depth=has_depth),
+            motion=Motion(),
+            scene=self.scene.elsewhere(),
+            reference_keyframe=-1,
+            local_map=None,
+            n_uncertain=0,
+            beyond_map=False,
+            lost=LostSearch(),
+            unconfirmed=None,
+            keyframe_candidate=None,
+            in_loaded_map=False,
+            initial_pose=None,
+        )
