@@ -8,9 +8,11 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 
 from orbslam2py.slam.initialization.earlier_frames import EarlierFrames
 from orbslam2py.slam.records import PoseEstimate, Verdict
+from orbslam2py.slam.state import Motion, State
 
 N, FIRST = 12, 8
 EXACT, VAGUE = 0.5, 1.2  # standard deviation of the rotation, degrees
@@ -31,21 +33,22 @@ def estimate(degrees: float, verdict: Verdict = Verdict.STRONG) -> PoseEstimate:
     return PoseEstimate(covariance=covariance, evidence=evidence)
 
 
+@pytest.fixture(autouse=True)
+def map_at_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Motion, "following", lambda motion, slam_map: motion)
+    monkeypatch.setattr(Motion, "since_last", lambda motion, frame: None)
+
+
 def tracked(judge: Callable[[int], PoseEstimate]) -> list[int]:
     """The frames that are given poses when the first view was frame 8 of 12."""
-    motion = SimpleNamespace(
-        remember=lambda frame: None, lose=lambda: None, way=lambda frame: None, velocity=None
-    )
+    slam_map = SimpleNamespace(living=lambda keyframe: keyframe)
     search: Any = SimpleNamespace(
-        motion=motion,
-        reset=lambda: None,
-        follow_map=lambda: None,
-        by_motion_model=lambda frame: judge(frame.id),
+        map=slam_map,
+        new_state=lambda: State.before_first_map(has_depth=False),
+        by_motion_model=lambda frame, state: judge(frame.id),
     )
-    belief: Any = SimpleNamespace(
-        reset=lambda: None, refine=lambda frame, first, lost: judge(frame.id)
-    )
-    earlier = EarlierFrames(search, belief)
+    acceptance: Any = SimpleNamespace(refine=lambda frame, first, state: (judge(frame.id), state))
+    earlier = EarlierFrames(search, acceptance)
     frames: list[Any] = [Frame(id=i) for i in range(N)]
     earlier.track(frames, frames[FIRST])
     return [frame.id for frame in earlier.take()]

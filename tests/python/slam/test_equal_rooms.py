@@ -10,9 +10,11 @@ import pytest
 from benchmarks.accuracy.mapped_world import MappedWorld, beside
 
 from orbslam2py import Reason, Sensor, TrackingState
+from orbslam2py import _core as core
 from orbslam2py.evaluation import PoseError
 from orbslam2py.slam.relocalization.ambiguity_check import AmbiguityCheck
-from orbslam2py.slam.relocalization.relocalizer import Relocalizer
+from orbslam2py.slam.relocalization.relocalizer import Relocalization, Relocalizer
+from orbslam2py.slam.state import LostSearch
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
 pytestmark = pytest.mark.watchdog(120)
@@ -67,10 +69,12 @@ def test_what_is_not_decided_has_neither_pose_nor_matches(monkeypatch: pytest.Mo
     seen = []
     relocalize = Relocalizer.relocalize
 
-    def watched(self: Relocalizer, frame: object) -> int:
-        n_inliers = relocalize(self, frame)
-        seen.append((n_inliers, frame.T_cw, frame.n_associated(), self.looks_like_several))
-        return n_inliers
+    def watched(
+        self: Relocalizer, frame: core.TrackedFrame, lost: LostSearch
+    ) -> tuple[Relocalization, LostSearch]:
+        found, lost = relocalize(self, frame, lost)
+        seen.append((found.n_inliers, frame.T_cw, frame.n_associated(), found.is_ambiguous))
+        return found, lost
 
     monkeypatch.setattr(Relocalizer, "relocalize", watched)
     world.lose()
