@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""All that tracking carries from one image to the next; ``docs/method/tracking.md#states``."""
+"""All that tracking carries from one image to the next; ``docs/method/tracking.md#state``."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What leads from one state of tracking to the next: a pure function of state and event.
 
-The table of all transitions is in ``docs/method/tracking.md#states``.
+The table of all transitions is in ``docs/method/tracking.md#state``.
 """
 
 from __future__ import annotations
