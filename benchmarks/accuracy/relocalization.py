@@ -39,6 +39,7 @@ from orbslam2py.evaluation import PoseError
 from orbslam2py.slam.config import RelocalizationConfig
 from orbslam2py.slam.front_end import FrontEnd
 from orbslam2py.slam.relocalization import Relocalizer
+from orbslam2py.slam.state import LostSearch
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence, SyntheticWorld
 
 #: Both views had enough matches, and a reconstruction was tried.
@@ -301,11 +302,14 @@ def _relocalization_speed(arguments: argparse.Namespace, sensor: str) -> None:
         for name, enough in limits.items():
             config = RelocalizationConfig(enough=enough, word_candidates=n_candidates)
             relocalizer = Relocalizer(slam_map, index, 0, fix_scale=False, config=config)
-            candidates = relocalizer._candidates(core.TrackedFrame(frame))
+            keyframes, _ = relocalizer._places.of(frame, LostSearch())
+            candidates = relocalizer._fitting.matched(core.TrackedFrame(frame), keyframes)
             times_of(
                 f"relocalization, {n_candidates} keyframes, {len(candidates)} of them with enough "
                 f"matches, {name}",
-                lambda r=relocalizer: r.relocalize(core.TrackedFrame(frame)),  # type: ignore[misc]
+                lambda r=relocalizer: r.relocalize(  # type: ignore[misc]
+                    core.TrackedFrame(frame), LostSearch()
+                ),
                 30,
                 30,
             )
