@@ -35,11 +35,9 @@ void bind_inliers(py::module_& module) {
       .def_readonly("cells", &InlierSpread::cells, "Of 48 cells of the image that hold an inlier.")
       .def_readonly("octaves", &InlierSpread::octaves, "Of depth that hold an inlier.")
       .def_readonly(
-          "correlation", &InlierSpread::correlation,
-          "Variance of the residuals between the cells by that of all: what a covariance\n"
-          "of independent residuals is to be multiplied by.")
-      .def_readonly("variance", &InlierSpread::variance,
-                    "Mean of the inliers' own, by their levels [square pixels]; 0 without any.");
+          "covariance", &InlierSpread::covariance,
+          "(6, 6) cluster-robust covariance of the pose: rotation [rad], translation [m].\n"
+          "Zero where it is not determined.");
   module.def("spread_of_inliers", &spread_of_inliers, py::arg("frame"),
              py::call_guard<py::gil_scoped_release>(),
              "How a frame's inliers are spread over the image and over depth: InlierSpread.\n"

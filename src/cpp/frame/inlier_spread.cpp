@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "frame/inlier_spread.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <bitset>
@@ -15,35 +16,63 @@ namespace {
 constexpr int kSpreadCells = kSpreadColumns * kSpreadRows;
 constexpr int kPoseParameters = 6;
 
-/// Whitened residuals of one cell.
-struct CellResiduals {
-  int n = 0;
-  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-  double squares = 0;
+/// Derivative of a pixel (u, v, right u) by the pose's tangent: rotation, then translation.
+Eigen::Matrix<double, 3, kPoseParameters> by_pose(const Eigen::Matrix3d& by_point,
+                                                  const Eigen::Vector3d& p) {
+  Eigen::Matrix<double, 3, kPoseParameters> J;
+  J.rightCols<3>() = by_point;
+  for (int row = 0; row < 3; ++row) {
+    J.row(row).head<3>() = p.cross(by_point.row(row).transpose()).transpose();
+  }
+  return J;
+}
 
-  void add(const Eigen::Vector2d& residual) {
-    n += 1;
-    sum += residual;
-    squares += residual.squaredNorm();
+/// Sums over the inliers' whitened residuals, by cells.
+struct Residuals {
+  Matrix6d H = Matrix6d::Zero();
+  std::array<Vector6d, kSpreadCells> gradients;
+  double squares = 0;
+  int n = 0;
+
+  Residuals() { gradients.fill(Vector6d::Zero()); }
+
+  void add(const TrackedFrame& tracked, std::size_t i, std::size_t cell, const Eigen::Vector3d& p,
+           const Seen& seen) {
+    const Frame& frame = *tracked.frame;
+    const Keypoint& keypoint = frame.keypoints[i];
+    Eigen::Matrix3d by_point = Eigen::Matrix3d::Zero();
+    by_point.topRows<2>() = seen.J;
+    Eigen::Vector3d r(keypoint.x - seen.uv.x(), keypoint.y - seen.uv.y(), 0);
+    const bool has_depth = frame.has_depth(i);
+    if (has_depth) {
+      const double bf = frame.camera->bf();
+      by_point.row(2) = seen.J.row(0);
+      by_point(2, 2) += bf / (p.z() * p.z());
+      r.z() = frame.right_u[i] - frame.camera->right_column(seen.uv.x(), p.z());
+    }
+    if (!r.allFinite()) return;
+    const double weight = frame.scales->inverse_sigma2(keypoint.level);
+    const auto J = by_pose(by_point, p);
+    H.noalias() += weight * J.transpose() * J;
+    gradients[cell].noalias() += weight * J.transpose() * r;
+    squares += weight * r.squaredNorm();
+    n += has_depth ? 3 : 2;
+  }
+
+  Matrix6d covariance(int n_cells) const {
+    if (n <= kPoseParameters) return Matrix6d::Zero();
+    const Eigen::LLT<Matrix6d> factor(H);
+    if (factor.info() != Eigen::Success) return Matrix6d::Zero();
+    Matrix6d scatter = Matrix6d::Zero();
+    for (const Vector6d& g : gradients) scatter.noalias() += g * g.transpose();
+    const Matrix6d unit = factor.solve(Matrix6d::Identity());
+    const Matrix6d robust = unit * scatter * unit;
+    const Matrix6d classical = squares / (n - kPoseParameters) * unit;
+    const Matrix6d sum = n_cells * robust + kPriorCells * classical;
+    const Matrix6d mean = sum / (n_cells + kPriorCells - kPoseParameters);
+    return mean.allFinite() ? Matrix6d(0.5 * (mean + mean.transpose())) : Matrix6d::Zero();
   }
 };
-
-/// Analysis of variance: that between the cells that hold several residuals, by that of all.
-double correlation(const std::array<CellResiduals, kSpreadCells>& cells) {
-  double between = 0, within = 0;
-  int n_between = -kPoseParameters, n_within = 0;
-  for (const CellResiduals& cell : cells) {
-    if (cell.n < 2) continue;
-    const double common = cell.sum.squaredNorm() / cell.n;
-    between += common;
-    within += cell.squares - common;
-    n_between += 2;
-    n_within += 2 * (cell.n - 1);
-  }
-  const double all = between + within;
-  if (n_between <= 0 || !(all > 0) || !std::isfinite(all)) return 1;
-  return (between / n_between) / (all / (n_between + n_within));
-}
 
 }  // namespace
 
@@ -61,14 +90,10 @@ InlierSpread spread_of_inliers(const TrackedFrame& tracked) {
   constexpr int kOctaves = 64;
   std::bitset<kSpreadCells> cells;
   std::bitset<kOctaves> octaves;
-  std::array<CellResiduals, kSpreadCells> residuals;
-  int n = 0;
-  double variances = 0;
+  Residuals residuals;
   for (std::size_t i = 0; i < frame.size(); ++i) {
     if (!tracked.map_points[i].valid() || tracked.outlier[i]) continue;
     const Keypoint& keypoint = frame.keypoints[i];
-    n += 1;
-    variances += frame.scales->sigma2(keypoint.level);
     const int column = static_cast<int>((keypoint.x - bounds.min_x) * across);
     const int row = static_cast<int>((keypoint.y - bounds.min_y) * down);
     const auto cell =
@@ -76,15 +101,14 @@ InlierSpread spread_of_inliers(const TrackedFrame& tracked) {
                                  std::clamp(column, 0, kSpreadColumns - 1));
     cells.set(cell);
     const Eigen::Vector3d p = R * tracked.positions[i] + tracked.T_cw->translation();
-    Eigen::Vector2d pixel;
-    if (!camera.project(p, pixel)) continue;
+    Seen seen;
+    if (!camera.project(p, seen)) continue;
     octaves.set(
         static_cast<std::size_t>(std::clamp(std::ilogb(p.z()) + kOctaves / 2, 0, kOctaves - 1)));
-    const double weight = std::sqrt(frame.scales->inverse_sigma2(keypoint.level));
-    residuals[cell].add(weight * (pixel - Eigen::Vector2d(keypoint.x, keypoint.y)));
+    residuals.add(tracked, i, cell, p, seen);
   }
-  return {static_cast<int>(cells.count()), static_cast<int>(octaves.count()),
-          correlation(residuals), n > 0 ? variances / n : 0};
+  const int n_cells = static_cast<int>(cells.count());
+  return {n_cells, static_cast<int>(octaves.count()), residuals.covariance(n_cells)};
 }
 
 int count_staying(const TrackedFrame& tracked, const Pose& T_nw) {

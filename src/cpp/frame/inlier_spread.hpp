@@ -1,26 +1,34 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "base/pose.hpp"
 #include "frame/frame.hpp"
 
 namespace orbslam {
 
 inline constexpr int kSpreadColumns = 8;  ///< cells of the image that inliers are counted in
 inline constexpr int kSpreadRows = 6;
+/// Cells that the classical covariance counts as beside the cluster-robust one.
+inline constexpr int kPriorCells = 12;
 
-/// How the keypoints that a pose was accepted with are spread.
+/// How the inliers of a pose are spread over the image, and what that says of its covariance.
 struct InlierSpread {
-  int cells = 0;    ///< of kSpreadColumns x kSpreadRows that hold one
+  int cells = 0;    ///< of kSpreadColumns x kSpreadRows that hold an inlier
   int octaves = 0;  ///< of depth that hold one: [1, 2), [2, 4), [4, 8)... of the map's units
-  /// Variance of the residuals between these cells by that of all: 1 where neighbours are
-  /// independent, more where they are wrong together. A covariance that takes them for independent
-  /// is too small by this factor.
-  double correlation = 1;
-  double variance = 0;  ///< of these keypoints by their levels, mean [square pixels]; 0 without any
+  /// Cluster-robust covariance of the pose (rotation, translation; left perturbation): residuals
+  /// within a cell may have errors in common, as those of a wrong point or of a region that moves.
+  /// Zero where it is not determined.
+  Matrix6d covariance = Matrix6d::Zero();
 };
 
 /// Over the associated keypoints that are no outliers; no cells without any. Throws StateError when
-/// the frame has no pose. See docs/method/tracking.md#evidence.
+/// the frame has no pose.
+///
+/// The covariance is the sandwich H^-1 (sum of g_c g_c') H^-1 over the cells c, with the gradient
+/// g_c of a cell's residuals and the normal matrix H (K.-Y. Liang and S. Zeger, "Longitudinal Data
+/// Analysis Using Generalized Linear Models", Biometrika 1986). Few cells tell little of their
+/// scatter: the classical covariance counts as kPriorCells more of them, and the pose takes six.
+/// See docs/method/tracking.md#stated-covariance.
 InlierSpread spread_of_inliers(const TrackedFrame& frame);
 
 /// How many of these keypoints show points that a camera at `T_nw` would still have in its image:
