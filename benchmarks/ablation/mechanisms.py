@@ -11,7 +11,7 @@ _NEVER = 1e9
 
 MECHANISMS: dict[str, Changes] = {
     "search of other hypotheses": {"acceptance.search_again": False},
-    "inflation of the covariance": {"acceptance.inflate_covariance": False},
+    "cluster-robust covariance": {"acceptance.robust_covariance": False},
     "uncertain and rejected poses": {
         "acceptance.weak_share": 0,
         "acceptance.weak_cells": 0,

@@ -691,20 +691,15 @@ class InlierSpread:
         Of 48 cells of the image that hold an inlier.
         """
     @property
-    def correlation(self) -> float:
+    def covariance(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"]:
         """
-        Variance of the residuals between the cells by that of all: what a covariance
-        of independent residuals is to be multiplied by.
+        (6, 6) cluster-robust covariance of the pose: rotation [rad], translation [m].
+        Zero where it is not determined.
         """
     @property
     def octaves(self) -> int:
         """
         Of depth that hold an inlier.
-        """
-    @property
-    def variance(self) -> float:
-        """
-        Mean of the inliers' own, by their levels [square pixels]; 0 without any.
         """
 class Map:
     """

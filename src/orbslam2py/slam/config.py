@@ -207,8 +207,15 @@ class AcceptanceConfig:
 
     search_again: bool = True
     """Search other hypotheses when the evidence for a pose falls."""
-    inflate_covariance: bool = True
-    """State a larger covariance than that of independent pixel noise."""
+    robust_covariance: bool = True
+    """State the cluster-robust covariance of a pose, with map motion and innovation, instead of
+    that of independent pixel noise."""
+    expected_error: float = 0.8
+    """Median error of the matches, in standard deviations, beyond which the covariance grows
+    with its square."""
+    wrong_share: float = 0.02
+    """With this probability the pose is assumed to be wrong by the whole innovation; the
+    covariance grows accordingly."""
     gain: float = 0.25
     """Weight of the newest frame in the running means of inliers, visibility ratio,
     deviation and error."""
@@ -234,40 +241,6 @@ class AcceptanceConfig:
     weak_error_spreads: float = 3.0
     """A pose is uncertain by its error only if that is also above the mean by this number of
     mean deviations."""
-    expected_error: float = 0.8
-    """Median residual up to which the covariance is that of pixel noise, in standard
-    deviations; beyond it deviations grow with the error."""
-    doubtful_error: float = 1.3
-    """Median residual beyond which deviations grow with its square: many matches are
-    accidental."""
-    largest_error: float = 10.0
-    """Largest such factor on the deviations."""
-    surprise_pixels: float = 15.0
-    """An unexpected rotation of this number of pixels doubles the variance."""
-    largest_surprise: float = 2.0
-    """Largest unexpected rotation that counts, in units of `surprise_pixels`."""
-    usual_deviation: float = 1.3
-    """Beyond this multiple of the mean deviation, the variance grows with the deviation."""
-    few_inliers: float = 70.0
-    """This number of inliers doubles the variance; it grows with the fourth power of fewer."""
-    fewest_inliers: int = 30
-    """Fewest inliers that this factor is computed for."""
-    unknown_change: float = 2.0
-    """Variance factor until the running statistics have converged, as after a loss."""
-    few_found: float = 0.15
-    """Visibility ratio that doubles the variance until then; it grows with the fourth power
-    of a smaller one."""
-    fewest_found: float = 0.05
-    """Smallest visibility ratio that this factor is computed for."""
-    usual_changes: float = 1.5
-    """A change of motion is unexpected beyond this multiple of the mean change."""
-    mistaken_share: float = 0.06
-    """With this probability the pose is assumed wrong by the unexpected motion; the
-    covariance grows accordingly."""
-    changes_seen: int = 3
-    """The mean change of motion is known after this number of changes."""
-    sudden_change: float = 3.0
-    """One change of motion counts as at most this multiple of the mean."""
     slow_gain: float = 0.02
     """Weight of a frame with a sudden error in the mean error."""
     refused_share: float = 0.3

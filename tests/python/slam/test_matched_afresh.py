@@ -101,7 +101,7 @@ def test_the_spread_of_inliers_is_that_of_one_frame_with_and_without_its_outlier
     walk: Walk,
 ) -> None:
     def figures(spread: core.InlierSpread) -> tuple[float, ...]:
-        return spread.cells, spread.octaves, spread.correlation, spread.variance
+        return spread.cells, spread.octaves, *spread.covariance.ravel()
 
     refined = walk.refined()
     assert refined.frame.outlier.any()

@@ -170,7 +170,8 @@ class FakeCore:
     #: Rotation of the next small images and their correlation; none: they say nothing.
     aligned: deque[SimpleNamespace] = field(default_factory=deque)
     n_cells: int = 30
-    correlation: float = 1.0
+    #: Cluster-robust, of every pose.
+    covariance: np.ndarray = field(default_factory=lambda: np.eye(6))
     match_error: float = 0.6
     #: Pixels that the points moved in the image since the last frame.
     displacement: float = 0.0
@@ -196,9 +197,7 @@ class FakeCore:
         return self.aligned.popleft() if self.aligned else None
 
     def spread_of_inliers(self, frame: FakeFrame) -> SimpleNamespace:
-        return SimpleNamespace(
-            cells=self.n_cells, octaves=4, correlation=self.correlation, variance=2.0
-        )
+        return SimpleNamespace(cells=self.n_cells, octaves=4, covariance=self.covariance)
 
     def median_match_error(self, frame: FakeFrame) -> float:
         return self.match_error

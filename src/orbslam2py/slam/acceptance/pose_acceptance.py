@@ -126,14 +126,16 @@ class PoseAcceptance:
                 state = replace(state, motion=state.motion.jumped(None))
         state = self._search.settle(refined, state, fixed_map=fixed_map)
         innovation = state.motion.innovation(frame)
-        covariance = self._judge.inflated_covariance(refined, evidence, state, innovation)
+        covariance = self._judge.stated_covariance(
+            refined, evidence.match_error, state.motion, innovation
+        )
         estimate = replace(
             refined.estimate, evidence=evidence, method=hypothesis.method, covariance=covariance
         )
         if evidence.verdict is Verdict.REFUSED:
             return estimate.failed(Reason.WEAK_EVIDENCE), state
         limits = self._judge.limits
-        scene = state.scene.with_frame(evidence.match_error, innovation, limits)
+        scene = state.scene.with_error(evidence.match_error, limits)
         if evidence.verdict is Verdict.STRONG or self._may_count(evidence, state):
             scene = scene.with_pose(statistics_of(refined), limits)
         return estimate, replace(state, scene=scene)

@@ -14,7 +14,7 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py.slam.config import AcceptanceConfig
 from orbslam2py.slam.pose_search import RefinedPose
 from orbslam2py.slam.records import Evidence, PoseMethod, Verdict
-from orbslam2py.slam.state import Motion, PoseStatistics, SceneStatistics, State
+from orbslam2py.slam.state import Motion, PoseStatistics, State
 
 
 class PoseValidator:
@@ -115,85 +115,42 @@ class PoseValidator:
         verdict = Verdict.WEAK if refused else evidence.verdict
         return replace(evidence, confirmed=True, verdict=verdict)
 
-    def inflated_covariance(
+    def stated_covariance(
         self,
         refined: RefinedPose,
-        evidence: Evidence,
-        state: State,
+        match_error: float,
+        motion: Motion,
         innovation: FloatArray | None,
     ) -> FloatArray | None:
-        """The covariance that a pose is told with.
+        """Return the covariance (6, 6) that is stated with a pose; None if it is not known.
 
-        Keypoints that are off by more than they are taken for make a pose that is less certain, and
-        so do few of them, and images of which it is not known what is usual, most where few of the
-        points in view were found. Keypoints near each other are wrong together: by a map point in
-        the wrong place, or a lens that is not as stated. As far as that shows they count as fewer.
-        Errors far beyond the usual ones are
-        those of whole regions that move: then each cell with inliers counts as one observation, and
-        errors as large as they are. A camera that suddenly turns otherwise smears and bends its
-        images while they are taken, and matches that hold a pose less firmly than usual let it be
-        pulled further by what is wrong in all of them. Where the map moved since the frame before,
-        it was off by as much. And a pose far from where the motion led may be a mistake, however
-        well it fits.
+        It is cluster-robust: residuals of neighbouring keypoints may have errors in common. It
+        grows with the median error of all matches, because the inliers of a wide distribution look
+        narrow. Two things that residuals cannot show are added. The map was wrong by as much as
+        local bundle adjustment has moved it since the last frame. And with a small probability the
+        prediction is right and the pose is wrong by the whole innovation.
+
+        Parameters
+        ----------
+        refined : RefinedPose
+            The pose.
+        match_error : float
+            Median error of its matches, outliers too, in standard deviations.
+        motion : Motion
+            The last frame and the velocity.
+        innovation : array of float64, (6,), or None
+            See `Motion.innovation`.
         """
-        covariance = refined.estimate.covariance
-        if covariance is None:
-            return None
-        limits = self.limits
-        if not limits.inflate_covariance:
+        covariance, limits = refined.estimate.covariance, self.limits
+        if covariance is None or not limits.robust_covariance:
             return covariance
-        surprise = self._pixels(evidence.turn_change) / limits.surprise_pixels
-        surprise = min(surprise, limits.largest_surprise)
-        looseness = max(1.0, evidence.deviation_to_usual / limits.usual_deviation)
-        n_inliers = max(refined.estimate.n_inliers, limits.fewest_inliers)
-        known = state.scene.innovation.is_known(limits)
-        factor = (
-            self._error_factor(refined, evidence, state.scene)
-            * (1.0 + (limits.few_inliers / n_inliers) ** 4)
-            * (1.0 if known else self._unknown_factor(evidence))
-            * (1.0 + surprise**2)
-            * looseness
-        )
-        errors = (
-            state.motion.map_motion_at(refined.frame),
-            self._mistake(innovation, state.scene),
-        )
-        present = [error for error in errors if error is not None]
+        errors = [motion.map_motion_at(refined.frame)]
+        if innovation is not None:
+            errors.append(math.sqrt(limits.wrong_share) * innovation)
+        known = [error for error in errors if error is not None]
         # One call: NumPy's take longer than what they do here, and in each frame.
-        return core.widened_covariance(covariance, factor, present)
-
-    def _unknown_factor(self, evidence: Evidence) -> float:
-        """How many times the variance is while it is not known what is usual.
-
-        As in a map's first frames and in a camera that was just found. Of that one, few of the
-        points in view may be those of another place.
-        """
-        limits = self.limits
-        found = max(evidence.found, limits.fewest_found)
-        return limits.unknown_change * (1.0 + (limits.few_found / found) ** 4)
-
-    def _error_factor(
-        self, refined: RefinedPose, evidence: Evidence, scene: SceneStatistics
-    ) -> float:
-        """How many times the variance is by how the matches fit, and how many are independent."""
-        limits = self.limits
-        per_cell = refined.estimate.n_inliers / max(1, evidence.n_cells)
-        spread = refined.spread
-        together = max(1.0, spread.correlation)
-        larger = max(1.0, evidence.match_error / limits.expected_error)
-        larger *= max(1.0, evidence.match_error / limits.doubtful_error)
-        factor = min(larger, limits.largest_error) ** 2 * together
-        if scene.is_sudden_error(evidence.match_error, limits):
-            larger = min(evidence.error_to_usual, limits.largest_error)
-            factor = max(factor, larger**2 * max(together, per_cell))
-        return factor
-
-    def _mistake(self, innovation: FloatArray | None, scene: SceneStatistics) -> FloatArray | None:
-        """By how much (6,) the pose may be wrong: its motion exceeds the usual innovation."""
-        if innovation is None:
-            return None
-        excess = scene.innovation.excess(innovation, self.limits)
-        return None if excess is None else math.sqrt(self.limits.mistaken_share) * excess
+        scale = max(1.0, match_error / limits.expected_error)
+        return core.widened_covariance(refined.spread.covariance, scale**2, known)
 
     def _windows(self, degrees: float) -> float:
         """How far a turn moves the image, in search windows of the motion model."""

@@ -4,7 +4,7 @@
 from orbslam2py.slam.state.loss import LastKnownPose, LostSearch, LostTime, Unconfirmed
 from orbslam2py.slam.state.motion import Motion
 from orbslam2py.slam.state.probation import Probation
-from orbslam2py.slam.state.scene import MotionInnovation, PoseStatistics, SceneStatistics
+from orbslam2py.slam.state.scene import PoseStatistics, SceneStatistics
 from orbslam2py.slam.state.state import SinceKeyframe, State
 
 __all__ = [
@@ -12,7 +12,6 @@ __all__ = [
     "LostSearch",
     "LostTime",
     "Motion",
-    "MotionInnovation",
     "PoseStatistics",
     "Probation",
     "SceneStatistics",
