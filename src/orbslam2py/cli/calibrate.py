@@ -30,6 +30,7 @@ from orbslam2py.cli.targets import check_apart, check_target
 from orbslam2py.errors import OutputFileError, SettingsError
 from orbslam2py.settings import CameraSettings, OrbSettings, Sensor, settings_for_camera
 from orbslam2py.settings.check import warn_of_doubts
+from orbslam2py.settings.defaults import ASSUMED_DEPTH_FACTOR
 from orbslam2py.settings.pair_views import views_of_pair
 
 Output = Annotated[Path, typer.Option("--output", "-o", help="Settings file to write.")]
@@ -119,6 +120,10 @@ def calibrate(
     if plot is not None:
         draw_residuals(plot, result, title=f"Calibration from {source.name}")
     console.print(_table(result, source))
+    if sensor is Sensor.RGBD and depth_factor is None:
+        console.print(ASSUMED_DEPTH_FACTOR, highlight=False)
+    elif sensor is Sensor.RGBD:
+        console.print(f"depth images: {depth_factor:g} units per metre", highlight=False)
     for warning in result.warnings():
         console.print(f"[bold yellow]Warning:[/] {escape(warning)}", highlight=False)
     console.print(f"Settings are in [bold]{escape(str(output))}[/]", highlight=False)
