@@ -5,24 +5,22 @@ from __future__ import annotations
 
 import logging
 import re
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from orbslam2py._arguments import index_of
 from orbslam2py._depth_size import depth_size_problem
-from orbslam2py.datasets.base import Images, Stamps
+from orbslam2py.datasets.base import Images
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.image_folder import image_files
 from orbslam2py.datasets.images import read_any, read_depth
-from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.datasets.time_files import seconds_of_name, stamps_of_names
-from orbslam2py.datasets.unposed import chosen_stamps, with_rate
+from orbslam2py.datasets.unlisted import UnlistedSequence
 from orbslam2py.errors import DatasetError, ImageError, OrbSlamError
-from orbslam2py.settings import Sensor, Settings
-from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory, associate
+from orbslam2py.settings import Sensor
+from orbslam2py.trajectory import MAX_DIFFERENCE, associate
 
 _log = logging.getLogger(__name__)
 
@@ -113,7 +111,7 @@ def no_depth_pair(folder: Path, kinds: list[FolderKind]) -> DatasetError:
     )
 
 
-class DepthFolders(RecordedSequence):
+class DepthFolders(UnlistedSequence):
     """Images and depth images in two folders side by side; see `datasets.base.Sequence`.
 
     The folders are told by the first image of each, and by their names where that leaves a choice.
@@ -162,55 +160,24 @@ class DepthFolders(RecordedSequence):
         super().__init__(folder, (Sensor.RGBD, Sensor.MONOCULAR), sensor, settings)
         self._fps = fps
         images = files_in_time(pair.colour.path)
-        self._depth_paths: list[Path] | None = None
+        self._partners = []
         how = "images alone"
         if self.sensor is Sensor.RGBD:
             _require_equal_view(pair)
-            images, self._depth_paths, how = _paired(folder, pair, images)
+            images, self._partners, how = _paired(folder, pair, images)
         self._paths, self._list_path = images, pair.colour.path
-        own = stamps_of_names(images)
-        if fps is not None or times is not None:
-            otherwise: Stamps | float = 0.0  # not needed, and there may be no settings yet
-            told = "are the given ones"
-        else:
-            otherwise = own or self.settings.camera.fps
-            told = "are their names" if own else f"count {otherwise:g} images per second"
-        names = [path.name for path in images]
-        self._stamps = chosen_stamps(
-            len(images), fps, times, otherwise, names, None if times is None else self.known_rate()
-        )
-        if self._depth_paths is not None:
+        told = self._choose_times(images, times)
+        if self._partners:
             _log.info(
                 "%s: %d images in %s go with depth in %s %s; their times %s",
                 *(folder, len(images), pair.colour.path.name, pair.depth.path.name, how, told),
             )
-
-    @cached_property
-    def settings(self) -> Settings:
-        """The settings the caller chose, or `default_settings`, with the rate that was given."""
-        chosen = self.default_settings() if self._chosen is None else self._chosen
-        if self._fps is None:
-            return chosen
-        return replace(chosen, camera=with_rate(chosen.camera, self._fps))
-
-    def image_path(self, index: int, /) -> Path:
-        """Return the file of the image of a frame."""
-        return self._paths[index]
 
     def load(self, index: int, /) -> Images:
         """Read the images of a frame; see `datasets.base.Sequence.load`."""
         image_path, *depth_path = self._files(index_of(index, len(self)))
         image = self._read(image_path)
         return Images(image, depth=read_depth(depth_path[0])) if depth_path else Images(image)
-
-    def ground_truth(self) -> Trajectory | None:
-        """Return None: there are no true poses."""
-        return None
-
-    def _files(self, index: int) -> tuple[Path, ...]:
-        if self._depth_paths is None:
-            return (self._paths[index],)
-        return self._paths[index], self._depth_paths[index]
 
 
 def _kind_of(folder: Path, files: list[Path]) -> FolderKind:

@@ -10,10 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from orbslam2py._arguments import index_of
 from orbslam2py._arguments import number_of as counted
 from orbslam2py._text_lines import content_lines
-from orbslam2py.datasets.base import Images, Layout, Stamps, rate_of, require_frames
+from orbslam2py.datasets.base import Layout, Stamps, rate_of, require_frames
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.clock import read_clock
 from orbslam2py.datasets.grey_scale import read_sample
@@ -21,7 +20,6 @@ from orbslam2py.datasets.image_folder import image_files
 from orbslam2py.datasets.layouts.kitti_raw_calibration import CAMERAS_FILE, DriveCalibration
 from orbslam2py.datasets.layouts.kitti_raw_poses import read_oxts
 from orbslam2py.datasets.recorded import RecordedSequence
-from orbslam2py.datasets.rectification import Rectifier
 from orbslam2py.errors import DatasetError
 from orbslam2py.settings import Sensor, Settings
 from orbslam2py.trajectory import Trajectory, associate
@@ -106,19 +104,6 @@ class KittiRawSequence(RecordedSequence):
     def image_path(self, index: int, /) -> Path:
         """Return the file of the left image of a frame."""
         return self._paths[index]
-
-    def load(self, index: int, /) -> Images:
-        """Read (and rectify) the images of a frame; see `datasets.base.Sequence.load`."""
-        paths = self._files(index_of(index, len(self)))
-        images = [self._read(path) for path in paths]
-        if len(images) == 1:
-            return Images(images[0])
-        if self._rectifiers is not None:
-            images = [
-                rectifier.rectify(image, path)
-                for rectifier, image, path in zip(self._rectifiers, images, paths, strict=True)
-            ]
-        return Images(images[0], right=images[1])
 
     def ground_truth(self) -> Trajectory | None:
         """Read the poses of ``oxts`` and move them to the left camera.
@@ -206,13 +191,6 @@ class KittiRawSequence(RecordedSequence):
     @property
     def _is_raw_mono(self) -> bool:
         return self.sensor is Sensor.MONOCULAR and self._is_raw
-
-    @cached_property
-    def _rectifiers(self) -> tuple[Rectifier, Rectifier] | None:
-        rectification = self.settings.rectification
-        if rectification is None:
-            return None
-        return Rectifier(rectification.left), Rectifier(rectification.right)
 
     def _from_calibration(self) -> Settings | None:
         if self._find(CAMERAS_FILE) is None:
