@@ -95,6 +95,8 @@ class KittiRawSequence(RecordedSequence):
             times = _some(times, i.tolist())
         require_frames(times_path, len(self._paths))
         self._stamps = times
+        colour = "grey" if self._left == 0 else "colour"
+        _log.info("%s: %d frames of the %s %s", folder, len(self), colour, self._named_cameras)
 
     @staticmethod
     def recognises(folder: Path) -> bool:
@@ -189,6 +191,12 @@ class KittiRawSequence(RecordedSequence):
         return self.name.endswith("_extract")
 
     @property
+    def _named_cameras(self) -> str:
+        if self.sensor is Sensor.STEREO:
+            return f"cameras image_{self._left:02d} and image_{self._right:02d}"
+        return f"camera image_{self._left:02d}"
+
+    @property
     def _is_raw_mono(self) -> bool:
         return self.sensor is Sensor.MONOCULAR and self._is_raw
 
@@ -196,6 +204,11 @@ class KittiRawSequence(RecordedSequence):
         if self._find(CAMERAS_FILE) is None:
             return None
         rate = rate_of(self.timestamps, _USUAL_RATE)
+        _log.info(
+            "%s: the calibration of the %s, %s, is from %s",
+            *(self.folder, self._named_cameras, "raw" if self._is_raw else "rectified"),
+            self._find(CAMERAS_FILE),
+        )
         if self.sensor is Sensor.STEREO:
             pair = (self._left, self._right)
             return self._calibration.stereo_settings(pair, rate, raw=self._is_raw)
