@@ -28,7 +28,6 @@ from orbslam2py.cli.interrupts import hold_while_loading
 from orbslam2py.cli.messages import print_error, tell_repeated
 from orbslam2py.errors import OrbSlamError, SettingsError
 
-
 #: Columns of a terminal in which boxes have room for all names of options and their help.
 _WIDE = 120
 
