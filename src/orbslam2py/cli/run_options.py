@@ -34,8 +34,8 @@ SettingsOption = Annotated[
     ),
 ]
 StartOption = Annotated[int, typer.Option(help="First frame.", min=0)]
-StrideOption = Annotated[int, typer.Option(help="Take every so many frames.", min=1)]
-MaxFramesOption = Annotated[int | None, typer.Option(help="Take at most so many frames.", min=1)]
+StrideOption = Annotated[int, typer.Option(help="Use every Nth frame.", min=1)]
+MaxFramesOption = Annotated[int | None, typer.Option(help="Use at most this number of frames.", min=1)]
 FpsOption = Annotated[
     float | None,
     typer.Option(
@@ -46,8 +46,10 @@ FpsOption = Annotated[
 TimesOption = Annotated[
     Path | None,
     typer.Option(
-        help="File with a time stamp per image of a folder or video: decimal seconds or whole "
-        "nanoseconds, with the images' file names or without (rgb.txt, data.csv)."
+        help="File with a time stamp per image of a folder or video: seconds, milliseconds, "
+        "microseconds, nanoseconds or dates (the unit is recognised). With the images' file names "
+        "or without (rgb.txt, data.csv); names in the first line say which columns are the time "
+        "and the file."
     ),
 ]
 TopicsOption = Annotated[
@@ -167,7 +169,7 @@ AllowOtherSetupFlag = Annotated[
 LocalizeOption = Annotated[
     int | None,
     typer.Option(
-        help="Localization mode, in which the map stays as it is: after so many frames; "
+        help="Localization mode, in which the map stays as it is: after N frames; "
         "without a number from the first on, in a loaded map.",
         min=0,
         metavar="[N]",
@@ -178,7 +180,7 @@ SaveOption = Annotated[
 ]
 AutosaveOption = Annotated[
     float | None,
-    typer.Option(help="Save it every so many seconds on the way as well.", metavar="SECONDS"),
+    typer.Option(help="Also save it during the run, each time after this many seconds.", metavar="SECONDS"),
 ]
 SaveImagesFlag = Annotated[
     bool,
