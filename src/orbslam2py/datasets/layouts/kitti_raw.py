@@ -95,8 +95,14 @@ class KittiRawSequence(RecordedSequence):
             times = _some(times, i.tolist())
         require_frames(times_path, len(self._paths))
         self._stamps = times
+
+    @cached_property
+    def settings(self) -> Settings:
+        """The settings the caller chose, or `default_settings`."""
+        settings = super().settings
         colour = "grey" if self._left == 0 else "colour"
-        _log.info("%s: %d frames of the %s %s", folder, len(self), colour, self._named_cameras)
+        _log.info("%s: %d frames of the %s %s", self.folder, len(self), colour, self._named_cameras)
+        return settings
 
     @staticmethod
     def recognises(folder: Path) -> bool:

@@ -124,10 +124,12 @@ def test_the_log_names_cameras_and_calibration(
     drive = write_drive(day, kind, cameras)
     with caplog.at_level("INFO"):
         sequence = open_sequence(drive, sensor)
-        assert caplog.messages[-1] == f"{drive}: {images}"
         assert sequence.settings.sensor is Sensor(sensor)
     path = day / "calib_cam_to_cam.txt"
-    assert caplog.messages[-1] == f"{drive}: the calibration of {calibration_of} is from {path}"
+    assert caplog.messages == [
+        f"{drive}: the calibration of {calibration_of} is from {path}",
+        f"{drive}: {images}",
+    ]
 
 
 def test_half_a_pair_is_a_single_camera(day: Path) -> None:
