@@ -74,7 +74,7 @@ def read_camera_file(
     path
         The file.
     file_format
-        Who wrote it, also as text (``"kalibr"``); by default told by its content.
+        Who wrote it, also as text (``"kalibr"``); by default recognised by its content.
     camera
         Number of the camera: ``cam0``, ``cam1`` ... of Kalibr, ``CAMERA_ID`` of COLMAP, ``P0`` to
         ``P3`` of KITTI, the socket of OAK; 0 is the left one of OpenCV and ZED. With `sensor`

@@ -70,12 +70,12 @@ def calibrate(
     every: Annotated[
         int | None,
         typer.Option(
-            help="Look at every so many images [all of a folder, four per second of a video].",
+            help="Search every Nth image [all of a folder, four per second of a video].",
             min=1,
         ),
     ] = None,
     max_views: Annotated[
-        int, typer.Option(help="Use at most so many views, those that differ most.", min=4)
+        int, typer.Option(help="Most views to use: those that differ most.", min=4)
     ] = 40,
     k3: Annotated[bool, typer.Option("--k3", help="Estimate k3 as well: for wide lenses.")] = False,
     plot: Annotated[

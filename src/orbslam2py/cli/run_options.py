@@ -35,7 +35,9 @@ SettingsOption = Annotated[
 ]
 StartOption = Annotated[int, typer.Option(help="First frame.", min=0)]
 StrideOption = Annotated[int, typer.Option(help="Use every Nth frame.", min=1)]
-MaxFramesOption = Annotated[int | None, typer.Option(help="Use at most this number of frames.", min=1)]
+MaxFramesOption = Annotated[
+    int | None, typer.Option(help="Use at most this number of frames.", min=1)
+]
 FpsOption = Annotated[
     float | None,
     typer.Option(
@@ -180,7 +182,7 @@ SaveOption = Annotated[
 ]
 AutosaveOption = Annotated[
     float | None,
-    typer.Option(help="Also save it during the run, each time after this many seconds.", metavar="SECONDS"),
+    typer.Option(help="Also save it during the run, at this interval.", metavar="SECONDS"),
 ]
 SaveImagesFlag = Annotated[
     bool,

@@ -94,7 +94,7 @@ Cover = Annotated[
 Pieces = Annotated[
     int | None,
     typer.Option(
-        help="Cut the way into so many pieces, which come in another order with darkness between."
+        help="Number of pieces of the path; they come in another order, with darkness between."
     ),
 ]
 Order = Annotated[
@@ -154,7 +154,7 @@ def synthesize(
     gap: Gap = None,
     overlap: Overlap = None,
     lateral: Annotated[float, typer.Option(help="Metres to the right of the usual way.")] = 0.0,
-    yaw: Annotated[float, typer.Option(help="Look so many degrees to the right.")] = 0.0,
+    yaw: Annotated[float, typer.Option(help="Degrees that the camera looks to the right.")] = 0.0,
     force: Annotated[
         bool, typer.Option("--force", help="Replace a synthetic sequence in the folder.")
     ] = False,

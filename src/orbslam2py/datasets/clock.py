@@ -31,13 +31,13 @@ _NANO = 10**9
 _UNITS = {0: "seconds", 3: "milliseconds", 6: "microseconds", 9: "nanoseconds"}
 #: Times since 1970 are at least this large in milli-, micro- and nanoseconds.
 _SINCE_1970 = {9: 10**17, 6: 10**14, 3: 10**11}
-#: Steps up to this multiple of the frame's duration are seconds: every so many images were kept.
+#: Steps up to this multiple of the frame's duration are seconds: images may have been left out.
 _MOST_FRAMES_LEFT_OUT = 300
 #: Steps below this share of the frame's duration contradict the frame rate.
 _LEAST_STEP = 1 / 20
 #: Longest step of seconds where no frame rate is known [s].
 _LONGEST_STEP = 300
-#: Of lists in disorder, at most one line in so many is out of order; else a clock was set back.
+#: If more than one line in this number is out of order, the clock may have been set back.
 _ORDERLY = 10
 _DATE = re.compile(
     r"(\d{4})-(\d\d)-(\d\d)[ T](\d\d):(\d\d):(\d\d)(?:[.,](\d+))?(?:Z|\+00:?00)?", re.ASCII

@@ -27,13 +27,13 @@ _log = logging.getLogger(__name__)
 #: Names of folders with images of the camera, and with depth: they decide between several.
 _COLOUR_NAME = re.compile(r"colou?r|rgb|images?|img|frames?", re.IGNORECASE)
 _DEPTH_NAME = re.compile(r"depth", re.IGNORECASE)
-#: So much of the smaller folder must be found by name, or names do not tell what is a pair.
+#: Least share of the smaller folder that must have a partner of the same name.
 _BY_NAME = 0.5
 
 
 @dataclass(frozen=True)
 class FolderKind:
-    """What a folder of images holds, told by the first of them.
+    """What a folder of images holds, recognised by its first image.
 
     Attributes
     ----------
@@ -101,20 +101,21 @@ def told_by_names(folder: Path) -> bool:
 def no_depth_pair(folder: Path, kinds: list[FolderKind]) -> DatasetError:
     """Say what is in a folder that should have had images and depth, and what to do."""
     has = ", ".join(map(str, kinds))
+    alone = ", or give one of these folders alone" if len(kinds) > 1 else ""
     only_depth = len(kinds) > 1 and all(one.kind == "depth" for one in kinds)
     if only_depth:
-        has += "; all look like depth images (16 bits, one channel), none like images of the camera"
+        has += "; all of them look like depth images (16 bits, one channel)"
     return DatasetError(
-        f"cannot tell images and depth in {folder}: it has {has}; keep one "
-        "folder of 8-bit images, such as color, and one of 16-bit depth, such as depth, or list "
-        "the files in rgb.txt and depth.txt ('time path' in every line)"
+        f"cannot tell which folder in {folder} has the images and which the depth: it has {has}; "
+        "keep one folder of 8-bit images, such as color, and one of 16-bit depth, such as depth, "
+        f"or list the files in rgb.txt and depth.txt ('time path' in every line){alone}"
     )
 
 
 class DepthFolders(UnlistedSequence):
     """Images and depth images in two folders side by side; see `datasets.base.Sequence`.
 
-    The folders are told by the first image of each, and by their names where that leaves a choice.
+    The folders are recognised by the first image of each, and by their names if several fit.
     Images and depth belong together by time if all names are times, else by equal names, else by
     their order if there are as many of both.
 
@@ -169,7 +170,7 @@ class DepthFolders(UnlistedSequence):
         told = self._choose_times(images, times)
         if self._partners:
             _log.info(
-                "%s: %d images in %s go with depth in %s %s; their times %s",
+                "%s: %d images of %s are paired with depth of %s %s; their times %s",
                 *(folder, len(images), pair.colour.path.name, pair.depth.path.name, how, told),
             )
 

@@ -53,8 +53,8 @@ class GreyScale:
         images = [one for one in self._sample() if one.dtype == np.uint16] or [image]
         chosen = range_of(images)
         _log.info(
-            "%s: images of 16 bits; grey values %s become 0 to 255, in all images alike (chosen "
-            "from %d of them)",
+            "%s: images of 16 bits; in all images, grey values %s become 0 to 255 (the range of %d "
+            "sample images)",
             *(self._what, chosen, len(images)),
         )
         zeros = float(np.mean([np.mean(np.asarray(one) == 0) for one in images]))

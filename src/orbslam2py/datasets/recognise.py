@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What kind of sequence a folder holds, told by its files."""
+"""What kind of sequence a folder holds, recognised by its files."""
 
 from __future__ import annotations
 

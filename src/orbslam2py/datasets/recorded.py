@@ -33,7 +33,7 @@ from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.settings import Sensor, Settings, resolve_settings
 from orbslam2py.trajectory import Trajectory
 
-#: So many frames without images in the beginning, and a sequence is refused.
+#: A sequence is refused if this number of frames at its beginning have no images.
 _FIRST = 10
 
 

@@ -22,7 +22,7 @@ from orbslam2py.trajectory import MAX_DIFFERENCE, associate
 
 _log = logging.getLogger(__name__)
 
-#: So many of the fewer images must have a partner of the same name or number.
+#: Least share of the smaller series that must have a partner of the same name or number.
 _COMMON = 0.5
 #: What a pair looks like, for messages.
 A_PAIR = (
@@ -112,9 +112,9 @@ def no_pair(folder: Path) -> DatasetError:
 class StereoFolders(UnlistedSequence):
     """Images of a pair of cameras, in two folders or in one; see `datasets.base.Sequence`.
 
-    The two are told by their names, which differ in left and right, l and r, 0 and 1, 1 and 2, or 2
-    and 3. Images belong together by equal names, by times if all names are times, by the numbers in
-    their names, or else by their order if there are as many of both.
+    The two sides are recognised by their names, which differ in left and right, l and r, 0 and 1, 1
+    and 2, or 2 and 3. Images belong together by equal names, by times if all names are times, by
+    the numbers in their names, or else by their order if there are as many of both.
 
     Parameters
     ----------

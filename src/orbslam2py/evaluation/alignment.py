@@ -27,7 +27,8 @@ class Alignment(str, Enum):
     NONE = "none"
     """Left as it is: both are in one world."""
     AUTO = "auto"
-    """``sim3`` for a single camera, ``se3`` for others; told by the lengths if it is not known."""
+    """``sim3`` for a single camera, ``se3`` for others;
+    chosen from the lengths of the paths if the sensor is not known."""
 
     @classmethod
     def of(cls, value: Alignment | str) -> Alignment:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Maps that rest beside the active one, as those who watch are told of them."""
+"""Maps that rest beside the active one, as watchers see them."""
 
 from __future__ import annotations
 

@@ -18,8 +18,8 @@ _READER = "_message_consumer"
 class UnwantedRequests(logging.Filter):
     """Keeps it off the log that a server was sent what is none of the page's.
 
-    The library closes the connection and goes on serving. An error of our own, as in what a button
-    does, is told as ever, and so is what other servers in this program have to tell.
+    The library closes the connection and goes on serving. Our own errors, for example of a
+    button, are logged as usual, and so are messages of other servers in this program.
 
     Parameters
     ----------

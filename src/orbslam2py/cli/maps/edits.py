@@ -217,7 +217,7 @@ def optimize(
     _say(quiet, _where(saved, number, output))
 
 
-# ---- what is told --------------------------------------------------------------------------------
+# ---- printed text --------------------------------------------------------------------------------
 def _where(saved: SavedMap, number: int | None, output: Path) -> str:
     others = _others(saved)
     return f"{f'Map {number}' if others else 'The map'} is in {output}{others}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which topics of a bag are the images: told by the user, or guessed by types and names."""
+"""Which topics of a bag are the images: named by the user, or guessed by types and names."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ def place_by_trajectory(
             f"{max_difference:g} s, and it takes {_FEWEST}; give the truth of the sequence that "
             "the map was made of"
         )
-    # A camera that went straight on has no other path to give: it is placed, and that is told.
+    # A camera that went straight on has no other path: it is placed, with a warning.
     return _place(contents, keyframes.T_wc[rows, :3, 3], there.positions[poses])
 
 
