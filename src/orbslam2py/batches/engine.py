@@ -147,7 +147,7 @@ def run_on(
     cache
         Where sequences from elsewhere go, on each worker's computer.
     watch
-        Told now and then which run each worker makes.
+        Called now and then with the run that each worker makes.
 
     Raises
     ------

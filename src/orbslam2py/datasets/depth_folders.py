@@ -85,7 +85,7 @@ def is_depth_name(name: str) -> bool:
 
 
 def find_depth_pair(folder: Path) -> DepthPair | None:
-    """Return the two sub-folders with images and depth; None if that cannot be told."""
+    """Return the two sub-folders with images and depth; None if they are not certain."""
     kinds = folder_kinds(folder)
     colour = _only([one for one in kinds if one.kind == "colour"], _COLOUR_NAME)
     depth = _only([one for one in kinds if one.kind == "depth"], _DEPTH_NAME)

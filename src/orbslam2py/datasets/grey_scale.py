@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Images of 16 bits in a sequence: told from depth, and scaled by one range."""
+"""Images of 16 bits in a sequence: distinguished from depth, and scaled by one range."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ _MANY_ZEROS = 0.05
 class GreyScale:
     """Makes 8 bits of the images of 16 bits of one sequence, all by the same range.
 
-    The range is chosen when the first of them comes, from images spread over the sequence, and told
-    once in a note. May be used by several threads.
+    The range is chosen when the first of them comes, from images spread over the sequence. A
+    note says it once. May be used by several threads.
 
     Parameters
     ----------

@@ -134,7 +134,7 @@ class StereoFolders(UnlistedSequence):
     Raises
     ------
     DatasetError
-        If there is no pair, or it cannot be told what belongs together, or the time stamps do not
+        If there is no pair, or its images cannot be paired, or the time stamps do not
         fit.
     SettingsError
         If the settings are wrong.

@@ -14,7 +14,7 @@ from orbslam2py.trajectory import MAX_DIFFERENCE, Similarity, align, associate
 
 #: Lengths that differ by more than this factor are those of one camera, not of a wrong baseline.
 _OTHER_UNIT = 1.5
-_FEWEST_POSES = 3  # of which a scale can be told apart from an error
+_FEWEST_POSES = 3  # from this number on, a scale differs from an error
 
 
 class Alignment(str, Enum):

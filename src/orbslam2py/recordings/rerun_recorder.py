@@ -77,7 +77,7 @@ class RerunRecorder:
     OrbSlamError
         If Rerun is not installed.
     OutputFileError
-        If it can be told already that there will be no file.
+        If it is already certain that there will be no file.
     """
 
     name = "the recording"

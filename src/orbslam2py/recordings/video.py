@@ -70,7 +70,7 @@ class VideoWriter:
     Raises
     ------
     OutputFileError
-        If it can be told already that there will be no video, or if a size, a rate, a duration or
+        If it is already certain that there will be no video, or if a size, a rate, a duration or
         a true path is none.
     """
 

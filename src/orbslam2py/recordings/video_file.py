@@ -36,7 +36,7 @@ class VideoFile:
     Raises
     ------
     OutputFileError
-        If it can be told already that there will be no video.
+        If it is already certain that there will be no video.
     """
 
     def __init__(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whether a calibration fits the first images of a run; told once, and the run goes on."""
+"""Checks whether a calibration fits the first images of a run; warns once, and the run goes on."""
 
 from __future__ import annotations
 

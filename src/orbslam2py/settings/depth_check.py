@@ -47,7 +47,7 @@ class DepthCheck:
     Attributes
     ----------
     warning : str or None
-        What was told.
+        The warning that was logged.
     """
 
     def __init__(self, factor: float) -> None:

@@ -33,11 +33,11 @@ class UnwantedRequests(logging.Filter):
         _LIBRARY.addFilter(self)
 
     def stop(self) -> None:
-        """Let everything be told again; may be repeated."""
+        """Log everything again; may be repeated."""
         _LIBRARY.removeFilter(self)
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Whether a record is to be told."""
+        """Whether a record is to be logged."""
         if not (self._is_of_server(record) and _is_of_sender(record)):
             return True
         _log.debug("%s", record.getMessage(), exc_info=record.exc_info)

@@ -77,7 +77,7 @@ class BagSequence(FramesInOrder):
     Raises
     ------
     DatasetError
-        If it is no bag, has no images for the sensor, or topics cannot be told.
+        If it is no bag, has no images for the sensor, or its topics cannot be recognised.
     SettingsError
         If the settings given are wrong.
     """

@@ -271,7 +271,7 @@ class TopicChoice:
             if compressed and image.ndim == 2 and not depth:
                 encoding = "mono8" if image.dtype.itemsize == 1 else "mono16"
         except OrbSlamError as error:
-            problem = str(error)  # told if nothing else can be read
+            problem = str(error)  # reported if nothing else can be read
         return ImageTopic(topic, encoding, size, problem)
 
     # ---- others ----------------------------------------------------------------------------------

@@ -37,9 +37,9 @@ class Placement:
     similarity
         From the map's world to the other; its scale is 1 for a map that sees metres.
     n_pairs
-        Positions that told it.
+        Number of positions that determined it.
     rmse
-        Of the distances that are left between them [m]; 0 where a length alone told it.
+        Of the distances that are left between them [m]; 0 where a length alone determined it.
     on_a_line
         The positions of a path lie on a line: the turn around it is not known, and was chosen
         small.

@@ -207,7 +207,7 @@ def _seen(report: dict[str, Any]) -> str:
 
 
 def _warnings(report: dict[str, Any]) -> Markup | None:
-    """What the result suffers from, as the command has told it."""
+    """What impairs the result, as the command has printed it."""
     told = report.get("warnings")
     if not told:
         return None
