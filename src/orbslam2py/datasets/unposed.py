@@ -219,7 +219,7 @@ def chosen_stamps(
     """
     if fps is not None and times is not None:
         raise DatasetError(
-            "--fps and --times exclude each other: both tell the time stamps; give one of them"
+            "--fps and --times exclude each other: both set the time stamps; give one of them"
         )
     if times is not None:
         return read_time_file(Path(times), n, names, rate)

@@ -138,7 +138,8 @@ def find_other_reading(
 
     Tried are the other order of the quaternions, inverse poses, and both; for the estimate and for
     the truth. An order that stands in the head of the file, or that the caller gave, is not
-    doubted. Nothing is found in paths of less than 10 matched poses, and in those that turn by less than 5 degrees.
+    doubted. Nothing is found in paths of less than 10 matched poses, and in those that turn by less
+    than 5 degrees.
 
     Parameters
     ----------
