@@ -101,7 +101,7 @@ def told_by_names(folder: Path) -> bool:
 def no_depth_pair(folder: Path, kinds: list[FolderKind]) -> DatasetError:
     """Say what is in a folder that should have had images and depth, and what to do."""
     has = ", ".join(map(str, kinds))
-    alone = ", or give one of these folders alone" if len(kinds) > 1 else ""
+    alone = ", or give one of these folders alone (--sensor mono)" if len(kinds) > 1 else ""
     only_depth = len(kinds) > 1 and all(one.kind == "depth" for one in kinds)
     if only_depth:
         has += "; all of them look like depth images (16 bits, one channel)"

@@ -200,8 +200,10 @@ def _cannot_be_registered(
 ) -> DatasetError:
     images, stream = topics.left, stream_of(depth)
     if T is None:
-        where = "/tf_static" if stream is None else f"{stream}/tf/..."
-        missing.append(f"the transform between the two cameras (topic {where})")
+        where = "topic /tf_static"
+        if stream is not None:
+            where = f"topics {stream_of(images)}/tf/... and {stream}/tf/..."
+        missing.append(f"the transform between the two cameras ({where})")
     remedy = _REMEDY
     if stream is not None:
         has_pair = any("/Infrared_2/image" in topic.name for topic in bag.topics)

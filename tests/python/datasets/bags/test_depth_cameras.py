@@ -242,9 +242,8 @@ def test_recordings_of_the_viewer_get_a_remedy_that_works(tmp_path: Path, pair: 
     with pytest.raises(orb.DatasetError) as told:
         BagSequence(bag, "rgbd")
     message = str(told.value)
-    assert "the transform between the two cameras (topic /device_0/sensor_0/Depth_0/tf/...)" in (
-        message
-    )
+    topics = "/device_0/sensor_1/Color_0/tf/... and /device_0/sensor_0/Depth_0/tf/..."
+    assert f"the transform between the two cameras (topics {topics})" in message
     assert "the RealSense Viewer does not record aligned depth" in message
     assert ("--sensor stereo" in message) == pair
     assert len(BagSequence(bag, "mono")) == 1
