@@ -122,7 +122,10 @@ def test_the_unit_of_the_truth(command: CommandLine, right: dict[str, Any]) -> N
     Path("truth_ms.txt").write_text(lines(TRUTH, per_second=1e3))
     figures, done = compared(command, "plain.txt", "truth_ms.txt")
     expect_same(figures, right)
-    assert "Read: truth_ms.txt: times in ms, told by those of the other file." in done.out
+    assert (
+        "Read: truth_ms.txt: times in ms, because these fit the times of the other file."
+        in done.out
+    )
     figures, _ = compared(command, "plain.txt", "truth_ms.txt", "--offset", "0.005")
     assert figures["time_difference_max_s"] == pytest.approx(0.005)
 
