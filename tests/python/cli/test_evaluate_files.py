@@ -85,9 +85,9 @@ def expect_same(figures: dict[str, Any], right: dict[str, Any]) -> None:
         (lines(ESTIMATE, ","), ""),
         (lines(ESTIMATE, ";"), ""),
         (" ".join(NAMES) + "\n" + lines(ESTIMATE), ""),
-        (lines(ESTIMATE, per_second=1e9), "times in ns, told by those of the other file"),
-        (lines(ESTIMATE, per_second=1e6), "times in us, told by those of the other file"),
-        (lines(ESTIMATE, per_second=1e3), "times in ms, told by those of the other file"),
+        (lines(ESTIMATE, per_second=1e9), "times in ns, because these fit the times of the other"),
+        (lines(ESTIMATE, per_second=1e6), "times in us, because these fit the times of the other"),
+        (lines(ESTIMATE, per_second=1e3), "times in ms, because these fit the times of the other"),
         (
             lines(ESTIMATE, ",", "wxyz", 1e9).replace("\n", ",\n"),
             "times in ns and quaternions w first, as EuRoC and VINS write them",
