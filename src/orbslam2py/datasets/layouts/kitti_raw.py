@@ -79,6 +79,7 @@ class KittiRawSequence(RecordedSequence):
         self._left, self._right = there[0] if alone else whole[0]
         available = (Sensor.STEREO, Sensor.MONOCULAR) if whole else (Sensor.MONOCULAR,)
         super().__init__(folder, available, sensor, settings)
+        self._calibrated_by: Path | None = None
         times, self._paths = self._list(self._left)
         self._list_path = times_path = self._camera_folder(self._left) / "timestamps.txt"
         self._right_paths: list[Path] = []
@@ -101,7 +102,16 @@ class KittiRawSequence(RecordedSequence):
         """The settings the caller chose, or `default_settings`."""
         settings = super().settings
         colour = "grey" if self._left == 0 else "colour"
-        _log.info("%s: %d frames of the %s %s", self.folder, len(self), colour, self._named_cameras)
+        source = "the given settings"
+        if self._chosen is None and self._calibrated_by is None:
+            source = str(self.folder / "settings.yaml")
+        elif self._chosen is None:
+            kind = "raw" if self._is_raw else "rectified"
+            source = f"{self._calibrated_by} (for {kind} images)"
+        _log.info(
+            "%s: %d frames of the %s %s; calibration: %s",
+            *(self.folder, len(self), colour, self._named_cameras, source),
+        )
         return settings
 
     @staticmethod
@@ -207,14 +217,10 @@ class KittiRawSequence(RecordedSequence):
         return self.sensor is Sensor.MONOCULAR and self._is_raw
 
     def _from_calibration(self) -> Settings | None:
-        if self._find(CAMERAS_FILE) is None:
+        self._calibrated_by = self._find(CAMERAS_FILE)
+        if self._calibrated_by is None:
             return None
         rate = rate_of(self.timestamps, _USUAL_RATE)
-        _log.info(
-            "%s: the calibration of the %s, %s, is from %s",
-            *(self.folder, self._named_cameras, "raw" if self._is_raw else "rectified"),
-            self._find(CAMERAS_FILE),
-        )
         if self.sensor is Sensor.STEREO:
             pair = (self._left, self._right)
             return self._calibration.stereo_settings(pair, rate, raw=self._is_raw)
