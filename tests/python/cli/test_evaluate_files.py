@@ -114,7 +114,7 @@ def test_any_file_gives_the_same_figures(
         else:
             assert figures["ate_rmse_m"] < 1e-6
         # What the digits say is not said twice.
-        short = note.partition(", told")[0]
+        short = note.partition(", because")[0]
         assert (f"Read: other.txt: {short}" in done.out) == bool(note), done.out
 
 
