@@ -42,7 +42,7 @@ Features = Annotated[
     typer.Option(help="ORB features per image [1000, or 2000 above 0.6 megapixels]."),
 ]
 OutputSensor = Annotated[
-    Sensor | None, typer.Option(help="What the settings are for [what the file is of].")
+    Sensor | None, typer.Option(help="Sensor of the settings [that of the file].")
 ]
 DepthFactor = Annotated[
     float | None,

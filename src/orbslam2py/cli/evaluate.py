@@ -69,7 +69,8 @@ def evaluate(
         ),
     ] = Alignment.AUTO,
     file_format: Annotated[
-        TrajectoryFormat, typer.Option("--format", help="Of both files; auto looks at each.")
+        TrajectoryFormat,
+        typer.Option("--format", help="Format of both files; auto recognises each."),
     ] = TrajectoryFormat.AUTO,
     times: Annotated[
         Path | None,

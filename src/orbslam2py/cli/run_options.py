@@ -29,7 +29,7 @@ SettingsOption = Annotated[
     str | None,
     typer.Option(
         help="Built-in name (tum1, kitti04-12, euroc, ...) or ORB-SLAM YAML file; "
-        "found by itself where the sequence tells.",
+        "chosen automatically if the sequence determines it.",
         metavar="NAME_OR_FILE",
     ),
 ]
@@ -42,7 +42,7 @@ FpsOption = Annotated[
     float | None,
     typer.Option(
         help="Images per second of a folder of images [that of the settings] or a video [its "
-        "own time stamps]; what a camera is asked for.",
+        "own time stamps]; for a camera, the rate to request.",
     ),
 ]
 TimesOption = Annotated[
@@ -74,7 +74,7 @@ SplitFlag = Annotated[
 MaskOption = Annotated[
     Path | None,
     typer.Option(
-        help="Where to look: an 8-bit image, 0 = ignore, or a folder with one per image.",
+        help="Image parts to use: an 8-bit image, 0 = ignore, or a folder with one per image.",
         metavar="FILE_OR_FOLDER",
     ),
 ]
@@ -89,13 +89,16 @@ VocabularyOption = Annotated[
     Path | None, typer.Option(help="Vocabulary file; the one of the package if not given.")
 ]
 DeterministicFlag = Annotated[
-    bool, typer.Option("--deterministic", help="Map inline: the same bytes in every run.")
+    bool,
+    typer.Option(
+        "--deterministic", help="Map in the tracking thread: every run gives the same bytes."
+    ),
 ]
 LoopClosingFlag = Annotated[
     bool,
     typer.Option(
         "--loop-closing/--no-loop-closing",
-        help="Recognise places seen before and take out the drift.",
+        help="Recognise places seen before and correct the drift.",
     ),
 ]
 FullAdjustmentFlag = Annotated[
@@ -106,7 +109,10 @@ FullAdjustmentFlag = Annotated[
 ]
 FullAdjustmentTimeLimitOption = Annotated[
     float | None,
-    typer.Option(help="Seconds after which that ends with what it has reached.", metavar="SECONDS"),
+    typer.Option(
+        help="Seconds after which a full adjustment stops and keeps its result so far.",
+        metavar="SECONDS",
+    ),
 ]
 FinalAdjustmentFlag = Annotated[
     bool,
@@ -118,19 +124,21 @@ SeveralMapsFlag = Annotated[
     bool,
     typer.Option(
         "--several-maps/--one-map",
-        help="Lost for long, begin another map, and join maps that show the same place; or wait "
-        "until the old one is in view again.",
+        help="After a long tracking loss, begin another map, and join maps that show the same "
+        "place; or wait until the old map is in view again.",
     ),
 ]
 NewMapAfterOption = Annotated[
     float | None,
-    typer.Option(help="Seconds that it is lost before another map begins [2].", metavar="SECONDS"),
+    typer.Option(
+        help="Seconds of tracking loss after which another map begins [2].", metavar="SECONDS"
+    ),
 ]
 EffortOption = Annotated[
     Effort,
     typer.Option(
         help="How much work goes into map and path: fast makes fewer keyframes, thorough matches "
-        "every frame with the map once more when that has settled."
+        "every frame with the map once more when the map has settled."
     ),
 ]
 SetOption = Annotated[
@@ -157,7 +165,7 @@ LoadOption = Annotated[
 InitialPoseOption = Annotated[
     str | None,
     typer.Option(
-        help="Where in the loaded map the camera may be: tried before all else.",
+        help="Likely pose of the camera in the loaded map; it is tried first.",
         metavar="X,Y,Z[,QX,QY,QZ,QW]",
     ),
 ]
@@ -165,14 +173,14 @@ AllowOtherSetupFlag = Annotated[
     bool,
     typer.Option(
         "--allow-other-setup",
-        help="Load the map although it is of another camera or other visual words.",
+        help="Load the map although it was made with another camera or vocabulary.",
     ),
 ]
 LocalizeOption = Annotated[
     int | None,
     typer.Option(
-        help="Localization mode, in which the map stays as it is: after N frames; "
-        "without a number from the first on, in a loaded map.",
+        help="Localization mode, in which the map does not change: after N frames; without N from "
+        "the first frame on, in a loaded map.",
         min=0,
         metavar="[N]",
     ),
@@ -198,8 +206,8 @@ ForceFlag = Annotated[
     bool,
     typer.Option(
         "--force",
-        help="Write into an output folder that is not empty; results of an earlier run there go. "
-        "Replace a video or recording.",
+        help="Write into an output folder that is not empty, and remove results of an earlier run "
+        "in it; replace a video or recording.",
     ),
 ]
 NoReportFlag = Annotated[

@@ -32,7 +32,7 @@ def view(
         ),
     ] = None,
     split: Annotated[
-        bool, typer.Option("--split", help="Of --sequence, as the run was given it.")
+        bool, typer.Option("--split", help="For --sequence: the same as in the run.")
     ] = False,
     viewer_port: ViewerPort = None,
     viewer_host: ViewerHost = None,
