@@ -232,7 +232,7 @@ def _longest_rise(times: Sequence[int]) -> int:
 
 
 def _continued(source: Path | str, times: Sequence[int], doubts: list[str]) -> list[int]:
-    """Let times go on where the clock was set back."""
+    """Move the times after each place where the clock was set back."""
     step = _usual_step(times)
     continued, shift = [times[0]], 0
     for place, (earlier, later) in enumerate(pairwise(times)):
@@ -241,7 +241,7 @@ def _continued(source: Path | str, times: Sequence[int], doubts: list[str]) -> l
             shift += back
             doubts.append(
                 f"{source}: the clock was set back by some {back / _NANO:.6g} s after image "
-                f"{place}; the order of the list is kept and the time goes on"
+                f"{place}; the order of the list is kept, and the later times are moved"
             )
         continued.append(later + shift)
     return continued

@@ -136,7 +136,7 @@ class RecordedSequence(FramesInOrder, ABC):
         for missing in zip(*(self._files(index) for index in range(n)), strict=True):
             if not any(path.exists() for path in missing):
                 raise DatasetError(
-                    f"none of the first {n} images that {self._list_path} tells is there, from "
+                    f"none of the first {n} images of {self._list_path} exists, from "
                     f"{missing[0]} on{_found_instead(self.folder, missing[0])}; put them where "
                     "the list says, or correct the list"
                 )

@@ -114,7 +114,7 @@ def find_depth_camera(
         if own_difference:  # the user named the CameraInfo of another camera
             _warn(bag, depth, f"has a CameraInfo of another camera ({own_difference})")
         elif frames[0] != frames[1]:
-            where = f"is in the coordinates '{frames[1]}', the images are in '{frames[0]}'"
+            where = f"has the frame_id '{frames[1]}', and the images have '{frames[0]}'"
             _warn(bag, depth, where)
         return None
     missing = [
@@ -134,8 +134,8 @@ def find_depth_camera(
     )
     if set(names[0]) & set(names[1]):
         _log.warning(
-            "%s: images and depth are both in the coordinates '%s', so the two cameras are taken "
-            "to stand in one place; if they do not, depth is some pixels off",
+            "%s: images and depth have the same frame_id '%s', so the two cameras are assumed to "
+            "be at the same place; if they are not, depth is some pixels off",
             *(bag.path, frames[0]),
         )
     return DepthCamera(_lens_of(depth, depth_info), T)

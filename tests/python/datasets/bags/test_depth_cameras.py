@@ -119,7 +119,7 @@ def test_one_place_is_left_as_it_is(tmp_path: Path, caplog: pytest.LogCaptureFix
 def test_equal_frames(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     """Coordinates of one name are in one place, which may be a driver's mistake."""
     sequence = BagSequence(rgbd(tmp_path, frames=("camera", "camera")))
-    assert "taken to stand in one place" in caplog.text
+    assert "assumed to be at the same place" in caplog.text
     found = sequence.load(0).depth
     assert found is not None
     assert np.abs(found / 1000 - seen(120, np.eye(4)))[found > 0].max() < 0.02
