@@ -248,7 +248,7 @@ def numbers_of(
     Raises
     ------
     error
-        For anything else, with the shape that is wanted if it is told.
+        For anything else, naming the wanted shape if it is given.
     """
     try:
         array = np.asarray(value)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Names of the array types that signatures share, and records that hold arrays.
 
-The names tell the type of the elements; shapes, units and frames are told where an array is
+The names tell the type of the elements; shapes, units and frames stand where an array is
 described.
 """
 

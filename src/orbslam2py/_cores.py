@@ -20,7 +20,7 @@ def n_cores() -> int:
 
 
 def n_threads(most: int) -> int:
-    """Threads for work that can be divided: at most so many, one a core, and as many as are wanted.
+    """Number of threads for work that can be divided: at most one a core, and at most `most`.
 
     ``OMP_NUM_THREADS`` says what is wanted, here as for most libraries; a batch sets it in its
     workers, each of which has one core.

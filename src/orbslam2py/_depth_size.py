@@ -41,6 +41,9 @@ def depth_size_problem(depth: tuple[int, ...], image: tuple[int, ...]) -> str | 
 def enlarged_depth(depth: NDArray[np.generic], image: tuple[int, ...]) -> NDArray[np.generic]:
     """Give every pixel of an image the depth (h, w) of the pixel that covers its centre.
 
+    OpenCV's ``INTER_NEAREST_EXACT`` may take the other pixel if a centre is on the border of two,
+    as in an enlargement from 192 to 1440 rows.
+
     Parameters
     ----------
     depth

@@ -20,7 +20,8 @@ from orbslam2py.errors import DatasetError
 
 DEFAULT_SIZE = "20GB"
 
-#: Puts content into a new folder; gets the folder, and what to call before it needs so many bytes.
+#: Puts content into a new folder; gets the folder, and a function to call with the bytes that it
+#: needs next.
 Fetch = Callable[[Path, Callable[[int], None]], None]
 
 

@@ -25,7 +25,7 @@ from orbslam2py.batches.work import failed_row, run_job
 from orbslam2py.batches.workers import Workers
 from orbslam2py.errors import DatasetError, SettingsError
 
-#: So many runs a worker are handed out at once: no worker waits, and none has a long queue.
+#: Runs that are handed out per worker at once: no worker waits, and none has a long queue.
 _AHEAD = 2
 #: A run whose worker failed otherwise than by ending is tried again so often.
 _RETRIES = 2
@@ -71,7 +71,7 @@ def open_workers(workers: Workers, most: int | None = None) -> Iterator[Any]:
     workers
         Which.
     most
-        No more than so many are started, if their number is given.
+        Largest number of workers; None for no limit.
 
     Yields
     ------
@@ -147,7 +147,7 @@ def run_on(
     cache
         Where sequences from elsewhere go, on each worker's computer.
     watch
-        Told now and then which run each worker makes.
+        Called now and then with the run that each worker makes.
 
     Raises
     ------

@@ -135,7 +135,7 @@ def _download(address: str, folder: Path, reserve: Callable[[int], None]) -> Non
     except OrbSlamError:
         raise
     except Exception as error:
-        # What systems of files raise is theirs; a full disk of the cache is told by who has it.
+        # File systems raise errors of their own; a full disk of the cache is reported elsewhere.
         if isinstance(error, OSError) and error.errno:
             raise
         words = " ".join(str(error).split()) or type(error).__name__
@@ -149,7 +149,7 @@ def _download(address: str, folder: Path, reserve: Callable[[int], None]) -> Non
 def _is_file(address: str, last: str, files: Any, path: str) -> bool:
     if is_archive(last):
         return True
-    if address.startswith("http"):  # there it is told by reading it whole, which may be long
+    if address.startswith("http"):  # only reading all of it would tell, which may take long
         return "." in last and not address.endswith("/")
     return bool(files.isfile(path))
 

@@ -154,7 +154,7 @@ class Results:
         name = f"runs/{key}/{_BEGUN_FILE}"
         noted = self._read(name) or {}
         times = int(noted["times"]) + 1 if noted.get("session") == session else 1
-        with contextlib.suppress(OSError):  # a full disk is told by the run
+        with contextlib.suppress(OSError):  # the run reports a full disk
             self._write(name, {"session": session, "times": times})
         return times
 
@@ -241,7 +241,7 @@ class Results:
 
     @contextlib.contextmanager
     def _files(self) -> Iterator[tuple[Any, str]]:
-        """Have fsspec's file system and the path in it; what it raises is told in our words."""
+        """Have fsspec's file system and the path in it; its errors become ours."""
         fsspec = importlib.import_module("fsspec")
         try:
             files, root = fsspec.core.url_to_fs(self.address)

@@ -58,7 +58,7 @@ class Sweep:
     def points(self) -> Iterator[tuple[tuple[str, float], ...]]:
         """Yield the values of each point; one without any if nothing is swept.
 
-        Draws differ; there are fewer than asked for where there are not so many different ones.
+        Draws differ; there are fewer than asked for if fewer different ones exist.
         """
         if not self.n_draws:
             names = [name for name, _ in self.grid]

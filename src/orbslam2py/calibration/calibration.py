@@ -246,7 +246,7 @@ def calibrate(
     board
         The board that was found.
     max_views
-        Use at most so many views, those that differ most.
+        Most views to use: those that differ most.
     k3
         Estimate the third radial coefficient: for wide lenses, where k1 and k2 leave residuals
         at the border.

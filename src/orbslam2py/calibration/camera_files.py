@@ -17,6 +17,7 @@ from orbslam2py.calibration.lenses import require_pinhole
 from orbslam2py.calibration.unknown_files import refuse_unknown
 from orbslam2py.errors import SettingsError
 from orbslam2py.settings import CameraSettings, OrbSettings, Sensor, Settings, settings_for_camera
+from orbslam2py.settings.defaults import ASSUMED_DEPTH_FACTOR
 from orbslam2py.settings.foreign import FOREIGN_FORMATS, FORMATS, recognise_camera_file
 from orbslam2py.settings.pair_views import is_likely_baseline
 
@@ -73,7 +74,7 @@ def read_camera_file(
     path
         The file.
     file_format
-        Who wrote it, also as text (``"kalibr"``); by default told by its content.
+        Who wrote it, also as text (``"kalibr"``); by default recognised by its content.
     camera
         Number of the camera: ``cam0``, ``cam1`` ... of Kalibr, ``CAMERA_ID`` of COLMAP, ``P0`` to
         ``P3`` of KITTI, the socket of OAK; 0 is the left one of OpenCV and ZED. With `sensor`
@@ -133,6 +134,10 @@ def read_camera_file(
         settings = replace(settings, orb=OrbSettings(n_features=n_features))
     if sensor is Sensor.RGBD and depth_factor is None:
         depth_factor = file.depth_factor
+        if depth_factor is None:
+            _log.info(
+                "%s does not say the units of the depth images; %s", path, ASSUMED_DEPTH_FACTOR
+            )
     return _made_for(path, settings, sensor, baseline, depth_factor)
 
 

@@ -55,7 +55,7 @@ def checked_numbers(path: object, where: str, value: object, count: tuple[int, .
     Raises
     ------
     SettingsError
-        If these are other than finite numbers, or not so many.
+        If these are not finite numbers, or their number is wrong.
     """
     try:
         found = np.asarray(value, dtype=np.float64).reshape(-1)

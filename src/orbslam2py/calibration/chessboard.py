@@ -183,7 +183,7 @@ def find_views(
     board
         What to look for.
     every
-        Look at every so many images; by default all of a folder, four per second of a video.
+        Search every Nth image; by default all of a folder, four per second of a video.
     progress
         Called after every image with the numbers of images looked at and with the board.
 

@@ -15,12 +15,12 @@ from orbslam2py._arrays import ByteArray, FloatArray
 
 #: Size of the window in which a point is followed [pixels], and how often images are halved.
 _WINDOW, _HALVINGS = (15, 15), 3
-#: Points that do not come back to their beginning to so many pixels are dropped.
+#: Points that come back farther from their beginning than this are dropped [pixels].
 _THERE_AND_BACK = 0.5
-#: A tracker looks back over so many images at once, each of which adds an error of its own.
+#: Images over which points are tracked back to check them, and the largest distance then [pixels].
 _CHECK_EVERY, _BACK_OVER_SOME = 2, 0.75
-#: Corners are looked for in so many parts of an image by row and column, so that a single thing
-#: with much texture does not take them all; least quality by the best of a part, and distance.
+#: Parts of an image per row and column in which corners are searched, so that one object with
+#: much texture does not get them all; least quality relative to the best of a part; distance.
 _N_PARTS, _QUALITY, _APART = 4, 0.05, 7
 
 
@@ -163,14 +163,13 @@ class PointTracker:
     Parameters
     ----------
     every : int
-        New points are looked for in every so many images, and pairs are made of images so far
-        apart.
+        Number of images after which new points are searched, and between the images of a pair.
     spans : int
-        Points are followed over so many of these distances.
+        Number of these distances over which points are followed.
     n_points : int
         Points looked for.
     least : int
-        A pair needs so many of them.
+        Least number of points of a pair.
     """
 
     def __init__(

@@ -8,7 +8,9 @@ list of commands may take.
 from __future__ import annotations
 
 import importlib
+import inspect
 import itertools
+import shutil
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -25,6 +27,9 @@ from orbslam2py.cli.exit_codes import ExitCode
 from orbslam2py.cli.interrupts import hold_while_loading
 from orbslam2py.cli.messages import print_error, tell_repeated
 from orbslam2py.errors import OrbSlamError, SettingsError
+
+#: Columns of a terminal in which boxes have room for all names of options and their help.
+_WIDE = 120
 
 
 @dataclass(frozen=True)
@@ -56,7 +61,23 @@ class Subcommand:
             function, target = target, typer.Typer(rich_markup_mode="markdown")
             target.command(name, cls=cls)(function)
         target._add_completion = False  # that of the program is enough
-        return typer.main.get_command(target)
+        command = typer.main.get_command(target)
+        if shutil.get_terminal_size().columns < _WIDE:
+            _without_boxes(command)
+        return command
+
+
+def _without_boxes(command: Any) -> None:
+    """Let the help of a command, or of all in a group, be plain text: no name is cut then."""
+    commands = getattr(command, "commands", None)
+    if commands is not None:  # plain text would cut the summaries in the list of a group
+        for one in commands.values():
+            _without_boxes(one)
+        return
+    command.rich_markup_mode = None
+    text, title, examples = (command.help or "").partition("**Example**")
+    examples = examples.replace("\n\n    ", "\n\n\b\n    ")  # lines to copy are not wrapped
+    command.help = inspect.cleandoc(text) + "\n\n" + title.strip("*") + examples
 
 
 def _module(name: str) -> Any:

@@ -30,6 +30,7 @@ from orbslam2py.cli.targets import check_apart, check_target
 from orbslam2py.errors import OutputFileError, SettingsError
 from orbslam2py.settings import CameraSettings, OrbSettings, Sensor, settings_for_camera
 from orbslam2py.settings.check import warn_of_doubts
+from orbslam2py.settings.defaults import ASSUMED_DEPTH_FACTOR
 from orbslam2py.settings.pair_views import views_of_pair
 
 Output = Annotated[Path, typer.Option("--output", "-o", help="Settings file to write.")]
@@ -41,7 +42,7 @@ Features = Annotated[
     typer.Option(help="ORB features per image [1000, or 2000 above 0.6 megapixels]."),
 ]
 OutputSensor = Annotated[
-    Sensor | None, typer.Option(help="What the settings are for [what the file is of].")
+    Sensor | None, typer.Option(help="Sensor of the settings [that of the file].")
 ]
 DepthFactor = Annotated[
     float | None,
@@ -69,12 +70,12 @@ def calibrate(
     every: Annotated[
         int | None,
         typer.Option(
-            help="Look at every so many images [all of a folder, four per second of a video].",
+            help="Search every Nth image [all of a folder, four per second of a video].",
             min=1,
         ),
     ] = None,
     max_views: Annotated[
-        int, typer.Option(help="Use at most so many views, those that differ most.", min=4)
+        int, typer.Option(help="Most views to use: those that differ most.", min=4)
     ] = 40,
     k3: Annotated[bool, typer.Option("--k3", help="Estimate k3 as well: for wide lenses.")] = False,
     plot: Annotated[
@@ -119,6 +120,10 @@ def calibrate(
     if plot is not None:
         draw_residuals(plot, result, title=f"Calibration from {source.name}")
     console.print(_table(result, source))
+    if sensor is Sensor.RGBD and depth_factor is None:
+        console.print(ASSUMED_DEPTH_FACTOR, highlight=False)
+    elif sensor is Sensor.RGBD:
+        console.print(f"depth images: {depth_factor:g} units per metre", highlight=False)
     for warning in result.warnings():
         console.print(f"[bold yellow]Warning:[/] {escape(warning)}", highlight=False)
     console.print(f"Settings are in [bold]{escape(str(output))}[/]", highlight=False)

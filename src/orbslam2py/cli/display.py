@@ -79,7 +79,7 @@ _Rows = Iterator[tuple[str, str]]
 
 #: Keys that hold frames by reason, and how the table calls them.
 _COUNTED = {"initialisation_reasons": "no map yet", "lost_reasons": "lost"}
-#: Keys that are told only if there is something to tell.
+#: Keys that are shown only if they are not zero.
 _UNUSUAL = {
     "skipped_frames": "skipped",
     "dropped_frames": "dropped",

@@ -69,7 +69,8 @@ def evaluate(
         ),
     ] = Alignment.AUTO,
     file_format: Annotated[
-        TrajectoryFormat, typer.Option("--format", help="Of both files; auto looks at each.")
+        TrajectoryFormat,
+        typer.Option("--format", help="Format of both files; auto recognises each."),
     ] = TrajectoryFormat.AUTO,
     times: Annotated[
         Path | None,
@@ -177,7 +178,11 @@ def _say_what_was_compared(
         if reading.notes:
             text = f"Read: {path.name}: {'; '.join(reading.notes)}."
             say(escape(text), highlight=False, soft_wrap=True)
-    say(f"Compared: {matched}, by {escape(both.by)}.", highlight=False, soft_wrap=True)
+    say(
+        f"Compared: {matched}; poses are matched by {escape(both.by)}.",
+        highlight=False,
+        soft_wrap=True,
+    )
     lost = int(both.estimate.lost.sum())
     if lost:
         rows = "1 row" if lost == 1 else f"{lost} rows"
@@ -186,7 +191,7 @@ def _say_what_was_compared(
         why = {
             True: "a single camera",
             False: "the run's sensor sees metres",
-            None: "told by the lengths",
+            None: "chosen from the lengths of the paths, because the sensor is not known",
         }
         reason = why[result.single_camera]
         say(f"Alignment: {result.alignment} ({reason}).", highlight=False, soft_wrap=True)

@@ -5,7 +5,7 @@ from enum import IntEnum
 
 
 class ExitCode(IntEnum):
-    """What the shell is told."""
+    """Exit codes of the program."""
 
     OK = 0
     FAILED = 1

@@ -19,7 +19,7 @@ _Handler = Callable[[int, "FrameType | None"], object]
 #: What asks for an end besides Ctrl-C, and what the program ends with then: ``kill``, ``timeout``
 #: and managers of jobs; a terminal that is closed, or a connection to it that breaks.
 _ENDINGS = {signal.SIGTERM: ExitCode.TERMINATED, signal.SIGHUP: ExitCode.HUNG_UP}
-#: Within so many seconds they are one request: ``timeout`` sends its signal to the program and to
+#: Signals within this time [s] are one request: ``timeout`` sends its signal to the program and to
 #: all of its group, and a shell passes on that its terminal is closed.
 _ECHO_SECONDS = 1.0
 

@@ -34,7 +34,7 @@ class _ConsoleHandler(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         kind = str(record.msg)
-        # What a kind is is told by the text with its gaps; a text without any is its own kind.
+        # Messages are of one kind if their texts without the values are equal.
         if record.levelno < logging.ERROR:
             self._counts[kind] += 1
             if self._counts[kind] > _TOLD_EACH:

@@ -136,8 +136,8 @@ def run(
     adjusts = final_adjustment or (loop_closing and full_adjustment)
     if full_adjustment_time_limit is not None and not adjusts:
         raise SettingsError(
-            "--full-adjustment-time-limit is of full adjustments, and there will be none; leave it "
-            "out, or take --final-adjustment"
+            "--full-adjustment-time-limit limits full adjustments, and this run makes none; leave "
+            "it out, or take --final-adjustment"
         )
     look = ViewerOptions(viewer, viewer_port, viewer_host, viewer_exit)
     log_to(Console(stderr=True), quiet=quiet)  # opening warns already

@@ -29,25 +29,29 @@ SettingsOption = Annotated[
     str | None,
     typer.Option(
         help="Built-in name (tum1, kitti04-12, euroc, ...) or ORB-SLAM YAML file; "
-        "found by itself where the sequence tells.",
+        "chosen automatically if the sequence determines it.",
         metavar="NAME_OR_FILE",
     ),
 ]
 StartOption = Annotated[int, typer.Option(help="First frame.", min=0)]
-StrideOption = Annotated[int, typer.Option(help="Take every so many frames.", min=1)]
-MaxFramesOption = Annotated[int | None, typer.Option(help="Take at most so many frames.", min=1)]
+StrideOption = Annotated[int, typer.Option(help="Use every Nth frame.", min=1)]
+MaxFramesOption = Annotated[
+    int | None, typer.Option(help="Use at most this number of frames.", min=1)
+]
 FpsOption = Annotated[
     float | None,
     typer.Option(
         help="Images per second of a folder of images [that of the settings] or a video [its "
-        "own time stamps]; what a camera is asked for.",
+        "own time stamps]; for a camera, the rate to request.",
     ),
 ]
 TimesOption = Annotated[
     Path | None,
     typer.Option(
-        help="File with a time stamp per image of a folder or video: decimal seconds or whole "
-        "nanoseconds, with the images' file names or without (rgb.txt, data.csv)."
+        help="File with a time stamp per image of a folder or video: seconds, milliseconds, "
+        "microseconds, nanoseconds or dates (the unit is recognised). With the images' file names "
+        "or without (rgb.txt, data.csv); names in the first line say which columns are the time "
+        "and the file."
     ),
 ]
 TopicsOption = Annotated[
@@ -70,7 +74,7 @@ SplitFlag = Annotated[
 MaskOption = Annotated[
     Path | None,
     typer.Option(
-        help="Where to look: an 8-bit image, 0 = ignore, or a folder with one per image.",
+        help="Image parts to use: an 8-bit image, 0 = ignore, or a folder with one per image.",
         metavar="FILE_OR_FOLDER",
     ),
 ]
@@ -85,13 +89,16 @@ VocabularyOption = Annotated[
     Path | None, typer.Option(help="Vocabulary file; the one of the package if not given.")
 ]
 DeterministicFlag = Annotated[
-    bool, typer.Option("--deterministic", help="Map inline: the same bytes in every run.")
+    bool,
+    typer.Option(
+        "--deterministic", help="Map in the tracking thread: every run gives the same bytes."
+    ),
 ]
 LoopClosingFlag = Annotated[
     bool,
     typer.Option(
         "--loop-closing/--no-loop-closing",
-        help="Recognise places seen before and take out the drift.",
+        help="Recognise places seen before and correct the drift.",
     ),
 ]
 FullAdjustmentFlag = Annotated[
@@ -102,7 +109,10 @@ FullAdjustmentFlag = Annotated[
 ]
 FullAdjustmentTimeLimitOption = Annotated[
     float | None,
-    typer.Option(help="Seconds after which that ends with what it has reached.", metavar="SECONDS"),
+    typer.Option(
+        help="Seconds after which a full adjustment stops and keeps its result so far.",
+        metavar="SECONDS",
+    ),
 ]
 FinalAdjustmentFlag = Annotated[
     bool,
@@ -114,19 +124,21 @@ SeveralMapsFlag = Annotated[
     bool,
     typer.Option(
         "--several-maps/--one-map",
-        help="Lost for long, begin another map, and join maps that show the same place; or wait "
-        "until the old one is in view again.",
+        help="After a long tracking loss, begin another map, and join maps that show the same "
+        "place; or wait until the old map is in view again.",
     ),
 ]
 NewMapAfterOption = Annotated[
     float | None,
-    typer.Option(help="Seconds that it is lost before another map begins [2].", metavar="SECONDS"),
+    typer.Option(
+        help="Seconds of tracking loss after which another map begins [2].", metavar="SECONDS"
+    ),
 ]
 EffortOption = Annotated[
     Effort,
     typer.Option(
         help="How much work goes into map and path: fast makes fewer keyframes, thorough matches "
-        "every frame with the map once more when that has settled."
+        "every frame with the map once more when the map has settled."
     ),
 ]
 SetOption = Annotated[
@@ -153,7 +165,7 @@ LoadOption = Annotated[
 InitialPoseOption = Annotated[
     str | None,
     typer.Option(
-        help="Where in the loaded map the camera may be: tried before all else.",
+        help="Likely pose of the camera in the loaded map; it is tried first.",
         metavar="X,Y,Z[,QX,QY,QZ,QW]",
     ),
 ]
@@ -161,14 +173,14 @@ AllowOtherSetupFlag = Annotated[
     bool,
     typer.Option(
         "--allow-other-setup",
-        help="Load the map although it is of another camera or other visual words.",
+        help="Load the map although it was made with another camera or vocabulary.",
     ),
 ]
 LocalizeOption = Annotated[
     int | None,
     typer.Option(
-        help="Localization mode, in which the map stays as it is: after so many frames; "
-        "without a number from the first on, in a loaded map.",
+        help="Localization mode, in which the map does not change: after N frames; without N from "
+        "the first frame on, in a loaded map.",
         min=0,
         metavar="[N]",
     ),
@@ -178,7 +190,7 @@ SaveOption = Annotated[
 ]
 AutosaveOption = Annotated[
     float | None,
-    typer.Option(help="Save it every so many seconds on the way as well.", metavar="SECONDS"),
+    typer.Option(help="Also save it during the run, at this interval.", metavar="SECONDS"),
 ]
 SaveImagesFlag = Annotated[
     bool,
@@ -194,8 +206,8 @@ ForceFlag = Annotated[
     bool,
     typer.Option(
         "--force",
-        help="Write into an output folder that is not empty; results of an earlier run there go. "
-        "Replace a video or recording.",
+        help="Write into an output folder that is not empty, and remove results of an earlier run "
+        "in it; replace a video or recording.",
     ),
 ]
 NoReportFlag = Annotated[

@@ -29,6 +29,7 @@ from orbslam2py.settings import (
 )
 from orbslam2py.settings.builtin import BUILTIN_DATA, builtin_sensors
 from orbslam2py.settings.check import read_choice, warn_of_doubts
+from orbslam2py.settings.defaults import ASSUMED_DEPTH_FACTOR
 from orbslam2py.settings.groups import DISTORTION_FIELDS
 
 app = typer.Typer(
@@ -93,7 +94,7 @@ def new(
     console = Console(quiet=quiet, highlight=False, soft_wrap=True)
     _describe(console, settings)
     if sensor is Sensor.RGBD and depth_factor is None:
-        console.print("depth images are taken to be in millimetres; if not, give --depth-factor")
+        console.print(ASSUMED_DEPTH_FACTOR)
     console.print(f"Settings are in [bold]{escape(str(output))}[/]")
 
 

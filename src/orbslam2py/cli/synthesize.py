@@ -55,11 +55,11 @@ Layouts = Annotated[
         "[default: kitti for stereo, else tum]"
     ),
 ]
-Frames = Annotated[int | None, typer.Option(help="Number of images.  [default: the whole way]")]
+Frames = Annotated[int | None, typer.Option(help="Number of images.  [default: the whole path]")]
 Laps = Annotated[
     float | None,
     typer.Option(
-        help="Instead of --frames: how often to go around, where the way comes back to its start.  "
+        help="Instead of --frames: number of laps, if the path returns to its start.  "
         "[default: 1.2; figure-eight: 1.1]"
     ),
 ]
@@ -70,15 +70,15 @@ Fps = Annotated[float | None, typer.Option(help="Frames per second.  [default: 2
 Speed = Annotated[
     float | None,
     typer.Option(
-        help="Metres per second along a way.  [default: 0.7; two-rooms: 0.4; streets: 10]"
+        help="Metres per second along a path.  [default: 0.7; two-rooms: 0.4; streets: 10]"
     ),
 ]
 Pace = Annotated[float, typer.Option(help="Times the usual speed, in every world.")]
-Motion = Annotated[SyntheticMotion, typer.Option(help="How the camera goes along its way.")]
+Motion = Annotated[SyntheticMotion, typer.Option(help="How the camera moves along its path.")]
 Bends = Annotated[
     Corners,
     typer.Option(
-        "--corners", help="Whether the camera turns early in bends, or at once with the way."
+        "--corners", help="Whether the camera turns early in bends, or together with the path."
     ),
 ]
 Blur = Annotated[
@@ -88,13 +88,13 @@ Cover = Annotated[
     str,
     typer.Option(
         metavar="SECONDS",
-        help="How long a hand is over the lens, in the middle of it all; FROM:SECONDS says when.",
+        help="Seconds that a hand covers the lens, in the middle; FROM:SECONDS says when.",
     ),
 ]
 Pieces = Annotated[
     int | None,
     typer.Option(
-        help="Cut the way into so many pieces, which come in another order with darkness between."
+        help="Number of pieces of the path; they come in another order, with darkness between."
     ),
 ]
 Order = Annotated[
@@ -153,8 +153,8 @@ def synthesize(
     order: Order = None,
     gap: Gap = None,
     overlap: Overlap = None,
-    lateral: Annotated[float, typer.Option(help="Metres to the right of the usual way.")] = 0.0,
-    yaw: Annotated[float, typer.Option(help="Look so many degrees to the right.")] = 0.0,
+    lateral: Annotated[float, typer.Option(help="Metres to the right of the usual path.")] = 0.0,
+    yaw: Annotated[float, typer.Option(help="Degrees that the camera looks to the right.")] = 0.0,
     force: Annotated[
         bool, typer.Option("--force", help="Replace a synthetic sequence in the folder.")
     ] = False,

@@ -32,7 +32,7 @@ def view(
         ),
     ] = None,
     split: Annotated[
-        bool, typer.Option("--split", help="Of --sequence, as the run was given it.")
+        bool, typer.Option("--split", help="For --sequence: the same as in the run.")
     ] = False,
     viewer_port: ViewerPort = None,
     viewer_host: ViewerHost = None,
@@ -63,7 +63,7 @@ def view(
         images = opened
     replay = Replay(run, images, host=viewer_host or LOOPBACK, port=viewer_port)
     try:
-        # Heard from the moment that the address is told.
+        # Ctrl-C counts from the moment that the address is shown.
         with contextlib.suppress(KeyboardInterrupt):
             announce(replay.address, open_browser=True)
             wait_for_event(threading.Event())

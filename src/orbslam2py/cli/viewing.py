@@ -150,7 +150,7 @@ class Viewing:
             return
         self._view.tell_end(f"The run has ended; its results are in {folder}.")
         text = f"The viewer stays at {self._view.address} until Ctrl-C."
-        # Heard from the moment that it is told.
+        # Ctrl-C counts from the moment that the text is shown.
         with contextlib.suppress(KeyboardInterrupt):
             console.print(text, highlight=False, soft_wrap=True)
             self._view.wait()

@@ -31,13 +31,13 @@ _NANO = 10**9
 _UNITS = {0: "seconds", 3: "milliseconds", 6: "microseconds", 9: "nanoseconds"}
 #: Times since 1970 are at least this large in milli-, micro- and nanoseconds.
 _SINCE_1970 = {9: 10**17, 6: 10**14, 3: 10**11}
-#: Steps up to this multiple of the frame's duration are seconds: every so many images were kept.
+#: Steps up to this multiple of the frame's duration are seconds: images may have been left out.
 _MOST_FRAMES_LEFT_OUT = 300
 #: Steps below this share of the frame's duration contradict the frame rate.
 _LEAST_STEP = 1 / 20
 #: Longest step of seconds where no frame rate is known [s].
 _LONGEST_STEP = 300
-#: Of lists in disorder, at most one line in so many is out of order; else a clock was set back.
+#: If more than one line in this number is out of order, the clock may have been set back.
 _ORDERLY = 10
 _DATE = re.compile(
     r"(\d{4})-(\d\d)-(\d\d)[ T](\d\d):(\d\d):(\d\d)(?:[.,](\d+))?(?:Z|\+00:?00)?", re.ASCII
@@ -232,7 +232,7 @@ def _longest_rise(times: Sequence[int]) -> int:
 
 
 def _continued(source: Path | str, times: Sequence[int], doubts: list[str]) -> list[int]:
-    """Let times go on where the clock was set back."""
+    """Move the times after each place where the clock was set back."""
     step = _usual_step(times)
     continued, shift = [times[0]], 0
     for place, (earlier, later) in enumerate(pairwise(times)):
@@ -241,7 +241,7 @@ def _continued(source: Path | str, times: Sequence[int], doubts: list[str]) -> l
             shift += back
             doubts.append(
                 f"{source}: the clock was set back by some {back / _NANO:.6g} s after image "
-                f"{place}; the order of the list is kept and the time goes on"
+                f"{place}; the order of the list is kept, and the later times are moved"
             )
         continued.append(later + shift)
     return continued

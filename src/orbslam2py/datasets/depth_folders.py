@@ -5,37 +5,35 @@ from __future__ import annotations
 
 import logging
 import re
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from orbslam2py._arguments import index_of
 from orbslam2py._depth_size import depth_size_problem
-from orbslam2py.datasets.base import Images, Stamps
+from orbslam2py.datasets.base import Images
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.image_folder import image_files
 from orbslam2py.datasets.images import read_any, read_depth
-from orbslam2py.datasets.recorded import RecordedSequence
 from orbslam2py.datasets.time_files import seconds_of_name, stamps_of_names
-from orbslam2py.datasets.unposed import chosen_stamps, with_rate
+from orbslam2py.datasets.unlisted import UnlistedSequence
 from orbslam2py.errors import DatasetError, ImageError, OrbSlamError
-from orbslam2py.settings import Sensor, Settings
-from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory, associate
+from orbslam2py.settings import Sensor
+from orbslam2py.trajectory import MAX_DIFFERENCE, associate
 
 _log = logging.getLogger(__name__)
 
 #: Names of folders with images of the camera, and with depth: they decide between several.
 _COLOUR_NAME = re.compile(r"colou?r|rgb|images?|img|frames?", re.IGNORECASE)
 _DEPTH_NAME = re.compile(r"depth", re.IGNORECASE)
-#: So much of the smaller folder must be found by name, or names do not tell what is a pair.
+#: Least share of the smaller folder that must have a partner of the same name.
 _BY_NAME = 0.5
 
 
 @dataclass(frozen=True)
 class FolderKind:
-    """What a folder of images holds, told by the first of them.
+    """What a folder of images holds, recognised by its first image.
 
     Attributes
     ----------
@@ -87,7 +85,7 @@ def is_depth_name(name: str) -> bool:
 
 
 def find_depth_pair(folder: Path) -> DepthPair | None:
-    """Return the two sub-folders with images and depth; None if that cannot be told."""
+    """Return the two sub-folders with images and depth; None if they are not certain."""
     kinds = folder_kinds(folder)
     colour = _only([one for one in kinds if one.kind == "colour"], _COLOUR_NAME)
     depth = _only([one for one in kinds if one.kind == "depth"], _DEPTH_NAME)
@@ -103,20 +101,21 @@ def told_by_names(folder: Path) -> bool:
 def no_depth_pair(folder: Path, kinds: list[FolderKind]) -> DatasetError:
     """Say what is in a folder that should have had images and depth, and what to do."""
     has = ", ".join(map(str, kinds))
+    alone = ", or give one of these folders alone (--sensor mono)" if len(kinds) > 1 else ""
     only_depth = len(kinds) > 1 and all(one.kind == "depth" for one in kinds)
     if only_depth:
-        has += "; all look like depth images (16 bits, one channel), none like images of the camera"
+        has += "; all of them look like depth images (16 bits, one channel)"
     return DatasetError(
-        f"cannot tell images and depth in {folder}: it has {has}; keep one "
-        "folder of 8-bit images, such as color, and one of 16-bit depth, such as depth, or list "
-        "the files in rgb.txt and depth.txt ('time path' in every line)"
+        f"cannot tell which folder in {folder} has the images and which the depth: it has {has}; "
+        "keep one folder of 8-bit images, such as color, and one of 16-bit depth, such as depth, "
+        f"or list the files in rgb.txt and depth.txt ('time path' in every line){alone}"
     )
 
 
-class DepthFolders(RecordedSequence):
+class DepthFolders(UnlistedSequence):
     """Images and depth images in two folders side by side; see `datasets.base.Sequence`.
 
-    The folders are told by the first image of each, and by their names where that leaves a choice.
+    The folders are recognised by the first image of each, and by their names if several fit.
     Images and depth belong together by time if all names are times, else by equal names, else by
     their order if there are as many of both.
 
@@ -162,55 +161,24 @@ class DepthFolders(RecordedSequence):
         super().__init__(folder, (Sensor.RGBD, Sensor.MONOCULAR), sensor, settings)
         self._fps = fps
         images = files_in_time(pair.colour.path)
-        self._depth_paths: list[Path] | None = None
+        self._partners = []
         how = "images alone"
         if self.sensor is Sensor.RGBD:
             _require_equal_view(pair)
-            images, self._depth_paths, how = _paired(folder, pair, images)
+            images, self._partners, how = _paired(folder, pair, images)
         self._paths, self._list_path = images, pair.colour.path
-        own = stamps_of_names(images)
-        if fps is not None or times is not None:
-            otherwise: Stamps | float = 0.0  # not needed, and there may be no settings yet
-            told = "are the given ones"
-        else:
-            otherwise = own or self.settings.camera.fps
-            told = "are their names" if own else f"count {otherwise:g} images per second"
-        names = [path.name for path in images]
-        self._stamps = chosen_stamps(
-            len(images), fps, times, otherwise, names, None if times is None else self.known_rate()
-        )
-        if self._depth_paths is not None:
+        told = self._choose_times(images, times)
+        if self._partners:
             _log.info(
-                "%s: %d images in %s go with depth in %s %s; their times %s",
+                "%s: %d images of %s are paired with depth of %s %s; their times %s",
                 *(folder, len(images), pair.colour.path.name, pair.depth.path.name, how, told),
             )
-
-    @cached_property
-    def settings(self) -> Settings:
-        """The settings the caller chose, or `default_settings`, with the rate that was given."""
-        chosen = self.default_settings() if self._chosen is None else self._chosen
-        if self._fps is None:
-            return chosen
-        return replace(chosen, camera=with_rate(chosen.camera, self._fps))
-
-    def image_path(self, index: int, /) -> Path:
-        """Return the file of the image of a frame."""
-        return self._paths[index]
 
     def load(self, index: int, /) -> Images:
         """Read the images of a frame; see `datasets.base.Sequence.load`."""
         image_path, *depth_path = self._files(index_of(index, len(self)))
         image = self._read(image_path)
         return Images(image, depth=read_depth(depth_path[0])) if depth_path else Images(image)
-
-    def ground_truth(self) -> Trajectory | None:
-        """Return None: there are no true poses."""
-        return None
-
-    def _files(self, index: int) -> tuple[Path, ...]:
-        if self._depth_paths is None:
-            return (self._paths[index],)
-        return self._paths[index], self._depth_paths[index]
 
 
 def _kind_of(folder: Path, files: list[Path]) -> FolderKind:

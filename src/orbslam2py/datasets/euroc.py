@@ -11,11 +11,10 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from orbslam2py._arguments import index_of
 from orbslam2py._arrays import FloatArray
 from orbslam2py._files import IMAGE_SUFFIXES
 from orbslam2py._text_lines import content_lines
-from orbslam2py.datasets.base import Images, Layout, Stamps, require_frames
+from orbslam2py.datasets.base import Layout, Stamps, require_frames
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.clock import read_clock, text_of
 from orbslam2py.datasets.euroc_calibration import (
@@ -133,18 +132,6 @@ class EurocSequence(RecordedSequence):
     def image_path(self, index: int, /) -> Path:
         """Return the file of the left image of a frame."""
         return self._left[index]
-
-    def load(self, index: int, /) -> Images:
-        """Read and rectify the images of a frame; see `datasets.base.Sequence.load`."""
-        paths = self._files(index_of(index, len(self)))
-        raw = [self._read(path) for path in paths]
-        if self.sensor is Sensor.MONOCULAR:
-            return Images(raw[0])
-        left, right = (
-            rectifier.rectify(image, path)
-            for rectifier, image, path in zip(self._rectifiers, raw, paths, strict=True)
-        )
-        return Images(left, right=right)
 
     def _files(self, index: int) -> tuple[Path, ...]:
         if self.sensor is Sensor.MONOCULAR:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Images of 16 bits in a sequence: told from depth, and scaled by one range."""
+"""Images of 16 bits in a sequence: distinguished from depth, and scaled by one range."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ _MANY_ZEROS = 0.05
 class GreyScale:
     """Makes 8 bits of the images of 16 bits of one sequence, all by the same range.
 
-    The range is chosen when the first of them comes, from images spread over the sequence, and told
-    once in a note. May be used by several threads.
+    The range is chosen when the first of them comes, from images spread over the sequence. A
+    note says it once. May be used by several threads.
 
     Parameters
     ----------
@@ -53,8 +53,8 @@ class GreyScale:
         images = [one for one in self._sample() if one.dtype == np.uint16] or [image]
         chosen = range_of(images)
         _log.info(
-            "%s: images of 16 bits; grey values %s become 0 to 255, in all images alike (chosen "
-            "from %d of them)",
+            "%s: images of 16 bits; in all images, grey values %s become 0 to 255 (the range of %d "
+            "sample images)",
             *(self._what, chosen, len(images)),
         )
         zeros = float(np.mean([np.mean(np.asarray(one) == 0) for one in images]))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What kind of sequence a folder holds, told by its files."""
+"""What kind of sequence a folder holds, recognised by its files."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def is_depth_pair(folder: Path, sensor: Sensor | str | None) -> bool:
     Raises
     ------
     DatasetError
-        If RGB-D is wanted, or there is depth, and it cannot be told which folders are meant.
+        If RGB-D is wanted, or there is depth, and it is not certain which folders are meant.
     """
     if not folder.is_dir() or has_layout(folder):
         return False
@@ -113,7 +113,7 @@ def open_folders(
     Raises
     ------
     DatasetError
-        If RGB-D or stereo is wanted, or there is depth, and it cannot be told which are meant.
+        If RGB-D or stereo is wanted, or there is depth, and it is not certain which are meant.
     SettingsError
         If there are no settings, or they are wrong.
     """

@@ -28,11 +28,12 @@ from orbslam2py.datasets.grey_scale import (
     spread_over,
 )
 from orbslam2py.datasets.images import read_image
+from orbslam2py.datasets.rectification import Rectifiers, rectifiers_of
 from orbslam2py.errors import DatasetError, SettingsError
 from orbslam2py.settings import Sensor, Settings, resolve_settings
 from orbslam2py.trajectory import Trajectory
 
-#: So many frames without images in the beginning, and a sequence is refused.
+#: A sequence is refused if this number of frames at its beginning have no images.
 _FIRST = 10
 
 
@@ -135,7 +136,7 @@ class RecordedSequence(FramesInOrder, ABC):
         for missing in zip(*(self._files(index) for index in range(n)), strict=True):
             if not any(path.exists() for path in missing):
                 raise DatasetError(
-                    f"none of the first {n} images that {self._list_path} tells is there, from "
+                    f"none of the first {n} images of {self._list_path} exists, from "
                     f"{missing[0]} on{_found_instead(self.folder, missing[0])}; put them where "
                     "the list says, or correct the list"
                 )
@@ -144,13 +145,26 @@ class RecordedSequence(FramesInOrder, ABC):
     def _files(self, index: int) -> tuple[Path, ...]:
         """Return the files of a frame, the image first."""
 
-    @abstractmethod
     def load(self, index: int, /) -> Images:
         """Read (and rectify) the images of a frame; see `datasets.base.Sequence.load`."""
+        paths = self._files(index_of(index, len(self)))
+        images = [self._read(path) for path in paths]
+        if len(images) == 1:
+            return Images(images[0])
+        if self._rectifiers is not None:
+            images = [
+                rectifier.rectify(image, path)
+                for rectifier, image, path in zip(self._rectifiers, images, paths, strict=True)
+            ]
+        return Images(images[0], right=images[1])
 
     @abstractmethod
     def ground_truth(self) -> Trajectory | None:
         """Read the true poses; see `datasets.base.Sequence.ground_truth`."""
+
+    @cached_property
+    def _rectifiers(self) -> Rectifiers | None:
+        return rectifiers_of(self.settings)
 
     def _read(self, path: Path) -> ByteArray:
         """Read an image in the colour order of the settings; 16 bits become 8."""

@@ -8,10 +8,10 @@ import numpy as np
 
 from orbslam2py._arrays import ByteArray
 from orbslam2py.errors import ImageError
-from orbslam2py.settings import CameraRectification
+from orbslam2py.settings import CameraRectification, Settings
 from orbslam2py.settings.rectify import rectification_of_pair
 
-__all__ = ["Rectifier", "rectification_of_pair"]
+__all__ = ["Rectifier", "Rectifiers", "rectification_of_pair", "rectifiers_of"]
 
 
 class Rectifier:
@@ -59,3 +59,13 @@ class Rectifier:
             image, *self._maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0
         )
         return np.asarray(rectified, dtype=np.uint8)
+
+
+#: Of the left and of the right camera.
+Rectifiers = tuple[Rectifier, Rectifier]
+
+
+def rectifiers_of(settings: Settings) -> Rectifiers | None:
+    """Make what rectifies the images of a pair; None if its images are rectified already."""
+    pair = settings.rectification
+    return None if pair is None else (Rectifier(pair.left), Rectifier(pair.right))

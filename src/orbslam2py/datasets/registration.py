@@ -13,16 +13,16 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py.errors import ImageError
 from orbslam2py.settings.projection import distorted
 
-#: A hole of one pixel is filled if so many of the eight pixels around it have depth ...
+#: A hole of one pixel is filled if at least this number of its eight neighbours have depth.
 _NEIGHBOURS = 4
-#: ... and differ by no more than this part of it: edges of things stay open.
+#: They may differ by no more than this part of their depth: edges of things stay open.
 _SAME_SURFACE = 0.05
 #: Points are projected up to this much beyond the corners of the image: a distortion polynomial
 #: may lead points from far outside back into it.
 _MARGIN = 1.1
 #: More pixels than this, in each direction, are not covered by one pixel of depth.
 _WIDEST = 16
-#: So many pixels of depth are projected at once: what is computed of them stays in the cache.
+#: Number of pixels of depth that are projected at once: their results stay in the cache.
 _AT_ONCE = 1 << 15
 #: Steps that undo a distortion.
 _STEPS = 30

@@ -7,27 +7,22 @@ import logging
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 from pathlib import Path
 
-from orbslam2py._arguments import index_of
-from orbslam2py.datasets.base import Images, Stamps
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.depth_folders import FolderKind, files_in_time, folder_kinds, is_depth_name
 from orbslam2py.datasets.image_folder import image_files
 from orbslam2py.datasets.pair_names import find_series, side_of_pair, tells_camera
-from orbslam2py.datasets.recorded import RecordedSequence
-from orbslam2py.datasets.rectification import Rectifier
 from orbslam2py.datasets.time_files import stamps_of_names
-from orbslam2py.datasets.unposed import chosen_stamps, with_rate
+from orbslam2py.datasets.unlisted import UnlistedSequence
 from orbslam2py.errors import DatasetError, SettingsError
-from orbslam2py.settings import Sensor, Settings, resolve_settings
-from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory, associate
+from orbslam2py.settings import Sensor, resolve_settings
+from orbslam2py.trajectory import MAX_DIFFERENCE, associate
 
 _log = logging.getLogger(__name__)
 
-#: So many of the fewer images must have a partner of the same name or number.
+#: Least share of the smaller series that must have a partner of the same name or number.
 _COMMON = 0.5
 #: What a pair looks like, for messages.
 A_PAIR = (
@@ -114,12 +109,12 @@ def no_pair(folder: Path) -> DatasetError:
     return DatasetError(f"{folder} has no stereo images: it has {has}; {A_PAIR}")
 
 
-class StereoFolders(RecordedSequence):
+class StereoFolders(UnlistedSequence):
     """Images of a pair of cameras, in two folders or in one; see `datasets.base.Sequence`.
 
-    The two are told by their names, which differ in left and right, l and r, 0 and 1, 1 and 2, or 2
-    and 3. Images belong together by equal names, by times if all names are times, by the numbers in
-    their names, or else by their order if there are as many of both.
+    The two sides are recognised by their names, which differ in left and right, l and r, 0 and 1, 1
+    and 2, or 2 and 3. Images belong together by equal names, by times if all names are times, by
+    the numbers in their names, or else by their order if there are as many of both.
 
     Parameters
     ----------
@@ -139,7 +134,7 @@ class StereoFolders(RecordedSequence):
     Raises
     ------
     DatasetError
-        If there is no pair, or it cannot be told what belongs together, or the time stamps do not
+        If there is no pair, or its images cannot be paired, or the time stamps do not
         fit.
     SettingsError
         If the settings are wrong.
@@ -179,63 +174,12 @@ class StereoFolders(RecordedSequence):
         else:
             frames = [(name, path, path) for name, path in pair.left_files.items()]
         self._paths = [left for _, left, _ in frames]
-        self._right = [right for _, _, right in frames]
-        self._list_path = folder
-        own = stamps_of_names([Path(name) for name, _, _ in frames])
-        otherwise: Stamps | float = 0.0  # not needed, and there may be no settings yet
-        told = "are the given ones"
-        if fps is None and times is None:
-            otherwise = own or self.settings.camera.fps
-            told = "are their names" if own else f"count {otherwise:g} images per second"
-        names = [path.name for path in self._paths]
-        self._stamps = chosen_stamps(
-            len(names), fps, times, otherwise, names, None if times is None else self.known_rate()
-        )
-        what = f"taking the {len(names)} left images alone ({pair.left}, not {pair.right})"
+        self._partners = [right for _, _, right in frames if self.sensor is Sensor.STEREO]
+        told = self._choose_times([Path(name) for name, _, _ in frames], times)
+        what = f"taking the {len(frames)} left images alone ({pair.left}, not {pair.right})"
         if self.sensor is Sensor.STEREO:
-            what = f"{len(names)} pairs of {pair.left} and {pair.right}, {how}"
+            what = f"{len(frames)} pairs of {pair.left} and {pair.right}, {how}"
         _log.info("%s: %s; their times %s", folder, what, told)
-
-    @cached_property
-    def settings(self) -> Settings:
-        """The settings the caller chose, or `default_settings`, with the rate that was given."""
-        chosen = self.default_settings() if self._chosen is None else self._chosen
-        if self._fps is None:
-            return chosen
-        return replace(chosen, camera=with_rate(chosen.camera, self._fps))
-
-    def image_path(self, index: int, /) -> Path:
-        """Return the file of the left image of a frame."""
-        return self._paths[index]
-
-    def load(self, index: int, /) -> Images:
-        """Read (and rectify) the images of a frame; see `datasets.base.Sequence.load`."""
-        paths = self._files(index_of(index, len(self)))
-        images = [self._read(path) for path in paths]
-        if len(images) == 1:
-            return Images(images[0])
-        if self._rectifiers is not None:
-            images = [
-                rectifier.rectify(image, path)
-                for rectifier, image, path in zip(self._rectifiers, images, paths, strict=True)
-            ]
-        return Images(images[0], right=images[1])
-
-    def ground_truth(self) -> Trajectory | None:
-        """Return None: there are no true poses."""
-        return None
-
-    @cached_property
-    def _rectifiers(self) -> tuple[Rectifier, Rectifier] | None:
-        rectification = self.settings.rectification
-        if rectification is None:
-            return None
-        return Rectifier(rectification.left), Rectifier(rectification.right)
-
-    def _files(self, index: int) -> tuple[Path, ...]:
-        if self.sensor is Sensor.MONOCULAR:
-            return (self._paths[index],)
-        return self._paths[index], self._right[index]
 
 
 def _doubt(pair: ImagePair, settings: SettingsChoice) -> str | None:

@@ -16,7 +16,7 @@ from orbslam2py.datasets.base import Stamps
 from orbslam2py.datasets.clock import is_time, read_clock, time_of, value_of
 from orbslam2py.errors import DatasetError
 
-#: Whole numbers with so many digits are a time since 1970, in so many parts of a second.
+#: Digits of a whole number that is a time since 1970, and its decimals of a second.
 _PARTS_OF_SECOND = {19: 9, 16: 6, 13: 3}
 
 #: Fields of a line: time; time and file; the same of two cameras.

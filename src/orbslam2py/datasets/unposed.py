@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from orbslam2py._arrays import ByteArray
 from orbslam2py.datasets.base import Images, Stamps, choose_sensor
 from orbslam2py.datasets.choose_settings import SettingsChoice
-from orbslam2py.datasets.rectification import Rectifier
+from orbslam2py.datasets.rectification import Rectifiers, rectifiers_of
 from orbslam2py.datasets.time_files import read_time_file, stamps_of_rate
 from orbslam2py.errors import DatasetError, ImageError, SettingsError
 from orbslam2py.settings import BUILTIN_NAMES, CameraSettings, Sensor, Settings, resolve_settings
@@ -123,11 +123,8 @@ class UnposedSource:
         return np.ascontiguousarray(image)
 
     @cached_property
-    def _rectifiers(self) -> tuple[Rectifier, Rectifier] | None:
-        rectification = self.settings.rectification
-        if rectification is None:
-            return None
-        return Rectifier(rectification.left), Rectifier(rectification.right)
+    def _rectifiers(self) -> Rectifiers | None:
+        return rectifiers_of(self.settings)
 
     def check_size(self, image: NDArray[np.generic]) -> None:
         """Compare the size of an image as it is stored with the one of the settings.
@@ -222,7 +219,7 @@ def chosen_stamps(
     """
     if fps is not None and times is not None:
         raise DatasetError(
-            "--fps and --times exclude each other: both tell the time stamps; give one of them"
+            "--fps and --times exclude each other: both set the time stamps; give one of them"
         )
     if times is not None:
         return read_time_file(Path(times), n, names, rate)

@@ -124,7 +124,7 @@ class VideoReader:
         return np.asarray(image, dtype=np.uint8)
 
     def frames(self, step: int = 1) -> Iterator[ByteArray | ImageError]:
-        """Yield every so many frames from the beginning; an error in the place of a bad one.
+        """Yield every `step`-th frame from the beginning; an error in the place of a bad one.
 
         Parameters
         ----------

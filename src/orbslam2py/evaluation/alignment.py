@@ -14,7 +14,7 @@ from orbslam2py.trajectory import MAX_DIFFERENCE, Similarity, align, associate
 
 #: Lengths that differ by more than this factor are those of one camera, not of a wrong baseline.
 _OTHER_UNIT = 1.5
-_FEWEST_POSES = 3  # of which a scale can be told apart from an error
+_FEWEST_POSES = 3  # from this number on, a scale differs from an error
 
 
 class Alignment(str, Enum):
@@ -27,7 +27,8 @@ class Alignment(str, Enum):
     NONE = "none"
     """Left as it is: both are in one world."""
     AUTO = "auto"
-    """``sim3`` for a single camera, ``se3`` for others; told by the lengths if it is not known."""
+    """``sim3`` for a single camera, ``se3`` for others;
+    chosen from the lengths of the paths if the sensor is not known."""
 
     @classmethod
     def of(cls, value: Alignment | str) -> Alignment:

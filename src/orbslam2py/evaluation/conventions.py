@@ -137,8 +137,9 @@ def find_other_reading(
     """See whether another convention makes an estimate fit the truth much better.
 
     Tried are the other order of the quaternions, inverse poses, and both; for the estimate and for
-    the truth. What a file's head or the caller has told about the order is not doubted. Nothing is
-    found in paths of less than 10 matched poses, and in those that turn by less than 5 degrees.
+    the truth. An order that stands in the head of the file, or that the caller gave, is not
+    doubted. Nothing is found in paths of less than 10 matched poses, and in those that turn by less
+    than 5 degrees.
 
     Parameters
     ----------

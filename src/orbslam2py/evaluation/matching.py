@@ -60,8 +60,8 @@ class Matched:
         text += f"over {self.path:.2f} of {self.truth_path:.2f} m of the true path{part}"
         if self.is_timed:
             text += (
-                f"; time stamps differ by {1e3 * self.median_difference:.2f} ms (median), "
-                f"{1e3 * self.max_difference:.2f} ms (largest)"
+                f"; time stamps of matched poses differ by {1e3 * self.median_difference:.2f} ms "
+                f"(median) and {1e3 * self.max_difference:.2f} ms (largest)"
             )
         return text
 

@@ -81,7 +81,7 @@ class Paired:
     estimate, truth
         On one clock.
     by
-        What the pairs are told by, for people.
+        What the poses are matched by, for people.
     is_timed
         Whether the time stamps are seconds; numbers of rows else.
     on_clocks
@@ -242,7 +242,7 @@ def _in_unit_of(poses: Poses, other: FloatArray) -> Poses:
         return poses
     seconds = path.timestamps * reading.unit.per_second / unit.per_second
     kept = tuple(note for note in reading.notes if not note.startswith("times in"))
-    note = f"times in {unit}, told by those of the other file"
+    note = f"times in {unit}, because these fit the times of the other file"
     return replace(
         poses,
         trajectory=Trajectory(seconds, path.T_wc, path.lost, path.indices),

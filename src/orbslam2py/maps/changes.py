@@ -113,7 +113,7 @@ class MapFollower:
     slam_map
         The map, as in ``slam.pipeline.back_end.map``; other threads may change it.
     least_weight
-        Shared points of two keyframes whose covisibility is told.
+        Least number of shared points of two keyframes whose covisibility is reported.
     map_index
         The map that is followed, if there are several; None: the active one, whichever that is.
     """

@@ -55,7 +55,7 @@ class Cameras(ArrayGroup):
     bf: FloatArray
     """Baseline times fx [px m]; 0 with a single camera."""
     depth_ratio: FloatArray
-    """Depths up to so many baselines are close; 0 with a single camera."""
+    """Largest close depth, in baselines; 0 with a single camera."""
     width: IntArray
     """Of the images [px]."""
     height: IntArray

@@ -36,7 +36,7 @@ _log = logging.getLogger(__name__)
 #: Seconds that saving keeps the interpreter's lock, and that it leaves to others after them.
 _LONGEST_STRETCH, _BREAK = 0.0005, 0.0005
 
-#: So many images may be kept before it is looked whether their keyframes live.
+#: Number of kept images from which it is checked whether their keyframes still exist.
 _FEW_IMAGES = 100
 
 #: Gives the frames of a map that hang on known keyframes: ``recorded(map_index, keyframe_ids)``.
@@ -241,7 +241,7 @@ class MapAutosave:
 
 
 class _Autosave:
-    """Saves every so many seconds in a thread of its own; a failure is told and tried again.
+    """Saves at a fixed interval in a thread of its own; a failure is logged and tried again.
 
     A new map after a reset goes into a file of its own: the old one's stays as it is.
     """

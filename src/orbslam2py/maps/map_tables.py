@@ -116,7 +116,7 @@ class BlobTable:
         return arrays
 
     def parts(self, rows_each: int = _PART) -> Iterator[tuple[dict[str, NDArray[Any]], int]]:
-        """Arrays by field of so many rows at a time, and of how many; at least one part."""
+        """Arrays by field of `rows_each` rows at a time, and their number; at least one part."""
         rows = each_row(self._connection, self._table)
         begin = 0
         while True:

@@ -190,7 +190,7 @@ class SavedMap:
         numbers = self._maps_of(frames.keyframes)
         if map_number is None:
             map_number = int(np.bincount(numbers[numbers >= 0], minlength=1).argmax())
-        # Before the first pose a frame is in no map, and is told with the first one.
+        # Before the first pose a frame is in no map; it is listed with the first one.
         chosen = (numbers == map_number) | ((numbers < 0) & (map_number == 0))
         frames = RecordedFrames(
             **{field.name: getattr(frames, field.name)[chosen] for field in fields(frames)}

@@ -91,7 +91,7 @@ def take_snapshots(slam_map: core.Map) -> list[MapSnapshot]:
     while True:
         epoch, there = slam_map.epoch, slam_map.maps
         snapshots = [take_snapshot(slam_map, index) for index in there]
-        # Two that became one meanwhile would be told twice, in two worlds.
+        # Two that became one meanwhile would be listed twice, in two worlds.
         if (slam_map.epoch, slam_map.maps) == (epoch, there):
             return snapshots
 

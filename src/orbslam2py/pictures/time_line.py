@@ -30,7 +30,7 @@ _SHIFT = 4
 NOT_USED = -2
 #: State of an image that was tracked by visual odometry, outside of the map.
 WANDERING = -3
-#: With so many lines of text of room there are two curves.
+#: Lines of text for which there must be room to draw two curves.
 _ROOM_FOR_TWO = 8
 _INLIERS: Colour = (196, 206, 218)
 _MILLISECONDS: Colour = (168, 150, 205)

@@ -33,11 +33,11 @@ from orbslam2py.pictures.framing import Framing
 from orbslam2py.pictures.lettering import draw_text, text_width
 
 _SHIFT = 4
-#: The box of what is to be seen is found with at most so many points.
+#: The box of what is to be seen is found with at most this number of points.
 _SAMPLE = 4000
-#: From so many keyframes on, they are drawn smaller.
+#: From this number of keyframes on, they are drawn smaller.
 _MANY_KEYFRAMES = 150
-#: From so many edges on, they are drawn without smoothing.
+#: From this number of edges on, they are drawn without smoothing.
 _MANY_EDGES = 2000
 #: Camera seen from above: its place, then the ends of what it sees, ahead is up.
 _WEDGE = np.array([(0.0, 0.0), (-0.62, 1.0), (0.62, 1.0)])

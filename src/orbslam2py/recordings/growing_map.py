@@ -78,7 +78,7 @@ class GrowingMap:
         local_points : array of int64, (l,), optional
             Ids of points to be lit up.
         renew : bool
-            Points, keyframes and covisibility too, else these are as they were told last.
+            Points, keyframes and covisibility too, else these are as in the last picture.
         """
         if renew or self._told is None:
             self._told = MapPicture(

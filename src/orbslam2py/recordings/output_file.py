@@ -41,7 +41,7 @@ class OutputFile:
     Raises
     ------
     OutputFileError
-        If it can be told already that nothing will come of it.
+        If it is already certain that the file cannot be written.
     """
 
     def __init__(self, path: str | os.PathLike[str], what: str, suffixes: Iterable[str]) -> None:

@@ -49,7 +49,7 @@ _POINT_PAGE, _KEYFRAME_PAGE = 4096, 64
 #: Seconds of the recording between two states of the map, and of what is as long as the run.
 _MAP_EVERY, _PATHS_EVERY = 0.25, 1.0
 _JPEG_QUALITY = 85
-#: Looks at the free space happen once in so many images.
+#: Number of images after which the free space is checked again.
 _LOOK = 8
 #: Half width, half height and depth of a camera's shape, relative to its size.
 _CORNERS = np.array([(-1, -0.75, 1.2), (1, -0.75, 1.2), (1, 0.75, 1.2), (-1, 0.75, 1.2)])
@@ -77,7 +77,7 @@ class RerunRecorder:
     OrbSlamError
         If Rerun is not installed.
     OutputFileError
-        If it can be told already that there will be no file.
+        If it is already certain that there will be no file.
     """
 
     name = "the recording"
@@ -109,7 +109,7 @@ class RerunRecorder:
         """Where it will be."""
         return self._file.path
 
-    # ---- what is told ----------------------------------------------------------------------------
+    # ---- notifications ---------------------------------------------------------------------------
     def on_map(self, changes: MapChanges) -> None:
         """Take over what has changed; it is written a few times a second."""
         if changes.restarted:

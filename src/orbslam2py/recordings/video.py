@@ -32,7 +32,7 @@ from orbslam2py.viewer.watching import FrameView
 
 #: More than the codecs take.
 _LARGEST_SIDE = 16384
-#: A pause of a stream of images is shown by at most so many pictures.
+#: A pause of a stream of images is shown by at most this number of pictures.
 _LONGEST_PAUSE = 300
 #: Images over which the rate of a recording is measured.
 _RATE_IMAGES = 30
@@ -70,7 +70,7 @@ class VideoWriter:
     Raises
     ------
     OutputFileError
-        If it can be told already that there will be no video, or if a size, a rate, a duration or
+        If it is already certain that there will be no video, or if a size, a rate, a duration or
         a true path is none.
     """
 
@@ -151,7 +151,7 @@ class VideoWriter:
         with self._lock:
             self._unused.append(_Unused(position, timestamp, reason))
 
-    # ---- what is told ----------------------------------------------------------------------------
+    # ---- notifications ---------------------------------------------------------------------------
     def on_map(self, changes: MapChanges) -> None:
         """Take over what has changed."""
         self._map.apply(changes)

@@ -16,7 +16,7 @@ from orbslam2py.recordings.output_file import OutputFile
 
 #: Codecs by the ending of the name, as FFmpeg calls them. All wheels of OpenCV have them.
 CODECS = {".mp4": "mp4v", ".mov": "mp4v", ".mkv": "mp4v", ".avi": "MJPG", ".webm": "VP80"}
-#: Looks at the free space happen once in so many pictures.
+#: Number of pictures after which the free space is checked again.
 _LOOK = 8
 
 
@@ -36,7 +36,7 @@ class VideoFile:
     Raises
     ------
     OutputFileError
-        If it can be told already that there will be no video.
+        If it is already certain that there will be no video.
     """
 
     def __init__(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Whether a calibration fits the first images of a run; told once, and the run goes on."""
+"""Checks whether a calibration fits the first images of a run; warns once, and the run goes on."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ from orbslam2py.slam.frame_source import FrameSource, timed_images
 
 _log = logging.getLogger(__name__)
 
-#: Images that are looked at; every so many begins new points, and a pair's rows are measured.
+#: Images that are used; images between two searches for points; and pairs whose rows are measured.
 N_IMAGES, _EVERY, _N_ROWS = 49, 8, 3
-#: Pairs of images that decide: those with most motion, and so many points of each.
+#: Pairs of images that decide: those with most motion, and the points of each.
 _N_PAIRS, _N_POINTS = 8, 150
 #: Least median motion of a pair's points, in image widths: less tells nothing.
 _MOTION = 0.012

@@ -121,7 +121,7 @@ class LiveFeed:
     camera : LiveSource
         The images.
     max_frames : int, optional
-        End after so many; else only `stop` ends it.
+        End after this number of frames; else only `stop` ends it.
     """
 
     is_live = True

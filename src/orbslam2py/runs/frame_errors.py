@@ -10,7 +10,7 @@ from orbslam2py.runs.report import RunEvaluation
 from orbslam2py.runs.result import RunResult
 from orbslam2py.trajectory import MAX_DIFFERENCE, Trajectory, associate
 
-#: So many places are told, this part of the run apart at least.
+#: Number of places that are listed, and their least distance as a part of the run.
 _N_WORST, _APART = 4, 0.06
 
 

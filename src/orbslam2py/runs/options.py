@@ -46,11 +46,11 @@ class RunOptions:
     start: int = 0
     """Index of the first frame."""
     stride: int = 1
-    """Take every so many frames."""
+    """Step between the frames that are used: 2 takes every second one."""
     max_frames: int | None = None
-    """Take at most so many frames."""
+    """Most frames to use."""
     localize_after: int | None = None
-    """Switch to localization mode after so many frames; 0, in a loaded map: from the first on."""
+    """Frames before localization mode; 0, in a loaded map: from the first frame on."""
     final_adjustment: bool = False
     """Refine the finished map as a whole (`System.optimize`) before the results are written."""
     load_map: SavedMap | MapFile | None = None
@@ -60,9 +60,9 @@ class RunOptions:
     allow_other_setup: bool = False
     """Load the map although it was made with another camera or other visual words."""
     save_map: Path | None = None
-    """Save the maps in this file at the end ..."""
+    """Save the maps in this file at the end."""
     autosave: float | None = None
-    """... and every so many seconds on the way."""
+    """Interval at which the maps are also saved during the run, seconds."""
 
     if TYPE_CHECKING:  # text is taken for a sensor, which the type of the field cannot say
 

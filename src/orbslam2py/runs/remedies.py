@@ -57,9 +57,9 @@ def why_nothing_was_tracked(
 ) -> str:
     """Name the commonest reason of a run without a pose, how common it was, and what helps.
 
-    That the first of two views was taken is a step on the way, and told only if there is nothing
-    else; frames that could not be read count as one reason, told by the first of them. If a warning
-    spoke against the calibration, that comes first, and other remedies only after it.
+    That only the first of two views was found is named only if there is no other reason. Frames
+    that could not be read count as one reason, the one of the first of them. If a warning doubted
+    the calibration, that comes first, and other remedies after it.
     """
     reasons = Counter(row.reason for row in rows if row.state != "SKIPPED" and row.reason)
     skipped = [row.reason for row in rows if row.state == "SKIPPED"]

@@ -20,7 +20,7 @@ from orbslam2py.runs.several_maps import draw_maps, maps_of_run
 from orbslam2py.runs.timeline import Timeline
 from orbslam2py.settings.sensor import Sensor
 
-#: So many poses must have a true one at their time before they tell how long a unit is.
+#: Least number of poses with a true one at their time to compute the scale.
 _POSES_FOR_SCALE = 3
 
 

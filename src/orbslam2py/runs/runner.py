@@ -124,7 +124,7 @@ class SequenceRunner:
         begin = time.perf_counter()
         result.started = datetime.now().astimezone().isoformat(timespec="seconds")
         in_time = options.realtime or self._feed.is_live
-        # Told by the watch, which knows more, or by nobody.
+        # The watch below checks the calibration: it knows more.
         how = replace(options.system, wait_for_mapping=not in_time, check_calibration=False)
         self._watch = self._calibration_watch(
             in_background=in_time or not options.system.deterministic

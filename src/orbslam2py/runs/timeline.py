@@ -12,7 +12,7 @@ import numpy.typing as npt
 from orbslam2py._arrays import FloatArray, IntArray
 from orbslam2py.runs.result import FrameRow
 
-#: Without a pose for longer than so many seconds, and so many frames, a path has a gap.
+#: A path has a gap where it has no pose for longer than this time [s] and number of frames.
 _LONG_SECONDS, _LONG_FRAMES = 1.0, 5.0
 
 #: A stretch of time: its beginning and its end [s].

@@ -14,9 +14,9 @@ import numpy.typing as npt
 
 _log = logging.getLogger(__name__)
 
-#: So many images with depth are looked at, and so many at all: a camera may begin without.
+#: Images with depth that are checked, and images that are read at most: the first may have none.
 N_CHECKED, N_LOOKED_AT = 5, 100
-#: Every so many pixels count. No divisor of a usual width, so that all columns take part.
+#: Step between the pixels that count. No divisor of a usual width, so that all columns take part.
 _STEP = 7
 #: Medians of depth images that a camera for which RGB-D is meant may have [m].
 _LEAST, _MOST = 0.05, 200.0
@@ -29,7 +29,7 @@ _SENSIBLE = (1e-100, 1e100)
 _NEAR = 0.5
 #: Where the median of a depth image usually lies [m].
 _LIKELY = (0.3, 8.0)
-#: What is told.
+#: The warning.
 _TEXT = (
     "depth images do not fit DepthMapFactor %g: their median is %.4g m; "
     "DepthMapFactor: %g would make it %.4g m"
@@ -47,7 +47,7 @@ class DepthCheck:
     Attributes
     ----------
     warning : str or None
-        What was told.
+        The warning that was logged.
     """
 
     def __init__(self, factor: float) -> None:

@@ -105,11 +105,11 @@ def _doubts_of_lens(
     corner = np.hypot(max(cx, width - 1 - cx) / fx, max(cy, height - 1 - cy) / fy)
     if fold < corner:
         found.append(
-            f"{name}: the radial distortion folds the image over: from {fold * fx:.0f} pixels "
-            f"beside the principal point on it draws what is farther outside farther inside, and "
-            f"the image reaches to {corner * fx:.0f}; look at order, signs and size of the "
-            "coefficients (OpenCV's k1, k2, p1, p2, k3), or calibrate with views that reach into "
-            "the corners"
+            f"{name}: the radial distortion is impossible near the image border: the distorted "
+            f"radius grows only up to {fold * fx:.0f} pixels, but the image corner is "
+            f"{corner * fx:.0f} pixels from the principal point; check order, signs and size of "
+            "the coefficients (OpenCV's k1, k2, p1, p2, k3), or calibrate with views that reach "
+            "into the corners"
         )
     return found
 

@@ -85,9 +85,9 @@ def _has_four_radial(entries: Mapping[str, Entry], camera: str) -> bool:
 
 def _refuse_fisheye(entry: Entry, why: str, path: Path, sensor: Sensor) -> None:
     text = (
-        f"{why} tells a fisheye calibration (Kannala-Brandt, k1 to k4): with its numbers in the "
-        "pinhole model, which orbslam2py has, every map would be bent. Undistort the images first, "
-        "with cv2.fisheye.estimateNewCameraMatrixForUndistortRectify (gives new_K), "
+        f"{why} belongs to a fisheye calibration (Kannala-Brandt, k1 to k4). orbslam2py has the "
+        "pinhole model; with these numbers in it every map would be bent. Undistort the images "
+        "first, with cv2.fisheye.estimateNewCameraMatrixForUndistortRectify (gives new_K), "
         "cv2.fisheye.initUndistortRectifyMap(K, D, R, new_K, size, cv2.CV_16SC2) and cv2.remap, "
         "and make settings of new_K without distortion:\n"
         f"    {new_line(sensor)}"

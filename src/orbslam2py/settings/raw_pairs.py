@@ -129,7 +129,7 @@ def stella_pair(
     size = _size(entries)
     bf = _read(entries["Camera.bf"], [])
     if camera is None or size is None or bf is None:
-        return None  # told where these are read
+        return None  # an error elsewhere names it
     cameras = []
     for side, shift in (("left", 0.0), ("right", -bf)):
         try:

@@ -250,6 +250,8 @@ class Settings:
             lines.append(
                 f"baseline {self.baseline:.4g} m, points are close below {self.close_depth:.4g} m"
             )
+        if self.sensor is Sensor.RGBD:
+            lines.append(f"depth images: {self.depth_factor:g} units per metre")
         return lines
 
 

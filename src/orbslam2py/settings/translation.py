@@ -64,7 +64,7 @@ class Translated(Document):
     rectification
         Of a raw pair that is described as other programs do it.
     unreadable
-        Our keys whose values could not be found because of a problem that is told.
+        Our keys whose values could not be found because of a problem that is in the list.
     """
 
     rectification: StereoRectification | None = None
@@ -159,7 +159,7 @@ def _translate_baseline(result: Translated, entry: Entry, sensor: Sensor) -> Non
         result.problems.append(Problem(entry.line, text))
         result.unreadable.add("Camera.bf")
         return
-    if fx is None:  # which is told where it is read
+    if fx is None:  # an error elsewhere names it
         result.unreadable.add("Camera.bf")
         return
     bf = baseline * fx

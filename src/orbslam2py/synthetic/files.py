@@ -28,8 +28,8 @@ Progress = Callable[[int, int], None]
 
 #: Holds the options; marks folders that may be replaced.
 MARKER = "synthetic.json"
-#: In it: names in the folder, and how many files each of them holds, by which another's files are
-#: told from its own.
+#: In it: names in the folder, and how many files each of them holds, by which files of others are
+#: distinguished from its own.
 _ENTRIES = "entries"
 #: What programs that show folders leave in them.
 _NOBODYS = (".DS_Store", "Thumbs.db", "desktop.ini")

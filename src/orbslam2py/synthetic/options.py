@@ -65,8 +65,8 @@ class SyntheticOptions:
         Seconds that a hand is over the lens, in the middle of the sequence. Two numbers: when it
         comes [s], and for how long it stays.
     pieces
-        Cut the way into so many pieces of one length, which come one after the other; `frames`
-        and `laps` are those of the way before it is cut.
+        Number of pieces of equal length that the path is cut into; they come one after the other.
+        `frames` and `laps` are those of the path before it is cut.
     order
         Numbers of the pieces that come, from 0; those that are not named are left out. By default
         all of them come, shuffled by the seed.

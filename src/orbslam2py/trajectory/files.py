@@ -34,7 +34,7 @@ class Reading:
     quaternions
         Order of the quaternions; None for matrices, and for poses of no file.
     order_is_known
-        Whether the order was given, or told by the head of the file.
+        Whether the order was given, or stands in the head of the file.
     inverse
         Whether the file holds poses of the world in the camera, which were inverted.
     unit
@@ -179,9 +179,9 @@ def read_trajectory_file(
     path
         The file.
     file_format
-        What it is; by default told by its content.
+        What it is; by default recognised by its content.
     quaternions
-        Order of the quaternions; by default told by the head, or by the format.
+        Order of the quaternions; by default that of the head, or of the format.
     inverse
         The file holds poses of the world in the camera, ``T_cw``.
 
@@ -236,7 +236,7 @@ def _read(
 
 
 def _format_of(table: TextTable, columns: Columns, unit: TimeUnit | None) -> TrajectoryFormat:
-    """EuRoC's format is told by times in ns with commas or a head, and by w first."""
+    """Whether a file is EuRoC's: times in ns with commas or a head, and w first."""
     if columns.time is None:
         return TrajectoryFormat.KITTI
     in_ns = unit is TimeUnit.NANOSECONDS and (table.has_commas or columns.is_named)
@@ -312,7 +312,7 @@ def _notes(
         columns.is_named and order is not _usual_order(file_format)
     ):
         where = ", ".join(str(column + 1) for column in sorted(columns.used))
-        told = "as its head says" if columns.is_named else "told by the numbers"
+        told = "as its head says" if columns.is_named else "recognised by their values"
         w = "last" if order is QuaternionOrder.XYZW else "first"
         notes.append(f"poses in the columns {where}, w {w} ({told})")
     return tuple(notes)

@@ -20,7 +20,7 @@ from orbslam2py.trajectory.columns import (
 from orbslam2py.trajectory.table import TextTable, is_number
 from orbslam2py.trajectory.writers import TrajectoryFormat
 
-_SAMPLE = 64  # rows by which columns are told
+_SAMPLE = 64  # rows by which columns are recognised
 _LONGEST = 60  # characters of a line that a message shows
 _FEWEST_COLUMNS = 7  # of a position and a quaternion: fewer are no poses at all
 REMEDY = (

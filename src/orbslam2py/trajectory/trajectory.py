@@ -110,7 +110,7 @@ class Trajectory(EqualByValue, MadeAgainByCopies):
         )
 
     def shifted(self, seconds: float) -> Trajectory:
-        """Return the same poses at time stamps that are later by so many seconds."""
+        """Return the same poses at time stamps that are later by `seconds`."""
         seconds = finite_number(seconds, "the shift", "a number of seconds", DatasetError)
         return Trajectory(self.timestamps + seconds, self.T_wc, self.lost, self.indices)
 

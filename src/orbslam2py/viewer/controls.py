@@ -32,7 +32,7 @@ _COLOURS: dict[str, Colour] = {
 
 
 class SystemActions(Protocol):
-    """What a person may ask of a system. Each returns what is to be told of it, if anything is."""
+    """What a person may ask of a system. Each returns a message for the page, or None."""
 
     def set_localization(self, wanted: bool) -> str | None:
         """Switch localization mode."""

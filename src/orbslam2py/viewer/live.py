@@ -44,7 +44,7 @@ FRAME_RATE = 10.0
 
 
 class LiveView:
-    """A watcher that shows what it is told in a page, which a process of its own serves.
+    """A watcher that shows the run in a page, which a process of its own serves.
 
     That process has a low priority, is not reached by Ctrl-C, and ends with this one. If it is the
     first to end, the run goes on without it.

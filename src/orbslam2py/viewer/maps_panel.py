@@ -41,7 +41,7 @@ class MapsPanel:
     server : viser.ViserServer
         The page.
     on_switch : callable
-        Told the number of a map, and whether it is to be seen.
+        Called with the number of a map, and whether it is to be seen.
     """
 
     def __init__(self, server: viser.ViserServer, on_switch: Callable[[int, bool], None]) -> None:

@@ -14,9 +14,9 @@ from orbslam2py.evaluation import Similarity, fit_by_time
 from orbslam2py.slam.records import TrackingRecord
 from orbslam2py.trajectory import Trajectory
 
-#: A path is drawn with at most so many corners.
+#: A path is drawn with at most this number of corners.
 MAX_CORNERS = 4000
-#: So many poses must have a true one at their time before the truth is laid beside them.
+#: Least number of poses with a true one at their time to align the truth with them.
 _MIN_PAIRS = 5
 #: Seconds of a path after which the truth is laid beside it anew.
 _LAY_EVERY = 1.0

@@ -38,7 +38,7 @@ _log = logging.getLogger(__name__)
 
 #: Views that wait for the watchers when every frame is wanted.
 _WAITING_VIEWS = 4
-#: After a look at the map that took a second, the next one waits for so many: loops move all of it.
+#: Pause after a look at the map, as a multiple of its duration: loops move all of the map.
 _REST = 4.0
 #: Seconds between two looks at the maps that rest.
 _RESTING_PERIOD = 1.0
@@ -64,9 +64,9 @@ class Publisher:
     watchers : iterable of Watcher
         Who wants to see it.
     frame_rate : float
-        At most so many images a second.
+        Most images per second.
     map_rate : float
-        At most so many looks at the map a second.
+        Most looks at the map per second.
     every_frame : bool
         Pass over no frame, and look at the map with each: the track call waits until there is room
         for one. For a video of a recorded sequence.

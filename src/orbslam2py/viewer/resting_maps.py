@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Maps that rest beside the active one, as those who watch are told of them."""
+"""Maps that rest beside the active one, as watchers see them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from orbslam2py.maps.changes import MapChanges, MapFollower
 
 @dataclass(frozen=True, eq=False)
 class RestingMaps:
-    """The maps that rest, and what has changed in them since they were told last.
+    """The maps that rest, and what has changed in them since the last notification.
 
     Each map is a world of its own: positions in two of them have nothing to do with each other.
     """
@@ -20,15 +20,15 @@ class RestingMaps:
     active: int
     """Number of the map that is tracked in, as in `TrackingRecord.map_index`."""
     there: tuple[int, ...]
-    """Numbers of those that rest, ascending. One that was told before and is not named here is the
-    active one now, or part of another, or no more."""
+    """Numbers of those that rest, ascending. One that was reported before and is not named here
+    is the active one now, or part of another, or no more."""
     changes: tuple[MapChanges, ...]
     """Of those that have changed; in the first for a map, all of it."""
 
 
 @runtime_checkable
 class RestingMapsWatcher(Protocol):
-    """A watcher that is also told of the maps that rest; others see the active one only."""
+    """A watcher that also gets the maps that rest; others see the active one only."""
 
     def on_resting_maps(self, maps: RestingMaps) -> None:
         """Other maps rest than at the last call, or one of them has changed."""

@@ -71,7 +71,7 @@ class Scene:
     colours : PointColours
         Of its points.
     on_click : callable
-        Told the id of a keyframe that somebody clicks.
+        Called with the id of a keyframe that somebody clicks.
     """
 
     def __init__(

@@ -36,7 +36,7 @@ LOOPBACK = "127.0.0.1"
 DEFAULT_PORT = 8080
 #: Ports after the first one that are tried.
 _TRIES = 100
-#: Seconds for browsers to be told that it ends.
+#: Time to notify browsers that it ends [s].
 _GOODBYE = 0.3
 
 

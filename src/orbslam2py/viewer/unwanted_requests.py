@@ -18,8 +18,8 @@ _READER = "_message_consumer"
 class UnwantedRequests(logging.Filter):
     """Keeps it off the log that a server was sent what is none of the page's.
 
-    The library closes the connection and goes on serving. An error of our own, as in what a button
-    does, is told as ever, and so is what other servers in this program have to tell.
+    The library closes the connection and goes on serving. Our own errors, for example of a
+    button, are logged as usual, and so are messages of other servers in this program.
 
     Parameters
     ----------
@@ -33,11 +33,11 @@ class UnwantedRequests(logging.Filter):
         _LIBRARY.addFilter(self)
 
     def stop(self) -> None:
-        """Let everything be told again; may be repeated."""
+        """Log everything again; may be repeated."""
         _LIBRARY.removeFilter(self)
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Whether a record is to be told."""
+        """Whether a record is to be logged."""
         if not (self._is_of_server(record) and _is_of_sender(record)):
             return True
         _log.debug("%s", record.getMessage(), exc_info=record.exc_info)

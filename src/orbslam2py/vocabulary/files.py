@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Vocabulary formats told apart by content, and read.
+"""Recognises the format of a vocabulary file by its content, and reads it.
 
 Binary (our own, memory-mapped), text (ORBvoc.txt), text packed with gzip or tar and gzip, and the
 YAML form of DBoW2.

@@ -46,7 +46,7 @@ def load_vocabulary(
     cache: bool = True,
     progress: Progress | None = None,
 ) -> core.Vocabulary:
-    """Open a vocabulary of any format, told by its content.
+    """Open a vocabulary of any format, which is recognised by its content.
 
     Parameters
     ----------

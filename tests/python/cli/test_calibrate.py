@@ -34,6 +34,18 @@ def test_command_writes_settings_that_load(tmp_path: Path) -> None:
     assert "--force" in str(again.exception)
 
 
+def test_the_depth_factor_is_printed(tmp_path: Path) -> None:
+    (tmp_path / "views").mkdir()
+    views = chessboards.write_views(tmp_path / "views")
+    arguments = ["calibrate", str(views), "--board", "9x6", "--square", "0.025", "--max-views", "6"]
+    arguments += ["--sensor", "rgbd", "--force", "--output", str(tmp_path / "my.yaml")]
+    assumed = CliRunner().invoke(app, arguments)
+    assert "1000 units per metre (millimetres) are assumed" in " ".join(assumed.output.split())
+    given = CliRunner().invoke(app, [*arguments, "--depth-factor", "5000"])
+    assert "depth images: 5000 units per metre" in given.output
+    assert "assumed" not in given.output
+
+
 def test_import_command(tmp_path: Path) -> None:
     output = tmp_path / "my.yaml"
     arguments = ["import-camera", str(written(tmp_path, KALIBR)), "--output", str(output)]

@@ -85,9 +85,9 @@ def expect_same(figures: dict[str, Any], right: dict[str, Any]) -> None:
         (lines(ESTIMATE, ","), ""),
         (lines(ESTIMATE, ";"), ""),
         (" ".join(NAMES) + "\n" + lines(ESTIMATE), ""),
-        (lines(ESTIMATE, per_second=1e9), "times in ns, told by those of the other file"),
-        (lines(ESTIMATE, per_second=1e6), "times in us, told by those of the other file"),
-        (lines(ESTIMATE, per_second=1e3), "times in ms, told by those of the other file"),
+        (lines(ESTIMATE, per_second=1e9), "times in ns, because these fit the times of the other"),
+        (lines(ESTIMATE, per_second=1e6), "times in us, because these fit the times of the other"),
+        (lines(ESTIMATE, per_second=1e3), "times in ms, because these fit the times of the other"),
         (
             lines(ESTIMATE, ",", "wxyz", 1e9).replace("\n", ",\n"),
             "times in ns and quaternions w first, as EuRoC and VINS write them",
@@ -114,7 +114,7 @@ def test_any_file_gives_the_same_figures(
         else:
             assert figures["ate_rmse_m"] < 1e-6
         # What the digits say is not said twice.
-        short = note.partition(", told")[0]
+        short = note.partition(", because")[0]
         assert (f"Read: other.txt: {short}" in done.out) == bool(note), done.out
 
 
@@ -122,7 +122,10 @@ def test_the_unit_of_the_truth(command: CommandLine, right: dict[str, Any]) -> N
     Path("truth_ms.txt").write_text(lines(TRUTH, per_second=1e3))
     figures, done = compared(command, "plain.txt", "truth_ms.txt")
     expect_same(figures, right)
-    assert "Read: truth_ms.txt: times in ms, told by those of the other file." in done.out
+    assert (
+        "Read: truth_ms.txt: times in ms, because these fit the times of the other file."
+        in done.out
+    )
     figures, _ = compared(command, "plain.txt", "truth_ms.txt", "--offset", "0.005")
     assert figures["time_difference_max_s"] == pytest.approx(0.005)
 

@@ -240,7 +240,9 @@ def test_a_report_of_another_program(command: CommandLine, tmp_path: Path, senso
     (tmp_path / "report.json").write_text(json.dumps({"sensor": sensor}))
     figures, done = compared(command, "a.txt", "b.txt")
     expect_right(figures, N)
-    assert "sim3 (told by the lengths)" in done.out
+    assert (
+        "sim3 (chosen from the lengths of the paths, because the sensor is not known)" in done.out
+    )
 
 
 @pytest.mark.parametrize("table", ["frame;x;y\n1;2;3\n", "", "index,timestamp\n0,0.5\n"])

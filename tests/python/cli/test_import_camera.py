@@ -119,6 +119,33 @@ def test_half_a_pixel_of_nerfstudio_is_told(command: CommandLine, tmp_path: Path
 
 
 # ---- remedies ------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("text", "given", "factor", "assumed"),
+    [
+        (files.RECORD3D, (), 1000, True),
+        (files.POLYCAM, (), 1000, True),
+        (files.RECORD3D, ("--depth-factor", "5000"), 5000, False),
+        (files.REPLICA, (), 6553.5, False),
+    ],
+)
+def test_the_depth_factor_is_printed(
+    command: CommandLine,
+    tmp_path: Path,
+    text: str,
+    given: tuple[str, ...],
+    factor: float,
+    assumed: bool,
+) -> None:
+    written(tmp_path, text, "file")
+    done = command(*IMPORT, "--sensor", "rgbd", *given)
+    assert done.code == 0, done.err
+    assert f"depth images: {factor:g} units per metre\n" in done.out
+    told = "file does not say the units of the depth images; 1000 units per metre (millimetres)"
+    assert (told in done.err) == assumed
+    assert Settings.load("my.yaml", "rgbd").depth_factor == factor
+    assert "units per metre" not in command(*IMPORT, "--force").out
+
+
 @pytest.mark.parametrize("name", EQUIDISTANT)
 def test_fisheye_is_undistorted_by_opencv(command: CommandLine, tmp_path: Path, name: str) -> None:
     written(tmp_path, EQUIDISTANT[name], "file")

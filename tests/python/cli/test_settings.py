@@ -21,7 +21,8 @@ def test_new_settings_of_a_phone(command: CommandLine) -> None:
     done = command("settings", "new", "--sensor", "rgbd", *NUMBERS, "-o", "phone.yaml")
     assert (done.code, done.err) == (0, "")
     assert "points are close below 3 m" in done.out
-    assert "taken to be in millimetres; if not, give --depth-factor" in done.out
+    assert "depth images: 1000 units per metre" in done.out
+    assert "(millimetres) are assumed; if they are others, give --depth-factor" in done.out
     settings = Settings.load("phone.yaml", Sensor.RGBD)
     assert (settings.camera.fx, settings.camera.fy, settings.depth_factor) == (525, 520, 1000)
 
@@ -31,7 +32,8 @@ def test_all_options_of_new(command: CommandLine) -> None:
     more += ("--distortion", "-0.1,0.02,0.001,-0.002,0.3", "--features", "1234", "--rgb")
     done = command("settings", "new", "--sensor", "rgbd", *NUMBERS, *more, "-o", "a.yaml")
     assert done.code == 0, done.err
-    assert "millimetres" not in done.out
+    assert "depth images: 5000 units per metre" in done.out
+    assert "assumed" not in done.out
     settings = Settings.load("a.yaml", Sensor.RGBD)
     camera = settings.camera
     assert (camera.width, camera.height, camera.fps, camera.rgb) == (1280, 720, 15, True)

@@ -17,7 +17,7 @@ def test_images_of_the_list_lie_elsewhere(tum: Path) -> None:
     with pytest.raises(DatasetError) as caught:
         open_input(tum)
     text = str(caught.value)
-    assert text.startswith(f"none of the first 3 images that {tum / 'rgb.txt'} tells is there, ")
+    assert text.startswith(f"none of the first 3 images of {tum / 'rgb.txt'} exists, ")
     assert f"from {tum / 'rgb/100.000000.png'} on" in text
     assert f"(there is {tum / 'colour/100.000000.png'}); put them where the list says" in text
     with pytest.raises(DatasetError, match="none of the first 3"):
@@ -44,7 +44,7 @@ def test_images_of_kitti_have_other_names(kitti: Path, camera: int) -> None:
 def test_images_of_euroc_are_missing(euroc: Path) -> None:
     for path in (euroc / "mav0/cam1/data").iterdir():
         path.unlink()
-    with pytest.raises(DatasetError, match=r"cam0/data\.csv tells is there, from .*cam1/data/14"):
+    with pytest.raises(DatasetError, match=r"cam0/data\.csv exists, from .*cam1/data/14"):
         open_input(euroc)
     assert len(open_input(euroc, "mono")) == 3  # type: ignore[arg-type]
 

@@ -40,8 +40,8 @@ def test_one_range_for_the_whole_sequence(tmp_path: Path, caplog: pytest.LogCapt
     with caplog.at_level(logging.INFO):
         images = [sequence.load(i).image for i in (7, 0, 19)]  # type: ignore[union-attr]
     (note,) = [r.getMessage() for r in caplog.records if r.levelno == logging.INFO]
-    assert "images of 16 bits; grey values" in note
-    assert "chosen from 16 of them" in note
+    assert "images of 16 bits; in all images, grey values" in note
+    assert "(the range of 16 sample images)" in note
     chosen = range_of([RAMP + np.uint16(7000 + 10 * k) for k in range(20)])
     assert chosen.low == pytest.approx(7000, abs=30)
     assert chosen.high == pytest.approx(10071 + 190, abs=30)
@@ -133,7 +133,8 @@ def test_a_folder_of_depth(tmp_path: Path) -> None:
 def test_only_depth_in_two_folders(tmp_path: Path) -> None:
     thermal(tmp_path / "p" / "rgb", 2)
     thermal(tmp_path / "p" / "depth", 2)
-    with pytest.raises(DatasetError, match="all look like depth images"):
+    remedy = r"all of them look like depth images.*or give one of these folders alone"
+    with pytest.raises(DatasetError, match=remedy):
         open_input(tmp_path / "p", settings=builtin_settings("tum1", Sensor.RGBD))
 
 

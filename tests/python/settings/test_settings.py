@@ -84,7 +84,7 @@ def test_distortion_vector() -> None:
 
 def test_description_names_the_figures() -> None:
     text = "\n".join(builtin_settings("tum1", Sensor.RGBD).describe())
-    for figure in ("517.306", "0.262383", "1000 features", "20 and 7", "3.093 m"):
+    for figure in ("517.306", "0.262383", "1000 features", "20 and 7", "3.093 m", ": 5000 units"):
         assert figure in text
 
 

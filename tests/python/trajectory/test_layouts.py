@@ -133,7 +133,7 @@ def test_a_number_behind_the_time(tmp_path: Path) -> None:
     done = read(tmp_path, text)
     expect_path(done.trajectory)
     assert done.reading.notes == (
-        "poses in the columns 1, 3, 4, 5, 6, 7, 8, 9, w last (told by the numbers)",
+        "poses in the columns 1, 3, 4, 5, 6, 7, 8, 9, w last (recognised by their values)",
     )
 
 

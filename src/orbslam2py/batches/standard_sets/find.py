@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Sequences of a standard data set below a folder, told by their files."""
+"""Sequences of a standard data set below a folder, recognised by their files."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class StandardSet(str, Enum):
 
     @property
     def files(self) -> str:
-        """What its sequences are told by."""
+        """The files by which its sequences are recognised."""
         return {
             "tum": "rgb.txt or associations.txt",
             "kitti": "times.txt with image_0 or image_2",

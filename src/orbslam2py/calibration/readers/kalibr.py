@@ -27,7 +27,7 @@ from orbslam2py.errors import SettingsError
 
 
 def read_kalibr(source: CalibrationSource) -> CameraFile:
-    """Read all cameras; where each stands is told by ``T_cn_cnm1``, from the one before."""
+    """Read all cameras; ``T_cn_cnm1`` gives the pose of each from the one before."""
     numbers = sorted(
         int(match[1]) for key in source.values if (match := re.fullmatch(r"cam(\d+)", str(key)))
     )

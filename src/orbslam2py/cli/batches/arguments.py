@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 ResumeFlag = Annotated[
-    bool, typer.Option("--resume", help="Go on: what was finished is not run again.")
+    bool, typer.Option("--resume", help="Continue a batch: finished runs are not repeated.")
 ]
 SchedulerOption = Annotated[
     str | None,
@@ -23,8 +23,8 @@ WorkersOption = Annotated[
 MemoryLimitOption = Annotated[
     str | None,
     typer.Option(
-        help="Of each worker that is started, such as 4GB; at least 500MB [an equal part of the "
-        "computer's].",
+        help="Memory of each worker that is started, such as 4GB; at least 500MB [an equal part of "
+        "the computer's memory].",
         metavar="SIZE",
     ),
 ]

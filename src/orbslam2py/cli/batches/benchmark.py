@@ -60,7 +60,7 @@ def benchmark(
         bool, typer.Option("--deterministic", help="The same result of a seed every time.")
     ] = False,
     max_frames: Annotated[
-        int | None, typer.Option(help="Only so many frames of each, for a trial.", min=1)
+        int | None, typer.Option(help="Most frames of each, for a trial.", min=1)
     ] = None,
     resume: ResumeFlag = False,
     scheduler: SchedulerOption = None,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a person is told about a map."""
+"""Text about a map for people."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ MapFile = Annotated[Path, typer.Argument(help="Map file.")]
 MapNumber = Annotated[
     int | None,
     typer.Option(
-        "--map", help="Which one, if the file holds several; 0 is the oldest.", metavar="K", min=0
+        "--map", help="Number of the map in a file of several; 0 is the oldest.", metavar="K", min=0
     ),
 ]
 Output = Annotated[Path, typer.Option("--output", "-o", help="Map file to write.")]
@@ -143,13 +143,13 @@ def align(
     ] = None,
     length: Annotated[
         float | None,
-        typer.Option(help="Of one camera: a known length, between ...", metavar="METRES"),
+        typer.Option(help="Known length between the places of --between [m].", metavar="METRES"),
     ] = None,
     between: Annotated[
         tuple[str, str] | None,
         typer.Option(
-            help="... two places: x,y,z in the map, or seconds since the first keyframe, where the "
-            "camera was then.",
+            help="The two places of --length: x,y,z in the map, or seconds since the first "
+            "keyframe for the place of the camera then.",
             metavar="PLACE PLACE",
         ),
     ] = None,
@@ -192,7 +192,7 @@ def optimize(
     output: Output,
     time_limit: Annotated[
         float | None,
-        typer.Option(help="Seconds after which it ends with what it has reached."),
+        typer.Option(help="Seconds after which it stops and keeps its result so far."),
     ] = None,
     number: MapNumber = None,
     force: Force = False,
@@ -217,7 +217,7 @@ def optimize(
     _say(quiet, _where(saved, number, output))
 
 
-# ---- what is told --------------------------------------------------------------------------------
+# ---- printed text --------------------------------------------------------------------------------
 def _where(saved: SavedMap, number: int | None, output: Path) -> str:
     others = _others(saved)
     return f"{f'Map {number}' if others else 'The map'} is in {output}{others}"

@@ -94,12 +94,12 @@ def export(
             metavar="SEQUENCE",
         ),
     ] = None,
-    fps: Annotated[float | None, typer.Option(help="Of --images, as the run was given it.")] = None,
+    fps: Annotated[float | None, typer.Option(help="For --images: the same as in the run.")] = None,
     times: Annotated[
-        Path | None, typer.Option(help="Of --images, as the run was given it.")
+        Path | None, typer.Option(help="For --images: the same as in the run.")
     ] = None,
     split: Annotated[
-        bool, typer.Option("--split", help="Of --images, as the run was given it.")
+        bool, typer.Option("--split", help="For --images: the same as in the run.")
     ] = False,
     without_images: Annotated[
         bool, typer.Option("--without-images", help="Use no images, also if the map file has some.")

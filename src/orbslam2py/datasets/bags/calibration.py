@@ -27,7 +27,7 @@ _NONE_IF_ZERO = ("none", "modified_brown_conrady")
 _INVERSE = "inverse_brown_conrady"
 #: Transforms of a rectified pair are off by no more than this (part of the distance, or radians).
 _AS_RECTIFIED = 2e-4
-#: So many points in a row and in a column of the image stand for all of it.
+#: Points per row and per column of the image at which it is sampled.
 _SAMPLES = 25
 _COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 _ADVICE = "give the calibration with --settings"

@@ -15,7 +15,7 @@ from orbslam2py.datasets.bags.calibration import CameraInfo
 from orbslam2py.datasets.bags.image_topics import ImageTopic
 from orbslam2py.datasets.bags.infos import info_if_any
 from orbslam2py.datasets.bags.realsense import stream_of
-from orbslam2py.datasets.bags.topics import Chosen, says_registered
+from orbslam2py.datasets.bags.topics import Chosen, own_info, says_registered
 from orbslam2py.datasets.bags.transforms import Transforms, names_of_coordinates
 from orbslam2py.datasets.registration import DepthRegistration, Lens
 from orbslam2py.errors import DatasetError
@@ -32,6 +32,10 @@ _NEAR, _HALF_A_PIXEL = 0.5, 0.5
 _REMEDY = (
     "record depth that is aligned to the images (realsense2_camera: align_depth.enable:=true), or "
     "run the images alone (--sensor mono)"
+)
+_REMEDY_OF_SDK = (
+    "the RealSense Viewer does not record aligned depth: run the images alone (--sensor mono){}, "
+    "or record with the ROS node realsense2_camera and align_depth.enable:=true"
 )
 
 
@@ -105,8 +109,12 @@ def find_depth_camera(
         return None
     known = depth_info is not None and (colour_info or chosen) is not None
     if not how and (one_info or T is None or not known or says_registered(depth)):
-        if frames[0] != frames[1]:
-            where = f"is in the coordinates '{frames[1]}', the images are in '{frames[0]}'"
+        own = info_if_any(bag, depth, own_info(bag, depth))
+        own_difference = _difference(images, depth, colour_info, own, chosen)
+        if own_difference:  # the user named the CameraInfo of another camera
+            _warn(bag, depth, f"has a CameraInfo of another camera ({own_difference})")
+        elif frames[0] != frames[1]:
+            where = f"has the frame_id '{frames[1]}', and the images have '{frames[0]}'"
             _warn(bag, depth, where)
         return None
     missing = [
@@ -126,8 +134,8 @@ def find_depth_camera(
     )
     if set(names[0]) & set(names[1]):
         _log.warning(
-            "%s: images and depth are both in the coordinates '%s', so the two cameras are taken "
-            "to stand in one place; if they do not, depth is some pixels off",
+            "%s: images and depth have the same frame_id '%s', so the two cameras are assumed to "
+            "be at the same place; if they are not, depth is some pixels off",
             *(bag.path, frames[0]),
         )
     return DepthCamera(_lens_of(depth, depth_info), T)
@@ -190,10 +198,16 @@ def _cannot_be_registered(
     missing: list[str],
     T: FloatArray | None,
 ) -> DatasetError:
-    images = topics.left
+    images, stream = topics.left, stream_of(depth)
     if T is None:
-        where = "/tf_static" if stream_of(depth) is None else "/tf_static, or /tf of the stream"
+        where = "topic /tf_static"
+        if stream is not None:
+            where = f"topics {stream_of(images)}/tf/... and {stream}/tf/..."
         missing.append(f"the transform between the two cameras ({where})")
+    remedy = _REMEDY
+    if stream is not None:
+        has_pair = any("/Infrared_2/image" in topic.name for topic in bag.topics)
+        remedy = _REMEDY_OF_SDK.format(" or the infrared pair (--sensor stereo)" * has_pair)
     registered = ""
     if topics.left_info is not None and images.size == depth.size:
         registered = (
@@ -201,6 +215,6 @@ def _cannot_be_registered(
         )
     return DatasetError(
         f"{bag.path}: depth of {depth.topic.name} is of another camera than {images.topic.name} "
-        f"({how}), and cannot be registered to it without {' and '.join(missing)}; {_REMEDY}"
+        f"({how}), and cannot be registered to it without {' and '.join(missing)}; {remedy}"
         f"{registered}"
     )

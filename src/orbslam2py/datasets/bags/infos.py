@@ -11,7 +11,7 @@ from orbslam2py.datasets.bags.parts import naming_damage
 from orbslam2py.datasets.bags.realsense import is_inverse
 from orbslam2py.errors import DatasetError
 
-#: So many CameraInfo are looked at to find one of a calibrated camera.
+#: Most messages of CameraInfo that are read to find one of a calibrated camera.
 _MOST = 10
 _ADVICE = (
     "give --settings with a file or a built-in name; 'orbslam2py settings new' makes a "

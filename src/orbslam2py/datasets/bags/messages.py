@@ -23,7 +23,7 @@ POSES = (
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 #: Encodings of messages that can be read.
 ENCODINGS = ("ros1", "cdr")
-#: So many first bytes hold the head of every image.
+#: The head of every image is within this number of bytes.
 HEAD_SIZE = 512
 
 _NANO = 10**9

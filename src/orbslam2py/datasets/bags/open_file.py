@@ -36,7 +36,7 @@ class OpenFile:
         self.size = os.fstat(self._descriptor).st_size
 
     def read(self, position: int, size: int) -> bytes:
-        """Read so many bytes from there on, fewer where the file ends.
+        """Read `size` bytes from `position` on, fewer where the file ends.
 
         Raises
         ------

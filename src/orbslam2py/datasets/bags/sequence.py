@@ -43,7 +43,7 @@ from orbslam2py.datasets.base import Images, choose_sensor, rate_of
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.frames import FramesInOrder
 from orbslam2py.datasets.grey_scale import GreyScale, spread_over
-from orbslam2py.datasets.rectification import Rectifier
+from orbslam2py.datasets.rectification import Rectifiers, rectifiers_of
 from orbslam2py.datasets.registration import DepthRegistration
 from orbslam2py.errors import DatasetError, ImageError
 from orbslam2py.settings import Sensor, Settings, resolve_settings
@@ -77,7 +77,7 @@ class BagSequence(FramesInOrder):
     Raises
     ------
     DatasetError
-        If it is no bag, has no images for the sensor, or topics cannot be told.
+        If it is no bag, has no images for the sensor, or its topics cannot be recognised.
     SettingsError
         If the settings given are wrong.
     """
@@ -273,11 +273,8 @@ class BagSequence(FramesInOrder):
         return depth
 
     @cached_property
-    def _rectifiers(self) -> tuple[Rectifier, Rectifier] | None:
-        rectification = self.settings.rectification
-        if rectification is None:
-            return None
-        return Rectifier(rectification.left), Rectifier(rectification.right)
+    def _rectifiers(self) -> Rectifiers | None:
+        return rectifiers_of(self.settings)
 
     def _where(self, one: ImageTopic) -> str:
         return f"{one.topic.name} in {self.path}"

@@ -20,9 +20,9 @@ from orbslam2py.trajectory import MAX_DIFFERENCE, associate
 _log = logging.getLogger(__name__)
 
 _NANO = 10**9
-#: A step longer than so many usual ones, and than so many seconds, is a gap.
+#: A step longer than this multiple of the usual one, and than this duration [s], is a gap.
 _GAP, _SHORTEST_GAP = 5.0, 0.5
-#: Images of a pair may be so many seconds apart without a word.
+#: Largest time between images of a pair that is not reported [s].
 _SAME_MOMENT = 1e-3
 
 

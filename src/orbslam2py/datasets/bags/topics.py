@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which topics of a bag are the images: told by the user, or guessed by types and names."""
+"""Which topics of a bag are the images: named by the user, or guessed by types and names."""
 
 from __future__ import annotations
 
@@ -26,6 +26,9 @@ from orbslam2py.settings import Sensor
 #: What may be named, and by which other words.
 ROLES = ("left", "right", "depth", "left_info", "right_info", "depth_info", "truth")
 _ALIASES = {"image": "left", "color": "left", "colour": "left", "rgb": "left", "info": "left_info"}
+_ROLES_ARE = (
+    "roles are image or left, right, depth, info or left_info, right_info, depth_info, truth"
+)
 #: The topic that is taken as the true poses of the camera if nobody names one.
 _TRUTH = "/ground_truth"
 _COLOUR = re.compile(r"rgb|colou?r", re.IGNORECASE)
@@ -69,13 +72,16 @@ def parse_topics(text: str) -> dict[str, str]:
     for part in text.split(","):
         role, equals, topic = (piece.strip() for piece in part.partition("="))
         role = _ALIASES.get(role, role)
-        if not (equals and topic) or role not in ROLES or role in named:
-            problem = "is there twice" if role in named else "is no ROLE=/TOPIC"
-            raise DatasetError(
-                f"--topics: '{part}' {problem}; roles are image or left, right, depth, info or "
-                "left_info, right_info, depth_info, truth"
-            )
-        named[role] = topic
+        if not (equals and topic):
+            problem = f"'{part}' is no ROLE=/TOPIC"
+        elif role not in ROLES:
+            problem = f"the role '{role}' of '{part}' is unknown"
+        elif role in named:
+            problem = f"'{part}' is there twice"
+        else:
+            named[role] = topic
+            continue
+        raise DatasetError(f"--topics: {problem}; {_ROLES_ARE}")
     return named
 
 
@@ -101,9 +107,7 @@ class TopicChoice:
         self._require_images()
         for role, name in self._named.items():
             if role not in ROLES:
-                raise DatasetError(
-                    f"topics: there is no role '{role}'; roles are {', '.join(ROLES)}"
-                )
+                raise DatasetError(f"topics: the role '{role}' is unknown; {_ROLES_ARE}")
             self._topic(role, name)
 
     @property
@@ -267,21 +271,14 @@ class TopicChoice:
             if compressed and image.ndim == 2 and not depth:
                 encoding = "mono8" if image.dtype.itemsize == 1 else "mono16"
         except OrbSlamError as error:
-            problem = str(error)  # told if nothing else can be read
+            problem = str(error)  # reported if nothing else can be read
         return ImageTopic(topic, encoding, size, problem)
 
     # ---- others ----------------------------------------------------------------------------------
     def _info(self, role: str, image: ImageTopic) -> Topic | None:
         if role in self._named:
             return self._topic(role, self._named[role])
-        parent = image.base.rpartition("/")[0]
-        stream = parent.rpartition("/")[0]  # as recordings of RealSense cameras have it
-        wanted = [
-            *(f"{image.base}/camera_info", f"{parent}/camera_info"),
-            f"{stream}/info/camera_info",
-        ]
-        found = {t.name: t for t in self._bag.topics if t.kind == CAMERA_INFO and t.n}
-        return next((found[name] for name in wanted if name in found), None)
+        return own_info(self._bag, image)
 
     def _truth(self) -> Topic | None:
         if "truth" in self._named:
@@ -353,6 +350,18 @@ class TopicChoice:
             first = next(iter(found[role]), None)
             examples[role] = named or ("/..." if first is None else first.topic.name)
         return examples
+
+
+def own_info(bag: Bag, image: ImageTopic) -> Topic | None:
+    """Find the CameraInfo beside a topic of images by its name; None if there is none."""
+    parent = image.base.rpartition("/")[0]
+    stream = parent.rpartition("/")[0]  # as recordings of RealSense cameras have it
+    wanted = [
+        *(f"{image.base}/camera_info", f"{parent}/camera_info"),
+        f"{stream}/info/camera_info",
+    ]
+    found = {t.name: t for t in bag.topics if t.kind == CAMERA_INFO and t.n}
+    return next((found[name] for name in wanted if name in found), None)
 
 
 def says_registered(depth: ImageTopic) -> bool:

@@ -27,7 +27,7 @@ _log = logging.getLogger(__name__)
 _STATIC, _MOVING = "/tf_static", "/tf"
 #: Frames that drivers write if they know none.
 _NO_FRAMES = ("", "0")
-#: So many messages of transforms that may move are looked at, evenly over the bag.
+#: Most messages of moving transforms that are read, evenly over the bag.
 _MOST = 500
 #: Numbers of a transform that does not move differ by no more than this.
 _FIXED = 1e-4

@@ -10,10 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from orbslam2py._arguments import index_of
 from orbslam2py._arguments import number_of as counted
 from orbslam2py._text_lines import content_lines
-from orbslam2py.datasets.base import Images, Layout, Stamps, rate_of, require_frames
+from orbslam2py.datasets.base import Layout, Stamps, rate_of, require_frames
 from orbslam2py.datasets.choose_settings import SettingsChoice
 from orbslam2py.datasets.clock import read_clock
 from orbslam2py.datasets.grey_scale import read_sample
@@ -21,7 +20,6 @@ from orbslam2py.datasets.image_folder import image_files
 from orbslam2py.datasets.layouts.kitti_raw_calibration import CAMERAS_FILE, DriveCalibration
 from orbslam2py.datasets.layouts.kitti_raw_poses import read_oxts
 from orbslam2py.datasets.recorded import RecordedSequence
-from orbslam2py.datasets.rectification import Rectifier
 from orbslam2py.errors import DatasetError
 from orbslam2py.settings import Sensor, Settings
 from orbslam2py.trajectory import Trajectory, associate
@@ -81,6 +79,7 @@ class KittiRawSequence(RecordedSequence):
         self._left, self._right = there[0] if alone else whole[0]
         available = (Sensor.STEREO, Sensor.MONOCULAR) if whole else (Sensor.MONOCULAR,)
         super().__init__(folder, available, sensor, settings)
+        self._calibrated_by: Path | None = None
         times, self._paths = self._list(self._left)
         self._list_path = times_path = self._camera_folder(self._left) / "timestamps.txt"
         self._right_paths: list[Path] = []
@@ -98,6 +97,23 @@ class KittiRawSequence(RecordedSequence):
         require_frames(times_path, len(self._paths))
         self._stamps = times
 
+    @cached_property
+    def settings(self) -> Settings:
+        """The settings the caller chose, or `default_settings`."""
+        settings = super().settings
+        colour = "grey" if self._left == 0 else "colour"
+        source = "the given settings"
+        if self._chosen is None and self._calibrated_by is None:
+            source = str(self.folder / "settings.yaml")
+        elif self._chosen is None:
+            kind = "raw" if self._is_raw else "rectified"
+            source = f"{self._calibrated_by} (for {kind} images)"
+        _log.info(
+            "%s: %d frames of the %s %s; calibration: %s",
+            *(self.folder, len(self), colour, self._named_cameras, source),
+        )
+        return settings
+
     @staticmethod
     def recognises(folder: Path) -> bool:
         """Tell whether a folder is such a drive."""
@@ -106,19 +122,6 @@ class KittiRawSequence(RecordedSequence):
     def image_path(self, index: int, /) -> Path:
         """Return the file of the left image of a frame."""
         return self._paths[index]
-
-    def load(self, index: int, /) -> Images:
-        """Read (and rectify) the images of a frame; see `datasets.base.Sequence.load`."""
-        paths = self._files(index_of(index, len(self)))
-        images = [self._read(path) for path in paths]
-        if len(images) == 1:
-            return Images(images[0])
-        if self._rectifiers is not None:
-            images = [
-                rectifier.rectify(image, path)
-                for rectifier, image, path in zip(self._rectifiers, images, paths, strict=True)
-            ]
-        return Images(images[0], right=images[1])
 
     def ground_truth(self) -> Trajectory | None:
         """Read the poses of ``oxts`` and move them to the left camera.
@@ -204,18 +207,18 @@ class KittiRawSequence(RecordedSequence):
         return self.name.endswith("_extract")
 
     @property
+    def _named_cameras(self) -> str:
+        if self.sensor is Sensor.STEREO:
+            return f"cameras image_{self._left:02d} and image_{self._right:02d}"
+        return f"camera image_{self._left:02d}"
+
+    @property
     def _is_raw_mono(self) -> bool:
         return self.sensor is Sensor.MONOCULAR and self._is_raw
 
-    @cached_property
-    def _rectifiers(self) -> tuple[Rectifier, Rectifier] | None:
-        rectification = self.settings.rectification
-        if rectification is None:
-            return None
-        return Rectifier(rectification.left), Rectifier(rectification.right)
-
     def _from_calibration(self) -> Settings | None:
-        if self._find(CAMERAS_FILE) is None:
+        self._calibrated_by = self._find(CAMERAS_FILE)
+        if self._calibrated_by is None:
             return None
         rate = rate_of(self.timestamps, _USUAL_RATE)
         if self.sensor is Sensor.STEREO:

@@ -37,9 +37,9 @@ class Placement:
     similarity
         From the map's world to the other; its scale is 1 for a map that sees metres.
     n_pairs
-        Positions that told it.
+        Number of positions that determined it.
     rmse
-        Of the distances that are left between them [m]; 0 where a length alone told it.
+        Of the distances that are left between them [m]; 0 where a length alone determined it.
     on_a_line
         The positions of a path lie on a line: the turn around it is not known, and was chosen
         small.
@@ -81,7 +81,7 @@ def place_by_trajectory(
             f"{max_difference:g} s, and it takes {_FEWEST}; give the truth of the sequence that "
             "the map was made of"
         )
-    # A camera that went straight on has no other path to give: it is placed, and that is told.
+    # A camera that went straight on has no other path: it is placed, with a warning.
     return _place(contents, keyframes.T_wc[rows, :3, 3], there.positions[poses])
 
 

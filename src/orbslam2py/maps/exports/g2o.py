@@ -48,7 +48,7 @@ def export_g2o(
     path
         The file; replaced only when everything was written.
     least_weight
-        Keyframes that share so many points are linked.
+        Least number of shared points of two keyframes that are linked.
 
     Raises
     ------

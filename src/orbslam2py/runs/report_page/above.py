@@ -69,7 +69,7 @@ class Window:
 
 
 def thin_path(flat: FloatArray, gaps: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Coordinates of a line broken before each of `gaps`, with every so many corners."""
+    """Coordinates of a line broken before each of `gaps`, with fewer corners."""
     keep = np.arange(0, len(flat), max(1, len(flat) // _CORNERS))
     keep = np.unique(np.concatenate([keep, gaps, gaps - 1, [len(flat) - 1]]).astype(int))
     keep = keep[keep >= 0] if len(flat) else keep[:0]

@@ -73,7 +73,7 @@ class Comparison:
         apart = [name for name, path in zip(names, paths, strict=True) if path is None]
         if apart:
             warnings.append(
-                f"Not among the paths, for want of poses at the same times as {names[0]}: "
+                f"Not drawn with the paths, because they have no poses at the times of {names[0]}: "
                 f"{', '.join(apart)}."
             )
         return cls(stories, names, paths, warnings)

@@ -85,7 +85,7 @@ ALIGNMENTS = {
     "none": "as it is",
 }
 
-#: Figures that are told in words.
+#: Figures that are written in words.
 _IN_WORDS: dict[str, Callable[[dict[str, Any]], str]] = {
     "relocalisations": relocalisations_words,
     "loaded_map": loaded_map_words,

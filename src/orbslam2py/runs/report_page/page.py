@@ -24,7 +24,7 @@ from orbslam2py.runs.report_page.story import Story
 _FOLDER = Path(__file__).parents[2] / "data" / "report_page"
 #: What the head of a page begins to say about its maker; the version follows.
 _MADE_BY = '<meta name="generator" content="orbslam2py '
-#: What it says about what the page is of; those of earlier versions are told by their titles.
+#: What it says about what the page is of; those of earlier versions are recognised by their titles.
 _IS_OF = '<meta name="orbslam2py-page" content="'
 #: Bytes in which these come.
 _HEAD = 4096
@@ -207,7 +207,7 @@ def _seen(report: dict[str, Any]) -> str:
 
 
 def _warnings(report: dict[str, Any]) -> Markup | None:
-    """What the result suffers from, as the command has told it."""
+    """What impairs the result, as the command has printed it."""
     told = report.get("warnings")
     if not told:
         return None

@@ -12,7 +12,7 @@ from orbslam2py._arrays import FloatArray
 #: What stands for a value that there is not.
 NONE = "\N{EN DASH}"
 
-#: Most buckets a line is told by; each has its smallest and its largest value.
+#: Most buckets that a line is reduced to; each keeps its smallest and its largest value.
 _BUCKETS = 600
 
 
@@ -24,7 +24,7 @@ def round_ticks(low: float, high: float, n: int) -> FloatArray:
     low, high
         The bounds, finite, `low` below `high`.
     n
-        About so many at most.
+        About the largest number of them.
 
     Returns
     -------
@@ -58,7 +58,7 @@ def tick_texts(ticks: FloatArray) -> list[str]:
 
 
 def short(value: float, digits: int = 3) -> str:
-    """Write a number with so many digits that count; never with an exponent below a million."""
+    """Write a number with `digits` significant digits; never with an exponent below a million."""
     if not math.isfinite(value):
         return NONE
     if value == 0:

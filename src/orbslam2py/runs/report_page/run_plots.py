@@ -208,7 +208,7 @@ def state_spans(frames: Frames) -> list[Span]:
 
 
 def _shown_states(frames: Frames) -> npt.NDArray[np.str_]:
-    """The states, with that of weak evidence told apart."""
+    """The states, with a state of its own for weak evidence."""
     shown: npt.NDArray[np.str_] = np.where(frames.is_weak & frames.has_pose, "WEAK", frames.state)
     return shown
 

@@ -136,7 +136,7 @@ def _nan(run: RunFolder) -> FloatArray:
 
 
 def rounded(values: FloatArray, digits: int) -> list[float | None]:
-    """Numbers with so many decimals; None for what is not finite."""
+    """Numbers with `digits` decimals; None for what is not finite."""
     known = np.isfinite(values).tolist()
     told = np.round(values, digits).tolist()
     make = int if digits == 0 else float

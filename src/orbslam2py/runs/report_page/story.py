@@ -15,7 +15,7 @@ from orbslam2py.runs.report_page.run_folder import RunFolder
 from orbslam2py.trajectory import Trajectory
 from orbslam2py.trajectory.rotations import rotation_angles
 
-#: What counts as having happened "there": so many seconds before and after.
+#: Time before and after an event that counts as its place [s].
 _AROUND = 1.0
 #: Turning by more in a second is fast [deg]; fewer inliers than this part of the median are few.
 _FAST_TURN, _FEW_INLIERS = 45.0, 0.5

@@ -98,7 +98,7 @@ class Channel:
         return data
 
     def close(self) -> None:
-        """End it: who waits at either end is told."""
+        """Close it, which wakes whoever waits at either end."""
         with contextlib.suppress(OSError):  # the other end is gone already
             self._socket.shutdown(socket.SHUT_RDWR)
         self._socket.close()

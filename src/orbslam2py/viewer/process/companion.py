@@ -111,7 +111,7 @@ class Companion:
         return self._why
 
     def _open(self, *wishes: str | int | None) -> str:
-        with contextlib.suppress(CompanionError):  # told below
+        with contextlib.suppress(CompanionError):  # reported below
             self.tell("open", *wishes)
         with self._condition:
             self._condition.wait_for(

@@ -27,7 +27,7 @@ from orbslam2py.viewer.watching import FrameView
 _PATHS, _PLOTS, _LOCAL = 1.0, 0.5, 0.3
 #: Seconds without news after which all of it is drawn.
 _STILL = 0.4
-#: What takes a second to be told is asked for again after so many.
+#: Pause before the next request, as a multiple of the time that the answer took.
 _REST = 30.0
 
 
@@ -86,7 +86,7 @@ class LivePage:
                 )
             self._system_controls = SystemControls(self.page.server, RequestsToSystem(self._ask))
 
-    # ---- what is told ----------------------------------------------------------------------------
+    # ---- notifications ---------------------------------------------------------------------------
     def on_frame(self, view: FrameView, localization: bool) -> None:
         """Show an image, where it was taken, and the mode that the next one is tracked in."""
         with self._lock:

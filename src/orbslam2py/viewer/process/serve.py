@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The process of the page: draws what it is told, asks what people want to know."""
+"""The process of the page: draws what the run sends, and asks it for what people want to see."""
 
 from __future__ import annotations
 

@@ -25,7 +25,10 @@ pytestmark = pytest.mark.watchdog(40)
 OURS = "".join(f"{key}: {value}\n" for key, value in MONO.items())
 OURS_DEPTH = OURS + "".join(f"{key}: {value}\n" for key, value in DEPTH.items())
 FOUR = "Camera.k1: -0.01\nCamera.k2: 0.05\nCamera.k3: -0.04\nCamera.k4: 0.01\n"
-FISHEYE = ("tells a fisheye calibration (Kannala-Brandt, k1 to k4)", "cv2.fisheye.initUndistort")
+FISHEYE = (
+    "belongs to a fisheye calibration (Kannala-Brandt, k1 to k4)",
+    "cv2.fisheye.initUndistort",
+)
 WHAT_HELPS = "orbslam2py settings new --sensor"
 
 

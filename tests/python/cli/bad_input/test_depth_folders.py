@@ -32,7 +32,7 @@ def test_it_runs_and_says_what_was_paired(command: CommandLine, phone: Path) -> 
     done = run(command, phone, "rgbd", "--settings", "phone.yaml")
     assert done.code == 0, done.err
     (line,) = [line for line in done.err.splitlines() if line.startswith("Note: ")]
-    assert f"{N} images in color go with depth in depth16 by equal names" in line
+    assert f"{N} images of color are paired with depth of depth16 by equal names" in line
 
 
 def test_quiet_says_nothing(command: CommandLine, phone: Path) -> None:

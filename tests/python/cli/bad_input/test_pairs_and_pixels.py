@@ -84,7 +84,7 @@ def test_16_bits(command: CommandLine, pair: Path) -> None:
         cv2.imwrite(str(path), image.astype(np.uint16) * 100)
     done = run(command, pair, "stereo", *WITH)
     assert done.code == 0, done.err
-    assert done.err.count("images of 16 bits; grey values") == 1
+    assert done.err.count("images of 16 bits; in all images, grey values") == 1
     assert tracked() == N
 
 
@@ -130,7 +130,12 @@ def test_nothing_fits(command: CommandLine, pair: Path) -> None:
 
 def test_rgbd_of_a_pair(command: CommandLine, pair: Path) -> None:
     done = run(command, pair, "rgbd", *WITH)
-    expect_refused(done, "cannot tell images and depth", "left (14 images")
+    expect_refused(
+        done,
+        "cannot tell which folder in",
+        "has the images and which the depth: it has left (14 images",
+        "or give one of these folders alone",
+    )
 
 
 def test_times_that_do_not_fit(command: CommandLine, pair: Path, tmp_path: Path) -> None:
@@ -193,7 +198,9 @@ def test_only_depth(command: CommandLine, rgbd: Path, tmp_path: Path) -> None:
     for name in ("rgb", "depth"):
         shutil.copytree(rgbd / "depth", folder / name)
     done = run(command, folder, "rgbd", "--settings", str(rgbd / "settings.yaml"))
-    expect_refused(done, "all look like depth images (16 bits, one channel)", "keep one folder")
+    expect_refused(
+        done, "all of them look like depth images (16 bits, one channel)", "keep one folder"
+    )
 
 
 def reshape_depth(path: Path, size: tuple[int, int]) -> None:

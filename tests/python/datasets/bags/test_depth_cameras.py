@@ -119,7 +119,7 @@ def test_one_place_is_left_as_it_is(tmp_path: Path, caplog: pytest.LogCaptureFix
 def test_equal_frames(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     """Coordinates of one name are in one place, which may be a driver's mistake."""
     sequence = BagSequence(rgbd(tmp_path, frames=("camera", "camera")))
-    assert "taken to stand in one place" in caplog.text
+    assert "assumed to be at the same place" in caplog.text
     found = sequence.load(0).depth
     assert found is not None
     assert np.abs(found / 1000 - seen(120, np.eye(4)))[found > 0].max() < 0.02
@@ -177,7 +177,7 @@ REFUSED: dict[str, tuple[dict[str, Any], list[str]]] = {
     "frames without names": ({"frames": ("0", "0")}, ["without the transform"]),
     "a transform to elsewhere": (
         {"more": (bags.frames("/tf_static", ("base", "depth_optical", np.eye(4))),)},
-        ["without the transform between the two cameras (/tf_static)"],
+        ["without the transform between the two cameras (topic /tf_static)"],
     ),
     "a transform that is none": ({"more": (edge(np.full((4, 4), np.nan)),)}, ["the transform"]),
     "a transform that moves": ({"more": MOVING}, ["without the transform"]),
@@ -206,8 +206,8 @@ def test_refused(tmp_path: Path, case: str) -> None:
     assert len(BagSequence(tmp_path / "b", "mono")) == 1
 
 
-def test_the_user_may_know_better(tmp_path: Path) -> None:
-    """The remedy that the message names: depth is taken as it is."""
+def test_the_user_may_know_better(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """The remedy that the message names: depth is taken as it is, and a warning says the risk."""
     bag = rgbd(tmp_path)
     with pytest.raises(orb.DatasetError, match="depth_info=/c/color/camera_info"):
         BagSequence(bag)
@@ -215,6 +215,40 @@ def test_the_user_may_know_better(tmp_path: Path) -> None:
     depth = sequence.load(0).depth
     assert depth is not None
     assert np.array_equal(depth, DEPTH)
+    assert (
+        "depth of /c/depth/image_rect_raw has a CameraInfo of another camera (fx 75 against 120): "
+        "if it is not registered to the images, the result is wrong"
+    ) in caplog.text
+
+
+def test_equal_cameras_need_no_warning(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    bag = rgbd(tmp_path, colour_f=75, frames=("colour_optical", "colour_optical"))
+    assert len(BagSequence(bag, topics="depth_info=/c/color/camera_info")) == 1
+    assert not caplog.records
+
+
+@pytest.mark.parametrize("pair", [True, False])
+def test_recordings_of_the_viewer_get_a_remedy_that_works(tmp_path: Path, pair: bool) -> None:
+    """The Viewer cannot align depth; an infrared pair can be run where there is one."""
+    place = np.eye(4)
+    messages = [
+        *realsense.viewer_stream("Depth_0", [DEPTH], 75),
+        *realsense.viewer_stream("Color_0", [GREY], 120),
+    ]
+    for name in ("Infrared_1", "Infrared_2") if pair else ():
+        place[0, 3] -= 0.05
+        messages += realsense.viewer_stream(name, [GREY], 75, T_stream_reference=place.copy())
+    bag = bags.write(tmp_path / "b", "rosbag1", messages)
+    with pytest.raises(orb.DatasetError) as told:
+        BagSequence(bag, "rgbd")
+    message = str(told.value)
+    topics = "/device_0/sensor_1/Color_0/tf/... and /device_0/sensor_0/Depth_0/tf/..."
+    assert f"the transform between the two cameras (topics {topics})" in message
+    assert "the RealSense Viewer does not record aligned depth" in message
+    assert ("--sensor stereo" in message) == pair
+    assert len(BagSequence(bag, "mono")) == 1
+    if pair:
+        assert len(BagSequence(bag, "stereo")) == 1
 
 
 @pytest.mark.parametrize("missing", ["depth_f", "colour_f"])

@@ -222,7 +222,7 @@ def test_grey_values_of_16_bits(
         assert image.dtype == np.uint8
         expected = (raw.astype(float) - low) * 255 / (high - low)
         assert np.abs(image - expected).max() < 4
-    assert caplog.text.count("images of 16 bits; grey values") == 1
+    assert caplog.text.count("images of 16 bits; in all images, grey values") == 1
 
 
 def test_16UC1_is_depth_unless_it_is_named_as_the_image(tmp_path: Path) -> None:

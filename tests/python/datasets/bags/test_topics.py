@@ -207,7 +207,11 @@ def test_one_named_finds_its_partner(tmp_path: Path) -> None:
     ("named", "message"),
     [
         ("left", "'left' is no ROLE=/TOPIC"),
-        ("middle=/a_left", "roles are image or left, right, depth"),
+        (
+            "middle=/a_left",
+            "the role 'middle' of 'middle=/a_left' is unknown; roles are image or left, right, "
+            "depth, info or left_info, right_info, depth_info, truth",
+        ),
         ("left=/a_left,image=/a_right", "'image=/a_right' is there twice"),
         ("left=/none", r"has no messages of /none \(left\); it has /a_left"),
         ("truth=/a_left", "has no poses; true poses are of the types geometry_msgs"),
@@ -216,6 +220,12 @@ def test_one_named_finds_its_partner(tmp_path: Path) -> None:
 def test_wrong_names(tmp_path: Path, named: str, message: str) -> None:
     with pytest.raises(orb.DatasetError, match=message):
         opened(tmp_path, "/a_left", "/a_right", named=named)
+
+
+def test_an_unknown_role_of_a_dictionary(tmp_path: Path) -> None:
+    bag = bags.write(tmp_path / "b", "mcap", [image("/a_left")])
+    with pytest.raises(orb.DatasetError, match="the role 'middle' is unknown; roles are image or"):
+        BagSequence(bag, topics={"middle": "/a_left"})
 
 
 def test_pairs_by_time(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
@@ -285,7 +295,7 @@ def test_equal_stamps_are_told(tmp_path: Path, caplog: pytest.LogCaptureFixture)
 def test_depth_of_another_camera(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     messages = [image("/rgb", frame="rgb_optical"), image("/depth", frame="depth_optical")]
     BagSequence(bags.write(tmp_path / "b", "mcap", messages))
-    assert "depth of /depth is in the coordinates 'depth_optical'" in caplog.text
+    assert "depth of /depth has the frame_id 'depth_optical', and the images have" in caplog.text
     caplog.clear()
     with caplog.at_level(logging.INFO):
         BagSequence(bags.write(tmp_path / "c", "mcap", [image("/rgb"), image("/depth")]))

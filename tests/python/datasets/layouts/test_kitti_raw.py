@@ -95,6 +95,52 @@ def test_the_colour_pair(day: Path) -> None:
     assert (int(images.image[0, 0]), int(images.right[0, 0])) == (21, 31)
 
 
+@pytest.mark.parametrize(
+    ("kind", "cameras", "sensor", "images", "of"),
+    [
+        (
+            *("sync", (0, 1, 2, 3), "stereo", "4 frames of the grey cameras image_00 and image_01"),
+            "rectified",
+        ),
+        (
+            *("extract", (2, 3), "stereo", "4 frames of the colour cameras image_02 and image_03"),
+            "raw",
+        ),
+        (
+            *("sync", (2, 3), "mono", "4 frames of the colour camera image_02"),
+            "rectified",
+        ),
+    ],
+)
+def test_the_log_names_cameras_and_calibration(
+    day: Path,
+    caplog: pytest.LogCaptureFixture,
+    kind: str,
+    cameras: tuple[int, ...],
+    sensor: str,
+    images: str,
+    of: str,
+) -> None:
+    drive = write_drive(day, kind, cameras)
+    with caplog.at_level("INFO"):
+        sequence = open_sequence(drive, sensor)
+        assert sequence.settings.sensor is Sensor(sensor)
+    path = day / "calib_cam_to_cam.txt"
+    assert caplog.messages == [f"{drive}: {images}; calibration: {path} (for {of} images)"]
+
+
+def test_the_log_names_no_calibration_that_is_not_used(
+    day: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    drive = write_drive(day)
+    with caplog.at_level("INFO"):
+        sequence = open_sequence(drive, settings="kitti00-02")
+        assert sequence.settings.camera.width == 1241
+        assert sequence.default_settings().camera.width == 64
+    (message,) = (one for one in caplog.messages if "frames of the" in one)
+    assert message.endswith("image_00 and image_01; calibration: the given settings")
+
+
 def test_half_a_pair_is_a_single_camera(day: Path) -> None:
     drive = write_drive(day, cameras=(0,))
     assert open_sequence(drive).sensor is Sensor.MONOCULAR
