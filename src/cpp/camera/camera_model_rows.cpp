@@ -140,20 +140,25 @@ std::string model_called(const std::string& given, const CameraModelRow& row) {
   return "camera model " + given + (given == row.name ? "" : " (" + row.name + ")");
 }
 
+/// OpenCV's models differ by the number of coefficients: each begins as the longest one does.
+bool is_of_opencv(const CameraModelRow& row) {
+  const auto longest = std::find_if(camera_model_rows().begin(), camera_model_rows().end(),
+                                    [](const auto& one) { return one.name == "thin_prism"; });
+  return std::equal(row.parameters.begin(), row.parameters.end(), longest->parameters.begin(),
+                    [](const auto& a, const auto& b) { return a.name == b.name; });
+}
+
 void check_count(const std::string& model, const CameraModelRow& row, std::size_t count) {
   if (count == row.parameters.size()) return;
-  std::vector<std::string> others;
-  for (const CameraModelRow& other : camera_model_rows()) {
-    if (other.parameters.size() == count) {
-      others.push_back(other.name + " (" + parameter_names(other) + ")");
+  std::string other;
+  for (const CameraModelRow& one : camera_model_rows()) {
+    if (one.parameters.size() == count && is_of_opencv(one) && is_of_opencv(row)) {
+      other = ", or the model " + one.name + " (" + parameter_names(one) + ")";
     }
   }
-  const std::string choice = others.empty() ? ""
-                                            : ", or name the model of these " +
-                                                  std::to_string(count) + ": " + joined(others);
   throw SettingsError(model + " has " + std::to_string(row.parameters.size()) +
                       " parameters, got " + std::to_string(count) + "; give " +
-                      parameter_names(row) + choice);
+                      parameter_names(row) + other);
 }
 
 void check_ranges(const std::string& model, const CameraModelRow& row,

@@ -457,13 +457,17 @@ std::string message(const std::string& model, const std::vector<double>& paramet
 }
 
 using ::testing::AllOf;
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 
 TEST(CameraModelErrors, NameModelParameterAndRemedy) {
   EXPECT_THAT(message("fishy", {}), AllOf(HasSubstr("'fishy'"), HasSubstr("kannala_brandt")));
   EXPECT_THAT(message("KannalaBrandt8", {300, 300, 320, 240, 0.1}),
               AllOf(HasSubstr("KannalaBrandt8 (kannala_brandt) has 8 parameters, got 5"),
-                    HasSubstr("give fx, fy, cx, cy, k1, k2, k3, k4"), HasSubstr("fov (fx")));
+                    EndsWith("give fx, fy, cx, cy, k1, k2, k3, k4")));
+  EXPECT_THAT(
+      message("PinHole", {300, 300, 320, 240, 0.1, 0, 0, 0}),
+      EndsWith("give fx, fy, cx, cy, or the model radtan4 (fx, fy, cx, cy, k1, k2, p1, p2)"));
   EXPECT_THAT(message("double_sphere", {300, 300, 320, 240, -1.2, 0.5}),
               AllOf(HasSubstr("double_sphere: xi is -1.2"), HasSubstr("from -1 to 1")));
   EXPECT_THAT(message("eucm", {300, 300, 320, 240, 1.2, 0.5}),
