@@ -203,8 +203,8 @@ class DoubleSphereLens {
     double z = 0;
     if (!second_.depth(r2, z)) return false;
     const double root = z * z + (1 - xi_ * xi_) * r2;
-    if (!(root > 0)) return false;
     const double scale = (z * xi_ + std::sqrt(root)) / (z * z + r2);
+    if (!(scale > 0)) return false;  // |xi| = 1: a ray that leaves the first sphere
     ray = {scale * m.x(), scale * m.y(), scale * z - xi_};
     return true;
   }

@@ -13,7 +13,9 @@ namespace {
 
 constexpr int kMostInverseSteps = 50;
 constexpr int kMostInverseHalvings = 30;
-constexpr double kInverseTolerance = 1e-14;  // of the residual at unit depth
+constexpr int kOutwardSteps = 16;
+// Residuals at unit depth: what ends the steps, and what must be reached.
+constexpr double kInverseGoal = 1e-14, kInverseTolerance = 1e-10;
 
 std::vector<double> product(const std::vector<double>& a, const std::vector<double>& b) {
   std::vector<double> c(a.size() + b.size() - 1, 0.0);
@@ -69,41 +71,49 @@ double second_part(const PlaneDistortion& distortion) {
 }  // namespace
 
 PlaneDistortion::PlaneDistortion(const std::array<double, 12>& coefficients)
-    : radial_tangential_(), prism_() {
+    : radial_tangential_(), prism_(), has_tangential_(false) {
   std::copy_n(coefficients.begin(), 8, radial_tangential_.begin());
   std::copy_n(coefficients.begin() + 8, 4, prism_.begin());
   largest_r2_ = largest_r2_of(radial_tangential_);
   const auto used = [](double coefficient) { return coefficient != 0; };
-  if (used(coefficients[2]) || used(coefficients[3]) ||
-      std::any_of(prism_.begin(), prism_.end(), used)) {
+  has_tangential_ = used(coefficients[2]) || used(coefficients[3]) ||
+                    std::any_of(prism_.begin(), prism_.end(), used);
+  if (has_tangential_) {
     const double second = second_part(*this);
     largest_r2_ = std::min(largest_r2_, second * second);
   }
 }
 
-// Begins at the solution of the radial part alone, which always exists inside of its domain. A step
-// is halved until it stays in the domain and comes nearer.
+// Begins at the solution of the radial part alone. Where strong tangential terms lead astray,
+// begins at the axis and follows the point outwards.
 bool PlaneDistortion::undistort(const Eigen::Vector2d& bent, Eigen::Vector2d& straight) const {
-  const double radius = bent.norm(), end = std::sqrt(largest_r2_);
+  // Not the end itself, which may be a pole of the rational model.
+  const double radius = bent.norm(), end = (1 - 1e-9) * std::sqrt(largest_r2_);
   if (!std::isfinite(radius)) return false;
   straight.setZero();
-  if (radius > 0) {
-    double r = 0;
-    const auto function = [this](double at) { return radius_at(radial_tangential_, at); };
-    // Tangential terms may move a point a little beyond what the radial part alone can show.
-    if (!invert_increasing(function, radius, end, r)) r = 0.99 * end;
-    if (!std::isfinite(r)) return false;
+  if (radius == 0) return true;
+  double r = 0;
+  const auto function = [this](double at) { return radius_at(radial_tangential_, at); };
+  if (invert_increasing(function, radius, end, r)) {
     straight = bent * (r / radius);
+    if (approach(bent, straight)) return true;
   }
+  if (!has_tangential_) return false;
+  straight.setZero();
+  for (int step = 1; step <= kOutwardSteps; ++step) {
+    if (!approach(bent * (static_cast<double>(step) / kOutwardSteps), straight)) return false;
+  }
+  return true;
+}
+
+// A step is halved until it stays in the domain and comes nearer.
+bool PlaneDistortion::approach(const Eigen::Vector2d& bent, Eigen::Vector2d& straight) const {
   Bent there;
-  for (int halvings = 0; !distort(straight, there); ++halvings) {
-    if (halvings == kMostInverseHalvings) return false;
-    straight *= 0.9;
-  }
-  const double tolerance = kInverseTolerance * std::max(1.0, radius);
+  if (!distort(straight, there)) return false;
+  const double size = std::max(1.0, bent.norm());
   for (int steps = 0; steps < kMostInverseSteps; ++steps) {
     const Eigen::Vector2d residual = there.at - bent;
-    if (residual.norm() <= tolerance) return true;
+    if (residual.norm() <= kInverseGoal * size) return true;
     Eigen::Vector2d step = there.J.inverse() * residual;
     int halvings = 0;
     for (; halvings < kMostInverseHalvings; ++halvings, step *= 0.5) {
@@ -116,7 +126,7 @@ bool PlaneDistortion::undistort(const Eigen::Vector2d& bent, Eigen::Vector2d& st
     }
     if (halvings == kMostInverseHalvings) break;  // rounding, or nothing fits
   }
-  return (there.at - bent).norm() <= 1e-10 * std::max(1.0, radius);
+  return (there.at - bent).norm() <= kInverseTolerance * size;
 }
 
 }  // namespace orbslam

@@ -34,8 +34,12 @@ class PlaneDistortion {
   bool undistort(const Eigen::Vector2d& bent, Eigen::Vector2d& straight) const;
 
  private:
+  /// Newton's method from `straight`.
+  bool approach(const Eigen::Vector2d& bent, Eigen::Vector2d& straight) const;
+
   Distortion radial_tangential_;
   std::array<double, 4> prism_;
+  bool has_tangential_;  ///< with the prism: the radius alone does not describe the distortion
   /// Squared radius at which the radial part stops increasing, or at which a direction would enter
   /// the domain again after its end.
   double largest_r2_;

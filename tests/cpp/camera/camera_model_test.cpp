@@ -60,6 +60,11 @@ const std::vector<Calibration>& calibrations() {
         1.4214},
        {2048, 1536},
        1},
+      {"RationalWithPole",
+       "rational",
+       {300, 300, 320, 240, 0, 0, 0.001, 0, 0, -0.5, 0, 0},
+       {640, 480},
+       1},
       {"ThinPrism",
        "thin_prism",
        {600, 605, 330, 236, -0.21, 0.06, 0.0011, -0.0007, 0.003, 0.05, -0.01, 0.002, 0.0012,
@@ -367,6 +372,8 @@ TEST(CameraModelDomain, EndsWhereTheModelFoldsOver) {
   EXPECT_NEAR(end_of("pinhole", {}), 90, 1e-9);
   // 1 + 3 k1 r^2 = 0 at r = 1.
   EXPECT_NEAR(end_of("radtan4", {-1.0 / 3, 0, 0, 0}), 45, 1e-9);
+  // Pole of the rational model: 1 + k4 r^2 = 0 at r = 1.
+  EXPECT_NEAR(end_of("rational", {0, 0, 0, 0, 0, -1, 0, 0}), 45, 1e-9);
   // 1 + 3 k1 theta^2 = 0 at theta = 100 degrees.
   const double theta = 100 * kDegree;
   EXPECT_NEAR(end_of("kannala_brandt", {-1 / (3 * theta * theta), 0, 0, 0}), 100, 1e-9);
@@ -402,6 +409,10 @@ TEST(CameraModelDomain, PixelsBeyondItShowNothing) {
     EXPECT_TRUE(camera.unproject({173, 0}, ray));
     EXPECT_FALSE(camera.unproject({174, 0}, ray));
   }
+  // With xi = 1 the second sphere sees the first from its surface: not beyond 90 degrees.
+  const CameraModel surface("double_sphere", {100, 100, 0, 0, 1, 0.5}, {640, 480});
+  EXPECT_TRUE(surface.unproject({199, 0}, ray));
+  EXPECT_FALSE(surface.unproject({201, 0}, ray));
   // The largest radius is 1 - 1/3 of 300 px.
   const CameraModel barrel("radtan4", {300, 300, 0, 0, -1.0 / 3, 0, 0, 0}, {640, 480});
   EXPECT_TRUE(barrel.unproject({199.9, 0}, ray));
