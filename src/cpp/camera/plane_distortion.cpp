@@ -15,7 +15,8 @@ constexpr int kMostInverseSteps = 50;
 constexpr int kMostInverseHalvings = 30;
 constexpr int kOutwardSteps = 16;
 // Residuals at unit depth: what ends the steps, and what must be reached.
-constexpr double kInverseGoal = 1e-14, kInverseTolerance = 1e-10;
+constexpr double kInverseGoal = 1e-14;
+constexpr double kInverseTolerance = 1e-10;
 
 std::vector<double> product(const std::vector<double>& a, const std::vector<double>& b) {
   std::vector<double> c(a.size() + b.size() - 1, 0.0);
