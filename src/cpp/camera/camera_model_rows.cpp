@@ -25,6 +25,7 @@ constexpr double kShortestFocalLength = 0.02;
 /// Parameters that may have any finite value.
 std::vector<CameraParameter> free_parameters(const std::vector<std::string>& names) {
   std::vector<CameraParameter> parameters;
+  parameters.reserve(names.size());
   for (const std::string& name : names) parameters.push_back({name, -kInfinity, kInfinity, true});
   return parameters;
 }
@@ -174,8 +175,8 @@ void check_ranges(const std::string& model, const CameraModelRow& row,
       range = "a number from " + number(one.low) + " to " + number(one.high) +
               (one.open ? ", both excluded" : "");
     } else if (std::isfinite(one.low)) {
-      range = "a finite number " +
-              (one.open ? "above " + number(one.low) : "not below " + number(one.low));
+      range =
+          (one.open ? "a finite number above " : "a finite number not below ") + number(one.low);
     }
     throw SettingsError(model + ": " + one.name + " is " + number(value) + "; give " + range +
                         ". The order of the parameters is " + parameter_names(row));

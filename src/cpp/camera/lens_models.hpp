@@ -56,7 +56,7 @@ struct PlaneDistortionLens {
   bool unproject(const Eigen::Vector2d& uv, Eigen::Vector3d& ray) const {
     Eigen::Vector2d m;
     if (!distortion.undistort(plane.to_plane(uv), m)) return false;
-    ray = m.homogeneous().normalized();
+    ray = Eigen::Vector3d(m.x(), m.y(), 1).normalized();
     return true;
   }
 };

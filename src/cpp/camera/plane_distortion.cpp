@@ -46,19 +46,20 @@ ValueAndSlope radius_at(const Distortion& coefficients, double r) {
 }
 
 // Radii and directions in which a domain with tangential terms is searched for a second part.
-constexpr double kFirstRadius = 0.01, kLastRadius = 1e4, kRadiusStep = 1.02;
+constexpr double kFirstRadius = 0.01, kRadiusStep = 1.02;
+constexpr int kRadii = 700;  // the last one is 1e4: 0.006 degrees from the plane z = 0
 constexpr int kDirections = 64;
 
 /// The smallest radius at which the distortion is one-to-one again, in any direction, after it was
 /// not: beyond it would be points of which the model shows images of nearer ones.
 double second_part(const PlaneDistortion& distortion) {
-  double smallest = kLastRadius;
+  double smallest = kFirstRadius * std::pow(kRadiusStep, kRadii);
   for (int i = 0; i < kDirections; ++i) {
     const double phi = 2 * 3.14159265358979323846 * i / kDirections;
     const Eigen::Vector2d direction(std::cos(phi), std::sin(phi));
-    double ended = 0;
+    double r = kFirstRadius, ended = 0;
     Bent bent;
-    for (double r = kFirstRadius; r < smallest; r *= kRadiusStep) {
+    for (int step = 0; step < kRadii && r < smallest; ++step, r *= kRadiusStep) {
       if (!distortion.distort(r * direction, bent)) {
         ended = r;
       } else if (ended > 0) {

@@ -44,10 +44,10 @@ class CameraModel:
     Parameters
     ----------
     model
-        A name of the table below, or another program's name for the same model. The case of letters
+        A name of the list below, or another program's name for the same model. The case of letters
         does not matter.
     parameters
-        The numbers in the order of the table, or a mapping from parameter names to numbers. Focal
+        The numbers in the order of the list, or a mapping from parameter names to numbers. Focal
         lengths and principal point are in pixels, ``omega`` is in radians, all others have no unit.
     image_size
         Width and height in pixels.
@@ -62,46 +62,36 @@ class CameraModel:
     Notes
     -----
     All parameters begin with ``fx, fy, cx, cy``. In the formulas, (x, y, z) is a point,
-    r = sqrt(x^2 + y^2), and the pixel is (fx m_x + cx, fy m_y + cy).
+    r = sqrt(x^2 + y^2), and the pixel is (fx m_x + cx, fy m_y + cy). The models with their further
+    parameters, and other programs' names:
 
-    ================== ============================ ===============================================
-    model              parameters after cy          other names
-    ================== ============================ ===============================================
-    ``pinhole``        none
-    ``radtan4``        k1, k2, p1, p2               radtan, radial-tangential, OPENCV
-    ``radtan5``        k1, k2, p1, p2, k3           plumb_bob
-    ``rational``       k1, k2, p1, p2, k3 to k6     rational_polynomial, pinhole-radtan8,
-                                                    FULL_OPENCV
-    ``thin_prism``     k1, k2, p1, p2, k3 to k6,    (12 of OpenCV's coefficients)
-                       s1 to s4
-    ``kannala_brandt`` k1, k2, k3, k4               KannalaBrandt8, kb4, equidistant, fisheye,
-                                                    OPENCV_FISHEYE
-    ``double_sphere``  xi, alpha                    ds
-    ``eucm``           alpha, beta                  extended_unified
-    ``mei``            xi, k1, k2, p1, p2           unified_omnidirectional
-    ``fov``            omega                        pinhole-fov
-    ================== ============================ ===============================================
+    - ``pinhole``: no further parameters; m = (x / z, y / z). Domain: z > 0.
+    - ``radtan4``: k1, k2, p1, p2. Other names: radtan, radial-tangential, OPENCV.
+    - ``radtan5``: k1, k2, p1, p2, k3. Other name: plumb_bob.
+    - ``rational``: k1, k2, p1, p2, k3, k4, k5, k6. Other names: rational_polynomial,
+      pinhole-radtan8, FULL_OPENCV.
+    - ``thin_prism``: k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4. ``radtan4`` to ``thin_prism``
+      are the distortions of OpenCV's documentation, module calib3d (D. C. Brown, "Close-range
+      camera calibration", 1971). Domain: z > 0, and radii below the one where the model folds over.
+    - ``kannala_brandt``: k1, k2, k3, k4; m = d (x, y) / r with the angle theta from the axis and
+      d = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8). Other names:
+      KannalaBrandt8, kb4, equidistant, fisheye, OPENCV_FISHEYE. Domain: angles below 180 degrees,
+      and below the one where d decreases. J. Kannala, S. Brandt, "A generic camera model and
+      calibration method for conventional, wide-angle, and fish-eye lenses", PAMI 2006.
+    - ``double_sphere``: xi (-1 to 1), alpha (0 to 1); m = (x, y) / (alpha d2 + (1 - alpha) z2) with
+      d1 = sqrt(r^2 + z^2), z2 = xi d1 + z, d2 = sqrt(r^2 + z2^2). Other name: ds. V. Usenko,
+      N. Demmel, D. Cremers, "The double sphere camera model", 3DV 2018.
+    - ``eucm``: alpha (0 to 1), beta (above 0); m = (x, y) / (alpha d + (1 - alpha) z) with
+      d = sqrt(beta r^2 + z^2). Other name: extended_unified. B. Khomutenko, G. Garcia, P. Martinet,
+      "An enhanced unified camera model", RA-L 2016.
+    - ``mei``: xi (not below 0), k1, k2, p1, p2; the distortion of ``radtan4`` of
+      (x, y) / (z + xi sqrt(r^2 + z^2)). Other name: unified_omnidirectional. C. Mei, P. Rives,
+      "Single view point omnidirectional camera calibration from planar grids", ICRA 2007.
+    - ``fov``: omega (between 0 and pi); m = d (x, y) / r with
+      d = atan2(2 r tan(omega / 2), z) / omega. Other name: pinhole-fov. F. Devernay, O. Faugeras,
+      "Straight lines have to be straight", 2001.
 
     Kalibr writes ``xi``, ``alpha`` and ``beta`` before the focal lengths: give those by name.
-
-    - ``radtan4`` to ``thin_prism``: OpenCV's documentation, module calib3d; D. C. Brown,
-      "Close-range camera calibration", 1971. Domain: z > 0 and radii below the one where the model
-      folds over.
-    - ``kannala_brandt``: m = d (x, y) / r with the angle theta from the axis and
-      d = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8). J. Kannala, S. Brandt,
-      "A generic camera model and calibration method for conventional, wide-angle, and fish-eye
-      lenses", PAMI 2006. Domain: angles below 180 degrees, and below the one where d decreases.
-    - ``double_sphere``: m = (x, y) / (alpha d2 + (1 - alpha) z2) with z2 = xi d1 + z,
-      d1 = sqrt(r^2 + z^2), d2 = sqrt(r^2 + z2^2); xi from -1 to 1, alpha from 0 to 1. V. Usenko,
-      N. Demmel, D. Cremers, "The double sphere camera model", 3DV 2018.
-    - ``eucm``: m = (x, y) / (alpha d + (1 - alpha) z) with d = sqrt(beta r^2 + z^2); alpha from 0
-      to 1, beta above 0. B. Khomutenko, G. Garcia, P. Martinet, "An enhanced unified camera model",
-      RA-L 2016.
-    - ``mei``: the distortion of ``radtan4`` of (x, y) / (z + xi sqrt(r^2 + z^2)); xi not below 0.
-      C. Mei, P. Rives, "Single view point omnidirectional camera calibration from planar grids",
-      ICRA 2007.
-    - ``fov``: m = d (x, y) / r with d = atan2(2 r tan(omega / 2), z) / omega; omega between 0 and
-      pi. F. Devernay, O. Faugeras, "Straight lines have to be straight", 2001.
 
     Examples
     --------
@@ -130,7 +120,7 @@ class CameraModel:
 
     @property
     def name(self) -> str:
-        """Name of the model, as in the first column of the table."""
+        """Name of the model, as in the list above."""
         return self._core.name
 
     @property
