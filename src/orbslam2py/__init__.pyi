@@ -23,6 +23,7 @@ from .recordings import RerunRecorder as RerunRecorder
 from .recordings import VideoWriter as VideoWriter
 from .runs import check_calibration as check_calibration
 from .runs import run_sequence as run_sequence
+from .settings import CameraModel as CameraModel
 from .settings import CameraSettings as CameraSettings
 from .settings import DepthSettings as DepthSettings
 from .settings import OrbSettings as OrbSettings

@@ -10,6 +10,7 @@ PYBIND11_MODULE(_core, module) {
   bind_images(module);
   bind_features(module);
   bind_camera(module);
+  bind_camera_model(module);
   bind_frame(module);
   bind_frame_evidence(module);
   bind_map(module);

@@ -6,30 +6,9 @@
 
 #include "base/scale_pyramid.hpp"
 #include "camera/lens.hpp"
+#include "camera/pinhole.hpp"
 
 namespace orbslam {
-
-/// Pinhole intrinsics in pixels, by which a Camera projects. Algorithms that hold for a pinhole
-/// alone (linear equations in pixels, kernels on the plane at unit depth) take them from a Camera.
-struct Pinhole {
-  double fx = 0, fy = 0, cx = 0, cy = 0;
-
-  /// (u, v) of a point in the camera frame; its z must not be 0.
-  Eigen::Vector2d project(const Eigen::Vector3d& p_c) const {
-    const double inverse_z = 1.0 / p_c.z();
-    return {fx * p_c.x() * inverse_z + cx, fy * p_c.y() * inverse_z + cy};
-  }
-  /// The calibration matrix K.
-  Eigen::Matrix3d matrix() const {
-    Eigen::Matrix3d K;
-    K << fx, 0, cx, 0, fy, cy, 0, 0, 1;
-    return K;
-  }
-  /// The point at depth z [m] seen at pixel (u, v).
-  Eigen::Vector3d unproject(double u, double v, double z) const {
-    return {(u - cx) * z / fx, (v - cy) * z / fy, z};
-  }
-};
 
 /// Limits of undistorted pixel coordinates.
 struct ImageBounds {
@@ -51,12 +30,6 @@ struct CameraOptions {
   double bf = 0;            ///< baseline times fx [pixel metre]; 0 for a single camera
   double depth_ratio = 0;   ///< close/far limit in multiples of the baseline (ThDepth)
   ImageSize image_size;     ///< of the first image
-};
-
-/// Where a camera shows a point, and how that moves with the point.
-struct Seen {
-  Eigen::Vector2d uv;             ///< undistorted pixel
-  Eigen::Matrix<double, 2, 3> J;  ///< d uv / d p_c
 };
 
 /// A calibrated camera, which owns its image plane: projection, lens, bounds and (virtual) right

@@ -2,6 +2,7 @@
 """What must be known before the first image: sensor, camera, features, depth."""
 
 from orbslam2py.settings.builtin import BUILTIN_NAMES
+from orbslam2py.settings.camera_model import AngleOfView, CameraModel
 from orbslam2py.settings.defaults import settings_for_camera
 from orbslam2py.settings.fit import FitThresholds, Misfit
 from orbslam2py.settings.groups import (
@@ -17,6 +18,8 @@ from orbslam2py.settings.settings import Settings, builtin_settings, resolve_set
 
 __all__ = [
     "BUILTIN_NAMES",
+    "AngleOfView",
+    "CameraModel",
     "CameraRectification",
     "CameraSettings",
     "DepthSettings",

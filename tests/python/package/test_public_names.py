@@ -18,6 +18,7 @@ from support.scripts import run_script
 
 NAMES = {
     "Callbacks",
+    "CameraModel",
     "CameraSettings",
     "DatasetError",
     "DepthSettings",
@@ -82,7 +83,10 @@ ROOMS = {
         *("export_colmap", "images_of", "with_colours"),
     ],
     "runs": ["RunOptions", "RunResult", "SequenceRunner", "SystemOptions", "run_sequence"],
-    "settings": ["CameraSettings", "DepthSettings", "OrbSettings", "Settings", "builtin_settings"],
+    "settings": [
+        *("AngleOfView", "CameraModel", "CameraSettings", "DepthSettings", "OrbSettings"),
+        *("Settings", "builtin_settings"),
+    ],
     "synthetic": ["SyntheticOptions", "SyntheticSequence"],
     "pictures": ["MapPicture", "Marks", "Status", "draw_overlay", "draw_top_view"],
     "recordings": ["RerunRecorder", "VideoWriter"],
