@@ -24,6 +24,8 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 # which another test may open.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 render_once()
+# No test cuts the power: nothing need be on the disk before it goes on.
+os.fsync = lambda _descriptor: None
 
 #: Files that take longest, and folders of such: with several workers they come first, so that no
 #: worker is left alone with one at the end (with ``--no-loadscope-reorder``).
