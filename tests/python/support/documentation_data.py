@@ -77,7 +77,7 @@ def make_data(folder: Path) -> None:
     hood = np.full(images[0].shape, 255, np.uint8)
     hood[-24:] = 0
     write_image(folder / "hood.png", hood)
-    write_video(folder / "board.mp4", chessboard_views(single.camera.matrix, 16), 4)
+    write_video(folder / "board.mp4", chessboard_views(single.camera.matrix, 12), 4)
     (folder / "camchain.yaml").write_text(CAMCHAIN)
     (folder / "jobs.yaml").write_text(JOBS)
     _write_vocabulary(folder)
