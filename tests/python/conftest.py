@@ -23,6 +23,8 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 # As the command line does (test_plain_messages.py): OpenCV's FFmpeg reads it at the first video,
 # which another test may open.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+if "PYTEST_XDIST_WORKER" in os.environ:  # whoever has other workers beside it has one core
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
 render_once()
 # No test cuts the power: nothing need be on the disk before it goes on.
 os.fsync = lambda _descriptor: None
