@@ -13,6 +13,7 @@ import pytest
 
 from orbslam2py.runs import outputs
 from support.data import shared_folder
+from support.rendered_once import render_once
 from support.watchdog import watchdog, worker_threads
 
 # Programs that are started in the background may be told to ignore Ctrl-C, and so is what they
@@ -22,6 +23,11 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 # As the command line does (test_plain_messages.py): OpenCV's FFmpeg reads it at the first video,
 # which another test may open.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+if "PYTEST_XDIST_WORKER" in os.environ:  # whoever has other workers beside it has one core
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+render_once()
+# No test cuts the power: nothing need be on the disk before it goes on.
+os.fsync = lambda _descriptor: None
 
 #: Files that take longest, and folders of such: with several workers they come first, so that no
 #: worker is left alone with one at the end (with ``--no-loadscope-reorder``).

@@ -168,7 +168,7 @@ def test_killed_at_any_moment(jobs: Path, whole: Whole, tmp_path: Path) -> None:
     # Processes that have loaded the package before they are told what to do.
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload([run_job.__module__, "matplotlib.backends.backend_agg"])
-    for number in range(3):
+    for number in range(2):
         folder = tmp_path / str(number)
         process = context.Process(target=make_batch, args=(jobs, folder))
         process.start()

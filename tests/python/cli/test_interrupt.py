@@ -22,7 +22,7 @@ from support.forked import Forked
 
 pytestmark = pytest.mark.watchdog(60)
 
-N = 30
+N = 20
 
 # Runs the command; sends Ctrl-C to itself when a function is called for the n-th time, or, if it is
 # to be sent no times, tells that it came so far.

@@ -15,7 +15,7 @@ import pytest
 from orbslam2py.cli.demo import own_name
 from support.browser import Browser
 from support.command_line import CommandLine, Results
-from support.viewer_pages import click_on, open_viewer
+from support.viewer_pages import AS_URGENT, click_on, open_viewer
 
 pytestmark = pytest.mark.watchdog(200)
 pytest.importorskip("viser", reason="the viewer's extra is not installed")
@@ -95,8 +95,16 @@ finally:
 def started(arguments: tuple[str, ...], folder: Path) -> tuple[subprocess.Popen[str], str]:
     """A command of its own, and where its viewer is."""
     environment = {name: value for name, value in os.environ.items() if name != "DISPLAY"}
+    code = (
+        "import sys\n"
+        "from orbslam2py.viewer.process import companion\n"
+        f"companion._CODE = {AS_URGENT!r} + companion._CODE\n"
+        "from orbslam2py.cli import main\n"
+        "sys.argv[0] = 'orbslam2py'\n"
+        "main()\n"
+    )
     process = subprocess.Popen(
-        [sys.executable, "-m", "orbslam2py", *arguments],
+        [sys.executable, "-c", code, *arguments],
         cwd=folder,
         env=environment,
         stdout=subprocess.PIPE,

@@ -14,7 +14,7 @@ import pytest
 
 from orbslam2py import MapFileError, Sensor
 from orbslam2py import _core as core
-from orbslam2py.maps import load_map, save_map, take_contents
+from orbslam2py.maps import load_map, map_writer, save_map, take_contents
 from orbslam2py.maps.map_rows import all_rows
 from orbslam2py.maps.map_writer import MapWriter
 from orbslam2py.maps.schema import APPLICATION_ID, TABLES
@@ -240,7 +240,8 @@ def test_lost_rows_are_noticed(tmp_path: Path) -> None:
     _refused(path, "lost rows")
 
 
-def test_a_locked_file_is_named(tmp_path: Path) -> None:
+def test_a_locked_file_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(map_writer, "LOCK_PATIENCE", 0.1)
     path = written(tmp_path)
     with closing(sqlite3.connect(path, isolation_level=None)) as connection:
         connection.execute("BEGIN EXCLUSIVE")

@@ -66,7 +66,7 @@ from orbslam2py.maps import load_map
 from benchmarks.map_files.mapping import corridor
 
 path = sys.argv[1]
-frames = [corridor(12).load(i) for i in range(12)]
+frames = [corridor(6).load(i) for i in range(6)]
 
 def turn():
     with System(load_map=path, deterministic=True) as slam:

@@ -25,7 +25,8 @@ def corridor(sensor: str, *, noisy: bool = False) -> SyntheticSequence:
     )
 
 
-def run(sensor: str, effort: Effort | str, *, noisy: bool = False, **options: bool) -> orb.System:
+@cache
+def run(sensor: str, effort: Effort, *, noisy: bool = False, **options: bool) -> orb.System:
     sequence = corridor(sensor, noisy=noisy)
     with orb.System(sequence.settings, sensor, effort=effort, **options) as slam:  # type: ignore[arg-type]
         for frame in sequence:
@@ -60,7 +61,7 @@ def test_more_effort_errs_less_from_frame_to_frame(sensor: str) -> None:
     sequence = corridor(sensor, noisy=True)
     truth = np.array([sequence.T_wc(i) for i in range(len(sequence))])
     errors = []
-    for effort in ("normal", "thorough"):
+    for effort in (Effort.NORMAL, Effort.THOROUGH):
         path = run(sensor, effort, noisy=True, deterministic=True).trajectory()
         T_wc = truth[path.indices]
         scale = np.linalg.norm(np.ptp(T_wc[:, :3, 3], axis=0))

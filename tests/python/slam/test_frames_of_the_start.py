@@ -132,7 +132,7 @@ def begun(sequence: SyntheticSequence) -> System:
 @pytest.fixture(scope="module")
 def room() -> SyntheticSequence:
     return SyntheticSequence(
-        SyntheticOptions(world="room", sensor="mono", size=(320, 240), frames=40)
+        SyntheticOptions(world="room", sensor="mono", size=(320, 240), frames=30, pace=2)
     )
 
 

@@ -57,7 +57,7 @@ def test_out_of_the_map_and_back(sensor: Sensor) -> None:
     system.wait_until_idle()
     before = system.map_contents()
     system.localization_mode = True
-    for _ in range(3):
+    for _ in range(2):
         turn(world, range(_MAPPED[-1], _HOME, -1))
         out = turn(world, range(_HOME, _FAR))
         back = turn(world, range(_FAR - 1, _HOME - 1, -1))
@@ -75,7 +75,7 @@ def test_out_of_the_map_and_back(sensor: Sensor) -> None:
         assert home.rotation_deg < 0.5
         assert before.first_difference(system.map_contents()) is None
     assert system.check_map() == []
-    assert len(system.trajectory()) == len(_MAPPED) + 6 * (_FAR - _HOME) + 15
+    assert len(system.trajectory()) == len(_MAPPED) + 4 * (_FAR - _HOME) + 10
 
 
 def test_the_end_of_odometry_is_no_motion(sensor: Sensor) -> None:

@@ -25,9 +25,12 @@ from support.feeding import feed
 
 pytestmark = pytest.mark.watchdog(300)
 
+#: Far enough behind the start to see it again.
+LAPS = 1.2
+
 
 @lru_cache
-def sequence(world: str, sensor: Sensor, laps: float | None = 1.4) -> SyntheticSequence:
+def sequence(world: str, sensor: Sensor, laps: float | None = LAPS) -> SyntheticSequence:
     """Few pixels and noise, so that a lap ends beside its start."""
     monocular = sensor is Sensor.MONOCULAR
     return SyntheticSequence(
@@ -36,8 +39,8 @@ def sequence(world: str, sensor: Sensor, laps: float | None = 1.4) -> SyntheticS
             sensor=sensor,
             laps=laps,
             seed=1,
-            fps=15.0 if monocular else 10.0,
-            speed=0.7 if monocular or laps is None else 1.0,
+            fps=12.0 if monocular else 10.0,
+            speed=0.7 if laps is None else 0.8 if monocular else 1.0,
             size=(400, 300) if monocular else (360, 270),
             noise=8.0 if monocular else 12.0,
             depth_noise=0.03 if sensor is Sensor.RGBD else 0.0,
@@ -64,7 +67,7 @@ class Run:
     """Violated invariants after any change of the map as a whole."""
 
 
-def run(world: str, sensor: Sensor, laps: float | None = 1.4, **options: object) -> Run:
+def run(world: str, sensor: Sensor, laps: float | None = LAPS, **options: object) -> Run:
     made = sequence(world, sensor, laps)
     settings = made.settings
     n_features = 1000 if sensor is Sensor.MONOCULAR else 600
@@ -176,7 +179,7 @@ def test_a_loop_that_still_waits_is_closed_when_all_is_waited_for() -> None:
     settings = replace(made.settings, orb=replace(made.settings.orb, n_features=600))
     with System(settings, Sensor.RGBD, deterministic=True, config=never) as system:
         for index, timestamp in enumerate(made.timestamps):
-            feed(system, images("corridor", Sensor.RGBD, 1.4, index), float(timestamp))
+            feed(system, images("corridor", Sensor.RGBD, LAPS, index), float(timestamp))
         assert system.loops == []
         system.localization_mode = True
         assert system.wait_until_idle()
@@ -200,7 +203,7 @@ def test_optimize_on_demand_lowers_the_cost() -> None:
     settings = replace(made.settings, orb=replace(made.settings.orb, n_features=600))
     with System(settings, Sensor.RGBD, loop_closing=False, wait_for_mapping=True) as system:
         for index in range(120):
-            shown = images("corridor", Sensor.RGBD, 1.4, index)
+            shown = images("corridor", Sensor.RGBD, LAPS, index)
             feed(system, shown, float(made.timestamps[index]))
         system.wait_until_idle()
         record = system.optimize()

@@ -143,7 +143,7 @@ def test_a_still_camera_begins_no_map() -> None:
 @pytest.mark.parametrize("degrees", [0.3, 1.0, 3.0])
 def test_pure_rotation_begins_no_map(degrees: float) -> None:
     camera = Camera()
-    for k in range(40):
+    for k in range(30):
         angle, turned = np.radians(degrees * k), SEQUENCE.T_wc(5)
         turn = np.array(
             [[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]]

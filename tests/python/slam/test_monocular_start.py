@@ -10,7 +10,6 @@ import pytest
 
 from orbslam2py import Reason, System, TrackingRecord, TrackingState, Trajectory
 from orbslam2py.evaluation import Alignment, evaluate_trajectory
-from orbslam2py.slam.config import InitializationConfig
 from orbslam2py.slam.initialization.image_motion import ImageMotion
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
@@ -52,6 +51,12 @@ class Played:
         assert figures.ate is not None
         length = np.linalg.norm(np.diff(truth.positions, axis=0), axis=1).sum()
         return figures.ate.rmse / float(length)
+
+
+@pytest.fixture(scope="module")
+def walked() -> Played:
+    """A walk along a corridor."""
+    return Played(world="corridor", frames=40)
 
 
 def test_a_plane_begins_a_map() -> None:
@@ -111,8 +116,9 @@ def test_after_a_long_stand_a_map_begins() -> None:
         SyntheticOptions(world="corridor", sensor="mono", size=(320, 240), noise=1, frames=40)
     )
     standing = sequence.load(0).image
-    n_remembered = InitializationConfig().remembered_frames
-    with System(sequence.settings, "mono", deterministic=True) as system:
+    n_remembered = 40
+    config = {"initialization.remembered_frames": n_remembered}
+    with System(sequence.settings, "mono", deterministic=True, config=config) as system:
         for i in range(n_remembered + 5):
             record = system.track_monocular(standing, i / 20)
             assert record.state is TrackingState.NOT_INITIALIZED
@@ -125,8 +131,8 @@ def test_after_a_long_stand_a_map_begins() -> None:
 
 
 # ---- where the trajectory begins -----------------------------------------------------------------
-def test_the_trajectory_begins_where_the_recording_does() -> None:
-    played = Played(world="corridor", frames=40)
+def test_the_trajectory_begins_where_the_recording_does(walked: Played) -> None:
+    played = walked
     assert played.first > 1
     path = played.path()
     assert list(path.indices) == list(range(40))
@@ -143,8 +149,8 @@ def test_the_trajectory_begins_where_the_recording_does() -> None:
     assert all(r.T_cw is None and r.reason is not Reason.NONE for r in before)
 
 
-def test_earlier_frames_are_no_keyframes_and_leave_a_sound_map() -> None:
-    played = Played(world="corridor", frames=40)
+def test_earlier_frames_are_no_keyframes_and_leave_a_sound_map(walked: Played) -> None:
+    played = walked
     assert played.system.check_map() == []
     keyframes = sum(r.is_keyframe for r in played.records)
     # The first view is a keyframe whose record said that there was no map.
@@ -181,8 +187,9 @@ def test_a_map_that_comes_to_nothing_throws_no_frames_away() -> None:
 
 
 def test_a_reset_that_is_asked_for_forgets_all() -> None:
-    played = Played(world="corridor", frames=40)
-    sequence = played.sequence
+    sequence = SyntheticSequence(
+        SyntheticOptions(world="corridor", sensor="mono", size=(320, 240), noise=1, frames=40)
+    )
     with System(sequence.settings, "mono", deterministic=True) as system:
         for i in range(15):
             system.track_monocular(sequence.load(i).image, i / 20)

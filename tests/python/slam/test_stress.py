@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Everything at once, at random: the system under several threads that use it.
 
-Lasts ORBSLAM2PY_STRESS_SECONDS (15); no control call may take ORBSLAM2PY_STRESS_PATIENCE (2)
+Lasts ORBSLAM2PY_STRESS_SECONDS (8); no control call may take ORBSLAM2PY_STRESS_PATIENCE (2)
 seconds, a shutdown that processes what waits ten times that.
 """
 
@@ -23,7 +23,7 @@ from orbslam2py.datasets import Images
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.watchdog import watchdog, worker_threads
 
-SECONDS = float(os.environ.get("ORBSLAM2PY_STRESS_SECONDS", "15"))
+SECONDS = float(os.environ.get("ORBSLAM2PY_STRESS_SECONDS", "8"))
 PATIENCE = float(os.environ.get("ORBSLAM2PY_STRESS_PATIENCE", "2"))
 #: A turn on the spot, which closes a loop.
 LAP = 150
@@ -196,7 +196,7 @@ def test_everything_at_once() -> None:
 
         while not enough():
             session = Session(seed, patience, counts)
-            session.run(rng.uniform(1, 10), drain=rng.random() < 0.5)
+            session.run(rng.uniform(1, 5), drain=rng.random() < 0.5)
             assert session.errors == []
             seed += 1
             del session

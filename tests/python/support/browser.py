@@ -79,8 +79,12 @@ class Browser:
         height: int = 900,
         dark: bool = False,
         reduced_motion: bool = False,
+        script: str = "",
     ) -> Page:
-        """Open an address in a tab of its own, and wait until it is loaded."""
+        """Open an address in a tab of its own, and wait until it is loaded.
+
+        `script` runs before the scripts of the page.
+        """
         target = self._wire.call("Target.createTarget", {"url": "about:blank"})["targetId"]
         attached = {"targetId": target, "flatten": True}
         session = self._wire.call("Target.attachToTarget", attached)["sessionId"]
@@ -89,6 +93,7 @@ class Browser:
             page.call(f"{domain}.enable")
         page.set_size(width, height)
         page.set_media(dark=dark, reduced_motion=reduced_motion)
+        page.call("Page.addScriptToEvaluateOnNewDocument", {"source": script})
         page.go(address)
         return page
 

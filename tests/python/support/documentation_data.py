@@ -17,7 +17,9 @@ from orbslam2py.trajectory import write_kitti, write_tum
 from orbslam2py.vocabulary import read_training_images, save_vocabulary, train_vocabulary
 from support.realsense import sdk_stream, write_sdk
 
-FRAMES, SIZE = 40, (320, 240)
+FRAMES, SIZE = 24, (320, 240)
+#: Of what a single camera shows: pages search for a good start in it.
+SINGLE_FRAMES = 40
 
 #: The pair that took the images of `mypair`.
 CAMCHAIN = """\
@@ -59,8 +61,8 @@ def make_data(folder: Path) -> None:
     shutil.rmtree(bag)
     _write_recording(folder / "recording.db3")
     _write_phone(folder / "phone")
-    single = _walk("mono")
-    images = [single.load(i).image for i in range(FRAMES)]
+    single = _walk("mono", SINGLE_FRAMES)
+    images = [single.load(i).image for i in range(SINGLE_FRAMES)]
     single.settings.save(folder / "my.yaml")
     truth = single.ground_truth()
     write_tum(folder / "groundtruth.txt", truth)
@@ -75,15 +77,15 @@ def make_data(folder: Path) -> None:
     hood = np.full(images[0].shape, 255, np.uint8)
     hood[-24:] = 0
     write_image(folder / "hood.png", hood)
-    write_video(folder / "board.mp4", chessboard_views(single.camera.matrix, 16), 4)
+    write_video(folder / "board.mp4", chessboard_views(single.camera.matrix, 12), 4)
     (folder / "camchain.yaml").write_text(CAMCHAIN)
     (folder / "jobs.yaml").write_text(JOBS)
     _write_vocabulary(folder)
 
 
-def _walk(sensor: str) -> SyntheticSequence:
+def _walk(sensor: str, frames: int = FRAMES) -> SyntheticSequence:
     return SyntheticSequence(
-        SyntheticOptions(world="corridor", sensor=sensor, frames=FRAMES, size=SIZE)
+        SyntheticOptions(world="corridor", sensor=sensor, frames=frames, size=SIZE)
     )
 
 

@@ -22,6 +22,16 @@ WIDTH, HEIGHT = 1200, 800
 #: Where the map is seen: between the two panels.
 _MAP = slice(470, 890)
 
+#: Run first in the process of the page, that gives way to nobody then.
+AS_URGENT = "import os; os.nice = lambda increment: 0\n"
+
+#: The page draws ten pictures a second instead of sixty: without graphics hardware they take all of
+#: the processor, which the system and the page's messages need.
+_DRAW_SELDOM = """
+window.requestAnimationFrame = call => setTimeout(() => call(performance.now()), 100);
+window.cancelAnimationFrame = number => clearTimeout(number);
+"""
+
 #: Clicks on one thing: the page may move it away between the look for it and the click.
 _MOST_CLICKS = 5
 
@@ -48,7 +58,7 @@ _FIND = """
 
 def open_viewer(browser: Browser, address: str) -> Page:
     """Open the page and wait until it is connected and has its switches."""
-    page = browser.open(address, width=WIDTH, height=HEIGHT)
+    page = browser.open(address, width=WIDTH, height=HEIGHT, script=_DRAW_SELDOM)
     page.wait_for("document.body.innerText.includes('Whole map')", PATIENCE)
     return page
 

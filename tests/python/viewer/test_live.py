@@ -4,14 +4,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from orbslam2py import Sensor, System, TrackingState, Viewer
+from orbslam2py import Sensor, System, TrackingRecord, TrackingState, Viewer
 from orbslam2py._palette import KEYFRAME, LOCAL_POINTS, MAPPED
 from orbslam2py.maps import load_map
 from support.browser import Browser, BrowserError, Page
@@ -40,7 +39,13 @@ class Show:
     system: System
     viewer: Viewer
     page: Page
-    browser: Browser
+    n_played: int = 0
+
+    def play(self, n_frames: int) -> list[TrackingRecord]:
+        """Track the next frames."""
+        records = play(self.system, n_frames, first=self.n_played)
+        self.n_played += n_frames
+        return records
 
 
 @pytest.fixture(scope="module")
@@ -49,8 +54,9 @@ def browser() -> Iterator[Browser]:
         yield browser
 
 
-@contextmanager
-def _a_show(browser: Browser) -> Iterator[Show]:
+@pytest.fixture(scope="module")
+def show(browser: Browser) -> Iterator[Show]:
+    """One for all tests; those that only look come first."""
     with (
         new_system(Sensor.RGBD, wait_for_mapping=True) as system,
         Viewer(
@@ -58,23 +64,11 @@ def _a_show(browser: Browser) -> Iterator[Show]:
         ) as viewer,
     ):
         page = open_viewer(browser, viewer.address)
-        play(system, N_FRAMES)
+        shown = Show(system, viewer, page)
+        shown.play(N_FRAMES)
         assert system.wait_until_idle(60)
-        yield Show(system, viewer, page, browser)
+        yield shown
         page.close()
-
-
-@pytest.fixture(scope="module")
-def steady(browser: Browser) -> Iterator[Show]:
-    """One for all tests that look, and leave everything as it was."""
-    with _a_show(browser) as show:
-        yield show
-
-
-@pytest.fixture
-def show(browser: Browser) -> Iterator[Show]:
-    with _a_show(browser) as show:
-        yield show
 
 
 def shows_local_points(seen: np.ndarray) -> bool:
@@ -82,7 +76,7 @@ def shows_local_points(seen: np.ndarray) -> bool:
     return amount(map_part(seen), LOCAL_POINTS) > 100
 
 
-def test_image_map_cameras_and_figures_are_seen(steady: Show, tmp_path: Path) -> None:
+def test_image_map_cameras_and_figures_are_seen(show: Show, tmp_path: Path) -> None:
     def complete(seen: np.ndarray) -> bool:
         middle = map_part(seen)
         cameras = amount(middle, KEYFRAME, 40)
@@ -90,80 +84,49 @@ def test_image_map_cameras_and_figures_are_seen(steady: Show, tmp_path: Path) ->
         camera = amount(middle, MAPPED, tolerance=65)
         return shows_local_points(seen) and cameras > 60 and camera > 40 and keypoints > 300
 
-    seen = wait_until_seen(steady.page, complete, "points, keyframes, camera and keypoints")
+    seen = wait_until_seen(show.page, complete, "points, keyframes, camera and keypoints")
     image = seen[80:380, 20:400]
     assert image.std() > 30  # a picture, and no grey rectangle
-    for text in ("SLAM", f"{steady.system.n_keyframes} keyframes", "from the ground truth"):
-        steady.page.wait_for(f"document.body.innerText.includes('{text}')", 50)
+    for text in ("SLAM", f"{show.system.n_keyframes} keyframes", "from the ground truth"):
+        show.page.wait_for(f"document.body.innerText.includes('{text}')", 50)
     plots = "document.querySelectorAll('.uplot canvas').length"
-    assert steady.page.evaluate(plots) == 2
+    assert show.page.evaluate(plots) == 2
     # The drawing library of the page speaks of itself, and of graphics that are drawn in software.
-    own = [text for text in steady.page.errors if "THREE.Clock" not in text and "WebGL" not in text]
+    own = [text for text in show.page.errors if "THREE.Clock" not in text and "WebGL" not in text]
     assert own == []
 
 
-def test_nothing_is_asked_of_other_computers(steady: Show) -> None:
-    wait_until_seen(steady.page, shows_local_points, "points")
-    own = steady.viewer.address.removeprefix("http://")
-    for request in steady.page.requests:
+def test_nothing_is_asked_of_other_computers(show: Show) -> None:
+    wait_until_seen(show.page, shows_local_points, "points")
+    own = show.viewer.address.removeprefix("http://")
+    for request in show.page.requests:
         assert request.startswith(("data:", f"blob:http://{own}/", f"http://{own}", f"ws://{own}"))
     assert own.startswith("127.0.0.1:")
 
 
-def test_layers_are_switched_off_and_on(steady: Show) -> None:
-    wait_until_seen(steady.page, shows_local_points, "local points")
-    click_on(steady.page, "Points of the local map")
+def test_layers_are_switched_off_and_on(show: Show) -> None:
+    wait_until_seen(show.page, shows_local_points, "local points")
+    click_on(show.page, "Points of the local map")
     wait_until_seen(
-        steady.page, lambda seen: amount(map_part(seen), LOCAL_POINTS) < 20, "no local points"
+        show.page, lambda seen: amount(map_part(seen), LOCAL_POINTS) < 20, "no local points"
     )
-    click_on(steady.page, "Points of the local map")
-    wait_until_seen(steady.page, shows_local_points, "local points again")
+    click_on(show.page, "Points of the local map")
+    wait_until_seen(show.page, shows_local_points, "local points again")
 
 
-def test_localization_mode_is_switched(show: Show) -> None:
-    click_on(show.page, "Localization")
-    wait_until(lambda: show.system.localization_mode, "localization mode")
-    play(show.system, 3, first=N_FRAMES)
-    show.page.wait_for("document.body.innerText.includes('LOCALIZATION')")
-    click_on(show.page, "Localization")
-    wait_until(lambda: not show.system.localization_mode, "no localization mode")
-    assert show.system.wait_until_idle(60)
-    # And the page shows what somebody else switches.
-    show.system.localization_mode = True
-    play(show.system, 3, first=N_FRAMES + 3)
-    wait_until_checked(show.page, "Localization")
+def test_optimize_is_told(show: Show) -> None:
+    click_on(show.page, "Optimize")
+    wait_until(lambda: len(show.system.full_adjustments) == 1, "a full adjustment")
+    show.page.wait_for("document.body.innerText.includes('Optimized: ')", 50)
 
 
-def test_reset_begins_a_new_map_and_the_page_goes_on(show: Show) -> None:
-    click_on(show.page, "Reset")
-    wait_until(show.system.pipeline.reset_requested.is_set, "the wish for a reset")
-    play(show.system, 4, first=N_FRAMES)
-    assert show.system.n_resets == 1
-    show.page.wait_for(
-        f"document.body.innerText.includes('{show.system.n_keyframes} keyframe')", 60
-    )
-    wait_until_seen(show.page, shows_local_points, "points")
-
-
-def test_optimize_is_told(steady: Show) -> None:
-    click_on(steady.page, "Optimize")
-    wait_until(lambda: len(steady.system.full_adjustments) == 1, "a full adjustment")
-    steady.page.wait_for("document.body.innerText.includes('Optimized: ')", 50)
-
-
-def test_the_map_is_saved(steady: Show, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_map_is_saved(show: Show, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    click_on(steady.page, "Save map")
-    steady.page.wait_for("document.body.innerText.includes('The map is in ')", 50)
+    click_on(show.page, "Save map")
+    show.page.wait_for("document.body.innerText.includes('The map is in ')", 50)
     saved = list(tmp_path.glob("map-*.orbmap"))
     assert len(saved) == 1
-    assert len(load_map(saved[0]).contents.keyframes.ids) == steady.system.n_keyframes
-
-
-def test_stop_is_told_to_the_loop_that_reads_images(show: Show) -> None:
-    assert not show.viewer.stopped.is_set()
-    click_on(show.page, "Stop")
-    assert show.viewer.stopped.wait(60)
+    assert len(load_map(saved[0]).contents.keyframes.ids) == show.system.n_keyframes
 
 
 #: The page shows a hand over what can be clicked.
@@ -204,24 +167,55 @@ def _click_on_a_keyframe(page: Page) -> bool:
     return True
 
 
-def test_a_keyframe_that_is_clicked_is_shown(steady: Show) -> None:
-    wait_until_seen(
-        steady.page, lambda seen: amount(map_part(seen), KEYFRAME, 40) > 60, "keyframes"
-    )
-    wait_until(lambda: _click_on_a_keyframe(steady.page), "a keyframe's panel", 150)
-    assert "matched to the map then" in steady.page.evaluate("document.body.innerText")
+def test_a_keyframe_that_is_clicked_is_shown(show: Show) -> None:
+    wait_until_seen(show.page, lambda seen: amount(map_part(seen), KEYFRAME, 40) > 60, "keyframes")
+    wait_until(lambda: _click_on_a_keyframe(show.page), "a keyframe's panel", 150)
+    assert "matched to the map then" in show.page.evaluate("document.body.innerText")
 
 
+# ---- what changes the system, and stops it last --------------------------------------------------
 def test_browsers_that_reload_or_are_killed_change_nothing(show: Show) -> None:
     show.page.go(show.viewer.address)
     with Browser() as other:
-        for _ in range(3):
+        for _ in range(2):
             open_viewer(other, show.viewer.address)
-        play(show.system, 2, first=N_FRAMES)
+        show.play(2)
         other.kill()
-    records = play(show.system, 4, first=N_FRAMES + 2)
+    records = show.play(4)
     assert all(record.state is TrackingState.OK for record in records)
     wait_until_seen(show.page, shows_local_points, "points")
+
+
+def test_localization_mode_is_switched(show: Show) -> None:
+    click_on(show.page, "Localization")
+    wait_until(lambda: show.system.localization_mode, "localization mode")
+    show.play(3)
+    show.page.wait_for("document.body.innerText.includes('LOCALIZATION')")
+    click_on(show.page, "Localization")
+    wait_until(lambda: not show.system.localization_mode, "no localization mode")
+    assert show.system.wait_until_idle(60)
+    # And the page shows what somebody else switches.
+    show.system.localization_mode = True
+    show.play(3)
+    wait_until_checked(show.page, "Localization")
+    show.system.localization_mode = False
+
+
+def test_reset_begins_a_new_map_and_the_page_goes_on(show: Show) -> None:
+    click_on(show.page, "Reset")
+    wait_until(show.system.pipeline.reset_requested.is_set, "the wish for a reset")
+    show.play(4)
+    assert show.system.n_resets == 1
+    show.page.wait_for(
+        f"document.body.innerText.includes('{show.system.n_keyframes} keyframe')", 60
+    )
+    wait_until_seen(show.page, shows_local_points, "points")
+
+
+def test_stop_is_told_to_the_loop_that_reads_images(show: Show) -> None:
+    assert not show.viewer.stopped.is_set()
+    click_on(show.page, "Stop")
+    assert show.viewer.stopped.wait(60)
 
 
 def test_a_page_left_open_over_the_end_stays(browser: Browser) -> None:
