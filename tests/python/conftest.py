@@ -27,13 +27,13 @@ if "PYTEST_XDIST_WORKER" in os.environ:  # whoever has other workers beside it h
     os.environ.setdefault("OMP_NUM_THREADS", "1")
 render_once()
 # No test cuts the power: nothing need be on the disk before it goes on.
-os.fsync = lambda _descriptor: None
+os.fsync = lambda fd: None
 
 #: Files that take longest, and folders of such: with several workers they come first, so that no
 #: worker is left alone with one at the end (with ``--no-loadscope-reorder``).
 LONGEST_FIRST = (
-    "slam/test_loops.py",
     "docs/test_snippets.py",
+    "slam/test_loops.py",
     "package/test_accuracy.py",
     "package/test_calibration_matrix.py",
     "viewer",

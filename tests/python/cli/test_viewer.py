@@ -129,8 +129,8 @@ def test_a_recorded_run_is_held_stepped_and_stopped_in_the_page(tmp_path: Path) 
     """Far more images than it takes to press the buttons, on any computer."""
     images = ("--frames", "5000")
     arguments = ("demo", "--sensor", "rgbd", *images, "--viewer", "--viewer-port", "0")
-    process, address = started(arguments, tmp_path)
     with Browser() as browser:
+        process, address = started(arguments, tmp_path)
         page = open_viewer(browser, address)
         click_on(page, "Pause")
         page.wait_for("document.body.innerText.includes('Go on')")

@@ -59,6 +59,11 @@ class Cluster:
             self.add_worker(hidden)
         self._wait(lambda: len(self._client.nthreads()) == n)
 
+    def require_none(self) -> None:
+        """End all workers, also without a scheduler."""
+        for worker in list(self.workers):
+            self.kill(worker)
+
     def add_worker(self, hidden: tuple[Path, ...] = ()) -> None:
         around: list[str] = []
         if hidden:
