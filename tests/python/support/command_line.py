@@ -6,6 +6,7 @@ from __future__ import annotations
 import csv
 import json
 import logging
+import shutil
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -61,8 +62,20 @@ def logging_restored() -> Iterator[None]:
         datasets.setLevel(level_of_datasets)
 
 
-#: The tree of all commands takes longer to build than most tests take to call one of them.
-_command_built_once = cache(typer.main.get_command)
+_get_command = typer.main.get_command
+
+
+@cache
+def _built(app: typer.Typer, columns: int) -> Any:
+    return _get_command(app)
+
+
+def _command_built_once(app: typer.Typer) -> Any:
+    """Build the tree of all commands once: it takes longer than most tests take to call one.
+
+    Its help depends on the width of the terminal.
+    """
+    return _built(app, shutil.get_terminal_size().columns)
 
 
 class CommandLine:
