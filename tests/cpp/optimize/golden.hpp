@@ -25,9 +25,10 @@ Array<T> golden(const std::string& set, const std::string& array) {
   return read_npy<T>(test_data("golden/" + set + "/" + array + ".npy"));
 }
 
-/// From fx, fy, cx, cy, bf.
+/// From fx, fy, cx, cy and, where a set has depth, bf.
 inline std::shared_ptr<const Camera> golden_camera(const Array<double>& K) {
-  return make_camera({K.values[0], K.values[1], K.values[2], K.values[3]}, K.values[4]);
+  const double bf = K.values.size() > 4 ? K.values[4] : 0;
+  return make_camera({K.values[0], K.values[1], K.values[2], K.values[3]}, bf);
 }
 
 struct PoseProblem {
