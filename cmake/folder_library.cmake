@@ -40,6 +40,9 @@ endif()
 if(ORBSLAM2PY_SANITIZE)
   target_compile_options(orbslam_options INTERFACE
     -fsanitize=${ORBSLAM2PY_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer
+    # A test at each pointer that is followed takes the compiler as long as all the others together, and
+    # the address sanitizer sees what they would.
+    -fno-sanitize=null,alignment,object-size,vptr
     -Wno-maybe-uninitialized)  # GCC 12 reports false ones inside instrumented library headers
   target_link_options(orbslam_options INTERFACE -fsanitize=${ORBSLAM2PY_SANITIZE})
   # Under the address sanitizer Eigen aligns memory itself, but not in libceres, which was compiled

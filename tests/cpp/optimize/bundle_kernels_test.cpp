@@ -12,11 +12,10 @@ namespace orbslam {
 namespace {
 
 using bundle_kernels::kBlockSize;
-using bundle_kernels::Kernels;
 using testing::uniform;
 
-std::vector<const Kernels*> all_kernels() {
-  std::vector<const Kernels*> kernels{&bundle_kernels::portable_kernels()};
+std::vector<const bundle_kernels::Kernels*> all_bundle_kernels() {
+  std::vector<const bundle_kernels::Kernels*> kernels{&bundle_kernels::portable_kernels()};
 #if defined(__x86_64__)
   if (__builtin_cpu_supports("avx2")) kernels.push_back(bundle_kernels::avx2_kernels());
 #endif
@@ -57,7 +56,7 @@ TEST(BundleKernels, SolvesAsADenseCholeskyDoes) {
       Eigen::VectorXd right(6 * n);
       for (double& value : right) value = uniform(random, -10, 10);
       const Eigen::VectorXd expected = matrix.llt().solve(right);
-      for (const Kernels* kernels : all_kernels()) {
+      for (const bundle_kernels::Kernels* kernels : all_bundle_kernels()) {
         std::vector<double> blocks = to_blocks(matrix);
         std::vector<double> scratch(bundle_kernels::kFactoriseSize * static_cast<std::size_t>(n));
         Eigen::VectorXd solution = right;
@@ -71,7 +70,7 @@ TEST(BundleKernels, SolvesAsADenseCholeskyDoes) {
 }
 
 TEST(BundleKernels, MatricesThatAreNotPositiveDefiniteHaveNoFactor) {
-  for (const Kernels* kernels : all_kernels()) {
+  for (const bundle_kernels::Kernels* kernels : all_bundle_kernels()) {
     for (const double wrong : {0.0, -1.0, std::nan("")}) {
       Eigen::MatrixXd matrix = random_matrix(3, 4, 4);
       matrix(15, 15) = wrong;
@@ -85,7 +84,7 @@ TEST(BundleKernels, MatricesThatAreNotPositiveDefiniteHaveNoFactor) {
 TEST(BundleKernels, AllGiveTheSameFactorBitByBit) {
   const Eigen::MatrixXd matrix = random_matrix(5, 12, 4);
   std::vector<std::vector<double>> factors;
-  for (const Kernels* kernels : all_kernels()) {
+  for (const bundle_kernels::Kernels* kernels : all_bundle_kernels()) {
     factors.push_back(to_blocks(matrix));
     std::vector<double> scratch(bundle_kernels::kFactoriseSize * 12);
     ASSERT_TRUE(kernels->factorise(factors.back().data(), 12, scratch.data()));

@@ -14,12 +14,11 @@
 namespace orbslam {
 namespace {
 
-using pose_sums::Kernels;
 using pose_sums::Task;
 using testing::uniform;
 
-std::vector<const Kernels*> all_kernels() {
-  std::vector<const Kernels*> kernels{&pose_sums::portable_kernels()};
+std::vector<const pose_sums::Kernels*> all_pose_kernels() {
+  std::vector<const pose_sums::Kernels*> kernels{&pose_sums::portable_kernels()};
 #if defined(__x86_64__)
   if (__builtin_cpu_supports("avx2")) kernels.push_back(pose_sums::avx2_kernels());
 #endif
@@ -78,7 +77,7 @@ TEST(PoseSums, CostIsThatOfAPlainLoop) {
   for (const std::size_t n : {4U, 40U, 400U}) {
     const Seen seen(n);
     for (const double huber : {0.0, 2.0}) {
-      for (const Kernels* kernels : all_kernels()) {
+      for (const pose_sums::Kernels* kernels : all_pose_kernels()) {
         EXPECT_NEAR(kernels->mono(seen.task(huber), nullptr) / seen.cost(false, huber), 1, 1e-12);
         EXPECT_NEAR(kernels->stereo(seen.task(huber), nullptr) / seen.cost(true, huber), 1, 1e-12);
       }
@@ -94,7 +93,7 @@ TEST(PoseSums, AllGiveTheSameBytes) {
       for (const bool stereo : {false, true}) {
         std::vector<double> costs;
         std::vector<System> systems;
-        for (const Kernels* kernels : all_kernels()) {
+        for (const pose_sums::Kernels* kernels : all_pose_kernels()) {
           System system{};
           const auto kernel = stereo ? kernels->stereo : kernels->mono;
           costs.push_back(kernel(seen.task(huber), system.data()));
@@ -115,7 +114,7 @@ TEST(PoseSums, PointsOnTheCamerasPlaneTakeNoPart) {
   const Seen as_it_was = seen;
   for (const double depth : {0.0, 1e-12, -1e-12}) {
     seen.z[2] = depth;
-    for (const Kernels* kernels : all_kernels()) {
+    for (const pose_sums::Kernels* kernels : all_pose_kernels()) {
       std::array<double, pose_sums::kSystemSize> system{};
       EXPECT_TRUE(std::isfinite(kernels->stereo(seen.task(2), system.data())));
       for (const double entry : system) EXPECT_TRUE(std::isfinite(entry));
