@@ -27,8 +27,6 @@ MECHANISMS: dict[str, Changes] = {
     "keyframes before a turn": {"keyframes.kept_share": 0, "keyframes.staying_share": 0},
     "keyframes of few inliers": {"keyframes.few_inliers": 0},
     "more features of few inliers": {"tracking.feature_factor": 1},
-    "all keypoints near a loss": {"relocalization.thorough_keyframes": 0},
-    "more inliers after a loss": {"tracking.local_map_inliers_after_relocalization": 30},
 }
 
 

@@ -179,8 +179,6 @@ class TrackingConfig:
     (ORB-SLAM)."""
     local_map_inliers: int = 30
     """Fewest inliers in the local map (ORB-SLAM)."""
-    local_map_inliers_after_relocalization: int = 50
-    """The same in the first second after a relocalization (ORB-SLAM)."""
     small_map: int = 5
     """A map with this number of keyframes or fewer is dropped when tracking is lost
     (ORB-SLAM)."""
@@ -192,11 +190,9 @@ class TrackingConfig:
 
     def for_features(self, n_features: int) -> TrackingConfig:
         """These limits for images with so many features: of few ones fewer are asked for."""
-        after = self.local_map_inliers_after_relocalization
         return replace(
             self,
             local_map_inliers=_for_features(self.local_map_inliers, n_features),
-            local_map_inliers_after_relocalization=_for_features(after, n_features),
             scarce_inliers=_for_features(self.scarce_inliers, n_features),
         )
 
@@ -337,9 +333,6 @@ class RelocalizationConfig:
     """The same ratio when each point is compared with every keypoint."""
     thorough_matches: int = 12
     """Fewest matches when each point is compared with every keypoint."""
-    thorough_keyframes: int = 2
-    """Number of keyframes near the last known pose that are compared so, for `motion_frames`
-    frames."""
     iterations: int = 5
     """RANSAC iterations of each candidate per turn (ORB-SLAM)."""
     inliers: int = 10

@@ -76,19 +76,13 @@ class FrameReestimation:
         if refined is None:
             return followed
         if finished:
-            refined = self._search.local_map_search.rematch(
-                refined, self._state(frame, wide=in_doubt).probation, in_doubt=in_doubt
-            )
+            refined = self._search.local_map_search.rematch(refined, in_doubt=in_doubt)
         return _without_outliers(refined).frame
 
     def _look(self, frame: core.TrackedFrame, *, wide: bool) -> RefinedPose | None:
-        state = self._state(frame, wide=wide)
+        state = State().relocalized(frame.id) if wide else State()
         refined = self._search.in_local_map(_copy_of(frame), PoseEstimate(), state)
         return _without_outliers(refined) if refined.estimate.found else None
-
-    def _state(self, frame: core.TrackedFrame, *, wide: bool) -> State:
-        state = self._search.new_state()
-        return state.relocalized(frame.id, where_expected=False) if wide else state
 
 
 def _shows_more(looked: core.TrackedFrame, found: core.TrackedFrame) -> bool:

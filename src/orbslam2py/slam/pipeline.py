@@ -387,14 +387,7 @@ class Pipeline:
 def _make_search(
     setup: Setup, back_end: BackEnd, config: Config, relocalizer: Relocalizer | None = None
 ) -> PoseSearch:
-    return PoseSearch(
-        back_end.map,
-        setup.vocabulary,
-        setup.sensor,
-        setup.settings.max_keyframe_interval,
-        relocalizer,
-        config.tracking,
-    )
+    return PoseSearch(back_end.map, setup.vocabulary, setup.sensor, relocalizer, config.tracking)
 
 
 def _make_tracking(
@@ -402,7 +395,6 @@ def _make_tracking(
 ) -> Tracking:
     seed = options.seed
     sensor, vocabulary = setup.sensor, setup.vocabulary
-    max_keyframe_interval = setup.settings.max_keyframe_interval
     slam_map, mapping = back_end.map, back_end.mapping
     n_features = setup.settings.orb.n_features
 
@@ -450,7 +442,7 @@ def _make_tracking(
             slam_map,
             mapping.worker,
             sensor,
-            max_keyframe_interval,
+            setup.settings.max_keyframe_interval,
             config.keyframes,
             waits=options.wait_for_mapping and not options.deterministic,
         ),

@@ -230,8 +230,6 @@ class PoseEstimate:
     """The frame before was in the map, and this one is not."""
     relocalized: bool = False
     """Found without a guess from the frame before."""
-    where_expected: bool = False
-    """Relocalized where tracking was just lost, or its motion led from there."""
     method: PoseMethod = PoseMethod.MOTION_MODEL
     """What found it."""
     evidence: Evidence | None = None

@@ -102,8 +102,8 @@ class Tracking:
         self._has_depth = has_depth
         self._in_growing_map = FirstEstimateInGrowingMap(search)
         self._in_fixed_map = FirstEstimateInFixedMap(search, has_depth=has_depth)
-        self._transitions = Transitions(config, has_depth=has_depth, new_map_after=new_map_after)
-        self._state = State.before_first_map(has_depth=has_depth)
+        self._transitions = Transitions(config, new_map_after=new_map_after)
+        self._state = State()
 
     # ---- maps that begin and end -----------------------------------------------------------------
     def restart(self) -> None:
@@ -112,9 +112,7 @@ class Tracking:
         self._begin_anew()
         if frames:
             # The count of the frames goes on, and the next map is young as well.
-            state = self._state
-            probation = state.probation.map_begun(frames[-1].id, has_depth=self._has_depth)
-            self._state = replace(state, probation=probation)
+            self._state = self._state.map_begun(frames[-1].id)
         self._initializer.restart(frames)
 
     def reset(self) -> None:
@@ -123,9 +121,7 @@ class Tracking:
         self._initializer.reset()
 
     def _begin_anew(self) -> None:
-        self._state = State.before_first_map(
-            has_depth=self._has_depth, n_relocalizations=self._state.n_relocalizations
-        )
+        self._state = State(n_relocalizations=self._state.n_relocalizations)
 
     def begin_in_loaded_map(self, initial_pose: core.Pose | None) -> None:
         """Start lost in the map as it is: every image is searched in it, and it is kept.
@@ -292,7 +288,7 @@ class Tracking:
         if lost and not first.found:
             return first, state
         if lost or first.relocalized:
-            state = state.relocalized(frame.id, where_expected=first.where_expected)
+            state = state.relocalized(frame.id)
             since = replace(state.since_keyframe, most_inliers=0)
             state = replace(state, since_keyframe=since)
         with timer("local_map"):

@@ -74,7 +74,6 @@ def test_of_few_features_fewer_inliers_are_asked_for(
 ) -> None:
     limits = TrackingConfig().for_features(n_features)
     assert limits.local_map_inliers == inliers
-    assert limits.local_map_inliers_after_relocalization == after
     assert limits.map_matches == TrackingConfig().map_matches
     again = RelocalizationConfig().for_features(n_features)
     assert (again.narrow, again.enough_near, again.enough) == (inliers, inliers, after)

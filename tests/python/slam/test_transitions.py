@@ -56,12 +56,12 @@ def frame(number: int, x: float = 0.0, *, map_index: int = 0) -> Any:
     )
 
 
-def transitions(*, has_depth: bool = False) -> Transitions:
-    return Transitions(Config(), has_depth=has_depth, new_map_after=PATIENCE)
+def transitions() -> Transitions:
+    return Transitions(Config(), new_map_after=PATIENCE)
 
 
-def after(state: State, *events: Any, has_depth: bool = False) -> State:
-    table = transitions(has_depth=has_depth)
+def after(state: State, *events: Any) -> State:
+    table = transitions()
     for event in events:
         state, _ = table.next_state(state, event)
     return state
@@ -71,7 +71,7 @@ def actions(state: State, event: Any) -> tuple[Any, ...]:
     return transitions().next_state(state, event)[1]
 
 
-NEW = State.before_first_map(has_depth=False)
+NEW = State()
 BEGUN = after(NEW, NotInitialized(), MapBegun(frame(1)))
 FOLLOWED = after(BEGUN, Tracked(frame(2, 1.0), MANY, 0), Tracked(frame(3, 3.0), MANY, 0))
 LOST_STATE = after(FOLLOWED, NotFound(0.4))
@@ -184,7 +184,7 @@ def test_a_relocalized_candidate_does_not_survive_a_loss() -> None:
 def test_another_map_may_begin_after_the_patience(seconds: float, may: bool) -> None:
     assert transitions().may_begin_map(LOST_STATE, 0.4 + seconds) is may
     assert not transitions().may_begin_map(FOLLOWED, 1e6)
-    never = Transitions(Config(), has_depth=False, new_map_after=None)
+    never = Transitions(Config(), new_map_after=None)
     assert not never.may_begin_map(LOST_STATE, 1e6)
 
 
@@ -220,8 +220,7 @@ def test_a_map_beside_others_forgets_the_frames_before() -> None:
     assert not begun.seeks_map
     assert begun.n_uncertain == 0
     assert begun.kept_maps == {3}
-    assert begun.probation.strict_from == 30
-    assert after(used, MapBegun(frame(30)), has_depth=True).probation.strict_from is None
+    assert (begun.tracked_since, begun.found_again) == (30, False)
 
 
 def test_after_a_map_was_dropped_the_next_image_may_begin_one() -> None:
@@ -259,6 +258,6 @@ def test_few_inliers_are_noted() -> None:
 
 
 def test_motion_is_forgotten_in_another_map() -> None:
-    left = FOLLOWED.in_another_map(has_depth=False)
+    left = FOLLOWED.in_another_map()
     assert left.motion.last_frame is Motion().last_frame
     assert left.scene.error is FOLLOWED.scene.error

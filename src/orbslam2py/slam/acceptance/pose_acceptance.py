@@ -88,9 +88,7 @@ class PoseAcceptance:
     def _rematched(self, hypothesis: Hypothesis, state: State, *, in_doubt: bool) -> Hypothesis:
         """In a fixed map an image has one pose, whatever frame came before it."""
         refined, evidence = hypothesis.refined, hypothesis.evidence
-        rematched = self._search.local_map_search.rematch(
-            refined, state.probation, in_doubt=in_doubt
-        )
+        rematched = self._search.local_map_search.rematch(refined, in_doubt=in_doubt)
         if rematched is refined:
             return hypothesis
         if in_doubt:
@@ -121,8 +119,7 @@ class PoseAcceptance:
             refined = replace(refined, frame=frame)
             if refined.estimate.relocalized:
                 # Found independently of the last frame: the motion from there is no velocity.
-                expected = refined.estimate.where_expected
-                state = state.relocalized(frame.id, where_expected=expected)
+                state = state.relocalized(frame.id)
                 state = replace(state, motion=state.motion.jumped(None))
         state = self._search.settle(refined, state, fixed_map=fixed_map)
         innovation = state.motion.innovation(frame)

@@ -72,8 +72,7 @@ class EarlierFrames:
         """Track one frame after the other until several are not found."""
         search, acceptance = self._search, self._acceptance
         assert search is not None and acceptance is not None
-        state = replace(
-            search.new_state(),
+        state = State(
             phase=TrackingState.OK,
             motion=Motion().remembering(first, None),
             reference_keyframe=first.reference_keyframe,

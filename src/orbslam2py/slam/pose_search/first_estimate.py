@@ -73,7 +73,7 @@ class FirstEstimateInGrowingMap:
             return estimate, state
         if state.is_lost:
             return estimate.failed(relocalized.reason), state
-        if state.probation.has_just_begun(frame.id, search.limits):
+        if state.has_just_begun(frame.id, search.limits):
             # Relocalized at the border of the map, the frame before shows most of this one.
             standing = search.by_motion_model(frame, state)
             if standing.found:

@@ -15,7 +15,7 @@ from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.config import TrackingConfig
 from orbslam2py.slam.pose_search.refined_pose import RefinedPose
 from orbslam2py.slam.records import PoseEstimate, Reason
-from orbslam2py.slam.state import Probation
+from orbslam2py.slam.state import State
 
 
 class LocalMapSearch:
@@ -29,8 +29,6 @@ class LocalMapSearch:
         The map.
     sensor : Sensor
         What the images come from.
-    second : int
-        Frames of one second, for the probation after a relocalization.
     config : TrackingConfig
         Limits.
     """
@@ -39,18 +37,14 @@ class LocalMapSearch:
         self,
         slam_map: core.Map,
         sensor: Sensor,
-        second: int,
         config: TrackingConfig,
     ) -> None:
         self._map = slam_map
-        self._second = second
         self._limits = config
         is_rgbd = sensor is Sensor.RGBD
         self._usual_window = config.local_map_window_rgbd if is_rgbd else config.local_map_window
 
-    def refine(
-        self, frame: core.TrackedFrame, first: PoseEstimate, probation: Probation
-    ) -> RefinedPose:
+    def refine(self, frame: core.TrackedFrame, first: PoseEstimate, state: State) -> RefinedPose:
         """Refine a first estimate with all points around it, and see how many are found.
 
         Parameters
@@ -59,8 +53,8 @@ class LocalMapSearch:
             With the pose and the associations of the first estimate.
         first : PoseEstimate
             The first estimate.
-        probation : Probation
-            How many inliers are required, and whether the search window is wide.
+        state : State
+            Whether the search window is wide.
 
         Returns
         -------
@@ -71,21 +65,22 @@ class LocalMapSearch:
         local_map = core.select_local_map(self._map, frame)
         n_held = frame.n_associated()
         window = self._usual_window
-        if probation.has_just_begun(frame.id, self._limits):
+        just_begun = state.has_just_begun(frame.id, self._limits)
+        if just_begun:
             window = self._limits.local_map_window_after_relocalization
         matches = core.match_local_map(frame, local_map.points, first.discarded, window)
         optimized = core.optimize_pose(frame)
         visible = matches.visible
-        found_again = probation.was_just_found(frame.id, self._limits)
+        found_again = just_begun and state.found_again
         if found_again and optimized.n_inliers >= self._limits.map_matches:
             # Wide windows find much that is wrong; where the camera is now, narrow ones find more.
             frame.discard_outliers()
             core.match_local_map(frame, local_map.points, first.discarded, self._usual_window)
             optimized = core.optimize_pose(frame)
-        estimate = self._enough_found(frame, first, optimized, probation)
+        estimate = self._enough_found(frame, first, optimized)
         return RefinedPose(frame, estimate, local_map, visible, n_held + len(visible))
 
-    def rematch(self, refined: RefinedPose, probation: Probation, *, in_doubt: bool) -> RefinedPose:
+    def rematch(self, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
         """Match a frame with the map from nothing, so that its pose does not hang on the way to it.
 
         What is matched with the frame before stays matched from frame to frame, and holds a pose
@@ -96,8 +91,6 @@ class LocalMapSearch:
         ----------
         refined : RefinedPose
             Where the search begins. It is not changed.
-        probation : Probation
-            How many inliers are required.
         in_doubt : bool
             Whether few points held the pose, or wrong ones: then it is taken from wherever the
             search leads.
@@ -126,7 +119,7 @@ class LocalMapSearch:
         elsewhere = in_doubt or _is_elsewhere(frame, refined, limits.elsewhere)
         if optimized.n_inliers < share * n_of_map or not elsewhere:
             return refined
-        estimate = self._enough_found(frame, refined.estimate, optimized, probation)
+        estimate = self._enough_found(frame, refined.estimate, optimized)
         if estimate.visual_odometry or not estimate.found:
             return refined
         return RefinedPose(frame, estimate, local_map, visible, len(visible))
@@ -136,7 +129,6 @@ class LocalMapSearch:
         frame: core.TrackedFrame,
         first: PoseEstimate,
         optimized: core.PoseEstimate,
-        probation: Probation,
     ) -> PoseEstimate:
         """What a pose is by what was found of the local map."""
         estimate = PoseEstimate(
@@ -145,10 +137,8 @@ class LocalMapSearch:
             covariance=optimized.covariance,
             discarded=first.discarded,
             relocalized=first.relocalized,
-            where_expected=first.where_expected,
         )
-        required = probation.required_inliers(frame.id, self._second, self._limits)
-        if estimate.n_inliers < required:
+        if estimate.n_inliers < self._limits.local_map_inliers:
             return estimate.failed(Reason.FEW_INLIERS_LOCAL_MAP)
         if frame.n_map_inliers() < self._limits.map_matches:
             # What the frame before measured speaks for itself, and says nothing of the map.

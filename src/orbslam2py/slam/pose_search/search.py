@@ -31,8 +31,6 @@ class PoseSearch:
         Visual words for matching with keyframes.
     sensor : Sensor
         What the images come from.
-    max_keyframe_interval : int
-        Frames of one second: see `Probation`.
     relocalizer : Relocalizer, optional
         Finds lost frames in the map; without it none is found there.
     config : TrackingConfig
@@ -53,7 +51,6 @@ class PoseSearch:
         slam_map: core.Map,
         vocabulary: core.Vocabulary,
         sensor: Sensor,
-        max_keyframe_interval: int,
         relocalizer: Relocalizer | None,
         config: TrackingConfig,
     ) -> None:
@@ -62,11 +59,7 @@ class PoseSearch:
         self._sensor = sensor
         self._relocalizer = relocalizer
         self.limits = config
-        self.local_map_search = LocalMapSearch(slam_map, sensor, max_keyframe_interval, config)
-
-    def new_state(self) -> State:
-        """Return the state before the first image."""
-        return State.before_first_map(has_depth=self._sensor.has_depth)
+        self.local_map_search = LocalMapSearch(slam_map, sensor, config)
 
     @property
     def motion_model_window(self) -> float:
@@ -180,14 +173,14 @@ class PoseSearch:
             not_found = Reason.SEARCHING_LOADED_MAP
         if self._relocalizer is None:
             return PoseEstimate(not_found), state
-        n_inliers, where_expected = 0, False
+        n_inliers = 0
         if state.initial_pose is not None:
             n_inliers = self._relocalizer.relocalize_near(frame, state.initial_pose)
         if n_inliers == 0:
             core.describe(frame.features, self._vocabulary)
             found, lost = self._relocalizer.relocalize(frame, state.lost)
             state = replace(state, lost=lost)
-            n_inliers, where_expected = found.n_inliers, found.where_expected
+            n_inliers = found.n_inliers
             if n_inliers == 0:
                 several = Reason.SEVERAL_PLACES if found.is_ambiguous else not_found
                 return PoseEstimate(several), state
@@ -197,7 +190,6 @@ class PoseSearch:
             n_matches=n_inliers,
             n_inliers=n_inliers,
             relocalized=True,
-            where_expected=where_expected,
             method=PoseMethod.RELOCALIZATION,
         )
         return estimate, state
@@ -235,7 +227,7 @@ class PoseSearch:
 
         The state stays as it is until `settle`: a frame may have several hypotheses.
         """
-        refined = self.local_map_search.refine(frame, first, state.probation)
+        refined = self.local_map_search.refine(frame, first, state)
         if refined.estimate.visual_odometry:
             return self.beyond_the_map(frame, refined.estimate, state.motion)
         return refined

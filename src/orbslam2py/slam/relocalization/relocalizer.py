@@ -26,8 +26,6 @@ class Relocalization(NamedTuple):
 
     n_inliers: int = 0
     """0: not found."""
-    where_expected: bool = False
-    """Found where tracking was just lost, or where the velocity led from there."""
     is_ambiguous: bool = False
     """Not found, because it fits at several places."""
 
@@ -113,11 +111,8 @@ class Relocalizer:
             nearest = self._nearest(guess, ids, T_wc)
             n_inliers = self._near(frame, guess, nearest, wider, enough)
             if n_inliers > 0:
-                return Relocalization(n_inliers, where_expected=just_lost), lost
-        if not just_lost:
-            return Relocalization(), lost
-        likeliest = [int(keyframe) for keyframe in ids[: limits.thorough_keyframes]]
-        return Relocalization(self._compare_with(frame, likeliest, limits.enough)), lost
+                return Relocalization(n_inliers), lost
+        return Relocalization(), lost
 
     def _by_likeness(
         self, frame: core.TrackedFrame, lost: LostSearch
@@ -173,11 +168,8 @@ class Relocalizer:
             Number of inliers, at least `RelocalizationConfig.inliers`; 0 if the frame was not
             found, and then it has no associations.
         """
-        return self._compare_with(frame, keyframes, self._limits.inliers)
-
-    def _compare_with(self, frame: core.TrackedFrame, keyframes: list[int], enough: int) -> int:
         candidates = self._fitting.matched(frame, keyframes, thoroughly=True)
-        found = self._fitting.first_that_fits(frame, candidates, enough)
+        found = self._fitting.first_that_fits(frame, candidates, self._limits.inliers)
         if found is not None:
             return found[1]
         frame.clear_associations()

@@ -3,7 +3,6 @@
 
 from orbslam2py.slam.state.loss import LastKnownPose, LostSearch, LostTime, Unconfirmed
 from orbslam2py.slam.state.motion import Motion
-from orbslam2py.slam.state.probation import Probation
 from orbslam2py.slam.state.scene import PoseStatistics, SceneStatistics
 from orbslam2py.slam.state.state import SinceKeyframe, State
 
@@ -13,7 +12,6 @@ __all__ = [
     "LostTime",
     "Motion",
     "PoseStatistics",
-    "Probation",
     "SceneStatistics",
     "SinceKeyframe",
     "State",

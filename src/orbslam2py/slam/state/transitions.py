@@ -134,16 +134,13 @@ class Transitions:
     ----------
     config : Config
         Thresholds.
-    has_depth : bool
-        Depths are measured.
     new_map_after : float or None
         Seconds after which a lost camera may begin another map; None: never.
     """
 
-    def __init__(self, config: Config, *, has_depth: bool, new_map_after: float | None) -> None:
+    def __init__(self, config: Config, *, new_map_after: float | None) -> None:
         self._limits = config.tracking
         self._relocalization = config.relocalization
-        self._has_depth = has_depth
         self._patience = new_map_after
 
     def may_begin_map(self, state: State, timestamp: float) -> bool:
@@ -187,7 +184,7 @@ class Transitions:
                 after = replace(state, seeks_map=True)
                 actions = _NOTHING if state.seeks_map else (RestartInitializer(),)
             case MapDropped():
-                left = state.in_another_map(has_depth=self._has_depth)
+                left = state.in_another_map()
                 lost = TrackingState.LOST
                 after = replace(left, phase=lost, lost_time=LONG_LOST, seeks_map=True)
             case MapLoaded():
@@ -197,9 +194,8 @@ class Transitions:
     def _begun(self, state: State, event: MapBegun) -> State:
         frame, earlier = event.frame, event.earlier
         if state.is_lost:
-            state = state.in_another_map(has_depth=self._has_depth)
-            probation = state.probation.map_begun(frame.id, has_depth=self._has_depth)
-            state = replace(state, probation=probation, seeks_map=False, lost_time=LostTime())
+            state = state.in_another_map().map_begun(frame.id)
+            state = replace(state, seeks_map=False, lost_time=LostTime())
         motion = state.motion
         if earlier:
             # With these the velocity is known, and the next frame can be predicted.
@@ -265,7 +261,6 @@ class Transitions:
                 after,
                 motion=motion.lost(),
                 lost=LostSearch(here),
-                probation=state.probation.lost(),
             )
         # The relocalized frame was wrong: the search continues where tracking was lost before.
         place = state.lost.place
