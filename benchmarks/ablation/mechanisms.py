@@ -24,7 +24,7 @@ MECHANISMS: dict[str, Changes] = {
     "comparison of all views": {"initialization.compare_views": False},
     "views between the first two": {"initialization.view_between": 0},
     "matching of uncertain frames again": {"trajectory.rematch_uncertain": False},
-    "keyframes before a turn": {"keyframes.kept_share": 0, "keyframes.staying_share": 0},
+    "keyframes before a turn": {"keyframes.kept_share": 0},
     "keyframes of few inliers": {"keyframes.few_inliers": 0},
     "more features of few inliers": {"tracking.feature_factor": 1},
 }

@@ -53,6 +53,9 @@ _log = logging.getLogger(__name__)
 #: The year 5138 in seconds since 1970; today in milliseconds, or in what is finer, lies far beyond.
 _NO_SECONDS = 1e11
 
+#: Keyframes after which the first frames of a map are estimated again, and frames at the latest.
+_SETTLED_MAP, _YOUNG_FRAMES = 10, 250
+
 #: Makes a frame of images: takes its id and a timer.
 BuildFrame = Callable[[int, StageTimer], core.Frame]
 
@@ -112,7 +115,6 @@ class Pipeline:
         self.reset_requested = threading.Event()
         self.frame_watchers: tuple[FrameWatcher, ...] = ()
         self.n_resets = 0
-        self._limits = config.initialization
         # The map that came to nothing, and is given up before the next image.
         self._given_up: int | None = None
         self._start_failed = False
@@ -254,8 +256,8 @@ class Pipeline:
         """Once a single camera's map has settled, its first frames get better poses in it."""
         n_young = self.recorder.n_young
         slam_map = self.back_end.map
-        settled = slam_map.n_keyframes_of(slam_map.active_map) > self._limits.settled_map
-        if n_young > 0 and (settled or n_young >= self._limits.young_frames):
+        settled = slam_map.n_keyframes_of(slam_map.active_map) > _SETTLED_MAP
+        if n_young > 0 and (settled or n_young >= _YOUNG_FRAMES):
             self.recorder.reestimate_first_frames()
 
     def _keep(self, frame: core.TrackedFrame, outcome: TrackingResult) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from orbslam2py import Reason, System, TrackingRecord, TrackingState, Trajectory
 from orbslam2py.evaluation import Alignment, evaluate_trajectory
+from orbslam2py.slam.initialization import from_views
 from orbslam2py.slam.initialization.image_motion import ImageMotion
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
@@ -110,15 +111,15 @@ def test_a_turn_before_the_first_step_begins_no_wrong_map() -> None:
     assert played.error() < 0.02
 
 
-def test_after_a_long_stand_a_map_begins() -> None:
+def test_after_a_long_stand_a_map_begins(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its first view is older than all frames that are remembered."""
     sequence = SyntheticSequence(
         SyntheticOptions(world="corridor", sensor="mono", size=(320, 240), noise=1, frames=40)
     )
     standing = sequence.load(0).image
     n_remembered = 40
-    config = {"initialization.remembered_frames": n_remembered}
-    with System(sequence.settings, "mono", deterministic=True, config=config) as system:
+    monkeypatch.setattr(from_views, "_REMEMBERED_FRAMES", n_remembered)
+    with System(sequence.settings, "mono", deterministic=True) as system:
         for i in range(n_remembered + 5):
             record = system.track_monocular(standing, i / 20)
             assert record.state is TrackingState.NOT_INITIALIZED

@@ -15,6 +15,12 @@ from orbslam2py.slam.pose_search import PoseSearch, RefinedPose
 from orbslam2py.slam.records import Evidence, PoseEstimate, PoseMethod, Reason, Verdict
 from orbslam2py.slam.state import State
 
+_BETTER = 1.1  # factor on the inliers with which another hypothesis wins
+_ENOUGH = 0.75  # share of the mean inliers with which no further hypothesis is searched
+_KEYFRAMES_AROUND = 3  # neighbours of the reference keyframe: each costs a matching by words
+_ALIGNED_WINDOW = 15.0  # half width of the search window after a rotation of the image, pixels
+_WIDE_WINDOW = 40.0  # the same around a prediction in doubt, pixels at level 0
+
 Way = Callable[[core.TrackedFrame, State], PoseEstimate]
 
 
@@ -106,11 +112,11 @@ class MultiHypothesisSearch:
 
     def _ways(self, state: State) -> Iterator[tuple[PoseMethod, Way]]:
         """The methods near the last frame, in the order of their cost."""
-        limits, search = self._judge.limits, self._search
+        search = self._search
         yield PoseMethod.ALIGNED_IMAGES, self._by_aligned_images
         yield (
             PoseMethod.KEYFRAMES_AROUND,
-            lambda v, s: search.by_keyframes_around(v, s, limits.keyframes_around),
+            lambda v, s: search.by_keyframes_around(v, s, _KEYFRAMES_AROUND),
         )
         if state.motion.velocity is not None:
             yield PoseMethod.WIDE_WINDOW, self._by_wide_window
@@ -121,16 +127,15 @@ class MultiHypothesisSearch:
         if aligned is None or aligned.correlation < limits.aligned_correlation:
             return PoseEstimate(Reason.FEW_MATCHES_LAST_FRAME)
         motion.predict_turned(frame, aligned.quaternion_xyzw)
-        return self._search.around_prediction(frame, motion, limits.aligned_window)
+        return self._search.around_prediction(frame, motion, _ALIGNED_WINDOW)
 
     def _by_wide_window(self, frame: core.TrackedFrame, state: State) -> PoseEstimate:
         state.motion.predict(frame)
-        window = self._judge.limits.wide_window
-        return self._search.around_prediction(frame, state.motion, window)
+        return self._search.around_prediction(frame, state.motion, _WIDE_WINDOW)
 
     def _has_enough(self, hypothesis: Hypothesis, others: list[Hypothesis]) -> bool:
         """Whether it is no use to look further."""
-        if hypothesis.evidence.inliers_to_usual >= self._judge.limits.enough_share:
+        if hypothesis.evidence.inliers_to_usual >= _ENOUGH:
             return True
         return any(self._confirms(hypothesis, other) for other in others)
 
@@ -143,7 +148,7 @@ class MultiHypothesisSearch:
         best = found[0]
         for hypothesis in found[1:]:
             # What was found first stays unless another one is clearly better.
-            if hypothesis.n_inliers > self._judge.limits.better * best.n_inliers:
+            if hypothesis.n_inliers > _BETTER * best.n_inliers:
                 best = hypothesis
         if any(self._confirms(best, other) for other in found if other is not best):
             best = replace(best, evidence=self._judge.confirm(best.evidence))

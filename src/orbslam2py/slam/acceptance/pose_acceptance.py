@@ -15,6 +15,8 @@ from orbslam2py.slam.pose_search import PoseSearch, RefinedPose
 from orbslam2py.slam.records import Evidence, PoseEstimate, Reason, Verdict
 from orbslam2py.slam.state import State
 
+_WEAK_FRAMES = 2  # uncertain ones in a row, after which a confirmed one may become a keyframe
+
 
 class PoseAcceptance:
     """Refines poses in the local map, weighs them, and has them searched again when in doubt.
@@ -131,10 +133,9 @@ class PoseAcceptance:
         )
         if evidence.verdict is Verdict.REFUSED:
             return estimate.failed(Reason.WEAK_EVIDENCE), state
-        limits = self._judge.limits
-        scene = state.scene.with_error(evidence.match_error, limits)
+        scene = state.scene.with_error(evidence.match_error, self._judge.limits)
         if evidence.verdict is Verdict.STRONG or self._may_count(evidence, state):
-            scene = scene.with_pose(statistics_of(refined), limits)
+            scene = scene.with_pose(statistics_of(refined))
         return estimate, replace(state, scene=scene)
 
     def allows_keyframe(self, evidence: Evidence | None, state: State) -> tuple[bool, State]:
@@ -146,4 +147,4 @@ class PoseAcceptance:
 
     def _may_count(self, evidence: Evidence, state: State) -> bool:
         """Whether a weak frame counts as usual: not the first in a row, and confirmed."""
-        return evidence.confirmed and state.n_uncertain >= self._judge.limits.weak_frames
+        return evidence.confirmed and state.n_uncertain >= _WEAK_FRAMES

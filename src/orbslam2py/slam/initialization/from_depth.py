@@ -17,6 +17,7 @@ from orbslam2py.slam.config import InitializationConfig
 from orbslam2py.slam.local_mapping import LocalMapping
 from orbslam2py.slam.records import Reason
 
+_MOST = 0.5  # share of the settings' features that is asked for at most
 _log = logging.getLogger(__name__)
 
 
@@ -51,9 +52,7 @@ class DepthInitializer:
         self._vocabulary = vocabulary
         self._mapping = mapping
         self._limits = limits = config
-        self._least = min(
-            limits.keypoints_with_depth_sensor, int(limits.share_with_depth_sensor * n_features)
-        )
+        self._least = min(limits.keypoints_with_depth_sensor, int(_MOST * n_features))
 
     def reset(self) -> None:
         """Nothing is kept from frame to frame."""

@@ -32,6 +32,11 @@ from orbslam2py.slam.watched_frame import pixels_as_given
 
 _log = logging.getLogger(__name__)
 
+_TRIED_VIEWS = 3  # that are reconstructed with each frame: some milliseconds each
+_PATIENCE, _PATIENCE_SECONDS = 10, 1.0  # frames, or time [s], until there are still more features
+_REMEMBERED_FRAMES = 200  # that are tracked in a new map after it began: ten seconds at 20 a second
+_FOLLOWED_AGAIN = 20  # of them, that begin the next map after one was dropped
+
 #: What the two views' reconstruction says, in the words of a record.
 _REASONS = {
     "too_few_matches": Reason.FEW_MATCHES_FIRST_VIEW,
@@ -97,7 +102,7 @@ class MonocularInitializer:
     def _drop_views(self) -> None:
         self._watch.end()
         self._kept.clear()
-        self._history: deque[core.TrackedFrame] = deque(maxlen=self._limits.remembered_frames)
+        self._history: deque[core.TrackedFrame] = deque(maxlen=_REMEMBERED_FRAMES)
         self._n_waiting = 0
         self._waited = self._waits_since = 0.0  # seconds
         self._last: core.TrackedFrame | None = None
@@ -116,7 +121,7 @@ class MonocularInitializer:
         self._drop_views()
         # Their poses were those in the map that is gone.
         self._history.extend(core.TrackedFrame(frame) for frame in frames)
-        for frame in frames[-self._limits.followed_again :]:
+        for frame in frames[-_FOLLOWED_AGAIN:]:
             if frame.size <= self._limits.keypoints:
                 continue
             self._kept.follow(frame)
@@ -145,7 +150,7 @@ class MonocularInitializer:
     def feature_factor(self) -> int:
         """Twice the features of the settings, and more when it takes long to begin."""
         limits = self._limits
-        waited = self._n_waiting >= limits.patience or self._waited >= limits.patience_seconds
+        waited = self._n_waiting >= _PATIENCE or self._waited >= _PATIENCE_SECONDS
         return limits.raised_feature_factor if waited else limits.feature_factor
 
     def lines(self) -> FloatArray | None:
@@ -220,7 +225,7 @@ class MonocularInitializer:
         limits = self._limits
         moved = [view for view in self._kept.views if view.displacement >= limits.displacement]
         moved.sort(key=lambda view: -view.displacement)
-        places = np.linspace(0, len(moved) - 1, min(limits.tried_views, len(moved)))
+        places = np.linspace(0, len(moved) - 1, min(_TRIED_VIEWS, len(moved)))
         return [moved[place] for place in np.rint(places).astype(int)]
 
     # ---- the map ---------------------------------------------------------------------------------

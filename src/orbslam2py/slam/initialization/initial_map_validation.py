@@ -22,6 +22,9 @@ from orbslam2py.slam.initialization.third_view import (
     three_view_consistency,
 )
 
+_AGREEMENTS, _CONTRADICTIONS = 2, 3  # motions until a map is accepted, or dropped
+_CONTRADICTED_MAPS = 3  # dropped in a row, after which the next one is not compared
+
 
 class InitialMapValidation:
     """Finds the motion between views of a young map once more, without the map, and compares.
@@ -53,7 +56,7 @@ class InitialMapValidation:
     def begin(self, frame: core.TrackedFrame) -> None:
         """Watch the map that has begun with a frame, unless all before were contradicted."""
         self.end()
-        if self._n_contradicted == self._limits.contradicted_maps:
+        if self._n_contradicted == _CONTRADICTED_MAPS:
             self._n_contradicted = 0
             return
         self._watching = True
@@ -91,10 +94,10 @@ class InitialMapValidation:
         self._kept.keep_last()
         limits = self._limits
         self._n_frames += 1
-        contradicted = self._n_contradicting >= limits.contradictions
+        contradicted = self._n_contradicting >= _CONTRADICTIONS
         if contradicted:
             self._n_contradicted += 1
-        elif self._n_agreeing >= limits.agreements or self._n_frames >= limits.watched_frames:
+        elif self._n_agreeing >= _AGREEMENTS or self._n_frames >= limits.watched_frames:
             self._n_contradicted = 0
         else:
             return False

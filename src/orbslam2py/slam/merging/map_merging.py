@@ -23,6 +23,11 @@ from orbslam2py.slam.merging.visibility_ratio import explained_share
 
 _log = logging.getLogger(__name__)
 
+_NEIGHBOURS = 6  # of a keyframe, that may confirm a place in another map
+_FAR_NEIGHBOURS = 3  # of the place, that they are compared with
+_REMEMBERED = 10  # keyframes whose places in another map are kept until confirmed
+_PLACES = 5  # in the other map, that are compared with the first
+
 #: Verifies by geometry that two keyframes show the same place.
 Verify = Callable[[int, int], core.Loop | None]
 #: Keyframes of any map that look like one.
@@ -120,7 +125,7 @@ class MapMerging:
         # What the far end looks like in its own map.
         there = self._map.map_of(best.matched)
         alike = [k for k in self._find_alike(best.matched) if self._map.map_of(k) == there]
-        found = (self._verify(best.matched, k) for k in alike[: self._limits.places])
+        found = (self._verify(best.matched, k) for k in alike[:_PLACES])
         return all(loop is None or self._is_drift(loop) for loop in found)
 
     def _is_drift(self, loop: core.Loop) -> bool:
@@ -129,7 +134,7 @@ class MapMerging:
 
     def _remember(self, best: core.Loop) -> None:
         self._shown[best.current] = (best.matched, best.S_cm)
-        while len(self._shown) > self._limits.remembered:
+        while len(self._shown) > _REMEMBERED:
             del self._shown[next(iter(self._shown))]
 
     def _is_confirmed(self, best: core.Loop) -> bool:
@@ -140,10 +145,10 @@ class MapMerging:
         if scene_depth is None:
             return False
         T_cw = slam_map.keyframe_pose(best.current)
-        around = slam_map.best_neighbours(best.matched, limits.far_neighbours).tolist()
+        around = slam_map.best_neighbours(best.matched, _FAR_NEIGHBOURS).tolist()
         candidates = [best.matched, *around]
         n_agreeing = 0
-        for keyframe in slam_map.best_neighbours(best.current, limits.neighbours).tolist():
+        for keyframe in slam_map.best_neighbours(best.current, _NEIGHBOURS).tolist():
             T_kc = slam_map.keyframe_pose(keyframe) @ T_cw.inverse()
             expected = T_kc.matrix @ best.S_cw
             found = self._place_of(keyframe, candidates, best.matched)

@@ -17,6 +17,9 @@ from orbslam2py.slam.pose_search.refined_pose import RefinedPose
 from orbslam2py.slam.records import PoseEstimate, Reason
 from orbslam2py.slam.state import State
 
+_AFRESH_WINDOW = 3.0  # factor on the search radius, for a pose that may be off by more than usual
+_ELSEWHERE = 3.0  # standard deviations: 99 % of two poses of one camera are nearer
+
 
 class LocalMapSearch:
     """Matches frames with the points around them, as far around as there is reason to.
@@ -111,12 +114,12 @@ class LocalMapSearch:
         frame.T_cw = refined.frame.T_cw
         frame.share_anchor(refined.frame)
         nothing = np.zeros(0, np.int64)
-        for window in (limits.afresh_window, self._usual_window):
+        for window in (_AFRESH_WINDOW, self._usual_window):
             frame.clear_associations()
             visible = core.match_local_map(frame, local_map.points, nothing, window).visible
             optimized = core.optimize_pose(frame)
         share = limits.afresh_share_in_doubt if in_doubt else limits.afresh_share
-        elsewhere = in_doubt or _is_elsewhere(frame, refined, limits.elsewhere)
+        elsewhere = in_doubt or _is_elsewhere(frame, refined)
         if optimized.n_inliers < share * n_of_map or not elsewhere:
             return refined
         estimate = self._enough_found(frame, refined.estimate, optimized)
@@ -146,9 +149,9 @@ class LocalMapSearch:
         return estimate
 
 
-def _is_elsewhere(frame: core.TrackedFrame, refined: RefinedPose, deviations: float) -> bool:
-    """Whether another version of a frame lies so many deviations from a refined pose."""
+def _is_elsewhere(frame: core.TrackedFrame, refined: RefinedPose) -> bool:
+    """Whether another version of a frame lies several deviations from a refined pose."""
     T_cw = refined.frame.T_cw
     assert T_cw is not None and frame.T_cw is not None
     _, move = frame.T_cw.difference(T_cw)
-    return move > deviations * refined.position_deviation
+    return move > _ELSEWHERE * refined.position_deviation
