@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from orbslam2py import _core as core
 from orbslam2py.slam.pose_search import PoseSearch, RefinedPose
 from orbslam2py.slam.records import PoseEstimate
@@ -81,7 +79,7 @@ class FrameReestimation:
 
     def _look(self, frame: core.TrackedFrame, *, wide: bool) -> RefinedPose | None:
         state = State().relocalized(frame.id) if wide else State()
-        refined = self._search.in_local_map(_copy_of(frame), PoseEstimate(), state)
+        refined = self._search.local_map_search.refine(_copy_of(frame), PoseEstimate(), state)
         return _without_outliers(refined) if refined.estimate.found else None
 
 
@@ -96,8 +94,6 @@ def _without_outliers(refined: RefinedPose) -> RefinedPose:
 
 def _copy_of(frame: core.TrackedFrame) -> core.TrackedFrame:
     copy = core.TrackedFrame(frame.features)
-    copy.copy_associations(frame, np.ones(len(frame.features), bool))
+    copy.take_over(frame)
     core.discard_temporary(copy)  # seen by the frame before alone
-    copy.T_cw = frame.T_cw
-    copy.share_anchor(frame)
     return copy

@@ -22,10 +22,9 @@ from orbslam2py.slam.initialization import Initializer
 from orbslam2py.slam.keyframe_decision import KeyframeDecision
 from orbslam2py.slam.local_mapping import LocalMapping
 from orbslam2py.slam.pose_search import (
-    FirstEstimate,
-    FirstEstimateInFixedMap,
-    FirstEstimateInGrowingMap,
     PoseSearch,
+    estimate_in_fixed_map,
+    estimate_in_growing_map,
 )
 from orbslam2py.slam.records import PoseEstimate, Reason, TrackingResult, TrackingState
 from orbslam2py.slam.state import Motion, State
@@ -100,8 +99,6 @@ class Tracking:
         self._acceptance = acceptance
         self._keyframe_decision = keyframe_decision
         self._has_depth = has_depth
-        self._in_growing_map = FirstEstimateInGrowingMap(search)
-        self._in_fixed_map = FirstEstimateInFixedMap(search, has_depth=has_depth)
         self._transitions = Transitions(config, new_map_after=new_map_after)
         self._state = State()
 
@@ -225,6 +222,7 @@ class Tracking:
             The outcome is to say which keypoints the pose was accepted with.
         """
         if self._state.initializing:
+            self._apply(NotInitialized())
             return self._begin_map(frame, timer)
         young = self._is_small or self._initializer.watches_map
         if young and not self._state.seeks_map:
@@ -282,9 +280,9 @@ class Tracking:
         self, frame: core.TrackedFrame, state: State, timer: StageTimer, localize: bool
     ) -> tuple[PoseEstimate, State]:
         lost = state.is_lost
-        strategy: FirstEstimate = self._in_fixed_map if localize else self._in_growing_map
+        estimate_first = estimate_in_fixed_map if localize else estimate_in_growing_map
         with timer("predict"):
-            first, state = strategy.estimate(frame, state)
+            first, state = estimate_first(self._search, frame, state)
         if lost and not first.found:
             return first, state
         if lost or first.relocalized:
@@ -298,14 +296,12 @@ class Tracking:
         return estimate, state
 
     def _begin_map(self, frame: core.TrackedFrame, timer: StageTimer) -> TrackingResult:
-        self._apply(NotInitialized())
         with timer("keyframe"):
             reason = self._initializer.try_initialize(frame)
-        if reason is not Reason.NONE:
-            spoilt = reason is Reason.INITIAL_MAP_FAILED
-            given_up = self._map.active_map if spoilt else None
-            return TrackingResult(self._state.phase, PoseEstimate(reason), given_up=given_up)
-        return self._map_begun(frame)
+        if reason is Reason.NONE:
+            return self._map_begun(frame)
+        spoilt = self._map.active_map if reason is Reason.INITIAL_MAP_FAILED else None
+        return TrackingResult(self._state.phase, PoseEstimate(reason), given_up=spoilt)
 
     def _begin_map_beside(
         self, frame: core.TrackedFrame, timer: StageTimer, *, localize: bool
@@ -315,12 +311,8 @@ class Tracking:
             return None
         self._apply(SearchForMap())
         frame.clear_associations()
-        with timer("keyframe"):
-            reason = self._initializer.try_initialize(frame)
-        if reason is Reason.INITIAL_MAP_FAILED:
-            spoilt = self._map.active_map
-            return TrackingResult(self._state.phase, PoseEstimate(reason), given_up=spoilt)
-        return self._map_begun(frame) if reason is Reason.NONE else None
+        begun = self._begin_map(frame, timer)
+        return begun if begun.estimate.found or begun.given_up is not None else None
 
     def _map_begun(self, frame: core.TrackedFrame) -> TrackingResult:
         earlier = self._initializer.take_earlier()

@@ -50,7 +50,7 @@ def test_tracking_goes_on_without_it(slam: System, culled: int) -> None:
     tracking = slam.pipeline.tracking
     frame = core.TrackedFrame(tracking.motion.last.features)
     state = replace(tracking._state, reference_keyframe=culled)
-    assert not tracking._search.by_keyframes_around(frame, state, 10).found
+    assert not tracking._search.by_keyframes(frame, state, 10).found
 
 
 def test_the_place_of_a_loss_is_its_parent_s(slam: System, culled: int) -> None:

@@ -51,7 +51,7 @@ class Walk:
         return version
 
     def refined(self) -> RefinedPose:
-        return self.search.in_local_map(self.version(), PoseEstimate(), State())
+        return self.search.local_map_search.refine(self.version(), PoseEstimate(), State())
 
     def rematch(self, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
         return self.search.local_map_search.rematch(refined, in_doubt=in_doubt)

@@ -102,7 +102,7 @@ class MultiHypothesisSearch:
         """Add the hypothesis of an estimate, if it holds; whether the search may end with it."""
         if not estimate.found:
             return False
-        refined = self._search.in_local_map(version, estimate, state)
+        refined = self._search.local_map_search.refine(version, estimate, state)
         if not refined.estimate.found:
             return False
         hypothesis = Hypothesis(refined, method, self._judge.assess(refined, state, method))
@@ -116,7 +116,7 @@ class MultiHypothesisSearch:
         yield PoseMethod.ALIGNED_IMAGES, self._by_aligned_images
         yield (
             PoseMethod.KEYFRAMES_AROUND,
-            lambda v, s: search.by_keyframes_around(v, s, _KEYFRAMES_AROUND),
+            lambda v, s: search.by_keyframes(v, s, _KEYFRAMES_AROUND),
         )
         if state.motion.velocity is not None:
             yield PoseMethod.WIDE_WINDOW, self._by_wide_window

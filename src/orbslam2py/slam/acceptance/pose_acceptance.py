@@ -63,7 +63,7 @@ class PoseAcceptance:
             state = state.elsewhere()
         estimate, hypothesis = first, None
         if first.found:
-            refined = self._refined(frame, first, state)
+            refined = self._search.local_map_search.refine(frame, first, state)
             hypothesis = self._hypothesis(refined, first, state)
             estimate = refined.estimate
         doubted = first.left_map or self._is_doubted(hypothesis)
@@ -106,11 +106,6 @@ class PoseAcceptance:
 
     def _is_doubted(self, hypothesis: Hypothesis | None) -> bool:
         return hypothesis is None or self._judge.needs_reestimation(hypothesis.evidence)
-
-    def _refined(self, frame: core.TrackedFrame, first: PoseEstimate, state: State) -> RefinedPose:
-        if first.visual_odometry:
-            return self._search.beyond_the_map(frame, first, state.motion)
-        return self._search.in_local_map(frame, first, state)
 
     def _take(
         self, frame: core.TrackedFrame, hypothesis: Hypothesis, state: State, *, fixed_map: bool

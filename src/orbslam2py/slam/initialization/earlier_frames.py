@@ -104,7 +104,7 @@ class EarlierFrames:
         estimate = search.by_motion_model(frame, state)
         if not estimate.found:
             frame.clear_associations()
-            estimate = search.by_reference_keyframe(frame, state)
+            estimate = search.by_keyframes(frame, state)
         estimate, state = acceptance.refine(frame, estimate, state)
         if not (estimate.found and _is_strong(estimate) and _is_exact(estimate)):
             return False, state

@@ -17,6 +17,7 @@ from orbslam2py.slam.config import InitializationConfig
 from orbslam2py.slam.initialization.earlier_frames import EarlierFrames
 from orbslam2py.slam.initialization.initial_map_validation import InitialMapValidation
 from orbslam2py.slam.initialization.initial_views import InitialViews, View
+from orbslam2py.slam.initialization.initializer import Initializer
 from orbslam2py.slam.initialization.multi_view_model_selection import MultiViewModelSelection
 from orbslam2py.slam.initialization.third_view import (
     Candidate,
@@ -49,7 +50,7 @@ _REASONS = {
 }
 
 
-class MonocularInitializer:
+class MonocularInitializer(Initializer):
     """Keeps views of the last moments and begins a map from the one that fits best to the last.
 
     The frame of that view becomes the world's frame; its median depth becomes 1. A third view

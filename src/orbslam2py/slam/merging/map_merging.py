@@ -19,7 +19,6 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py._timing import StageTimer
 from orbslam2py.slam.config import MergingConfig
 from orbslam2py.slam.events import MapsMerged
-from orbslam2py.slam.merging.visibility_ratio import explained_share
 
 _log = logging.getLogger(__name__)
 
@@ -265,3 +264,42 @@ def _parts(S_cw: FloatArray) -> tuple[float, FloatArray, FloatArray]:
     scale = float(np.cbrt(np.linalg.det(S_cw[:3, :3])))
     rotation = S_cw[:3, :3] / scale
     return scale, rotation, -rotation.T @ S_cw[:3, 3] / scale
+
+
+def explained_share(slam_map: core.Map, loop: core.Loop, view_cosine: float) -> float:
+    """The share of points that a keyframe should see at a place in another map, and sees.
+
+    Parameters
+    ----------
+    slam_map : orbslam2py._core.Map
+        The maps.
+    loop : Loop
+        The place, with the points around it and how many of them the keyframe shows.
+    view_cosine : float
+        Points are counted that are seen from nearly where they were seen before: cosine of the
+        angle between both directions, at least.
+
+    Returns
+    -------
+    float
+        Matches over points that are in the image of the keyframe, within the distances at which
+        they can be recognised, and seen from the right side; 0 if there are none.
+    """
+    try:
+        features = slam_map.keyframe_frame(loop.current)
+    except KeyError:  # local mapping has just culled it
+        return 0.0
+    S_cw = np.asarray(loop.S_cw)
+    scale = np.cbrt(np.linalg.det(S_cw[:3, :3]))
+    # The keyframe's camera in the other map's world and scale.
+    T_cw = np.eye(4)
+    T_cw[:3] = S_cw[:3] / scale
+    camera = core.TrackedFrame(features)
+    camera.T_cw = core.Pose.from_matrix(T_cw)
+    points = core.gather_points(slam_map, np.unique(loop.loop_points))
+    _, cosines, _, visible = core.project_into(camera, points)
+    center = -T_cw[:3, :3].T @ T_cw[:3, 3]
+    distances = np.linalg.norm(points.positions - center, axis=1)
+    near_enough = (distances >= points.min_distances) & (distances <= points.max_distances)
+    n_visible = np.count_nonzero(visible & near_enough & (cosines >= view_cosine))
+    return loop.n_matches / n_visible if n_visible else 0.0

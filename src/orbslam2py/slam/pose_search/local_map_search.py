@@ -6,19 +6,46 @@ Mur-Artal, Montiel and Tardos, 2015, section V-D; ``docs/method/tracking.md#loca
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from orbslam2py import _core as core
+from orbslam2py._arrays import IntArray
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.config import TrackingConfig
-from orbslam2py.slam.pose_search.refined_pose import RefinedPose
 from orbslam2py.slam.records import PoseEstimate, Reason
 from orbslam2py.slam.state import State
 
 _AFRESH_WINDOW = 3.0  # factor on the search radius, for a pose that may be off by more than usual
 _ELSEWHERE = 3.0  # standard deviations: 99 % of two poses of one camera are nearer
+
+
+@dataclass(frozen=True)
+class RefinedPose:
+    """A pose with all that was found of the map around it."""
+
+    frame: core.TrackedFrame
+    """Holds pose and associations."""
+    estimate: PoseEstimate
+    local_map: core.LocalMap | None
+    """Where it was searched; None where the pose is settled by visual odometry alone."""
+    visible: IntArray
+    """Ids of the points in view that the first estimate did not hold."""
+    n_predicted: int
+    """Points that should be in view."""
+
+    @cached_property
+    def position_deviation(self) -> float:
+        """Standard deviation of the position, all directions together [m]; 0 if not known."""
+        covariance = self.estimate.covariance
+        return 0.0 if covariance is None else core.position_deviation(covariance)
+
+    @cached_property
+    def spread(self) -> core.InlierSpread:
+        """How the inliers are spread over image and depth, and how far they are wrong together."""
+        return core.spread_of_inliers(self.frame)
 
 
 class LocalMapSearch:
@@ -62,9 +89,10 @@ class LocalMapSearch:
         Returns
         -------
         RefinedPose
-            Whether it was found says its estimate; one in `visual_odometry` hangs on the depths of
-            the frame before, and `PoseSearch.in_local_map` takes it so.
+            Whether it was found says its estimate.
         """
+        if first.visual_odometry:
+            return _beyond_the_map(frame, first, state)
         local_map = core.select_local_map(self._map, frame)
         n_held = frame.n_associated()
         window = self._usual_window
@@ -81,6 +109,8 @@ class LocalMapSearch:
             core.match_local_map(frame, local_map.points, first.discarded, self._usual_window)
             optimized = core.optimize_pose(frame)
         estimate = self._enough_found(frame, first, optimized)
+        if estimate.visual_odometry:
+            return _beyond_the_map(frame, estimate, state)
         return RefinedPose(frame, estimate, local_map, visible, n_held + len(visible))
 
     def rematch(self, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
@@ -147,6 +177,13 @@ class LocalMapSearch:
             # What the frame before measured speaks for itself, and says nothing of the map.
             return replace(estimate, visual_odometry=True)
         return estimate
+
+
+def _beyond_the_map(frame: core.TrackedFrame, odometry: PoseEstimate, state: State) -> RefinedPose:
+    """Take a pose from the depths of the last frame; these points should be in view."""
+    assert frame.T_cw is not None
+    n_predicted = core.count_staying(state.motion.last, frame.T_cw)
+    return RefinedPose(frame, odometry, None, np.zeros(0, np.int64), n_predicted)
 
 
 def _is_elsewhere(frame: core.TrackedFrame, refined: RefinedPose) -> bool:
