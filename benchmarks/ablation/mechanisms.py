@@ -20,7 +20,6 @@ MECHANISMS: dict[str, Changes] = {
         "acceptance.refused_share": 0,
     },
     "ambiguous places": {"relocalization.rival_share": _NEVER},
-    "validation of the initial map": {"initialization.watched_frames": 0},
     "comparison of all views": {"initialization.compare_views": False},
     "views between the first two": {"initialization.view_between": 0},
     "matching of uncertain frames again": {"trajectory.rematch_uncertain": False},

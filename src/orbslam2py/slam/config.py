@@ -86,13 +86,6 @@ class InitializationConfig:
     view_between: float = 0.9
     """A view between the first two becomes a keyframe when it finds less than this share of
     the first points."""
-    watched_frames: int = 60
-    """Number of frames in which a single camera's first map is compared with independent
-    two-view motions; 0 switches it off."""
-    agreeing_direction: float = 15.0
-    """A motion agrees when its direction differs by less than this, degrees."""
-    contradicting_direction: float = 35.0
-    """A motion contradicts when its direction differs by more than this, degrees."""
 
 
 @dataclass(frozen=True)

@@ -262,11 +262,8 @@ class Pipeline:
 
     def _keep(self, frame: core.TrackedFrame, outcome: TrackingResult) -> None:
         if outcome.given_up is not None:
-            reason = outcome.estimate.reason
-            self._start_failed = reason is Reason.INITIAL_MAP_FAILED
-            if reason is Reason.MAP_CONTRADICTED:
-                _log.info("%s; starting a new map", reason)
-            elif not self._start_failed:
+            self._start_failed = outcome.estimate.reason is Reason.INITIAL_MAP_FAILED
+            if not self._start_failed:
                 _log.info("lost soon after initialization; starting a new map")
             self._given_up = outcome.given_up
         elif outcome.state in (TrackingState.OK, TrackingState.LOST):

@@ -224,8 +224,7 @@ class Tracking:
         if self._state.initializing:
             self._apply(NotInitialized())
             return self._begin_map(frame, timer)
-        young = self._is_small or self._initializer.watches_map
-        if young and not self._state.seeks_map:
+        if self._is_small and not self._state.seeks_map:
             self._initializer.remember(frame)
         estimate = self._find_pose(frame, timer, localize)
         if estimate.found and self._transitions.is_contradicted(self._state, frame):
@@ -239,12 +238,6 @@ class Tracking:
         else:
             if self._state.unconfirmed is not None:
                 self._apply(Confirmed())
-            if not localize:
-                with timer("keyframe"):
-                    wrong = self._wrong_map(frame)
-                if wrong is not None:
-                    contradicted = estimate.failed(Reason.MAP_CONTRADICTED)
-                    return self._lose(frame, contradicted, wrong_map=wrong)
             self._apply(Tracked(frame, estimate.n_inliers, self._map.active_map))
         # Before temporary points go, and a keyframe's keypoints become points.
         inliers = accepted_keypoints(frame) if details else None
@@ -267,7 +260,6 @@ class Tracking:
         if localize:
             kept = self._state.kept_maps | {self._map.active_map}
             self._state = replace(self._state, kept_maps=kept)
-            self._initializer.believe_map()
         estimate, state = self._search_once(frame, self._state, timer, localize)
         if not estimate.found and self._map.big_change_index != changes_before:
             # A loop was closed meanwhile: what was matched may be half of the old map.
@@ -323,16 +315,7 @@ class Tracking:
         estimate = PoseEstimate(n_matches=n, n_inliers=n, covariance=covariance)
         return TrackingResult(self._state.phase, estimate, is_keyframe=True, earlier=earlier)
 
-    def _wrong_map(self, frame: core.TrackedFrame) -> int | None:
-        """The number of a map that the images contradict by now."""
-        there = frame.map_index
-        contradicted = self._initializer.contradicts(frame)
-        # While they were compared loop closing may have joined it to another map.
-        return there if contradicted and self._map.active_map == there else None
-
-    def _lose(
-        self, frame: core.TrackedFrame, estimate: PoseEstimate, *, wrong_map: int | None = None
-    ) -> TrackingResult:
+    def _lose(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> TrackingResult:
         if not self._state.is_lost:
             _log.info("tracking lost at frame %d: %s", frame.id, estimate.reason)
         self._apply(NotFound(frame.timestamp))
@@ -344,9 +327,7 @@ class Tracking:
         # Other maps are dropped for one that begins. Under a hand none does, and the camera may be
         # found behind it.
         another = self._initializer.shows_enough(frame)
-        given_up = wrong_map
-        if given_up is None and small and another:
-            given_up = active
+        given_up = active if small and another else None
         return TrackingResult(self._state.phase, estimate, given_up=given_up)
 
     @property

@@ -302,16 +302,9 @@ class FakeInitializer:
     """Refuses a given number of frames."""
 
     feature_factor = 1
-    watches_map = False
 
     def __init__(self, refusals: int = 0) -> None:
         self.refusals = refusals
-
-    def contradicts(self, frame: FakeFrame) -> bool:
-        return False
-
-    def believe_map(self) -> None:
-        """No map is doubted."""
 
     def remember(self, frame: FakeFrame) -> None:
         """Frames of a young map are not needed again."""

@@ -15,7 +15,6 @@ from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py.slam.config import InitializationConfig
 from orbslam2py.slam.initialization.earlier_frames import EarlierFrames
-from orbslam2py.slam.initialization.initial_map_validation import InitialMapValidation
 from orbslam2py.slam.initialization.initial_views import InitialViews, View
 from orbslam2py.slam.initialization.initializer import Initializer
 from orbslam2py.slam.initialization.multi_view_model_selection import MultiViewModelSelection
@@ -88,7 +87,6 @@ class MonocularInitializer(Initializer):
         self._seed = seed
         self._limits = config
         self._kept = InitialViews(self._limits)
-        self._watch = InitialMapValidation(self._limits, seed)
         self._earlier = earlier or EarlierFrames(None, None)
         # The last map's number, and the keyframes between the two that it began from.
         self._begun_map = -1
@@ -96,12 +94,7 @@ class MonocularInitializer(Initializer):
         self.reset()
 
     def reset(self) -> None:
-        """Drop all views, and what became of earlier maps."""
-        self._watch.reset()
-        self._drop_views()
-
-    def _drop_views(self) -> None:
-        self._watch.end()
+        """Drop all views."""
         self._kept.clear()
         self._history: deque[core.TrackedFrame] = deque(maxlen=_REMEMBERED_FRAMES)
         self._n_waiting = 0
@@ -119,7 +112,7 @@ class MonocularInitializer(Initializer):
 
     def restart(self, frames: list[core.Frame]) -> None:
         """Begin anew, with the views of the last moments of an earlier attempt."""
-        self._drop_views()
+        self.reset()
         # Their poses were those in the map that is gone.
         self._history.extend(core.TrackedFrame(frame) for frame in frames)
         for frame in frames[-_FOLLOWED_AGAIN:]:
@@ -133,19 +126,6 @@ class MonocularInitializer(Initializer):
         if map_index != self._begun_map:
             return 0
         return sum(self._map.living(keyframe) == keyframe for keyframe in self._between)
-
-    @property
-    def watches_map(self) -> bool:
-        """Whether the map is so young that the next frame may contradict it."""
-        return self._watch.watching
-
-    def believe_map(self) -> None:
-        """No later frame contradicts the map."""
-        self._watch.end()
-
-    def contradicts(self, frame: core.TrackedFrame) -> bool:
-        """Whether this frame and those before it, tracked in a young map, prove it wrong."""
-        return self._watch.contradicted(frame)
 
     @property
     def feature_factor(self) -> int:
@@ -251,7 +231,6 @@ class MonocularInitializer(Initializer):
         self._mapping.insert_keyframe(begun.second)
         between = self._earlier.track(history, first)
         self._insert_views([frame for frame in between if self._adds(frame, n_points)])
-        self._watch.begin(second)
         self._kept.clear()
         self._n_waiting, self._waited = 0, 0.0
         self._last = self._shown = None

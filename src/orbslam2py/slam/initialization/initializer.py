@@ -35,11 +35,6 @@ class Initializer(ABC):
         """How many features the next frame needs, in multiples of the settings' number."""
         return 1
 
-    @property
-    def watches_map(self) -> bool:
-        """Whether the map that has begun is so young that later frames may contradict it."""
-        return False
-
     def lines(self) -> FloatArray | None:
         """What the last frame was matched with, for those who watch.
 
@@ -63,15 +58,8 @@ class Initializer(ABC):
         """What a new map may begin from, if the young one came to nothing."""
         return []
 
-    def contradicts(self, frame: core.TrackedFrame) -> bool:
-        """Whether this frame and those before it, tracked in a young map, prove it wrong."""
-        return False
-
     def remember(self, frame: core.TrackedFrame) -> None:  # noqa: B027
         """Keep a frame that was tracked in a young map, which may yet come to nothing."""
-
-    def believe_map(self) -> None:  # noqa: B027
-        """No later frame contradicts the map that has begun."""
 
     def reset(self) -> None:  # noqa: B027
         """Forget the frames before."""
