@@ -17,19 +17,13 @@ from typing import Any
 from orbslam2py._arguments import is_finite, is_whole, shown
 from orbslam2py.errors import SettingsError
 
-#: Features of an image for which numbers of inliers are stated ...
-USUAL_FEATURES = 1000
-#: ... and the least share of them that is asked for where images have fewer.
-LEAST_SHARE = 0.6
-
-
-def _for_features(n_inliers: int, n_features: int) -> int:
-    """Inliers that say as much of an image with fewer features.
-
-    Fewer points meet fewer keypoints by chance, and fewer can be found of them.
-    """
-    share = min(1.0, max(LEAST_SHARE, n_features / USUAL_FEATURES))
-    return math.ceil(share * n_inliers)
+#: The numbers of inliers below are for images with so many features or more. Of fewer ones a share
+#: is asked for: fewer points meet fewer keypoints by chance, and fewer can be found of them.
+USUAL_FEATURES, LEAST_SHARE = 1000, 0.6
+_INLIERS = (
+    *("tracking.local_map_inliers", "tracking.scarce_inliers"),
+    *("relocalization.enough", "relocalization.enough_near", "relocalization.narrow"),
+)
 
 
 @dataclass(frozen=True)
@@ -135,14 +129,6 @@ class TrackingConfig:
     localizes, or has few inliers."""
     scarce_inliers: int = 100
     """Fewer inliers than this are few."""
-
-    def for_features(self, n_features: int) -> TrackingConfig:
-        """These limits for images with so many features: of few ones fewer are asked for."""
-        return replace(
-            self,
-            local_map_inliers=_for_features(self.local_map_inliers, n_features),
-            scarce_inliers=_for_features(self.scarce_inliers, n_features),
-        )
 
 
 @dataclass(frozen=True)
@@ -270,15 +256,6 @@ class RelocalizationConfig:
     """A relocalization is confirmed only when the cosine of the rotation to the next frame
     is at least this."""
 
-    def for_features(self, n_features: int) -> RelocalizationConfig:
-        """These limits for images with so many features: of few ones fewer are asked for."""
-        return replace(
-            self,
-            enough=_for_features(self.enough, n_features),
-            enough_near=_for_features(self.enough_near, n_features),
-            narrow=_for_features(self.narrow, n_features),
-        )
-
 
 @dataclass(frozen=True)
 class MappingConfig:
@@ -388,11 +365,9 @@ class Config:
 
     def for_features(self, n_features: int) -> Config:
         """Return the configuration for images with so many features: fewer inliers of few ones."""
-        return replace(
-            self,
-            tracking=self.tracking.for_features(n_features),
-            relocalization=self.relocalization.for_features(n_features),
-        )
+        share = min(1.0, max(LEAST_SHARE, n_features / USUAL_FEATURES))
+        changes = {name: math.ceil(share * value_of(self, name)) for name in _INLIERS}
+        return self.with_changes(changes)
 
 
 #: Named sets of changes to the defaults.

@@ -30,7 +30,6 @@ from orbslam2py.slam.records import PoseEstimate, Reason, TrackingResult, Tracki
 from orbslam2py.slam.state import Motion, State
 from orbslam2py.slam.state.transitions import (
     ActivateMap,
-    Confirmed,
     Event,
     KeyframeInserted,
     MapBegun,
@@ -236,8 +235,6 @@ class Tracking:
             estimate = replace(estimate, unconfirmed=True)
             self._apply(Relocalized(frame, estimate.n_inliers))
         else:
-            if self._state.unconfirmed is not None:
-                self._apply(Confirmed())
             self._apply(Tracked(frame, estimate.n_inliers, self._map.active_map))
         # Before temporary points go, and a keyframe's keypoints become points.
         inliers = accepted_keypoints(frame) if details else None

@@ -23,7 +23,6 @@ from orbslam2py.slam.state import (
 )
 from orbslam2py.slam.state.transitions import (
     ActivateMap,
-    Confirmed,
     KeyframeInserted,
     MapBegun,
     MapDropped,
@@ -76,7 +75,7 @@ BEGUN = after(NEW, NotInitialized(), MapBegun(frame(1)))
 FOLLOWED = after(BEGUN, Tracked(frame(2, 1.0), MANY, 0), Tracked(frame(3, 3.0), MANY, 0))
 LOST_STATE = after(FOLLOWED, NotFound(0.4))
 FOUND = after(LOST_STATE, Relocalized(frame(5, 5.0), MANY))
-CONFIRMED = after(FOUND, Confirmed(), Tracked(frame(6, 6.0), MANY, 0))
+CONFIRMED = after(FOUND, Tracked(frame(6, 6.0), MANY, 0))
 
 
 @pytest.mark.parametrize(
@@ -92,7 +91,6 @@ CONFIRMED = after(FOUND, Confirmed(), Tracked(frame(6, 6.0), MANY, 0))
         (LOST_STATE, SearchForMap(), LOST),
         (LOST_STATE, Relocalized(frame(5), MANY), OK),
         (LOST_STATE, MapBegun(frame(5)), OK),
-        (FOUND, Confirmed(), OK),
         (FOUND, NotFound(0.6), LOST),
         (CONFIRMED, NotFound(0.7), LOST),
         (BEGUN, MapDropped(), LOST),
@@ -191,7 +189,7 @@ def test_another_map_may_begin_after_the_patience(seconds: float, may: bool) -> 
 def test_a_short_success_does_not_end_a_loss() -> None:
     short = after(CONFIRMED, NotFound(0.7))
     assert short.lost_time.lost_since == 0.4
-    long_enough = after(FOUND, Confirmed(), *(Tracked(frame(n), MANY, 0) for n in range(6, 30)))
+    long_enough = after(FOUND, *(Tracked(frame(n), MANY, 0) for n in range(6, 30)))
     assert long_enough.lost_time == LostTime()
 
 

@@ -65,8 +65,8 @@ class MonocularInitializer(Initializer):
         Takes the first keyframes.
     seed : int
         Seed of the draws.
-    earlier : EarlierFrames, optional
-        Tracks the earlier frames in the map; without it they are left out.
+    earlier : EarlierFrames
+        Tracks the earlier frames in the map.
     config : InitializationConfig
         Limits.
     """
@@ -77,7 +77,7 @@ class MonocularInitializer(Initializer):
         vocabulary: core.Vocabulary,
         mapping: LocalMapping,
         seed: int,
-        earlier: EarlierFrames | None = None,
+        earlier: EarlierFrames,
         *,
         config: InitializationConfig,
     ) -> None:
@@ -87,7 +87,7 @@ class MonocularInitializer(Initializer):
         self._seed = seed
         self._limits = config
         self._kept = InitialViews(self._limits)
-        self._earlier = earlier or EarlierFrames(None, None)
+        self._earlier = earlier
         # The last map's number, and the keyframes between the two that it began from.
         self._begun_map = -1
         self._between: list[int] = []

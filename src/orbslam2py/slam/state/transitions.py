@@ -45,14 +45,9 @@ class Relocalized:
     n_inliers: int
 
 
-@dataclass(frozen=True)
-class Confirmed:
-    """The frame after a relocalization confirms it."""
-
-
 @dataclass(frozen=True, eq=False)
 class Tracked:
-    """The frame has an accepted pose, which follows from the frame before."""
+    """The frame has an accepted pose, which follows from the frame before and confirms it."""
 
     frame: core.TrackedFrame
     n_inliers: int
@@ -98,7 +93,6 @@ Event = (
     NotInitialized
     | MapBegun
     | Relocalized
-    | Confirmed
     | Tracked
     | NotFound
     | KeyframeInserted
@@ -171,8 +165,6 @@ class Transitions:
                 after = self._begun(state, event)
             case Relocalized():
                 after = self._relocalized(state, event)
-            case Confirmed():
-                after = replace(state, unconfirmed=None, lost=LostSearch())
             case Tracked():
                 after, actions = self._tracked(state, event)
             case NotFound():
@@ -230,6 +222,8 @@ class Transitions:
             lost_time=state.lost_time.tracked(frame.timestamp, self._patience),
             n_lost=0,
             seeks_map=False,
+            unconfirmed=None,
+            lost=LostSearch(),
         )
         return after, tuple(actions)
 
