@@ -19,9 +19,11 @@ _BETTER = 1.1  # factor on the inliers with which another hypothesis wins
 _ENOUGH = 0.75  # share of the mean inliers with which no further hypothesis is searched
 _KEYFRAMES_AROUND = 3  # neighbours of the reference keyframe: each costs a matching by words
 _ALIGNED_WINDOW = 15.0  # half width of the search window after a rotation of the image, pixels
+#: Only without any strong hypothesis: these take longest.
+_LAST = (PoseMethod.ALL_KEYPOINTS, PoseMethod.RELOCALIZATION)
 _WIDE_WINDOW = 40.0  # the same around a prediction in doubt, pixels at level 0
 
-Way = Callable[[core.TrackedFrame, State], PoseEstimate]
+Way = Callable[[core.TrackedFrame, State], tuple[PoseEstimate, State]]
 
 
 @dataclass(frozen=True)
@@ -77,18 +79,12 @@ class MultiHypothesisSearch:
         """
         found = [] if first is None else [first]
         for method, way in self._ways(state):
+            if method in _LAST and any(h.evidence.verdict is Verdict.STRONG for h in found):
+                break
             version = core.TrackedFrame(frame.features)
-            if self._add(found, version, way(version, state), method, state):
-                return self._best(found), state
-        if not _any_strong(found):
-            version = core.TrackedFrame(frame.features)
-            estimate = self._search.by_all_keypoints(version, state)
-            if self._add(found, version, estimate, PoseMethod.ALL_KEYPOINTS, state):
-                return self._best(found), state
-        if not _any_strong(found):
-            version = core.TrackedFrame(frame.features)
-            estimate, state = self._search.by_relocalization(version, state)
-            self._add(found, version, estimate, PoseMethod.RELOCALIZATION, state)
+            estimate, state = way(version, state)
+            if self._add(found, version, estimate, method, state):
+                break
         return self._best(found) if found else None, state
 
     def _add(
@@ -111,15 +107,17 @@ class MultiHypothesisSearch:
         return enough
 
     def _ways(self, state: State) -> Iterator[tuple[PoseMethod, Way]]:
-        """The methods near the last frame, in the order of their cost."""
+        """The methods in the order of their cost."""
         search = self._search
-        yield PoseMethod.ALIGNED_IMAGES, self._by_aligned_images
+        yield PoseMethod.ALIGNED_IMAGES, lambda v, s: (self._by_aligned_images(v, s), s)
         yield (
             PoseMethod.KEYFRAMES_AROUND,
-            lambda v, s: search.by_keyframes(v, s, _KEYFRAMES_AROUND),
+            lambda v, s: (search.by_keyframes(v, s, _KEYFRAMES_AROUND), s),
         )
         if state.motion.velocity is not None:
-            yield PoseMethod.WIDE_WINDOW, self._by_wide_window
+            yield PoseMethod.WIDE_WINDOW, lambda v, s: (self._by_wide_window(v, s), s)
+        yield PoseMethod.ALL_KEYPOINTS, lambda v, s: (search.by_all_keypoints(v, s), s)
+        yield PoseMethod.RELOCALIZATION, search.by_relocalization
 
     def _by_aligned_images(self, frame: core.TrackedFrame, state: State) -> PoseEstimate:
         limits, motion = self._judge.limits, state.motion
@@ -153,7 +151,3 @@ class MultiHypothesisSearch:
         if any(self._confirms(best, other) for other in found if other is not best):
             best = replace(best, evidence=self._judge.confirm(best.evidence))
         return best
-
-
-def _any_strong(found: list[Hypothesis]) -> bool:
-    return any(hypothesis.evidence.verdict is Verdict.STRONG for hypothesis in found)

@@ -154,11 +154,7 @@ class PoseValidator:
 
     def _windows(self, degrees: float) -> float:
         """How far a turn moves the image, in search windows of the motion model."""
-        return self._pixels(degrees) / self._window
-
-    def _pixels(self, degrees: float) -> float:
-        """How far a turn moves the image, in pixels."""
-        return self._focal_length * math.radians(degrees)
+        return self._focal_length * math.radians(degrees) / self._window
 
 
 def statistics_of(refined: RefinedPose) -> PoseStatistics:
