@@ -203,6 +203,13 @@ def test_the_initializer_begins_anew_once_and_ends_when_the_camera_is_found() ->
     assert not after(found, Tracked(frame(6), MANY, 0)).seeks_map
 
 
+def test_a_tracked_frame_ends_a_search_only_if_it_confirms() -> None:
+    """Beyond a fixed map frames have a pose by their depths, and are searched in the map."""
+    search = LostSearch(failures=3)
+    assert after(replace(FOLLOWED, lost=search), Tracked(frame(4), MANY, 0)).lost is search
+    assert after(replace(FOUND, lost=search), Tracked(frame(6), MANY, 0)).lost.failures == 0
+
+
 def test_a_camera_found_in_an_inactive_map_activates_it() -> None:
     there = frame(6, map_index=0)
     assert actions(FOUND, Tracked(there, MANY, active_map=1)) == (ActivateMap(6, 7),)

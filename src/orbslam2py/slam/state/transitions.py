@@ -223,7 +223,8 @@ class Transitions:
             n_lost=0,
             seeks_map=False,
             unconfirmed=None,
-            lost=LostSearch(),
+            # Beyond the map frames are tracked and searched at once: that search goes on.
+            lost=state.lost if state.unconfirmed is None else LostSearch(),
         )
         return after, tuple(actions)
 
