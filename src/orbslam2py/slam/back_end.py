@@ -85,8 +85,8 @@ class BackEnd:
             self.mapping.worker,
             self.adjustment,
             options,
-            on_loop=partial(_announce_loop, self.events),
-            on_merge=partial(_announce_merge, self.events),
+            on_loop=partial(_announce, self.events, MapChangeCause.LOOP),
+            on_merge=partial(_announce, self.events, MapChangeCause.MERGE),
             config=config,
         )
         self.mapping.on_done = partial(_pass_on_keyframe, self.map, self.loop_closing, self.events)
@@ -251,14 +251,11 @@ def _pass_on_keyframe(
     loop_closing.insert_keyframe(keyframe)
 
 
-def _announce_loop(events: EventDispatcher, closed: LoopClosed) -> None:
-    events.post(closed)
-    events.post(MapChanged(closed.map_index, MapChangeCause.LOOP))
-
-
-def _announce_merge(events: EventDispatcher, merged: MapsMerged) -> None:
-    events.post(merged)
-    events.post(MapChanged(merged.map_index, MapChangeCause.MERGE))
+def _announce(
+    events: EventDispatcher, cause: MapChangeCause, event: LoopClosed | MapsMerged
+) -> None:
+    events.post(event)
+    events.post(MapChanged(event.map_index, cause))
 
 
 def _announce_adjustment(events: EventDispatcher, record: FullAdjustmentRecord) -> None:

@@ -309,27 +309,14 @@ class Pipeline:
 
     def _announce(self, before: TrackingState, record: TrackingRecord) -> None:
         events = self.back_end.events
+        here = (record.map_index, record.frame_id, record.timestamp)
         if record.state is TrackingState.OK and record.map_index > self._last_map:
             self._last_map = record.map_index
-            events.post(MapStarted(record.map_index, record.frame_id, record.timestamp))
+            events.post(MapStarted(*here))
         if before is TrackingState.OK and record.state is TrackingState.LOST:
-            events.post(
-                TrackingLost(
-                    map_index=record.map_index,
-                    frame_id=record.frame_id,
-                    timestamp=record.timestamp,
-                    reason=str(record.reason),
-                )
-            )
+            events.post(TrackingLost(*here, str(record.reason)))
         elif before is TrackingState.LOST and record.T_wc is not None:
-            events.post(
-                Relocalized(
-                    map_index=record.map_index,
-                    frame_id=record.frame_id,
-                    timestamp=record.timestamp,
-                    T_wc=record.T_wc,
-                )
-            )
+            events.post(Relocalized(*here, record.T_wc))
 
     def request_reset(self) -> None:
         """Begin a new map with the next image, and forget all before it."""
