@@ -46,6 +46,9 @@ def main() -> None:
     parser.add_argument("--part", choices=parts, default="motions", help="[motions]")
     add_counts(parser, runs=(78, "how many"), jobs=(1, "processes at once"))
     add_sensors(parser)
+    parser.add_argument(
+        "--only", nargs="+", metavar="TEXT", help="runs with all of these in their name"
+    )
     parser.add_argument("--off", nargs="+", choices=MECHANISMS, metavar="NAME", help="[all]")
     parser.add_argument("--together", action="store_true", help="switch these off at once")
     parser.add_argument("--set", nargs="+", metavar="NAME=VALUE", help="any other change, at once")
@@ -71,7 +74,9 @@ def cases_of(arguments: argparse.Namespace) -> list[Case]:
     if arguments.part == "block":
         return list(block_cases(arguments.runs))
     endless = recorded_cases if arguments.part == "recorded" else motion_cases
-    return list(islice(endless(arguments.sensors), arguments.runs))
+    wanted = arguments.only or []
+    named = (c for c in endless(arguments.sensors) if all(text in c.key for text in wanted))
+    return list(islice(named, arguments.runs))
 
 
 def run(arguments: argparse.Namespace) -> None:

@@ -20,15 +20,12 @@ MECHANISMS: dict[str, Changes] = {
         "acceptance.refused_share": 0,
     },
     "ambiguous places": {"relocalization.rival_share": _NEVER},
-    "validation of the initial map": {"initialization.watched_frames": 0},
     "comparison of all views": {"initialization.compare_views": False},
     "views between the first two": {"initialization.view_between": 0},
     "matching of uncertain frames again": {"trajectory.rematch_uncertain": False},
-    "keyframes before a turn": {"keyframes.kept_share": 0, "keyframes.staying_share": 0},
+    "keyframes before a turn": {"keyframes.kept_share": 0},
     "keyframes of few inliers": {"keyframes.few_inliers": 0},
     "more features of few inliers": {"tracking.feature_factor": 1},
-    "all keypoints near a loss": {"relocalization.thorough_keyframes": 0},
-    "more inliers after a loss": {"tracking.local_map_inliers_after_relocalization": 30},
 }
 
 

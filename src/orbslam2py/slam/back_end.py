@@ -8,6 +8,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from orbslam2py import _core as core
@@ -75,7 +76,7 @@ class BackEnd:
             time_limit=options.full_adjustment_time_limit,
             monocular=not sensor.has_depth,
             threaded=threaded,
-            on_done=_announce_adjustment(self.events),
+            on_done=partial(_announce_adjustment, self.events),
         )
         self.loop_closing = LoopClosing(
             self.map,
@@ -84,11 +85,11 @@ class BackEnd:
             self.mapping.worker,
             self.adjustment,
             options,
-            on_loop=_announce_loop(self.events),
-            on_merge=_announce_merge(self.events),
+            on_loop=partial(_announce, self.events, MapChangeCause.LOOP),
+            on_merge=partial(_announce, self.events, MapChangeCause.MERGE),
             config=config,
         )
-        self.mapping.on_done = _pass_on_keyframe(self.map, self.loop_closing, self.events)
+        self.mapping.on_done = partial(_pass_on_keyframe, self.map, self.loop_closing, self.events)
         take_turns(self.workers)
 
     @property
@@ -235,43 +236,28 @@ def abandon(back_end: BackEnd, keeper: MapAutosave) -> None:
 
 
 def _pass_on_keyframe(
-    slam_map: core.Map, loop_closing: LoopClosing, events: EventDispatcher
-) -> Callable[[int], None]:
-    def pass_on(keyframe: int) -> None:
-        if events.wanted(KeyframeAdded):
-            added = KeyframeAdded(
-                map_index=slam_map.map_of(keyframe),
-                keyframe=keyframe,
-                timestamp=slam_map.keyframe_timestamp(keyframe),
-                T_wc=slam_map.keyframe_pose(keyframe).inverse().matrix,
-                n_keyframes=slam_map.n_keyframes,
-                n_map_points=slam_map.n_points,
-            )
-            events.post(added)
-        loop_closing.insert_keyframe(keyframe)
-
-    return pass_on
+    slam_map: core.Map, loop_closing: LoopClosing, events: EventDispatcher, keyframe: int
+) -> None:
+    if events.wanted(KeyframeAdded):
+        added = KeyframeAdded(
+            map_index=slam_map.map_of(keyframe),
+            keyframe=keyframe,
+            timestamp=slam_map.keyframe_timestamp(keyframe),
+            T_wc=slam_map.keyframe_pose(keyframe).inverse().matrix,
+            n_keyframes=slam_map.n_keyframes,
+            n_map_points=slam_map.n_points,
+        )
+        events.post(added)
+    loop_closing.insert_keyframe(keyframe)
 
 
-def _announce_loop(events: EventDispatcher) -> Callable[[LoopClosed], None]:
-    def announce(closed: LoopClosed) -> None:
-        events.post(closed)
-        events.post(MapChanged(closed.map_index, MapChangeCause.LOOP))
-
-    return announce
-
-
-def _announce_merge(events: EventDispatcher) -> Callable[[MapsMerged], None]:
-    def announce(merged: MapsMerged) -> None:
-        events.post(merged)
-        events.post(MapChanged(merged.map_index, MapChangeCause.MERGE))
-
-    return announce
+def _announce(
+    events: EventDispatcher, cause: MapChangeCause, event: LoopClosed | MapsMerged
+) -> None:
+    events.post(event)
+    events.post(MapChanged(event.map_index, cause))
 
 
-def _announce_adjustment(events: EventDispatcher) -> Callable[[FullAdjustmentRecord], None]:
-    def announce(record: FullAdjustmentRecord) -> None:
-        if record.used:
-            events.post(MapChanged(record.map_index, MapChangeCause.FULL_ADJUSTMENT))
-
-    return announce
+def _announce_adjustment(events: EventDispatcher, record: FullAdjustmentRecord) -> None:
+    if record.used:
+        events.post(MapChanged(record.map_index, MapChangeCause.FULL_ADJUSTMENT))

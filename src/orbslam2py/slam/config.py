@@ -17,19 +17,13 @@ from typing import Any
 from orbslam2py._arguments import is_finite, is_whole, shown
 from orbslam2py.errors import SettingsError
 
-#: Features of an image for which numbers of inliers are stated ...
-USUAL_FEATURES = 1000
-#: ... and the least share of them that is asked for where images have fewer.
-LEAST_SHARE = 0.6
-
-
-def _for_features(n_inliers: int, n_features: int) -> int:
-    """Inliers that say as much of an image with fewer features.
-
-    Fewer points meet fewer keypoints by chance, and fewer can be found of them.
-    """
-    share = min(1.0, max(LEAST_SHARE, n_features / USUAL_FEATURES))
-    return math.ceil(share * n_inliers)
+#: The numbers of inliers below are for images with so many features or more. Of fewer ones a share
+#: is asked for: fewer points meet fewer keypoints by chance, and fewer can be found of them.
+USUAL_FEATURES, LEAST_SHARE = 1000, 0.6
+_INLIERS = (
+    *("tracking.local_map_inliers", "tracking.scarce_inliers"),
+    *("relocalization.enough", "relocalization.enough_near", "relocalization.narrow"),
+)
 
 
 @dataclass(frozen=True)
@@ -38,46 +32,26 @@ class InitializationConfig:
 
     keypoints_with_depth_sensor: int = 500
     """A stereo or RGB-D frame begins a map only with more keypoints than this (ORB-SLAM2)."""
-    share_with_depth_sensor: float = 0.5
-    """Upper limit of `keypoints_with_depth_sensor`, as a share of the settings' number of
-    features."""
     depths: int = 100
     """Fewest keypoints with a depth in a stereo or RGB-D frame that begins a map."""
     keypoints: int = 100
     """Each of the two views of a single camera must have more keypoints than this (ORB-SLAM)."""
     matches: int = 100
     """Fewest matches between the two views of a single camera (ORB-SLAM)."""
-    views: int = 6
-    """Number of recent views that are kept as a possible first view."""
-    new_view: float = 5.0
-    """A frame is kept as a view when its keypoints moved by this median since the last view,
-    pixels."""
-    distant_views: int = 3
-    """Number of views that are kept although they have too few matches to begin a map; they
-    confirm a motion."""
-    distant_matches: int = 30
-    """Fewest matches of such a view with the newest frame."""
     window: float = 100.0
-    """Half width of the search window for matches from frame to frame, pixels."""
-    wide_window: float = 200.0
-    """Half width of the window of a second search, after the first found too few matches,
-    pixels."""
-    narrow_window: float = 25.0
-    """Smallest half width of the window around the predicted place of a view's keypoints,
-    pixels."""
+    """Half width of the search window for matches from frame to frame, pixels; the second search,
+    after the first found too few matches, is twice as wide."""
     displacement: float = 5.0
-    """Two views are reconstructed when their keypoints moved by this median, pixels."""
-    tried_views: int = 3
-    """Number of kept views that are reconstructed with each frame."""
+    """A frame is kept as a view when its keypoints moved by this median since the last view, and
+    two views are reconstructed when theirs did, pixels."""
     parallax: float = 1.0
     """Smallest median parallax of the points of a first map, degrees (ORB-SLAM)."""
     third_view_share: float = 0.2
     """A third view is used when it moved by this share of the motion between the two views,
     away from both."""
     third_view_points: int = 30
-    """Fewest points of the two views that a third view must see."""
-    fewer_third_view_points: int = 20
-    """Fewest points that a third view must see when none sees `third_view_points`."""
+    """Fewest points of the two views that a third view must see, and fewest matches of a view that
+    can only confirm a motion; two thirds when no view sees so many."""
     third_view_fits: float = 0.75
     """A third view confirms a motion when it sees this share of the points where the motion
     puts them."""
@@ -91,8 +65,6 @@ class InitializationConfig:
     """Two motions count as one when their directions differ by less than this, degrees."""
     compare_views: bool = True
     """Begin a map only when all kept views together prefer one motion."""
-    further_draws: int = 5
-    """Number of further RANSAC runs whose motions are compared in all views together."""
     other_direction: float = 30.0
     """A motion of such a run is an alternative when its direction differs by more than this,
     degrees."""
@@ -105,34 +77,9 @@ class InitializationConfig:
     number (ORB-SLAM)."""
     raised_feature_factor: int = 4
     """The same multiple after a long wait for a first map."""
-    patience: int = 10
-    """Number of frames after which the raised multiple is used."""
-    patience_seconds: float = 1.0
-    """Seconds after which the raised multiple is used."""
     view_between: float = 0.9
     """A view between the first two becomes a keyframe when it finds less than this share of
     the first points."""
-    remembered_frames: int = 200
-    """Number of recent frames that are tracked in a new map after it began."""
-    followed_again: int = 20
-    """Number of recent frames that begin the next map after a map was dropped."""
-    watched_frames: int = 60
-    """Number of frames in which a single camera's first map is compared with independent
-    two-view motions; 0 switches it off."""
-    agreements: int = 2
-    """The map is accepted after this number of agreeing motions."""
-    agreeing_direction: float = 15.0
-    """A motion agrees when its direction differs by less than this, degrees."""
-    contradictions: int = 3
-    """The map is dropped after this number of contradicting motions."""
-    contradicting_direction: float = 35.0
-    """A motion contradicts when its direction differs by more than this, degrees."""
-    contradicted_maps: int = 3
-    """After this number of dropped maps in a row the next map is not compared."""
-    settled_map: int = 10
-    """The first frames of a map are estimated again when it has more keyframes than this."""
-    young_frames: int = 250
-    """The first frames of a map are estimated again at the latest after this number of frames."""
 
 
 @dataclass(frozen=True)
@@ -165,11 +112,6 @@ class TrackingConfig:
     """The same with an RGB-D camera (ORB-SLAM2)."""
     local_map_window_after_relocalization: float = 5.0
     """The same in the first frames after a relocalization (ORB-SLAM)."""
-    elsewhere: float = 3.0
-    """Two poses differ when their positions are this number of standard deviations apart."""
-    afresh_window: float = 3.0
-    """Factor on the search radius when a frame is matched with a fixed map without the
-    matches of the frame before."""
     afresh_share: float = 0.9
     """That pose is taken when it keeps this share of the inliers and differs."""
     afresh_share_in_doubt: float = 0.6
@@ -179,8 +121,6 @@ class TrackingConfig:
     (ORB-SLAM)."""
     local_map_inliers: int = 30
     """Fewest inliers in the local map (ORB-SLAM)."""
-    local_map_inliers_after_relocalization: int = 50
-    """The same in the first second after a relocalization (ORB-SLAM)."""
     small_map: int = 5
     """A map with this number of keyframes or fewer is dropped when tracking is lost
     (ORB-SLAM)."""
@@ -189,16 +129,6 @@ class TrackingConfig:
     localizes, or has few inliers."""
     scarce_inliers: int = 100
     """Fewer inliers than this are few."""
-
-    def for_features(self, n_features: int) -> TrackingConfig:
-        """These limits for images with so many features: of few ones fewer are asked for."""
-        after = self.local_map_inliers_after_relocalization
-        return replace(
-            self,
-            local_map_inliers=_for_features(self.local_map_inliers, n_features),
-            local_map_inliers_after_relocalization=_for_features(after, n_features),
-            scarce_inliers=_for_features(self.scarce_inliers, n_features),
-        )
 
 
 @dataclass(frozen=True)
@@ -216,9 +146,6 @@ class AcceptanceConfig:
     wrong_share: float = 0.02
     """With this probability the pose is assumed to be wrong by the whole innovation; the
     covariance grows accordingly."""
-    gain: float = 0.25
-    """Weight of the newest frame in the running means of inliers, visibility ratio,
-    deviation and error."""
     sudden_share: float = 0.6
     """Other hypotheses are searched below this share of the mean inliers, or of the mean
     visibility ratio."""
@@ -238,38 +165,13 @@ class AcceptanceConfig:
     """A pose is uncertain when the position's deviation is this factor above its mean."""
     weak_error: float = 1.5
     """A pose is uncertain when the median reprojection error is this factor above its mean."""
-    weak_error_spreads: float = 3.0
-    """A pose is uncertain by its error only if that is also above the mean by this number of
-    mean deviations."""
-    slow_gain: float = 0.02
-    """Weight of a frame with a sudden error in the mean error."""
     refused_share: float = 0.3
     """A pose is rejected below this share of the mean inliers, unless a second method
     confirms it."""
     refused_inliers: int = 100
     """Only a pose with fewer inliers than this is rejected."""
-    better: float = 1.1
-    """Another hypothesis wins with this factor on the inliers."""
-    enough_share: float = 0.75
-    """No further hypothesis is searched with this share of the mean inliers."""
     aligned_correlation: float = 0.6
     """Smallest correlation of two small images that gives a rotation (Klein and Murray 2008)."""
-    aligned_window: float = 15.0
-    """Half width of the search window around points turned by that rotation, pixels at level
-    0."""
-    wide_window: float = 40.0
-    """Half width of the window around predicted points when the prediction is in doubt,
-    pixels at level 0."""
-    keyframes_around: int = 3
-    """Number of neighbours of the reference keyframe that are matched by words."""
-    same_windows: float = 0.5
-    """Two hypotheses are one pose only when they differ by less than this number of search
-    windows in the image."""
-    same_deviations: float = 3.0
-    """Two hypotheses are one pose only when their positions differ by less than this number
-    of standard deviations."""
-    weak_frames: int = 2
-    """After this number of uncertain frames in a row a confirmed frame may become a keyframe."""
 
 
 @dataclass(frozen=True)
@@ -277,10 +179,8 @@ class KeyframeConfig:
     """Which frames become keyframes."""
 
     few_keyframes: int = 2
-    """A map with this number of keyframes or fewer is new (ORB-SLAM)."""
-    observations_of_few: int = 2
-    """In a new map, a point of the reference keyframe counts when this number of keyframes
-    see it (ORB-SLAM)."""
+    """A map with this number of keyframes or fewer is new; a point of its reference keyframe counts
+    when as many keyframes see it (ORB-SLAM)."""
     observations: int = 3
     """In a larger map, a point of the reference keyframe counts when this number of
     keyframes see it (ORB-SLAM)."""
@@ -299,13 +199,9 @@ class KeyframeConfig:
     many_untracked_close_points: int = 70
     """More close points than this outside the map are many (ORB-SLAM2)."""
     kept_share: float = 0.65
-    """A keyframe is needed when a frame tracks less than this share of the most inliers
-    since the last keyframe, with stereo and RGB-D."""
-    turn_frames: int = 3
-    """The view is predicted this number of frames ahead."""
-    staying_share: float = 0.65
-    """A keyframe is needed when less than this share of the inliers stays in that view, with
-    stereo and RGB-D."""
+    """A keyframe is needed when a frame tracks less than this share of the most inliers since the
+    last keyframe, or when less than this share of its inliers stays in view, with stereo and
+    RGB-D."""
     few_inliers: int = 150
     """Fewer inliers than this are few; a single camera then needs a keyframe if the view is
     new."""
@@ -319,9 +215,6 @@ class KeyframeConfig:
     spacing_with_depth: int = 2
     """Fewest frames from one keyframe to the next with stereo and RGB-D, where tracking is
     not weak."""
-    queue: int = 3
-    """A busy mapper gets a keyframe only if fewer than this number wait, with stereo and
-    RGB-D (ORB-SLAM2)."""
 
 
 @dataclass(frozen=True)
@@ -333,13 +226,6 @@ class RelocalizationConfig:
     (ORB-SLAM)."""
     matches: int = 15
     """Fewest matches by words of a candidate keyframe (ORB-SLAM)."""
-    thorough_ratio: float = 0.85
-    """The same ratio when each point is compared with every keypoint."""
-    thorough_matches: int = 12
-    """Fewest matches when each point is compared with every keypoint."""
-    thorough_keyframes: int = 2
-    """Number of keyframes near the last known pose that are compared so, for `motion_frames`
-    frames."""
     iterations: int = 5
     """RANSAC iterations of each candidate per turn (ORB-SLAM)."""
     inliers: int = 10
@@ -358,53 +244,17 @@ class RelocalizationConfig:
     narrow_window: float = 3.0
     """Search radius of the second refinement, pixels at level 0 (ORB-SLAM)."""
     narrow_distance: int = 64
-    """Largest descriptor distance of the second refinement, bits (ORB-SLAM)."""
-    guess_keyframes: int = 5
-    """Number of keyframes nearest to a guessed pose that are tried."""
-    guess_cosine: float = 0.5
-    """Smallest cosine of the angle between their viewing directions and that of the guess."""
+    """Largest descriptor distance of the second refinement, and around a guessed pose, bits
+    (ORB-SLAM)."""
     guess_window: float = 30.0
-    """Search radius around their points, pixels at level 0."""
-    guess_distance: int = 64
-    """Largest descriptor distance of these matches, bits."""
-    guessed_frames: int = 60
-    """Number of frames after a loss in which the last known pose is searched."""
-    motion_frames: int = 10
-    """Number of frames after a loss in which the pose predicted by the motion is searched."""
-    widening: float = 0.25
-    """Share by which the search radius grows at every failure."""
-    widest: float = 3.0
-    """Largest multiple of the search radius after failures."""
-    word_frames: int = 3
-    """Number of lost frames, this one included, whose words name candidates."""
-    word_candidates: int = 8
-    """Number of candidates named by words that are matched with one frame."""
-    near_candidates: int = 4
-    """Number of candidates near the last known pose that are matched with one frame."""
-    covisible_keyframes: int = 10
-    """Number of keyframes near the last known pose by covisibility."""
-    last_keyframes: int = 5
-    """Number of the newest keyframes that are candidates after a loss."""
-    verified_poses: int = 20
-    """Most RANSAC poses that are optimised for one frame."""
+    """Search radius around the points of keyframes near a guessed pose, pixels at level 0."""
     rival_share: float = 0.6
     """A place is ambiguous when another place shows more than this share of its points."""
-    support_window: float = 5.0
-    """Factor on the search radius in counting the points of a place."""
     common_points: int = 15
     """A relocalization is confirmed only when the next frame shares this number of points."""
     confirming_cosine: float = 0.87
     """A relocalization is confirmed only when the cosine of the rotation to the next frame
     is at least this."""
-
-    def for_features(self, n_features: int) -> RelocalizationConfig:
-        """These limits for images with so many features: of few ones fewer are asked for."""
-        return replace(
-            self,
-            enough=_for_features(self.enough, n_features),
-            enough_near=_for_features(self.enough_near, n_features),
-            narrow=_for_features(self.narrow, n_features),
-        )
 
 
 @dataclass(frozen=True)
@@ -433,22 +283,14 @@ class LoopConfig:
     """Number of keyframes after a loop that are not searched for another (ORB-SLAM)."""
     firm_matches: int = 100
     """A loop with fewer matches than this waits for a better one."""
-    patience: int = 8
-    """Number of keyframes that such a loop waits."""
 
 
 @dataclass(frozen=True)
 class MergingConfig:
     """When two maps are believed to show the same place."""
 
-    neighbours: int = 6
-    """Number of neighbours of a keyframe that may confirm a place in another map."""
     confirmations: int = 2
     """Number of neighbours that must confirm it."""
-    far_neighbours: int = 3
-    """Number of neighbours of the place that they are compared with."""
-    remembered: int = 10
-    """Number of keyframes whose places in another map are kept until confirmed."""
     position: float = 0.15
     """Largest difference of a neighbour's position, in median depths of the other keyframe."""
     angle: float = 0.1
@@ -459,8 +301,6 @@ class MergingConfig:
     """Smallest share of visible points of the other map that the keyframe must find."""
     view_cosine: float = 0.87
     """A point is visible when the cosine of the angle to its earlier views is at least this."""
-    places: int = 5
-    """Number of places in the other map that are compared with the first."""
 
 
 @dataclass(frozen=True)
@@ -525,11 +365,9 @@ class Config:
 
     def for_features(self, n_features: int) -> Config:
         """Return the configuration for images with so many features: fewer inliers of few ones."""
-        return replace(
-            self,
-            tracking=self.tracking.for_features(n_features),
-            relocalization=self.relocalization.for_features(n_features),
-        )
+        share = min(1.0, max(LEAST_SHARE, n_features / USUAL_FEATURES))
+        changes = {name: math.ceil(share * value_of(self, name)) for name in _INLIERS}
+        return self.with_changes(changes)
 
 
 #: Named sets of changes to the defaults.

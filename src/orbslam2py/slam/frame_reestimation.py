@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from orbslam2py import _core as core
 from orbslam2py.slam.pose_search import PoseSearch, RefinedPose
 from orbslam2py.slam.records import PoseEstimate
@@ -76,19 +74,13 @@ class FrameReestimation:
         if refined is None:
             return followed
         if finished:
-            refined = self._search.local_map_search.rematch(
-                refined, self._state(frame, wide=in_doubt).probation, in_doubt=in_doubt
-            )
+            refined = self._search.local_map_search.rematch(refined, in_doubt=in_doubt)
         return _without_outliers(refined).frame
 
     def _look(self, frame: core.TrackedFrame, *, wide: bool) -> RefinedPose | None:
-        state = self._state(frame, wide=wide)
-        refined = self._search.in_local_map(_copy_of(frame), PoseEstimate(), state)
+        state = State().relocalized(frame.id) if wide else State()
+        refined = self._search.local_map_search.refine(_copy_of(frame), PoseEstimate(), state)
         return _without_outliers(refined) if refined.estimate.found else None
-
-    def _state(self, frame: core.TrackedFrame, *, wide: bool) -> State:
-        state = self._search.new_state()
-        return state.relocalized(frame.id, where_expected=False) if wide else state
 
 
 def _shows_more(looked: core.TrackedFrame, found: core.TrackedFrame) -> bool:
@@ -102,8 +94,6 @@ def _without_outliers(refined: RefinedPose) -> RefinedPose:
 
 def _copy_of(frame: core.TrackedFrame) -> core.TrackedFrame:
     copy = core.TrackedFrame(frame.features)
-    copy.copy_associations(frame, np.ones(len(frame.features), bool))
+    copy.take_over(frame)
     core.discard_temporary(copy)  # seen by the frame before alone
-    copy.T_cw = frame.T_cw
-    copy.share_anchor(frame)
     return copy

@@ -36,18 +36,18 @@ class FullAdjustmentRecord:
 
     map_index: int
     """Which map, as in `TrackingRecord.map_index`."""
-    n_keyframes: int
+    n_keyframes: int = 0
     """Keyframes that took part."""
-    n_points: int
-    n_observations: int
+    n_points: int = 0
+    n_observations: int = 0
     """Keypoints of these keyframes that show these points."""
-    iterations: int
+    iterations: int = 0
     """Accepted steps."""
-    initial_cost: float
+    initial_cost: float = 0.0
     """Sum of squared residuals, each over its standard deviation, robustified."""
-    final_cost: float
+    final_cost: float = 0.0
     """The same at the end."""
-    used: bool
+    used: bool = False
     """False: given up because of another loop, a reset or the shutdown, or it gained nothing."""
     milliseconds: dict[str, float] = field(default_factory=dict)
     """Time per step: gather, solve, wait, commit, local (if there were new keyframes)."""
@@ -146,16 +146,7 @@ class FullBundleAdjustment:
         latest = self._latest
         if latest is not None and latest[0] == number:
             return latest[1]
-        return FullAdjustmentRecord(
-            map_index=self._wanted[1],
-            n_keyframes=0,
-            n_points=0,
-            n_observations=0,
-            iterations=0,
-            initial_cost=0.0,
-            final_cost=0.0,
-            used=False,
-        )
+        return FullAdjustmentRecord(self._wanted[1])
 
     @contextlib.contextmanager
     def kept_away(self) -> Iterator[None]:

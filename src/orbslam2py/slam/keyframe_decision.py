@@ -13,6 +13,9 @@ from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.config import KeyframeConfig
 from orbslam2py.slam.state import SinceKeyframe
 
+_TURN_FRAMES = 3  # frames that the view is predicted ahead: a keyframe needs as long to be mapped
+_QUEUE = 3  # keyframes that may wait for the mapper, with depth (ORB-SLAM2)
+
 
 class KeyframeDecision:
     """Weighs what a frame would bring to the map against what mapping can take.
@@ -110,12 +113,12 @@ class KeyframeDecision:
             return wanted
         self._mapping.interrupt()
         # A busy mapper gets no keyframes of a single camera: they would come at every frame.
-        queue = limits.queue if self._has_depth else 0
+        queue = _QUEUE if self._has_depth else 0
         return self._mapping.n_waiting < queue
 
     def _points_of(self, keyframe: int, n_keyframes: int) -> int:
         few = n_keyframes <= self.limits.few_keyframes
-        observations = self.limits.observations_of_few if few else self.limits.observations
+        observations = self.limits.few_keyframes if few else self.limits.observations
         return core.count_tracked_points(self._map, keyframe, observations)
 
     def _share(self, n_keyframes: int) -> float:
@@ -151,10 +154,10 @@ class KeyframeDecision:
         T_nw = frame.T_cw
         if velocity is None or T_nw is None:
             return False
-        for _ in range(self.limits.turn_frames):
+        for _ in range(_TURN_FRAMES):
             T_nw = velocity @ T_nw
         staying = core.count_staying(frame, T_nw)
-        if staying >= self.limits.staying_share * n_inliers:
+        if staying >= self.limits.kept_share * n_inliers:
             return False
         _, untracked = frame.n_close_tracked_untracked()
         return untracked > self.limits.many_untracked_close_points

@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterator
 from orbslam2py import _core as core
 from orbslam2py.slam.config import LoopConfig
 
+_PATIENCE = 8  # keyframes that a loop with few matches waits for a better one
+
 
 class PendingLoop:
     """Chooses among the loops of a few keyframes the one with most matches.
@@ -96,10 +98,10 @@ class PendingLoop:
         self._big_change = self._map.big_change_index
 
     def _is_ripe(self) -> bool:
-        limits, best = self._limits, self._best
+        best = self._best
         if best is None:
             return False
-        return best.n_matches >= limits.firm_matches or self._n_waited >= limits.patience
+        return best.n_matches >= self._limits.firm_matches or self._n_waited >= _PATIENCE
 
     def _follow_map(self) -> None:
         """Find what waits anew if the map has moved since; drop it if it is no loop any more."""

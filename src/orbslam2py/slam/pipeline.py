@@ -53,6 +53,9 @@ _log = logging.getLogger(__name__)
 #: The year 5138 in seconds since 1970; today in milliseconds, or in what is finer, lies far beyond.
 _NO_SECONDS = 1e11
 
+#: Keyframes after which the first frames of a map are estimated again, and frames at the latest.
+_SETTLED_MAP, _YOUNG_FRAMES = 10, 250
+
 #: Makes a frame of images: takes its id and a timer.
 BuildFrame = Callable[[int, StageTimer], core.Frame]
 
@@ -112,7 +115,6 @@ class Pipeline:
         self.reset_requested = threading.Event()
         self.frame_watchers: tuple[FrameWatcher, ...] = ()
         self.n_resets = 0
-        self._limits = config.initialization
         # The map that came to nothing, and is given up before the next image.
         self._given_up: int | None = None
         self._start_failed = False
@@ -254,17 +256,14 @@ class Pipeline:
         """Once a single camera's map has settled, its first frames get better poses in it."""
         n_young = self.recorder.n_young
         slam_map = self.back_end.map
-        settled = slam_map.n_keyframes_of(slam_map.active_map) > self._limits.settled_map
-        if n_young > 0 and (settled or n_young >= self._limits.young_frames):
+        settled = slam_map.n_keyframes_of(slam_map.active_map) > _SETTLED_MAP
+        if n_young > 0 and (settled or n_young >= _YOUNG_FRAMES):
             self.recorder.reestimate_first_frames()
 
     def _keep(self, frame: core.TrackedFrame, outcome: TrackingResult) -> None:
         if outcome.given_up is not None:
-            reason = outcome.estimate.reason
-            self._start_failed = reason is Reason.INITIAL_MAP_FAILED
-            if reason is Reason.MAP_CONTRADICTED:
-                _log.info("%s; starting a new map", reason)
-            elif not self._start_failed:
+            self._start_failed = outcome.estimate.reason is Reason.INITIAL_MAP_FAILED
+            if not self._start_failed:
                 _log.info("lost soon after initialization; starting a new map")
             self._given_up = outcome.given_up
         elif outcome.state in (TrackingState.OK, TrackingState.LOST):
@@ -310,27 +309,14 @@ class Pipeline:
 
     def _announce(self, before: TrackingState, record: TrackingRecord) -> None:
         events = self.back_end.events
+        here = (record.map_index, record.frame_id, record.timestamp)
         if record.state is TrackingState.OK and record.map_index > self._last_map:
             self._last_map = record.map_index
-            events.post(MapStarted(record.map_index, record.frame_id, record.timestamp))
+            events.post(MapStarted(*here))
         if before is TrackingState.OK and record.state is TrackingState.LOST:
-            events.post(
-                TrackingLost(
-                    map_index=record.map_index,
-                    frame_id=record.frame_id,
-                    timestamp=record.timestamp,
-                    reason=str(record.reason),
-                )
-            )
+            events.post(TrackingLost(*here, str(record.reason)))
         elif before is TrackingState.LOST and record.T_wc is not None:
-            events.post(
-                Relocalized(
-                    map_index=record.map_index,
-                    frame_id=record.frame_id,
-                    timestamp=record.timestamp,
-                    T_wc=record.T_wc,
-                )
-            )
+            events.post(Relocalized(*here, record.T_wc))
 
     def request_reset(self) -> None:
         """Begin a new map with the next image, and forget all before it."""
@@ -387,14 +373,7 @@ class Pipeline:
 def _make_search(
     setup: Setup, back_end: BackEnd, config: Config, relocalizer: Relocalizer | None = None
 ) -> PoseSearch:
-    return PoseSearch(
-        back_end.map,
-        setup.vocabulary,
-        setup.sensor,
-        setup.settings.max_keyframe_interval,
-        relocalizer,
-        config.tracking,
-    )
+    return PoseSearch(back_end.map, setup.vocabulary, setup.sensor, relocalizer, config.tracking)
 
 
 def _make_tracking(
@@ -402,7 +381,6 @@ def _make_tracking(
 ) -> Tracking:
     seed = options.seed
     sensor, vocabulary = setup.sensor, setup.vocabulary
-    max_keyframe_interval = setup.settings.max_keyframe_interval
     slam_map, mapping = back_end.map, back_end.mapping
     n_features = setup.settings.orb.n_features
 
@@ -450,7 +428,7 @@ def _make_tracking(
             slam_map,
             mapping.worker,
             sensor,
-            max_keyframe_interval,
+            setup.settings.max_keyframe_interval,
             config.keyframes,
             waits=options.wait_for_mapping and not options.deterministic,
         ),

@@ -44,6 +44,7 @@ class Reason(str, enum.Enum):
     FEW_INLIERS_REFERENCE = "too few inliers from the reference keyframe"
     FEW_INLIERS_LOCAL_MAP = "too few inliers in the local map"
     WEAK_EVIDENCE = "the pose found explains too little of what should be seen"
+    #: Only in results of earlier versions.
     MAP_CONTRADICTED = "the images since the map began contradict it"
 
     def __str__(self) -> str:
@@ -230,8 +231,6 @@ class PoseEstimate:
     """The frame before was in the map, and this one is not."""
     relocalized: bool = False
     """Found without a guess from the frame before."""
-    where_expected: bool = False
-    """Relocalized where tracking was just lost, or its motion led from there."""
     method: PoseMethod = PoseMethod.MOTION_MODEL
     """What found it."""
     evidence: Evidence | None = None

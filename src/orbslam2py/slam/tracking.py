@@ -22,16 +22,14 @@ from orbslam2py.slam.initialization import Initializer
 from orbslam2py.slam.keyframe_decision import KeyframeDecision
 from orbslam2py.slam.local_mapping import LocalMapping
 from orbslam2py.slam.pose_search import (
-    FirstEstimate,
-    FirstEstimateInFixedMap,
-    FirstEstimateInGrowingMap,
     PoseSearch,
+    estimate_in_fixed_map,
+    estimate_in_growing_map,
 )
 from orbslam2py.slam.records import PoseEstimate, Reason, TrackingResult, TrackingState
 from orbslam2py.slam.state import Motion, State
 from orbslam2py.slam.state.transitions import (
     ActivateMap,
-    Confirmed,
     Event,
     KeyframeInserted,
     MapBegun,
@@ -100,10 +98,8 @@ class Tracking:
         self._acceptance = acceptance
         self._keyframe_decision = keyframe_decision
         self._has_depth = has_depth
-        self._in_growing_map = FirstEstimateInGrowingMap(search)
-        self._in_fixed_map = FirstEstimateInFixedMap(search, has_depth=has_depth)
-        self._transitions = Transitions(config, has_depth=has_depth, new_map_after=new_map_after)
-        self._state = State.before_first_map(has_depth=has_depth)
+        self._transitions = Transitions(config, new_map_after=new_map_after)
+        self._state = State()
 
     # ---- maps that begin and end -----------------------------------------------------------------
     def restart(self) -> None:
@@ -112,9 +108,7 @@ class Tracking:
         self._begin_anew()
         if frames:
             # The count of the frames goes on, and the next map is young as well.
-            state = self._state
-            probation = state.probation.map_begun(frames[-1].id, has_depth=self._has_depth)
-            self._state = replace(state, probation=probation)
+            self._state = self._state.map_begun(frames[-1].id)
         self._initializer.restart(frames)
 
     def reset(self) -> None:
@@ -123,9 +117,7 @@ class Tracking:
         self._initializer.reset()
 
     def _begin_anew(self) -> None:
-        self._state = State.before_first_map(
-            has_depth=self._has_depth, n_relocalizations=self._state.n_relocalizations
-        )
+        self._state = State(n_relocalizations=self._state.n_relocalizations)
 
     def begin_in_loaded_map(self, initial_pose: core.Pose | None) -> None:
         """Start lost in the map as it is: every image is searched in it, and it is kept.
@@ -229,9 +221,9 @@ class Tracking:
             The outcome is to say which keypoints the pose was accepted with.
         """
         if self._state.initializing:
+            self._apply(NotInitialized())
             return self._begin_map(frame, timer)
-        young = self._is_small or self._initializer.watches_map
-        if young and not self._state.seeks_map:
+        if self._is_small and not self._state.seeks_map:
             self._initializer.remember(frame)
         estimate = self._find_pose(frame, timer, localize)
         if estimate.found and self._transitions.is_contradicted(self._state, frame):
@@ -243,14 +235,6 @@ class Tracking:
             estimate = replace(estimate, unconfirmed=True)
             self._apply(Relocalized(frame, estimate.n_inliers))
         else:
-            if self._state.unconfirmed is not None:
-                self._apply(Confirmed())
-            if not localize:
-                with timer("keyframe"):
-                    wrong = self._wrong_map(frame)
-                if wrong is not None:
-                    contradicted = estimate.failed(Reason.MAP_CONTRADICTED)
-                    return self._lose(frame, contradicted, wrong_map=wrong)
             self._apply(Tracked(frame, estimate.n_inliers, self._map.active_map))
         # Before temporary points go, and a keyframe's keypoints become points.
         inliers = accepted_keypoints(frame) if details else None
@@ -273,7 +257,6 @@ class Tracking:
         if localize:
             kept = self._state.kept_maps | {self._map.active_map}
             self._state = replace(self._state, kept_maps=kept)
-            self._initializer.believe_map()
         estimate, state = self._search_once(frame, self._state, timer, localize)
         if not estimate.found and self._map.big_change_index != changes_before:
             # A loop was closed meanwhile: what was matched may be half of the old map.
@@ -286,13 +269,13 @@ class Tracking:
         self, frame: core.TrackedFrame, state: State, timer: StageTimer, localize: bool
     ) -> tuple[PoseEstimate, State]:
         lost = state.is_lost
-        strategy: FirstEstimate = self._in_fixed_map if localize else self._in_growing_map
+        estimate_first = estimate_in_fixed_map if localize else estimate_in_growing_map
         with timer("predict"):
-            first, state = strategy.estimate(frame, state)
+            first, state = estimate_first(self._search, frame, state)
         if lost and not first.found:
             return first, state
         if lost or first.relocalized:
-            state = state.relocalized(frame.id, where_expected=first.where_expected)
+            state = state.relocalized(frame.id)
             since = replace(state.since_keyframe, most_inliers=0)
             state = replace(state, since_keyframe=since)
         with timer("local_map"):
@@ -302,14 +285,12 @@ class Tracking:
         return estimate, state
 
     def _begin_map(self, frame: core.TrackedFrame, timer: StageTimer) -> TrackingResult:
-        self._apply(NotInitialized())
         with timer("keyframe"):
             reason = self._initializer.try_initialize(frame)
-        if reason is not Reason.NONE:
-            spoilt = reason is Reason.INITIAL_MAP_FAILED
-            given_up = self._map.active_map if spoilt else None
-            return TrackingResult(self._state.phase, PoseEstimate(reason), given_up=given_up)
-        return self._map_begun(frame)
+        if reason is Reason.NONE:
+            return self._map_begun(frame)
+        spoilt = self._map.active_map if reason is Reason.INITIAL_MAP_FAILED else None
+        return TrackingResult(self._state.phase, PoseEstimate(reason), given_up=spoilt)
 
     def _begin_map_beside(
         self, frame: core.TrackedFrame, timer: StageTimer, *, localize: bool
@@ -319,12 +300,8 @@ class Tracking:
             return None
         self._apply(SearchForMap())
         frame.clear_associations()
-        with timer("keyframe"):
-            reason = self._initializer.try_initialize(frame)
-        if reason is Reason.INITIAL_MAP_FAILED:
-            spoilt = self._map.active_map
-            return TrackingResult(self._state.phase, PoseEstimate(reason), given_up=spoilt)
-        return self._map_begun(frame) if reason is Reason.NONE else None
+        begun = self._begin_map(frame, timer)
+        return begun if begun.estimate.found or begun.given_up is not None else None
 
     def _map_begun(self, frame: core.TrackedFrame) -> TrackingResult:
         earlier = self._initializer.take_earlier()
@@ -335,16 +312,7 @@ class Tracking:
         estimate = PoseEstimate(n_matches=n, n_inliers=n, covariance=covariance)
         return TrackingResult(self._state.phase, estimate, is_keyframe=True, earlier=earlier)
 
-    def _wrong_map(self, frame: core.TrackedFrame) -> int | None:
-        """The number of a map that the images contradict by now."""
-        there = frame.map_index
-        contradicted = self._initializer.contradicts(frame)
-        # While they were compared loop closing may have joined it to another map.
-        return there if contradicted and self._map.active_map == there else None
-
-    def _lose(
-        self, frame: core.TrackedFrame, estimate: PoseEstimate, *, wrong_map: int | None = None
-    ) -> TrackingResult:
+    def _lose(self, frame: core.TrackedFrame, estimate: PoseEstimate) -> TrackingResult:
         if not self._state.is_lost:
             _log.info("tracking lost at frame %d: %s", frame.id, estimate.reason)
         self._apply(NotFound(frame.timestamp))
@@ -356,9 +324,7 @@ class Tracking:
         # Other maps are dropped for one that begins. Under a hand none does, and the camera may be
         # found behind it.
         another = self._initializer.shows_enough(frame)
-        given_up = wrong_map
-        if given_up is None and small and another:
-            given_up = active
+        given_up = active if small and another else None
         return TrackingResult(self._state.phase, estimate, given_up=given_up)
 
     @property

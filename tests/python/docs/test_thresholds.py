@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -18,6 +19,7 @@ HEADER = ("name in the code", "value")
 CHAPTERS = sorted(ROOT.glob("docs/method/*.md"))
 
 _CPP = re.compile(r"^`(?P<name>\w+)` in `(?P<file>[\w/]+\.(?:hpp|cpp))`")
+_CONSTANT = re.compile(r"^`(?P<name>_?[A-Z][A-Z_]*)` in `(?P<file>slam/[\w/]+\.py)`")
 _PYTHON = re.compile(r"^`(?P<owner>[A-Za-z_]\w*)\.(?P<field>\w+)`$")
 _NUMBER = r"[-+]?(?:\d[\d']*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 
@@ -77,6 +79,22 @@ def literals_of(text: str, name: str) -> list[float]:
     return found
 
 
+def constants_of(text: str) -> dict[str, float]:
+    """Numbers that a Python module gives to names: ``_MOST = 6`` or ``_FEW, _MANY = 2, 10``."""
+    found = {}
+    for node in ast.parse(text).body:
+        if not isinstance(node, ast.Assign):
+            continue
+        (target,) = node.targets
+        names, values = [target], [node.value]
+        if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple):
+            names, values = target.elts, node.value.elts
+        for name, value in zip(names, values, strict=True):
+            if isinstance(value, ast.Constant) and isinstance(value.value, int | float):
+                found[ast.unparse(name)] = float(value.value)
+    return found
+
+
 @pytest.fixture(scope="module")
 def thresholds() -> dict[str, Any]:
     """Sections of the configuration, and other classes of thresholds, by their names."""
@@ -121,14 +139,29 @@ def test_thresholds_of_python(path: Path, thresholds: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("path", CHAPTERS, ids=lambda p: p.stem)
+def test_constants_of_python(path: Path) -> None:
+    wrong = []
+    for row in rows_of(path):
+        named = _CONSTANT.match(row.name)
+        if named is None:
+            continue
+        source = ROOT / "src/orbslam2py" / named["file"]
+        code = constants_of(read(source)) if source.is_file() else {}
+        if number_in(row.value) != pytest.approx(code.get(named["name"])):
+            wrong.append(f"{row.place}: '{row.value}', the code {code.get(named['name'])}")
+    assert not wrong, "\n".join(wrong)
+
+
+@pytest.mark.parametrize("path", CHAPTERS, ids=lambda p: p.stem)
 def test_names_of_thresholds_are_of_a_known_form(path: Path) -> None:
     """A typing error must not turn a row into one that nothing checks."""
+    forms = (_CPP, _CONSTANT, _PYTHON)
     odd = [
         row.place
         for row in rows_of(path)
-        if row.name.startswith("`") and not (_CPP.match(row.name) or _PYTHON.match(row.name))
+        if row.name.startswith("`") and not any(form.match(row.name) for form in forms)
     ]
-    assert not odd, f"neither a name of C++ in a file nor section.field: {odd}"
+    assert not odd, f"neither a name in a file nor section.field: {odd}"
 
 
 def test_numbers_are_read() -> None:
@@ -143,4 +176,9 @@ def test_numbers_are_read() -> None:
     assert literals_of(text, "on") == [1]
     assert literals_of("const double k = std::log(1.5);", "k") == [1.5]
     assert literals_of("Options ransac{0.99, 10};  // 7", "ransac") == [0.99, 10]
+    assert constants_of("_MOST = 6\n_FEW, MANY = 2, 1.5  # frames\n_X = f(3)\n") == {
+        "_MOST": 6,
+        "_FEW": 2,
+        "MANY": 1.5,
+    }
     assert literals_of("using Eight = std::array<int, 8>;", "Eight") == [8]

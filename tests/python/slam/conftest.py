@@ -12,7 +12,7 @@ from orbslam2py._worker import Worker
 from orbslam2py.slam import keyframe_decision, tracking
 from orbslam2py.slam.acceptance import multi_hypothesis_search, pose_validator
 from orbslam2py.slam.config import AcceptanceConfig, TrackingConfig
-from orbslam2py.slam.pose_search import first_estimate, local_map_search, refined_pose, search
+from orbslam2py.slam.pose_search import first_estimate, local_map_search, search
 from orbslam2py.slam.state import motion
 from support.interleaving import LIMIT, Stage
 from support.small_sequences import new_system, play
@@ -52,7 +52,7 @@ def core(monkeypatch: pytest.MonkeyPatch) -> FakeCore:
     core = FakeCore()
     for module in (
         *(tracking, keyframe_decision),
-        *(first_estimate, motion, search, local_map_search, refined_pose),
+        *(first_estimate, motion, search, local_map_search),
         *(multi_hypothesis_search, pose_validator),
     ):
         monkeypatch.setattr(module, "core", core)

@@ -11,11 +11,9 @@ import numpy as np
 import pytest
 
 from orbslam2py import _core
-from orbslam2py.slam.config import RelocalizationConfig
 from orbslam2py.slam.relocalization import CandidatePlaces, candidates
-from orbslam2py.slam.state import LastKnownPose, LostSearch, loss
+from orbslam2py.slam.state import MOTION_FRAMES, LastKnownPose, LostSearch, loss
 
-LIMITS = RelocalizationConfig()
 FRAME: Any = SimpleNamespace()
 
 
@@ -74,7 +72,7 @@ class Places:
     def __init__(self, slam_map: FakeMap) -> None:
         given: Any = slam_map
         index: Any = "index"
-        self._places = CandidatePlaces(given, index, LIMITS)
+        self._places = CandidatePlaces(given, index)
         self._lost = LostSearch()
 
     def of(self, place: LastKnownPose | None, failures: int) -> list[int]:
@@ -105,7 +103,7 @@ def test_what_several_frames_look_like_comes_before_what_one_does(fake: FakeCore
     fake.found = {3: 0.3, 8: 0.4}
     assert chosen.of(None, 1) == [3, 8, 4], "4 is remembered"
     fake.found = {}
-    for _ in range(LIMITS.word_frames - 1):
+    for _ in range(candidates._WORD_FRAMES - 1):
         remembered = chosen.of(None, 2)
     assert remembered == [8, 3]
     assert chosen.of(None, 3) == [], "not for longer than some frames"
@@ -127,7 +125,7 @@ def test_the_number_is_bounded_and_all_are_reached_in_the_end(fake: FakeCore) ->
     reached: set[int] = set()
     for failures in range(20):
         tried = chosen.of(place, failures)
-        assert len(tried) <= LIMITS.word_candidates + LIMITS.near_candidates
+        assert len(tried) <= candidates._WORD_CANDIDATES + candidates._NEAR_CANDIDATES
         assert tried[:4] == [0, 1, 2, 3], "the best are tried every time"
         reached.update(tried)
     near = {80, *range(70, 80), *range(95, 100)}
@@ -155,15 +153,15 @@ def test_a_place_that_died_names_nothing(fake: FakeCore) -> None:
 # ---- guesses -----------------------------------------------------------------------------------
 def test_the_camera_went_on_or_stayed() -> None:
     place = lost_at(80, velocity=_core.Pose([0, 0, 0, 1], [0.5, 0, 0]))
-    went_on, stayed = place.guesses(13, LIMITS)
+    went_on, stayed = place.guesses(13)
     assert went_on.translation[0] == pytest.approx(5.0 + 3 * 0.5)
     assert stayed.translation[0] == 5.0
 
 
 def test_after_a_while_nobody_knows_where_it_went() -> None:
     place = lost_at(80, velocity=_core.Pose([0, 0, 0, 1], [0.5, 0, 0]))
-    assert len(place.guesses(10 + LIMITS.motion_frames, LIMITS)) == 2
-    assert len(place.guesses(11 + LIMITS.motion_frames, LIMITS)) == 1
+    assert len(place.guesses(10 + MOTION_FRAMES)) == 2
+    assert len(place.guesses(11 + MOTION_FRAMES)) == 1
 
 
 def test_a_motion_is_stretched_with_the_map(fake: FakeCore) -> None:

@@ -23,6 +23,11 @@ def test_every_value_is_reached_by_its_name() -> None:
         assert changed.changes() == {name: other}
 
 
+def test_there_are_no_more_values_than_a_person_can_look_through() -> None:
+    """Sizes of buffers, patience and limits inside a step are constants beside the code."""
+    assert len(list(all_values(Config()))) <= 100
+
+
 def test_every_value_says_what_it_means() -> None:
     meanings = descriptions()
     assert {name for name, _ in all_values(Config())} == set(meanings)
@@ -34,6 +39,7 @@ def test_every_value_says_what_it_means() -> None:
     [
         ("tracking.map_match", "did you mean tracking.map_matches?"),
         ("map_matches", "did you mean tracking.map_matches?"),
+        ("initialization.watched_frames", "did you mean "),
         ("", "orbslam2py config"),
         ("nothing.like.it", "orbslam2py config"),
     ],

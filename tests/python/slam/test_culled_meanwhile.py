@@ -10,7 +10,6 @@ import pytest
 
 from orbslam2py import Sensor, System
 from orbslam2py import _core as core
-from orbslam2py.slam.config import RelocalizationConfig
 from orbslam2py.slam.state import LastKnownPose
 from support.small_sequences import new_system, play
 
@@ -51,12 +50,12 @@ def test_tracking_goes_on_without_it(slam: System, culled: int) -> None:
     tracking = slam.pipeline.tracking
     frame = core.TrackedFrame(tracking.motion.last.features)
     state = replace(tracking._state, reference_keyframe=culled)
-    assert not tracking._search.by_keyframes_around(frame, state, 10).found
+    assert not tracking._search.by_keyframes(frame, state, 10).found
 
 
 def test_the_place_of_a_loss_is_its_parent_s(slam: System, culled: int) -> None:
     slam_map = slam.pipeline.back_end.map
     last = slam.pipeline.tracking.motion.last
-    named = LastKnownPose(last, None, culled).keyframes(slam_map, RelocalizationConfig())
+    named = LastKnownPose(last, None, culled).keyframes(slam_map)
     assert named[0] == slam_map.living(culled)
     assert culled not in named

@@ -12,7 +12,7 @@ import pytest
 
 from orbslam2py.slam.initialization.earlier_frames import EarlierFrames
 from orbslam2py.slam.records import PoseEstimate, Verdict
-from orbslam2py.slam.state import Motion, State
+from orbslam2py.slam.state import Motion
 
 N, FIRST = 12, 8
 EXACT, VAGUE = 0.5, 1.2  # standard deviation of the rotation, degrees
@@ -44,7 +44,6 @@ def tracked(judge: Callable[[int], PoseEstimate]) -> list[int]:
     slam_map = SimpleNamespace(living=lambda keyframe: keyframe)
     search: Any = SimpleNamespace(
         map=slam_map,
-        new_state=lambda: State.before_first_map(has_depth=False),
         by_motion_model=lambda frame, state: judge(frame.id),
     )
     acceptance: Any = SimpleNamespace(refine=lambda frame, first, state: (judge(frame.id), state))

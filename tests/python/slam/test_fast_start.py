@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from orbslam2py import Sensor, System, TrackingRecord
-from orbslam2py.slam.config import RelocalizationConfig, TrackingConfig
+from orbslam2py.slam.config import Config
 from orbslam2py.slam.records import PoseMethod
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.trajectory.rotations import inverse_poses
@@ -72,9 +72,8 @@ def test_its_poses_are_right(sequence: SyntheticSequence, driven: list[TrackingR
 def test_of_few_features_fewer_inliers_are_asked_for(
     n_features: int, inliers: int, after: int
 ) -> None:
-    limits = TrackingConfig().for_features(n_features)
-    assert limits.local_map_inliers == inliers
-    assert limits.local_map_inliers_after_relocalization == after
-    assert limits.map_matches == TrackingConfig().map_matches
-    again = RelocalizationConfig().for_features(n_features)
+    config = Config().for_features(n_features)
+    assert config.tracking.local_map_inliers == inliers
+    assert config.tracking.map_matches == Config().tracking.map_matches
+    again = config.relocalization
     assert (again.narrow, again.enough_near, again.enough) == (inliers, inliers, after)

@@ -16,7 +16,6 @@ from orbslam2py.slam.effort import Effort
 from orbslam2py.slam.frame_recorder import FrameRecorder
 from orbslam2py.slam.frame_reestimation import FrameReestimation
 from orbslam2py.slam.pose_search import LocalMapSearch, PoseSearch, RefinedPose
-from orbslam2py.slam.state import Probation
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.vocabulary import load_vocabulary
 from support.moved_frames import MovedByAMetre
@@ -43,14 +42,7 @@ class Walk:
         self.map = self.system.pipeline.back_end.map
         self.reestimation = FrameReestimation(
             self.map,
-            PoseSearch(
-                self.map,
-                load_vocabulary(),
-                Sensor.RGBD,
-                20,
-                None,
-                TrackingConfig(),
-            ),
+            PoseSearch(self.map, load_vocabulary(), Sensor.RGBD, None, TrackingConfig()),
         )
 
     def no_keyframe(self) -> core.TrackedFrame:
@@ -108,9 +100,7 @@ def test_a_look_that_does_not_show_clearly_more_is_not_followed(
     """It may have found other things, and led to where still other ones are found."""
     began: list[core.TrackedFrame] = []
 
-    def remember(
-        _: LocalMapSearch, refined: RefinedPose, probation: Probation, *, in_doubt: bool
-    ) -> RefinedPose:
+    def remember(_: LocalMapSearch, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
         assert in_doubt
         began.append(refined.frame)
         return refined
@@ -327,9 +317,7 @@ def test_only_the_last_look_is_matched_from_nothing(
 ) -> None:
     looked: list[tuple[int, bool]] = []
 
-    def note(
-        _: LocalMapSearch, refined: RefinedPose, probation: Probation, *, in_doubt: bool
-    ) -> RefinedPose:
+    def note(_: LocalMapSearch, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
         looked.append((refined.frame.id, in_doubt))
         return refined
 

@@ -14,7 +14,8 @@ from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py._timing import StageTimer
 from orbslam2py.evaluation import match_poses
-from orbslam2py.slam.config import InitializationConfig, TrackingConfig
+from orbslam2py.slam import pipeline
+from orbslam2py.slam.config import TrackingConfig
 from orbslam2py.slam.frame_recorder import FrameRecorder
 from orbslam2py.slam.initialization import MonocularInitializer
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
@@ -69,7 +70,7 @@ class Corridor:
 
 def test_the_frames_of_the_start_are_looked_at_once_the_map_has_settled() -> None:
     walk = Corridor(60)
-    settled = InitializationConfig().settled_map
+    settled = pipeline._SETTLED_MAP
     begun = int(np.argmax(np.array(walk.n_young) > 0))
     looked = next(i for i, n in enumerate(walk.n_keyframes) if n > settled) + 1
     assert walk.n_young[looked - 1] == looked  # from the very first frame on

@@ -70,9 +70,7 @@ TABLE = [
 @pytest.mark.parametrize("case", TABLE, ids=lambda case: case.why)
 def test_keyframe_decision(sensor: Sensor, core: FakeCore, case: Case) -> None:
     # Too few inliers to go on tracking are enough for a decision.
-    limits = TrackingConfig(
-        local_map_inliers=1, local_map_inliers_after_relocalization=1, map_matches=1
-    )
+    limits = TrackingConfig(local_map_inliers=1, map_matches=1)
     scene = Scene(sensor, core, limits)
     scene.run(1)
     scene.core.inliers.extend([100, 100])

@@ -20,6 +20,7 @@ from orbslam2py import (
 )
 from orbslam2py.datasets import Images
 from orbslam2py.evaluation import lap_error, scale_drift
+from orbslam2py.slam import pending_loop
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from support.feeding import feed
 
@@ -173,8 +174,11 @@ def test_walls_that_repeat_their_pictures_close_true_loops_only() -> None:
     assert result.problems == []
 
 
-def test_a_loop_that_still_waits_is_closed_when_all_is_waited_for() -> None:
-    never = {"loops.firm_matches": 10**6, "loops.patience": 10**6}
+def test_a_loop_that_still_waits_is_closed_when_all_is_waited_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(pending_loop, "_PATIENCE", 10**6)
+    never = {"loops.firm_matches": 10**6}
     made = sequence("corridor", Sensor.RGBD)
     settings = replace(made.settings, orb=replace(made.settings.orb, n_features=600))
     with System(settings, Sensor.RGBD, deterministic=True, config=never) as system:

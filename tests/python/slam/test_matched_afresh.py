@@ -16,7 +16,7 @@ from orbslam2py import _core as core
 from orbslam2py.slam.config import AcceptanceConfig, TrackingConfig
 from orbslam2py.slam.pose_search import LocalMapSearch, PoseSearch, RefinedPose
 from orbslam2py.slam.records import PoseEstimate, TrackingResult
-from orbslam2py.slam.state import Probation
+from orbslam2py.slam.state import State
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 from orbslam2py.vocabulary import load_vocabulary
 from support.tracking_scene import FakeCore, FakeFrame, Scene, pose
@@ -40,9 +40,7 @@ class Walk:
             self.system.track_stereo(images.image, images.right, i / 20)
         self.last = self.system.pipeline.tracking.motion.last
         self.map = self.system.pipeline.back_end.map
-        self.search = PoseSearch(
-            self.map, load_vocabulary(), Sensor.STEREO, 20, None, TrackingConfig()
-        )
+        self.search = PoseSearch(self.map, load_vocabulary(), Sensor.STEREO, None, TrackingConfig())
 
     def version(self) -> core.TrackedFrame:
         """The last frame as it was tracked."""
@@ -53,13 +51,10 @@ class Walk:
         return version
 
     def refined(self) -> RefinedPose:
-        return self.search.in_local_map(self.version(), PoseEstimate(), self.search.new_state())
+        return self.search.local_map_search.refine(self.version(), PoseEstimate(), State())
 
-    def rematch(
-        self, refined: RefinedPose, *, in_doubt: bool, probation: Probation | None = None
-    ) -> RefinedPose:
-        probation = probation or self.search.new_state().probation
-        return self.search.local_map_search.rematch(refined, probation, in_doubt=in_doubt)
+    def rematch(self, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
+        return self.search.local_map_search.rematch(refined, in_doubt=in_doubt)
 
     def turned(self, radians: float, n_inliers: int, *, metres: float = 1e-3) -> RefinedPose:
         """A pose beside the right one that so many points fit, told with so many metres."""
@@ -171,9 +166,8 @@ def test_nothing_to_match_from_nothing_changes_nothing(walk: Walk) -> None:
     beside = walk.held(0.01, 60)
     n_found = walk.rematch(beside, in_doubt=True).estimate.n_inliers
     limits = replace(LIMITS, local_map_inliers=n_found + 1)
-    stricter = LocalMapSearch(walk.map, Sensor.STEREO, 20, limits)
-    probation = walk.search.new_state().probation
-    refined = stricter.rematch(beside, probation, in_doubt=True)
+    stricter = LocalMapSearch(walk.map, Sensor.STEREO, limits)
+    refined = stricter.rematch(beside, in_doubt=True)
     assert refined is beside, "not enough for a pose"
 
 
@@ -194,9 +188,7 @@ class FromNothing:
         self.ends: list[float] = []
         scene.search.local_map_search.rematch = self  # type: ignore[method-assign]
 
-    def __call__(
-        self, refined: RefinedPose, probation: Probation, *, in_doubt: bool
-    ) -> RefinedPose:
+    def __call__(self, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
         if not in_doubt:
             return refined
         assert refined.frame.T_cw is not None

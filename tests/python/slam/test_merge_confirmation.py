@@ -13,7 +13,7 @@ import pytest
 from orbslam2py import _core as core
 from orbslam2py.slam.config import MergingConfig
 from orbslam2py.slam.merging import MapMerging, map_merging
-from orbslam2py.slam.merging.visibility_ratio import explained_share
+from orbslam2py.slam.merging.map_merging import explained_share
 
 OLD, YOUNG = 0, 1
 #: Keyframes 0 to 9 are of the old map, 20 to 29 of the young one; each shows a place of its own.

@@ -4,12 +4,21 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from orbslam2py import Reason, System, TrackingRecord, TrackingState, Trajectory
+from orbslam2py import (
+    Reason,
+    System,
+    TrackingRecord,
+    TrackingState,
+    Trajectory,
+    open_sequence,
+)
 from orbslam2py.evaluation import Alignment, evaluate_trajectory
+from orbslam2py.slam.initialization import from_views
 from orbslam2py.slam.initialization.image_motion import ImageMotion
 from orbslam2py.synthetic import SyntheticOptions, SyntheticSequence
 
@@ -110,15 +119,15 @@ def test_a_turn_before_the_first_step_begins_no_wrong_map() -> None:
     assert played.error() < 0.02
 
 
-def test_after_a_long_stand_a_map_begins() -> None:
+def test_after_a_long_stand_a_map_begins(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its first view is older than all frames that are remembered."""
     sequence = SyntheticSequence(
         SyntheticOptions(world="corridor", sensor="mono", size=(320, 240), noise=1, frames=40)
     )
     standing = sequence.load(0).image
     n_remembered = 40
-    config = {"initialization.remembered_frames": n_remembered}
-    with System(sequence.settings, "mono", deterministic=True, config=config) as system:
+    monkeypatch.setattr(from_views, "_REMEMBERED_FRAMES", n_remembered)
+    with System(sequence.settings, "mono", deterministic=True) as system:
         for i in range(n_remembered + 5):
             record = system.track_monocular(standing, i / 20)
             assert record.state is TrackingState.NOT_INITIALIZED
@@ -253,3 +262,20 @@ def test_more_features_after_ten_images_or_a_second(fps: float, waits: int) -> N
             slam.track_monocular(image, 100.0 + i / fps)
             factors.append(slam.pipeline.feature_factor)
     assert factors == [2] * (waits - 1) + [4] * (12 - waits + 1)
+
+
+@pytest.mark.shared
+@pytest.mark.parametrize("seed", [0, 3])
+def test_a_real_camera_that_takes_off_ends_with_a_right_map(seed: int, shared_data: Path) -> None:
+    """A drone, seen with 2000 features."""
+    sequence = open_sequence(shared_data / "sequences" / "drone_semicircle", "mono")
+    truth = sequence.ground_truth()
+    assert truth is not None
+    settings = sequence.settings
+    settings = dataclasses.replace(settings, orb=dataclasses.replace(settings.orb, n_features=2000))
+    with System(settings, "mono", deterministic=True, seed=seed) as system:
+        for i in range(len(sequence)):
+            system.track_monocular(sequence.load(i).image, float(sequence.timestamps[i]))
+        path = system.trajectory()
+    figures = evaluate_trajectory(path.select(~path.lost), truth, Alignment.SIM3)
+    assert figures.as_dict()["ate_rmse_m"] < 0.04

@@ -8,10 +8,11 @@ from typing import Any
 
 import pytest
 
+from orbslam2py.slam import pending_loop
 from orbslam2py.slam.config import LoopConfig
 from orbslam2py.slam.pending_loop import PendingLoop
 
-FIRM, PATIENCE = LoopConfig().firm_matches, LoopConfig().patience
+FIRM, PATIENCE = LoopConfig().firm_matches, pending_loop._PATIENCE
 
 
 class World:

@@ -13,7 +13,6 @@ from orbslam2py import Reason, Sensor, TrackingState
 from support.tracking_scene import (
     MAX_FRAMES,
     OUTLIERS,
-    FakeCore,
     FakeFrame,
     FakeMap,
     Scene,
@@ -199,21 +198,6 @@ def test_limits_of_the_reference_keyframe(
 @pytest.mark.parametrize("frame_id", [3, MAX_FRAMES])
 def test_limits_of_the_local_map(scene: Scene, frame_id: int, inliers: int, ok: bool) -> None:
     expect_of_the_local_map(scene, frame_id, inliers, ok)
-
-
-@pytest.mark.parametrize(
-    ("frame_id", "inliers", "ok"),
-    [
-        (MAX_FRAMES - 1, 49, False),
-        (MAX_FRAMES - 1, 50, True),
-        (MAX_FRAMES, 29, False),
-        (MAX_FRAMES, 30, True),
-    ],
-)
-def test_the_young_map_of_a_single_camera_has_to_prove_itself(
-    core: FakeCore, frame_id: int, inliers: int, ok: bool
-) -> None:
-    expect_of_the_local_map(Scene(Sensor.MONOCULAR, core), frame_id, inliers, ok)
 
 
 def expect_of_the_local_map(scene: Scene, frame_id: int, inliers: int, ok: bool) -> None:

@@ -23,7 +23,6 @@ from orbslam2py.slam.state import (
 )
 from orbslam2py.slam.state.transitions import (
     ActivateMap,
-    Confirmed,
     KeyframeInserted,
     MapBegun,
     MapDropped,
@@ -56,12 +55,12 @@ def frame(number: int, x: float = 0.0, *, map_index: int = 0) -> Any:
     )
 
 
-def transitions(*, has_depth: bool = False) -> Transitions:
-    return Transitions(Config(), has_depth=has_depth, new_map_after=PATIENCE)
+def transitions() -> Transitions:
+    return Transitions(Config(), new_map_after=PATIENCE)
 
 
-def after(state: State, *events: Any, has_depth: bool = False) -> State:
-    table = transitions(has_depth=has_depth)
+def after(state: State, *events: Any) -> State:
+    table = transitions()
     for event in events:
         state, _ = table.next_state(state, event)
     return state
@@ -71,12 +70,12 @@ def actions(state: State, event: Any) -> tuple[Any, ...]:
     return transitions().next_state(state, event)[1]
 
 
-NEW = State.before_first_map(has_depth=False)
+NEW = State()
 BEGUN = after(NEW, NotInitialized(), MapBegun(frame(1)))
 FOLLOWED = after(BEGUN, Tracked(frame(2, 1.0), MANY, 0), Tracked(frame(3, 3.0), MANY, 0))
 LOST_STATE = after(FOLLOWED, NotFound(0.4))
 FOUND = after(LOST_STATE, Relocalized(frame(5, 5.0), MANY))
-CONFIRMED = after(FOUND, Confirmed(), Tracked(frame(6, 6.0), MANY, 0))
+CONFIRMED = after(FOUND, Tracked(frame(6, 6.0), MANY, 0))
 
 
 @pytest.mark.parametrize(
@@ -92,7 +91,6 @@ CONFIRMED = after(FOUND, Confirmed(), Tracked(frame(6, 6.0), MANY, 0))
         (LOST_STATE, SearchForMap(), LOST),
         (LOST_STATE, Relocalized(frame(5), MANY), OK),
         (LOST_STATE, MapBegun(frame(5)), OK),
-        (FOUND, Confirmed(), OK),
         (FOUND, NotFound(0.6), LOST),
         (CONFIRMED, NotFound(0.7), LOST),
         (BEGUN, MapDropped(), LOST),
@@ -184,14 +182,14 @@ def test_a_relocalized_candidate_does_not_survive_a_loss() -> None:
 def test_another_map_may_begin_after_the_patience(seconds: float, may: bool) -> None:
     assert transitions().may_begin_map(LOST_STATE, 0.4 + seconds) is may
     assert not transitions().may_begin_map(FOLLOWED, 1e6)
-    never = Transitions(Config(), has_depth=False, new_map_after=None)
+    never = Transitions(Config(), new_map_after=None)
     assert not never.may_begin_map(LOST_STATE, 1e6)
 
 
 def test_a_short_success_does_not_end_a_loss() -> None:
     short = after(CONFIRMED, NotFound(0.7))
     assert short.lost_time.lost_since == 0.4
-    long_enough = after(FOUND, Confirmed(), *(Tracked(frame(n), MANY, 0) for n in range(6, 30)))
+    long_enough = after(FOUND, *(Tracked(frame(n), MANY, 0) for n in range(6, 30)))
     assert long_enough.lost_time == LostTime()
 
 
@@ -203,6 +201,13 @@ def test_the_initializer_begins_anew_once_and_ends_when_the_camera_is_found() ->
     assert found.seeks_map, "not before it is confirmed"
     assert actions(found, Tracked(frame(6), MANY, 0)) == (RestartInitializer(),)
     assert not after(found, Tracked(frame(6), MANY, 0)).seeks_map
+
+
+def test_a_tracked_frame_ends_a_search_only_if_it_confirms() -> None:
+    """Beyond a fixed map frames have a pose by their depths, and are searched in the map."""
+    search = LostSearch(failures=3)
+    assert after(replace(FOLLOWED, lost=search), Tracked(frame(4), MANY, 0)).lost is search
+    assert after(replace(FOUND, lost=search), Tracked(frame(6), MANY, 0)).lost.failures == 0
 
 
 def test_a_camera_found_in_an_inactive_map_activates_it() -> None:
@@ -220,8 +225,7 @@ def test_a_map_beside_others_forgets_the_frames_before() -> None:
     assert not begun.seeks_map
     assert begun.n_uncertain == 0
     assert begun.kept_maps == {3}
-    assert begun.probation.strict_from == 30
-    assert after(used, MapBegun(frame(30)), has_depth=True).probation.strict_from is None
+    assert (begun.tracked_since, begun.found_again) == (30, False)
 
 
 def test_after_a_map_was_dropped_the_next_image_may_begin_one() -> None:
@@ -259,6 +263,6 @@ def test_few_inliers_are_noted() -> None:
 
 
 def test_motion_is_forgotten_in_another_map() -> None:
-    left = FOLLOWED.in_another_map(has_depth=False)
+    left = FOLLOWED.in_another_map()
     assert left.motion.last_frame is Motion().last_frame
     assert left.scene.error is FOLLOWED.scene.error

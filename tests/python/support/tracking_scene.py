@@ -21,7 +21,7 @@ from orbslam2py.slam.config import AcceptanceConfig, Config, KeyframeConfig, Tra
 from orbslam2py.slam.keyframe_decision import KeyframeDecision
 from orbslam2py.slam.pose_search import LocalMapSearch, PoseSearch, RefinedPose
 from orbslam2py.slam.records import TrackingResult
-from orbslam2py.slam.state import Probation, State
+from orbslam2py.slam.state import State
 from orbslam2py.slam.tracking import Tracking
 
 MAX_FRAMES = 30
@@ -302,16 +302,9 @@ class FakeInitializer:
     """Refuses a given number of frames."""
 
     feature_factor = 1
-    watches_map = False
 
     def __init__(self, refusals: int = 0) -> None:
         self.refusals = refusals
-
-    def contradicts(self, frame: FakeFrame) -> bool:
-        return False
-
-    def believe_map(self) -> None:
-        """No map is doubted."""
 
     def remember(self, frame: FakeFrame) -> None:
         """Frames of a young map are not needed again."""
@@ -374,7 +367,7 @@ class NearSearch(LocalMapSearch):
         #: Ids of frames, and whether they were in doubt.
         self.looked_afresh: list[tuple[int, bool]] = []
 
-    def rematch(self, refined: RefinedPose, probation: Probation, *, in_doubt: bool) -> RefinedPose:
+    def rematch(self, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
         self.looked_afresh.append((refined.frame.id, in_doubt))
         return refined
 
@@ -399,9 +392,9 @@ class Scene:
         vocabulary: Any = "vocabulary"
         limits = config or TrackingConfig()
         self.search = search = PoseSearch(
-            fakes.map, vocabulary, sensor, MAX_FRAMES, relocalizer=None, config=limits
+            fakes.map, vocabulary, sensor, relocalizer=None, config=limits
         )
-        self.local_map_search = NearSearch(fakes.map, sensor, MAX_FRAMES, limits)
+        self.local_map_search = NearSearch(fakes.map, sensor, limits)
         search.local_map_search = self.local_map_search
         judge = PoseValidator(search.motion_model_window, 500.0, evidence or CREDULOUS)
         again: Any = NoFurtherSearch() if evidence is None else MultiHypothesisSearch(search, judge)

@@ -15,7 +15,15 @@ from orbslam2py.slam.pose_search import PoseSearch, RefinedPose
 from orbslam2py.slam.records import Evidence, PoseEstimate, PoseMethod, Reason, Verdict
 from orbslam2py.slam.state import State
 
-Way = Callable[[core.TrackedFrame, State], PoseEstimate]
+_BETTER = 1.1  # factor on the inliers with which another hypothesis wins
+_ENOUGH = 0.75  # share of the mean inliers with which no further hypothesis is searched
+_KEYFRAMES_AROUND = 3  # neighbours of the reference keyframe: each costs a matching by words
+_ALIGNED_WINDOW = 15.0  # half width of the search window after a rotation of the image, pixels
+#: Only without any strong hypothesis: these take longest.
+_LAST = (PoseMethod.ALL_KEYPOINTS, PoseMethod.RELOCALIZATION)
+_WIDE_WINDOW = 40.0  # the same around a prediction in doubt, pixels at level 0
+
+Way = Callable[[core.TrackedFrame, State], tuple[PoseEstimate, State]]
 
 
 @dataclass(frozen=True)
@@ -71,18 +79,12 @@ class MultiHypothesisSearch:
         """
         found = [] if first is None else [first]
         for method, way in self._ways(state):
+            if method in _LAST and any(h.evidence.verdict is Verdict.STRONG for h in found):
+                break
             version = core.TrackedFrame(frame.features)
-            if self._add(found, version, way(version, state), method, state):
-                return self._best(found), state
-        if not _any_strong(found):
-            version = core.TrackedFrame(frame.features)
-            estimate = self._search.by_all_keypoints(version, state)
-            if self._add(found, version, estimate, PoseMethod.ALL_KEYPOINTS, state):
-                return self._best(found), state
-        if not _any_strong(found):
-            version = core.TrackedFrame(frame.features)
-            estimate, state = self._search.by_relocalization(version, state)
-            self._add(found, version, estimate, PoseMethod.RELOCALIZATION, state)
+            estimate, state = way(version, state)
+            if self._add(found, version, estimate, method, state):
+                break
         return self._best(found) if found else None, state
 
     def _add(
@@ -96,7 +98,7 @@ class MultiHypothesisSearch:
         """Add the hypothesis of an estimate, if it holds; whether the search may end with it."""
         if not estimate.found:
             return False
-        refined = self._search.in_local_map(version, estimate, state)
+        refined = self._search.local_map_search.refine(version, estimate, state)
         if not refined.estimate.found:
             return False
         hypothesis = Hypothesis(refined, method, self._judge.assess(refined, state, method))
@@ -105,15 +107,17 @@ class MultiHypothesisSearch:
         return enough
 
     def _ways(self, state: State) -> Iterator[tuple[PoseMethod, Way]]:
-        """The methods near the last frame, in the order of their cost."""
-        limits, search = self._judge.limits, self._search
-        yield PoseMethod.ALIGNED_IMAGES, self._by_aligned_images
+        """The methods in the order of their cost."""
+        search = self._search
+        yield PoseMethod.ALIGNED_IMAGES, lambda v, s: (self._by_aligned_images(v, s), s)
         yield (
             PoseMethod.KEYFRAMES_AROUND,
-            lambda v, s: search.by_keyframes_around(v, s, limits.keyframes_around),
+            lambda v, s: (search.by_keyframes(v, s, _KEYFRAMES_AROUND), s),
         )
         if state.motion.velocity is not None:
-            yield PoseMethod.WIDE_WINDOW, self._by_wide_window
+            yield PoseMethod.WIDE_WINDOW, lambda v, s: (self._by_wide_window(v, s), s)
+        yield PoseMethod.ALL_KEYPOINTS, lambda v, s: (search.by_all_keypoints(v, s), s)
+        yield PoseMethod.RELOCALIZATION, search.by_relocalization
 
     def _by_aligned_images(self, frame: core.TrackedFrame, state: State) -> PoseEstimate:
         limits, motion = self._judge.limits, state.motion
@@ -121,16 +125,15 @@ class MultiHypothesisSearch:
         if aligned is None or aligned.correlation < limits.aligned_correlation:
             return PoseEstimate(Reason.FEW_MATCHES_LAST_FRAME)
         motion.predict_turned(frame, aligned.quaternion_xyzw)
-        return self._search.around_prediction(frame, motion, limits.aligned_window)
+        return self._search.around_prediction(frame, motion, _ALIGNED_WINDOW)
 
     def _by_wide_window(self, frame: core.TrackedFrame, state: State) -> PoseEstimate:
         state.motion.predict(frame)
-        window = self._judge.limits.wide_window
-        return self._search.around_prediction(frame, state.motion, window)
+        return self._search.around_prediction(frame, state.motion, _WIDE_WINDOW)
 
     def _has_enough(self, hypothesis: Hypothesis, others: list[Hypothesis]) -> bool:
         """Whether it is no use to look further."""
-        if hypothesis.evidence.inliers_to_usual >= self._judge.limits.enough_share:
+        if hypothesis.evidence.inliers_to_usual >= _ENOUGH:
             return True
         return any(self._confirms(hypothesis, other) for other in others)
 
@@ -143,12 +146,8 @@ class MultiHypothesisSearch:
         best = found[0]
         for hypothesis in found[1:]:
             # What was found first stays unless another one is clearly better.
-            if hypothesis.n_inliers > self._judge.limits.better * best.n_inliers:
+            if hypothesis.n_inliers > _BETTER * best.n_inliers:
                 best = hypothesis
         if any(self._confirms(best, other) for other in found if other is not best):
             best = replace(best, evidence=self._judge.confirm(best.evidence))
         return best
-
-
-def _any_strong(found: list[Hypothesis]) -> bool:
-    return any(hypothesis.evidence.verdict is Verdict.STRONG for hypothesis in found)

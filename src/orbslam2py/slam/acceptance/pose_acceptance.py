@@ -15,6 +15,8 @@ from orbslam2py.slam.pose_search import PoseSearch, RefinedPose
 from orbslam2py.slam.records import Evidence, PoseEstimate, Reason, Verdict
 from orbslam2py.slam.state import State
 
+_WEAK_FRAMES = 2  # uncertain ones in a row, after which a confirmed one may become a keyframe
+
 
 class PoseAcceptance:
     """Refines poses in the local map, weighs them, and has them searched again when in doubt.
@@ -61,7 +63,7 @@ class PoseAcceptance:
             state = state.elsewhere()
         estimate, hypothesis = first, None
         if first.found:
-            refined = self._refined(frame, first, state)
+            refined = self._search.local_map_search.refine(frame, first, state)
             hypothesis = self._hypothesis(refined, first, state)
             estimate = refined.estimate
         doubted = first.left_map or self._is_doubted(hypothesis)
@@ -88,9 +90,7 @@ class PoseAcceptance:
     def _rematched(self, hypothesis: Hypothesis, state: State, *, in_doubt: bool) -> Hypothesis:
         """In a fixed map an image has one pose, whatever frame came before it."""
         refined, evidence = hypothesis.refined, hypothesis.evidence
-        rematched = self._search.local_map_search.rematch(
-            refined, state.probation, in_doubt=in_doubt
-        )
+        rematched = self._search.local_map_search.rematch(refined, in_doubt=in_doubt)
         if rematched is refined:
             return hypothesis
         if in_doubt:
@@ -107,11 +107,6 @@ class PoseAcceptance:
     def _is_doubted(self, hypothesis: Hypothesis | None) -> bool:
         return hypothesis is None or self._judge.needs_reestimation(hypothesis.evidence)
 
-    def _refined(self, frame: core.TrackedFrame, first: PoseEstimate, state: State) -> RefinedPose:
-        if first.visual_odometry:
-            return self._search.beyond_the_map(frame, first, state.motion)
-        return self._search.in_local_map(frame, first, state)
-
     def _take(
         self, frame: core.TrackedFrame, hypothesis: Hypothesis, state: State, *, fixed_map: bool
     ) -> tuple[PoseEstimate, State]:
@@ -121,8 +116,7 @@ class PoseAcceptance:
             refined = replace(refined, frame=frame)
             if refined.estimate.relocalized:
                 # Found independently of the last frame: the motion from there is no velocity.
-                expected = refined.estimate.where_expected
-                state = state.relocalized(frame.id, where_expected=expected)
+                state = state.relocalized(frame.id)
                 state = replace(state, motion=state.motion.jumped(None))
         state = self._search.settle(refined, state, fixed_map=fixed_map)
         innovation = state.motion.innovation(frame)
@@ -134,10 +128,9 @@ class PoseAcceptance:
         )
         if evidence.verdict is Verdict.REFUSED:
             return estimate.failed(Reason.WEAK_EVIDENCE), state
-        limits = self._judge.limits
-        scene = state.scene.with_error(evidence.match_error, limits)
+        scene = state.scene.with_error(evidence.match_error, self._judge.limits)
         if evidence.verdict is Verdict.STRONG or self._may_count(evidence, state):
-            scene = scene.with_pose(statistics_of(refined), limits)
+            scene = scene.with_pose(statistics_of(refined))
         return estimate, replace(state, scene=scene)
 
     def allows_keyframe(self, evidence: Evidence | None, state: State) -> tuple[bool, State]:
@@ -149,4 +142,4 @@ class PoseAcceptance:
 
     def _may_count(self, evidence: Evidence, state: State) -> bool:
         """Whether a weak frame counts as usual: not the first in a row, and confirmed."""
-        return evidence.confirmed and state.n_uncertain >= self._judge.limits.weak_frames
+        return evidence.confirmed and state.n_uncertain >= _WEAK_FRAMES

@@ -16,6 +16,9 @@ from orbslam2py.slam.pose_search import RefinedPose
 from orbslam2py.slam.records import Evidence, PoseMethod, Verdict
 from orbslam2py.slam.state import Motion, PoseStatistics, State
 
+_SAME_WINDOWS = 0.5  # search windows in the image that two versions of one pose may differ by
+_SAME_DEVIATIONS = 3.0  # standard deviations of the position that they may differ by
+
 
 class PoseValidator:
     """Knows what is usual, and says how far a pose is from it.
@@ -104,10 +107,7 @@ class PoseValidator:
             return False
         turn, move = difference(T_first, T_second)
         deviations = first.position_deviation + second.position_deviation
-        return (
-            self._windows(turn) < self.limits.same_windows
-            and move <= self.limits.same_deviations * deviations
-        )
+        return self._windows(turn) < _SAME_WINDOWS and move <= _SAME_DEVIATIONS * deviations
 
     def confirm(self, evidence: Evidence) -> Evidence:
         """A second method came to the same pose: it is believed, though weak evidence stays so."""
@@ -154,11 +154,7 @@ class PoseValidator:
 
     def _windows(self, degrees: float) -> float:
         """How far a turn moves the image, in search windows of the motion model."""
-        return self._pixels(degrees) / self._window
-
-    def _pixels(self, degrees: float) -> float:
-        """How far a turn moves the image, in pixels."""
-        return self._focal_length * math.radians(degrees)
+        return self._focal_length * math.radians(degrees) / self._window
 
 
 def statistics_of(refined: RefinedPose) -> PoseStatistics:

@@ -25,13 +25,13 @@ class EarlierFrames:
 
     Parameters
     ----------
-    search : PoseSearch, optional
-        The ways to a pose; its own, not the tracker's. Without one no frame is tracked.
-    acceptance : PoseAcceptance, optional
-        Whether enough speaks for a pose; of the same search, and there whenever that is.
+    search : PoseSearch
+        The ways to a pose; its own, not the tracker's.
+    acceptance : PoseAcceptance
+        Whether enough speaks for a pose; of the same search.
     """
 
-    def __init__(self, search: PoseSearch | None, acceptance: PoseAcceptance | None) -> None:
+    def __init__(self, search: PoseSearch, acceptance: PoseAcceptance) -> None:
         self._search = search
         self._acceptance = acceptance
         self._tracked: tuple[core.TrackedFrame, ...] = ()
@@ -58,8 +58,6 @@ class EarlierFrames:
         list of TrackedFrame
             Those found between the first view and the last frame, in the order of time.
         """
-        if self._search is None:
-            return []
         at = next(i for i, frame in enumerate(history) if frame.id == first.id)
         before = self._follow(first, reversed(history[:at]))
         between = self._follow(first, history[at + 1 : -1])
@@ -70,10 +68,7 @@ class EarlierFrames:
         self, first: core.TrackedFrame, frames: Iterable[core.TrackedFrame]
     ) -> list[core.TrackedFrame]:
         """Track one frame after the other until several are not found."""
-        search, acceptance = self._search, self._acceptance
-        assert search is not None and acceptance is not None
-        state = replace(
-            search.new_state(),
+        state = State(
             phase=TrackingState.OK,
             motion=Motion().remembering(first, None),
             reference_keyframe=first.reference_keyframe,
@@ -81,7 +76,7 @@ class EarlierFrames:
         tracked: list[core.TrackedFrame] = []
         missed = 0
         for frame in frames:
-            is_found, state = self._find(search, acceptance, frame, state)
+            is_found, state = self._find(frame, state)
             if is_found:
                 tracked.append(frame)
                 missed = 0
@@ -94,19 +89,14 @@ class EarlierFrames:
             frame.T_cw = None
         return tracked
 
-    def _find(
-        self,
-        search: PoseSearch,
-        acceptance: PoseAcceptance,
-        frame: core.TrackedFrame,
-        state: State,
-    ) -> tuple[bool, State]:
+    def _find(self, frame: core.TrackedFrame, state: State) -> tuple[bool, State]:
+        search = self._search
         state = state.following(search.map)
         estimate = search.by_motion_model(frame, state)
         if not estimate.found:
             frame.clear_associations()
-            estimate = search.by_reference_keyframe(frame, state)
-        estimate, state = acceptance.refine(frame, estimate, state)
+            estimate = search.by_keyframes(frame, state)
+        estimate, state = self._acceptance.refine(frame, estimate, state)
         if not (estimate.found and _is_strong(estimate) and _is_exact(estimate)):
             return False, state
         frame.discard_outliers()

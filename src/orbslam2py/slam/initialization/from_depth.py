@@ -12,15 +12,16 @@ import sys
 import numpy as np
 
 from orbslam2py import _core as core
-from orbslam2py._arrays import FloatArray
 from orbslam2py.slam.config import InitializationConfig
+from orbslam2py.slam.initialization.initializer import Initializer
 from orbslam2py.slam.local_mapping import LocalMapping
 from orbslam2py.slam.records import Reason
 
+_MOST = 0.5  # share of the settings' features that is asked for at most
 _log = logging.getLogger(__name__)
 
 
-class DepthInitializer:
+class DepthInitializer(Initializer):
     """Begins a map from one frame of a sensor that sees depth (ORB-SLAM2, section III-B).
 
     The camera's frame becomes the world's frame.
@@ -51,52 +52,7 @@ class DepthInitializer:
         self._vocabulary = vocabulary
         self._mapping = mapping
         self._limits = limits = config
-        self._least = min(
-            limits.keypoints_with_depth_sensor, int(limits.share_with_depth_sensor * n_features)
-        )
-
-    def reset(self) -> None:
-        """Nothing is kept from frame to frame."""
-
-    @property
-    def feature_factor(self) -> int:
-        """1: depths do not grow with the number of features."""
-        return 1
-
-    def take_earlier(self) -> tuple[core.TrackedFrame, ...]:
-        """None: the first frame that can begin the map does."""
-        return ()
-
-    def n_between(self, map_index: int) -> int:
-        """None: one frame is enough."""
-        del map_index
-        return 0
-
-    def remember(self, frame: core.TrackedFrame) -> None:
-        """Nothing: the next frame can begin a map as well."""
-
-    def remembered(self) -> list[core.Frame]:
-        """Nothing."""
-        return []
-
-    @property
-    def watches_map(self) -> bool:
-        """False: depths tell where everything is."""
-        return False
-
-    def believe_map(self) -> None:
-        """It is believed from the beginning."""
-
-    def contradicts(self, frame: core.TrackedFrame) -> bool:
-        """False: depths tell where everything is."""
-        return False
-
-    def restart(self, frames: list[core.Frame]) -> None:
-        """Nothing is kept."""
-
-    def lines(self) -> FloatArray | None:
-        """None: one frame is enough."""
-        return None
+        self._least = min(limits.keypoints_with_depth_sensor, int(_MOST * n_features))
 
     def shows_enough(self, frame: core.TrackedFrame) -> bool:
         """Whether a frame has the keypoints that a map needs to begin."""

@@ -15,8 +15,8 @@ from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py.slam.config import InitializationConfig
 from orbslam2py.slam.initialization.earlier_frames import EarlierFrames
-from orbslam2py.slam.initialization.initial_map_validation import InitialMapValidation
 from orbslam2py.slam.initialization.initial_views import InitialViews, View
+from orbslam2py.slam.initialization.initializer import Initializer
 from orbslam2py.slam.initialization.multi_view_model_selection import MultiViewModelSelection
 from orbslam2py.slam.initialization.third_view import (
     Candidate,
@@ -32,6 +32,11 @@ from orbslam2py.slam.watched_frame import pixels_as_given
 
 _log = logging.getLogger(__name__)
 
+_TRIED_VIEWS = 3  # that are reconstructed with each frame: some milliseconds each
+_PATIENCE, _PATIENCE_SECONDS = 10, 1.0  # frames, or time [s], until there are still more features
+_REMEMBERED_FRAMES = 200  # that are tracked in a new map after it began: ten seconds at 20 a second
+_FOLLOWED_AGAIN = 20  # of them, that begin the next map after one was dropped
+
 #: What the two views' reconstruction says, in the words of a record.
 _REASONS = {
     "too_few_matches": Reason.FEW_MATCHES_FIRST_VIEW,
@@ -44,7 +49,7 @@ _REASONS = {
 }
 
 
-class MonocularInitializer:
+class MonocularInitializer(Initializer):
     """Keeps views of the last moments and begins a map from the one that fits best to the last.
 
     The frame of that view becomes the world's frame; its median depth becomes 1. A third view
@@ -60,8 +65,8 @@ class MonocularInitializer:
         Takes the first keyframes.
     seed : int
         Seed of the draws.
-    earlier : EarlierFrames, optional
-        Tracks the earlier frames in the map; without it they are left out.
+    earlier : EarlierFrames
+        Tracks the earlier frames in the map.
     config : InitializationConfig
         Limits.
     """
@@ -72,7 +77,7 @@ class MonocularInitializer:
         vocabulary: core.Vocabulary,
         mapping: LocalMapping,
         seed: int,
-        earlier: EarlierFrames | None = None,
+        earlier: EarlierFrames,
         *,
         config: InitializationConfig,
     ) -> None:
@@ -82,22 +87,16 @@ class MonocularInitializer:
         self._seed = seed
         self._limits = config
         self._kept = InitialViews(self._limits)
-        self._watch = InitialMapValidation(self._limits, seed)
-        self._earlier = earlier or EarlierFrames(None, None)
+        self._earlier = earlier
         # The last map's number, and the keyframes between the two that it began from.
         self._begun_map = -1
         self._between: list[int] = []
         self.reset()
 
     def reset(self) -> None:
-        """Drop all views, and what became of earlier maps."""
-        self._watch.reset()
-        self._drop_views()
-
-    def _drop_views(self) -> None:
-        self._watch.end()
+        """Drop all views."""
         self._kept.clear()
-        self._history: deque[core.TrackedFrame] = deque(maxlen=self._limits.remembered_frames)
+        self._history: deque[core.TrackedFrame] = deque(maxlen=_REMEMBERED_FRAMES)
         self._n_waiting = 0
         self._waited = self._waits_since = 0.0  # seconds
         self._last: core.TrackedFrame | None = None
@@ -113,10 +112,10 @@ class MonocularInitializer:
 
     def restart(self, frames: list[core.Frame]) -> None:
         """Begin anew, with the views of the last moments of an earlier attempt."""
-        self._drop_views()
+        self.reset()
         # Their poses were those in the map that is gone.
         self._history.extend(core.TrackedFrame(frame) for frame in frames)
-        for frame in frames[-self._limits.followed_again :]:
+        for frame in frames[-_FOLLOWED_AGAIN:]:
             if frame.size <= self._limits.keypoints:
                 continue
             self._kept.follow(frame)
@@ -129,23 +128,10 @@ class MonocularInitializer:
         return sum(self._map.living(keyframe) == keyframe for keyframe in self._between)
 
     @property
-    def watches_map(self) -> bool:
-        """Whether the map is so young that the next frame may contradict it."""
-        return self._watch.watching
-
-    def believe_map(self) -> None:
-        """No later frame contradicts the map."""
-        self._watch.end()
-
-    def contradicts(self, frame: core.TrackedFrame) -> bool:
-        """Whether this frame and those before it, tracked in a young map, prove it wrong."""
-        return self._watch.contradicted(frame)
-
-    @property
     def feature_factor(self) -> int:
         """Twice the features of the settings, and more when it takes long to begin."""
         limits = self._limits
-        waited = self._n_waiting >= limits.patience or self._waited >= limits.patience_seconds
+        waited = self._n_waiting >= _PATIENCE or self._waited >= _PATIENCE_SECONDS
         return limits.raised_feature_factor if waited else limits.feature_factor
 
     def lines(self) -> FloatArray | None:
@@ -220,7 +206,7 @@ class MonocularInitializer:
         limits = self._limits
         moved = [view for view in self._kept.views if view.displacement >= limits.displacement]
         moved.sort(key=lambda view: -view.displacement)
-        places = np.linspace(0, len(moved) - 1, min(limits.tried_views, len(moved)))
+        places = np.linspace(0, len(moved) - 1, min(_TRIED_VIEWS, len(moved)))
         return [moved[place] for place in np.rint(places).astype(int)]
 
     # ---- the map ---------------------------------------------------------------------------------
@@ -245,7 +231,6 @@ class MonocularInitializer:
         self._mapping.insert_keyframe(begun.second)
         between = self._earlier.track(history, first)
         self._insert_views([frame for frame in between if self._adds(frame, n_points)])
-        self._watch.begin(second)
         self._kept.clear()
         self._n_waiting, self._waited = 0, 0.0
         self._last = self._shown = None

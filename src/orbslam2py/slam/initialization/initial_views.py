@@ -12,6 +12,10 @@ from orbslam2py.slam.initialization.image_motion import ImageMotion, Pixels
 
 Indices = npt.NDArray[np.int32]
 
+_VIEWS = 6  # that a map may begin from: each is matched with every frame
+_DISTANT_VIEWS = 3  # that have too few matches left to begin a map, but may confirm a motion
+_WIDE, _NARROW = 2.0, 0.25  # search windows after a failure and around a prediction, of the usual
+
 
 class View:
     """A frame that was kept, and where its keypoints have moved to.
@@ -145,7 +149,7 @@ class InitialViews:
             motion = self._follow_image(last, frame, seen)
             narrow = limits.window
             if motion.spread is not None:
-                narrow = min(limits.window, max(limits.narrow_window, 4 * motion.spread))
+                narrow = min(limits.window, max(_NARROW * limits.window, 4 * motion.spread))
             for view in (*self.distant, *self.views):
                 view.follow(frame, seen, motion, narrow)
             self._let_go()
@@ -157,8 +161,8 @@ class InitialViews:
         lost = [view for view in self.views if view.n_matches < limits.matches]
         self.views = [view for view in self.views if view.n_matches >= limits.matches]
         distant = [*self.distant, *lost]
-        distant = [view for view in distant if view.n_matches >= limits.distant_matches]
-        self.distant = distant[-limits.distant_views :]
+        distant = [view for view in distant if view.n_matches >= limits.third_view_points]
+        self.distant = distant[-_DISTANT_VIEWS:]
 
     def _follow_image(self, last: View, frame: core.Frame, seen: Pixels) -> ImageMotion:
         """The motion from the last frame, searched in wide windows around where it would lead."""
@@ -170,9 +174,9 @@ class InitialViews:
         # As before, it is enough to look near to where that leads; else ever wider.
         enough, windows = self._n_usual // 2, [(self._motion, limits.window)]
         if self._motion.spread is not None:
-            windows.insert(0, (self._motion, limits.narrow_window + 4 * self._motion.spread))
+            windows.insert(0, (self._motion, _NARROW * limits.window + 4 * self._motion.spread))
         still = ImageMotion(*self._motion.frame)
-        for motion, window in (*windows, (still, limits.wide_window)):
+        for motion, window in (*windows, (still, _WIDE * limits.window)):
             last.positions = last.keypoints
             last.follow(frame, seen, motion, window)
             if last.n_matches >= max(limits.matches, enough):
@@ -186,13 +190,13 @@ class InitialViews:
     def keep_last(self) -> None:
         """Keep the last frame as a view, if it shows enough that is new."""
         last, views = self._last, self.views
-        if last is None or (views and views[-1].displacement < self._limits.new_view):
+        if last is None or (views and views[-1].displacement < self._limits.displacement):
             return
         kept = View(last.frame)
         for view in (*views, *self.distant):
             view.link(kept)
         views.append(kept)
-        if len(views) > self._limits.views:
+        if len(views) > _VIEWS:
             # The one that differs least from its neighbours; the first and the last stay.
             moved = np.array([view.displacement for view in views])
             gaps = np.abs(moved[:-2] - moved[2:])

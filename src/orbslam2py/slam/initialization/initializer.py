@@ -3,32 +3,37 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from abc import ABC, abstractmethod
 
 from orbslam2py import _core as core
 from orbslam2py._arrays import FloatArray
 from orbslam2py.slam.records import Reason
 
 
-class Initializer(Protocol):
+class Initializer(ABC):
     """Begins a map from the frames that come.
 
-    Attributes
-    ----------
-    feature_factor
-        How many features the next frame needs, in multiples of the settings' number.
-    watches_map
-        Whether the map that has begun is so young that later frames may contradict it.
+    One that begins a map with one frame keeps nothing from frame to frame: so are the defaults.
     """
 
-    @property
-    def feature_factor(self) -> int: ...  # noqa: D102
-    @property
-    def watches_map(self) -> bool: ...  # noqa: D102
+    @abstractmethod
+    def shows_enough(self, frame: core.TrackedFrame) -> bool:
+        """Whether a frame has the keypoints that a map needs to begin."""
 
-    def reset(self) -> None:
-        """Forget the frames before."""
-        ...
+    @abstractmethod
+    def try_initialize(self, frame: core.TrackedFrame) -> Reason:
+        """Begin the map with this frame; or say why not (`Reason.NONE`: it has begun).
+
+        Parameters
+        ----------
+        frame : orbslam2py._core.TrackedFrame
+            The frame.
+        """
+
+    @property
+    def feature_factor(self) -> int:
+        """How many features the next frame needs, in multiples of the settings' number."""
+        return 1
 
     def lines(self) -> FloatArray | None:
         """What the last frame was matched with, for those who watch.
@@ -39,46 +44,25 @@ class Initializer(Protocol):
             Pixels of the images as given: x and y in the first view, then in the last frame. None
             where a map does not begin from two views.
         """
-        ...
-
-    def shows_enough(self, frame: core.TrackedFrame) -> bool:
-        """Whether a frame has the keypoints that a map needs to begin."""
-        ...
-
-    def try_initialize(self, frame: core.TrackedFrame) -> Reason:
-        """Begin the map with this frame; or say why not (`Reason.NONE`: it has begun).
-
-        Parameters
-        ----------
-        frame : orbslam2py._core.TrackedFrame
-            The frame.
-        """
-        ...
+        return None
 
     def take_earlier(self) -> tuple[core.TrackedFrame, ...]:
         """Frames before the one that began the map, with their poses in it, in order; once."""
-        ...
+        return ()
 
     def n_between(self, map_index: int) -> int:
         """Living keyframes that a map began with, beyond those that it needs."""
-        ...
-
-    def remember(self, frame: core.TrackedFrame) -> None:
-        """A frame that was tracked in a young map, which may yet come to nothing."""
-        ...
-
-    def contradicts(self, frame: core.TrackedFrame) -> bool:
-        """Whether this frame and those before it, tracked in a young map, prove it wrong."""
-        ...
-
-    def believe_map(self) -> None:
-        """No later frame contradicts the map that has begun."""
-        ...
+        return 0
 
     def remembered(self) -> list[core.Frame]:
         """What a new map may begin from, if the young one came to nothing."""
-        ...
+        return []
 
-    def restart(self, frames: list[core.Frame]) -> None:
+    def remember(self, frame: core.TrackedFrame) -> None:  # noqa: B027
+        """Keep a frame that was tracked in a young map, which may yet come to nothing."""
+
+    def reset(self) -> None:  # noqa: B027
+        """Forget the frames before."""
+
+    def restart(self, frames: list[core.Frame]) -> None:  # noqa: B027
         """Begin anew, with frames remembered from before."""
-        ...

@@ -31,6 +31,7 @@ from orbslam2py.slam.initialization.third_view import (
     squared_errors,
 )
 
+_FURTHER_DRAWS = 5  # RANSAC runs whose motions are compared in all views together
 _ROUNDS = 2  # of adjustment, each followed by placing all matches anew
 _COLLAPSED = 1e-9  # of the way before the adjustment
 
@@ -124,7 +125,7 @@ class MultiViewModelSelection:
         limits = self._limits
         is_ambiguous = len(motions) > 1
         judged: list[tuple[_Placed, float]] = []
-        draws = range(limits.further_draws + 1)
+        draws = range(_FURTHER_DRAWS + 1)
         if is_ambiguous:
             judged = side_by_side(self._refined, motions)
             if self._told_apart(judged, is_ambiguous=True) is None:

@@ -22,6 +22,7 @@ Motion: TypeAlias = core.TwoViewResult | core.TwoViewMotion
 
 #: Limit of squared errors over their variance: 95 %, two degrees of freedom.
 INLIER_CHI2 = 5.991
+_FEWER = 2 / 3  # of the points that a third view must see, where no view sees as many
 _MOST_PARALLAX = 5.0  # degrees that count: more does not make a better start
 
 
@@ -132,7 +133,7 @@ class ThirdViews:
         others = [third for third in (*kept.distant, *kept.views) if third is not view]
         every = (ThirdView(third, view.all_partners(third)) for third in others)
         afar = tuple(third for third in every if _lies_between(third, view, limits))
-        return ThirdViews(afar, limits.fewer_third_view_points)
+        return ThirdViews(afar, round(_FEWER * limits.third_view_points))
 
     def asks(self, candidate: Candidate, third: ThirdView) -> bool:
         """Whether a view sees enough of what each of the motions has placed."""

@@ -19,9 +19,13 @@ from orbslam2py._arrays import FloatArray
 from orbslam2py._timing import StageTimer
 from orbslam2py.slam.config import MergingConfig
 from orbslam2py.slam.events import MapsMerged
-from orbslam2py.slam.merging.visibility_ratio import explained_share
 
 _log = logging.getLogger(__name__)
+
+_NEIGHBOURS = 6  # of a keyframe, that may confirm a place in another map
+_FAR_NEIGHBOURS = 3  # of the place, that they are compared with
+_REMEMBERED = 10  # keyframes whose places in another map are kept until confirmed
+_PLACES = 5  # in the other map, that are compared with the first
 
 #: Verifies by geometry that two keyframes show the same place.
 Verify = Callable[[int, int], core.Loop | None]
@@ -120,7 +124,7 @@ class MapMerging:
         # What the far end looks like in its own map.
         there = self._map.map_of(best.matched)
         alike = [k for k in self._find_alike(best.matched) if self._map.map_of(k) == there]
-        found = (self._verify(best.matched, k) for k in alike[: self._limits.places])
+        found = (self._verify(best.matched, k) for k in alike[:_PLACES])
         return all(loop is None or self._is_drift(loop) for loop in found)
 
     def _is_drift(self, loop: core.Loop) -> bool:
@@ -129,7 +133,7 @@ class MapMerging:
 
     def _remember(self, best: core.Loop) -> None:
         self._shown[best.current] = (best.matched, best.S_cm)
-        while len(self._shown) > self._limits.remembered:
+        while len(self._shown) > _REMEMBERED:
             del self._shown[next(iter(self._shown))]
 
     def _is_confirmed(self, best: core.Loop) -> bool:
@@ -140,10 +144,10 @@ class MapMerging:
         if scene_depth is None:
             return False
         T_cw = slam_map.keyframe_pose(best.current)
-        around = slam_map.best_neighbours(best.matched, limits.far_neighbours).tolist()
+        around = slam_map.best_neighbours(best.matched, _FAR_NEIGHBOURS).tolist()
         candidates = [best.matched, *around]
         n_agreeing = 0
-        for keyframe in slam_map.best_neighbours(best.current, limits.neighbours).tolist():
+        for keyframe in slam_map.best_neighbours(best.current, _NEIGHBOURS).tolist():
             T_kc = slam_map.keyframe_pose(keyframe) @ T_cw.inverse()
             expected = T_kc.matrix @ best.S_cw
             found = self._place_of(keyframe, candidates, best.matched)
@@ -260,3 +264,42 @@ def _parts(S_cw: FloatArray) -> tuple[float, FloatArray, FloatArray]:
     scale = float(np.cbrt(np.linalg.det(S_cw[:3, :3])))
     rotation = S_cw[:3, :3] / scale
     return scale, rotation, -rotation.T @ S_cw[:3, 3] / scale
+
+
+def explained_share(slam_map: core.Map, loop: core.Loop, view_cosine: float) -> float:
+    """The share of points that a keyframe should see at a place in another map, and sees.
+
+    Parameters
+    ----------
+    slam_map : orbslam2py._core.Map
+        The maps.
+    loop : Loop
+        The place, with the points around it and how many of them the keyframe shows.
+    view_cosine : float
+        Points are counted that are seen from nearly where they were seen before: cosine of the
+        angle between both directions, at least.
+
+    Returns
+    -------
+    float
+        Matches over points that are in the image of the keyframe, within the distances at which
+        they can be recognised, and seen from the right side; 0 if there are none.
+    """
+    try:
+        features = slam_map.keyframe_frame(loop.current)
+    except KeyError:  # local mapping has just culled it
+        return 0.0
+    S_cw = np.asarray(loop.S_cw)
+    scale = np.cbrt(np.linalg.det(S_cw[:3, :3]))
+    # The keyframe's camera in the other map's world and scale.
+    T_cw = np.eye(4)
+    T_cw[:3] = S_cw[:3] / scale
+    camera = core.TrackedFrame(features)
+    camera.T_cw = core.Pose.from_matrix(T_cw)
+    points = core.gather_points(slam_map, np.unique(loop.loop_points))
+    _, cosines, _, visible = core.project_into(camera, points)
+    center = -T_cw[:3, :3].T @ T_cw[:3, 3]
+    distances = np.linalg.norm(points.positions - center, axis=1)
+    near_enough = (distances >= points.min_distances) & (distances <= points.max_distances)
+    n_visible = np.count_nonzero(visible & near_enough & (cosines >= view_cosine))
+    return loop.n_matches / n_visible if n_visible else 0.0

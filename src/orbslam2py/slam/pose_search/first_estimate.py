@@ -9,9 +9,6 @@ sections V-B and V-C; Mur-Artal and Tardos, "ORB-SLAM2", 2017, section III-F.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Protocol
-
-import numpy as np
 
 from orbslam2py import _core as core
 from orbslam2py.slam.pose_search.search import PoseSearch
@@ -19,128 +16,98 @@ from orbslam2py.slam.records import PoseEstimate, Reason
 from orbslam2py.slam.state import State
 
 
-class FirstEstimate(Protocol):
-    """A strategy for the first pose of a frame."""
-
-    def estimate(self, frame: core.TrackedFrame, state: State) -> tuple[PoseEstimate, State]:
-        """Find a first pose.
-
-        Parameters
-        ----------
-        frame : orbslam2py._core.TrackedFrame
-            The frame.
-        state : State
-            The state before it.
-
-        Returns
-        -------
-        PoseEstimate
-            Found or not.
-        State
-            The state as it follows the map, and as relocalization leaves it.
-        """
-        ...
-
-
-class FirstEstimateInGrowingMap:
+def estimate_in_growing_map(
+    search: PoseSearch, frame: core.TrackedFrame, state: State
+) -> tuple[PoseEstimate, State]:
     """By the motion model, else the reference keyframe; when lost, anywhere in the map.
 
     Parameters
     ----------
     search : PoseSearch
-        The ways to a pose.
+        The methods.
+    frame : orbslam2py._core.TrackedFrame
+        The frame.
+    state : State
+        The state before it.
+
+    Returns
+    -------
+    PoseEstimate
+        Found or not.
+    State
+        The state as it follows the map, and as relocalization leaves it.
     """
-
-    def __init__(self, search: PoseSearch) -> None:
-        self._search = search
-
-    def estimate(self, frame: core.TrackedFrame, state: State) -> tuple[PoseEstimate, State]:
-        """See `FirstEstimate`."""
-        search = self._search
-        relocalized = PoseEstimate()
-        if state.is_lost:
-            relocalized, state = search.by_relocalization(frame, state)
-            if relocalized.found or state.motion.last_frame is None:
-                return relocalized, state
-        state = state.following(search.map)
-        # There is none right after a relocalization, but where a map has just begun.
-        if state.motion.velocity is not None:
-            estimate = search.by_motion_model(frame, state)
-            if estimate.found:
-                return estimate, state
-        estimate = search.by_reference_keyframe(frame, state)
+    relocalized = PoseEstimate()
+    if state.is_lost:
+        relocalized, state = search.by_relocalization(frame, state)
+        if relocalized.found or state.motion.last_frame is None:
+            return relocalized, state
+    state = state.following(search.map)
+    # There is none right after a relocalization, but where a map has just begun.
+    if state.motion.velocity is not None:
+        estimate = search.by_motion_model(frame, state)
         if estimate.found:
             return estimate, state
-        if state.is_lost:
-            return estimate.failed(relocalized.reason), state
-        if state.probation.has_just_begun(frame.id, search.limits):
-            # Relocalized at the border of the map, the frame before shows most of this one.
-            standing = search.by_motion_model(frame, state)
-            if standing.found:
-                return standing, state
+    estimate = search.by_keyframes(frame, state)
+    if estimate.found:
         return estimate, state
+    if state.is_lost:
+        return estimate.failed(relocalized.reason), state
+    if state.has_just_begun(frame.id, search.limits):
+        # Relocalized at the border of the map, the frame before shows most of this one.
+        standing = search.by_motion_model(frame, state)
+        if standing.found:
+            return standing, state
+    return estimate, state
 
 
-class FirstEstimateInFixedMap:
+def estimate_in_fixed_map(
+    search: PoseSearch, frame: core.TrackedFrame, state: State
+) -> tuple[PoseEstimate, State]:
     """By the motion model or the reference keyframe, also where the map ends.
 
     There the pose depends on the depths of the last frame (visual odometry), while every frame is
-    also searched in the map.
-
-    Parameters
-    ----------
-    search : PoseSearch
-        The ways to a pose.
-    has_depth : bool
-        Whether frames measure depths.
+    also searched in the map. Parameters and results are those of `estimate_in_growing_map`.
     """
+    if state.is_lost:
+        return search.by_relocalization(frame, state)
+    state = state.following(search.map)
+    if state.beyond_map:
+        estimate, state = _back_into_the_map(search, frame, state)
+    elif state.motion.velocity is not None:
+        estimate = _by_motion_model(search, frame, state)
+    else:
+        estimate = search.by_keyframes(frame, state)
+    left_map = estimate.visual_odometry and not state.beyond_map
+    return replace(estimate, left_map=left_map), state
 
-    def __init__(self, search: PoseSearch, *, has_depth: bool) -> None:
-        self._search = search
-        self._has_depth = has_depth
 
-    def estimate(self, frame: core.TrackedFrame, state: State) -> tuple[PoseEstimate, State]:
-        """See `FirstEstimate`."""
-        search = self._search
-        if state.is_lost:
-            return search.by_relocalization(frame, state)
-        state = state.following(search.map)
-        if state.beyond_map:
-            estimate, state = self._back_into_the_map(frame, state)
-        elif state.motion.velocity is not None:
-            estimate = self._by_motion_model(frame, state)
-        else:
-            estimate = search.by_reference_keyframe(frame, state)
-        left_map = estimate.visual_odometry and not state.beyond_map
-        return replace(estimate, left_map=left_map), state
+def _by_motion_model(search: PoseSearch, frame: core.TrackedFrame, state: State) -> PoseEstimate:
+    limits = search.limits
+    estimate = search.by_motion_model(frame, state, beyond_the_map=search.has_depth)
+    if not estimate.found or estimate.n_inliers <= limits.localization_matches:
+        return estimate.failed(Reason.FEW_MATCHES_LAST_FRAME)
+    beyond = core.count_map_points(frame) < limits.map_matches
+    return replace(estimate, visual_odometry=beyond)
 
-    def _by_motion_model(self, frame: core.TrackedFrame, state: State) -> PoseEstimate:
-        limits = self._search.limits
-        estimate = self._search.by_motion_model(frame, state, beyond_the_map=self._has_depth)
-        if not estimate.found or estimate.n_inliers <= limits.localization_matches:
-            return estimate.failed(Reason.FEW_MATCHES_LAST_FRAME)
-        beyond = core.count_map_points(frame) < limits.map_matches
-        return replace(estimate, visual_odometry=beyond)
 
-    def _back_into_the_map(
-        self, frame: core.TrackedFrame, state: State
-    ) -> tuple[PoseEstimate, State]:
-        """Go on with visual odometry, unless the map is in view again."""
-        odometry = PoseEstimate(Reason.FEW_MATCHES_LAST_FRAME)
-        if state.motion.velocity is not None:
-            odometry = self._by_motion_model(frame, state)
-            if odometry.found and not odometry.visual_odometry:
-                return odometry, state
-        found = core.TrackedFrame(frame.features)
-        relocalized, state = self._search.by_relocalization(found, state)
-        if not relocalized.found or found.T_cw is None:
+def _back_into_the_map(
+    search: PoseSearch, frame: core.TrackedFrame, state: State
+) -> tuple[PoseEstimate, State]:
+    """Go on with visual odometry, unless the map is in view again."""
+    odometry = PoseEstimate(Reason.FEW_MATCHES_LAST_FRAME)
+    if state.motion.velocity is not None:
+        odometry = _by_motion_model(search, frame, state)
+        if odometry.found and not odometry.visual_odometry:
             return odometry, state
-        # The drift of visual odometry ends here. It is no motion: the last frame is corrected, too.
-        motion, T_lw = state.motion, None
-        followed = odometry.found and found.map_index == frame.map_index
-        if followed and frame.T_cw is not None and motion.last.T_cw is not None:
-            T_lw = motion.last.T_cw @ frame.T_cw.inverse() @ found.T_cw
-        frame.copy_associations(found, np.ones(len(frame.features), bool))
-        frame.T_cw = found.T_cw
-        frame.share_anchor(found)
-        return relocalized, replace(state, motion=motion.jumped(T_lw))
+    found = core.TrackedFrame(frame.features)
+    relocalized, state = search.by_relocalization(found, state)
+    if not relocalized.found or found.T_cw is None:
+        return odometry, state
+    # The drift of visual odometry ends here. It is no motion: the last frame is corrected, too.
+    motion, T_lw = state.motion, None
+    followed = odometry.found and found.map_index == frame.map_index
+    if followed and frame.T_cw is not None and motion.last.T_cw is not None:
+        T_lw = motion.last.T_cw @ frame.T_cw.inverse() @ found.T_cw
+    frame.take_over(found)
+    return relocalized, replace(state, motion=motion.jumped(T_lw))

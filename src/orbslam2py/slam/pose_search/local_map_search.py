@@ -6,16 +6,46 @@ Mur-Artal, Montiel and Tardos, 2015, section V-D; ``docs/method/tracking.md#loca
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from orbslam2py import _core as core
+from orbslam2py._arrays import IntArray
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.config import TrackingConfig
-from orbslam2py.slam.pose_search.refined_pose import RefinedPose
 from orbslam2py.slam.records import PoseEstimate, Reason
-from orbslam2py.slam.state import Probation
+from orbslam2py.slam.state import State
+
+_AFRESH_WINDOW = 3.0  # factor on the search radius, for a pose that may be off by more than usual
+_ELSEWHERE = 3.0  # standard deviations: 99 % of two poses of one camera are nearer
+
+
+@dataclass(frozen=True)
+class RefinedPose:
+    """A pose with all that was found of the map around it."""
+
+    frame: core.TrackedFrame
+    """Holds pose and associations."""
+    estimate: PoseEstimate
+    local_map: core.LocalMap | None
+    """Where it was searched; None where the pose is settled by visual odometry alone."""
+    visible: IntArray
+    """Ids of the points in view that the first estimate did not hold."""
+    n_predicted: int
+    """Points that should be in view."""
+
+    @cached_property
+    def position_deviation(self) -> float:
+        """Standard deviation of the position, all directions together [m]; 0 if not known."""
+        covariance = self.estimate.covariance
+        return 0.0 if covariance is None else core.position_deviation(covariance)
+
+    @cached_property
+    def spread(self) -> core.InlierSpread:
+        """How the inliers are spread over image and depth, and how far they are wrong together."""
+        return core.spread_of_inliers(self.frame)
 
 
 class LocalMapSearch:
@@ -29,8 +59,6 @@ class LocalMapSearch:
         The map.
     sensor : Sensor
         What the images come from.
-    second : int
-        Frames of one second, for the probation after a relocalization.
     config : TrackingConfig
         Limits.
     """
@@ -39,18 +67,14 @@ class LocalMapSearch:
         self,
         slam_map: core.Map,
         sensor: Sensor,
-        second: int,
         config: TrackingConfig,
     ) -> None:
         self._map = slam_map
-        self._second = second
         self._limits = config
         is_rgbd = sensor is Sensor.RGBD
         self._usual_window = config.local_map_window_rgbd if is_rgbd else config.local_map_window
 
-    def refine(
-        self, frame: core.TrackedFrame, first: PoseEstimate, probation: Probation
-    ) -> RefinedPose:
+    def refine(self, frame: core.TrackedFrame, first: PoseEstimate, state: State) -> RefinedPose:
         """Refine a first estimate with all points around it, and see how many are found.
 
         Parameters
@@ -59,33 +83,37 @@ class LocalMapSearch:
             With the pose and the associations of the first estimate.
         first : PoseEstimate
             The first estimate.
-        probation : Probation
-            How many inliers are required, and whether the search window is wide.
+        state : State
+            Whether the search window is wide.
 
         Returns
         -------
         RefinedPose
-            Whether it was found says its estimate; one in `visual_odometry` hangs on the depths of
-            the frame before, and `PoseSearch.in_local_map` takes it so.
+            Whether it was found says its estimate.
         """
+        if first.visual_odometry:
+            return _beyond_the_map(frame, first, state)
         local_map = core.select_local_map(self._map, frame)
         n_held = frame.n_associated()
         window = self._usual_window
-        if probation.has_just_begun(frame.id, self._limits):
+        just_begun = state.has_just_begun(frame.id, self._limits)
+        if just_begun:
             window = self._limits.local_map_window_after_relocalization
         matches = core.match_local_map(frame, local_map.points, first.discarded, window)
         optimized = core.optimize_pose(frame)
         visible = matches.visible
-        found_again = probation.was_just_found(frame.id, self._limits)
+        found_again = just_begun and state.found_again
         if found_again and optimized.n_inliers >= self._limits.map_matches:
             # Wide windows find much that is wrong; where the camera is now, narrow ones find more.
             frame.discard_outliers()
             core.match_local_map(frame, local_map.points, first.discarded, self._usual_window)
             optimized = core.optimize_pose(frame)
-        estimate = self._enough_found(frame, first, optimized, probation)
+        estimate = self._enough_found(frame, first, optimized)
+        if estimate.visual_odometry:
+            return _beyond_the_map(frame, estimate, state)
         return RefinedPose(frame, estimate, local_map, visible, n_held + len(visible))
 
-    def rematch(self, refined: RefinedPose, probation: Probation, *, in_doubt: bool) -> RefinedPose:
+    def rematch(self, refined: RefinedPose, *, in_doubt: bool) -> RefinedPose:
         """Match a frame with the map from nothing, so that its pose does not hang on the way to it.
 
         What is matched with the frame before stays matched from frame to frame, and holds a pose
@@ -96,8 +124,6 @@ class LocalMapSearch:
         ----------
         refined : RefinedPose
             Where the search begins. It is not changed.
-        probation : Probation
-            How many inliers are required.
         in_doubt : bool
             Whether few points held the pose, or wrong ones: then it is taken from wherever the
             search leads.
@@ -118,15 +144,15 @@ class LocalMapSearch:
         frame.T_cw = refined.frame.T_cw
         frame.share_anchor(refined.frame)
         nothing = np.zeros(0, np.int64)
-        for window in (limits.afresh_window, self._usual_window):
+        for window in (_AFRESH_WINDOW, self._usual_window):
             frame.clear_associations()
             visible = core.match_local_map(frame, local_map.points, nothing, window).visible
             optimized = core.optimize_pose(frame)
         share = limits.afresh_share_in_doubt if in_doubt else limits.afresh_share
-        elsewhere = in_doubt or _is_elsewhere(frame, refined, limits.elsewhere)
+        elsewhere = in_doubt or _is_elsewhere(frame, refined)
         if optimized.n_inliers < share * n_of_map or not elsewhere:
             return refined
-        estimate = self._enough_found(frame, refined.estimate, optimized, probation)
+        estimate = self._enough_found(frame, refined.estimate, optimized)
         if estimate.visual_odometry or not estimate.found:
             return refined
         return RefinedPose(frame, estimate, local_map, visible, len(visible))
@@ -136,7 +162,6 @@ class LocalMapSearch:
         frame: core.TrackedFrame,
         first: PoseEstimate,
         optimized: core.PoseEstimate,
-        probation: Probation,
     ) -> PoseEstimate:
         """What a pose is by what was found of the local map."""
         estimate = PoseEstimate(
@@ -145,10 +170,8 @@ class LocalMapSearch:
             covariance=optimized.covariance,
             discarded=first.discarded,
             relocalized=first.relocalized,
-            where_expected=first.where_expected,
         )
-        required = probation.required_inliers(frame.id, self._second, self._limits)
-        if estimate.n_inliers < required:
+        if estimate.n_inliers < self._limits.local_map_inliers:
             return estimate.failed(Reason.FEW_INLIERS_LOCAL_MAP)
         if frame.n_map_inliers() < self._limits.map_matches:
             # What the frame before measured speaks for itself, and says nothing of the map.
@@ -156,9 +179,16 @@ class LocalMapSearch:
         return estimate
 
 
-def _is_elsewhere(frame: core.TrackedFrame, refined: RefinedPose, deviations: float) -> bool:
-    """Whether another version of a frame lies so many deviations from a refined pose."""
+def _beyond_the_map(frame: core.TrackedFrame, odometry: PoseEstimate, state: State) -> RefinedPose:
+    """Take a pose from the depths of the last frame; these points should be in view."""
+    assert frame.T_cw is not None
+    n_predicted = core.count_staying(state.motion.last, frame.T_cw)
+    return RefinedPose(frame, odometry, None, np.zeros(0, np.int64), n_predicted)
+
+
+def _is_elsewhere(frame: core.TrackedFrame, refined: RefinedPose) -> bool:
+    """Whether another version of a frame lies several deviations from a refined pose."""
     T_cw = refined.frame.T_cw
     assert T_cw is not None and frame.T_cw is not None
     _, move = frame.T_cw.difference(T_cw)
-    return move > deviations * refined.position_deviation
+    return move > _ELSEWHERE * refined.position_deviation

@@ -8,13 +8,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from orbslam2py import _core as core
 from orbslam2py.settings.sensor import Sensor
 from orbslam2py.slam.config import TrackingConfig
-from orbslam2py.slam.pose_search.local_map_search import LocalMapSearch
-from orbslam2py.slam.pose_search.refined_pose import RefinedPose
+from orbslam2py.slam.pose_search.local_map_search import LocalMapSearch, RefinedPose
 from orbslam2py.slam.records import PoseEstimate, PoseMethod, Reason
 from orbslam2py.slam.relocalization import Relocalizer
 from orbslam2py.slam.state import Motion, State
@@ -31,8 +28,6 @@ class PoseSearch:
         Visual words for matching with keyframes.
     sensor : Sensor
         What the images come from.
-    max_keyframe_interval : int
-        Frames of one second: see `Probation`.
     relocalizer : Relocalizer, optional
         Finds lost frames in the map; without it none is found there.
     config : TrackingConfig
@@ -42,6 +37,8 @@ class PoseSearch:
     ----------
     map : orbslam2py._core.Map
         The map.
+    has_depth : bool
+        Whether frames measure depths.
     limits : TrackingConfig
         Thresholds.
     local_map_search : LocalMapSearch
@@ -53,20 +50,16 @@ class PoseSearch:
         slam_map: core.Map,
         vocabulary: core.Vocabulary,
         sensor: Sensor,
-        max_keyframe_interval: int,
         relocalizer: Relocalizer | None,
         config: TrackingConfig,
     ) -> None:
         self.map = slam_map
         self._vocabulary = vocabulary
         self._sensor = sensor
+        self.has_depth = sensor.has_depth
         self._relocalizer = relocalizer
         self.limits = config
-        self.local_map_search = LocalMapSearch(slam_map, sensor, max_keyframe_interval, config)
-
-    def new_state(self) -> State:
-        """Return the state before the first image."""
-        return State.before_first_map(has_depth=self._sensor.has_depth)
+        self.local_map_search = LocalMapSearch(slam_map, sensor, config)
 
     @property
     def motion_model_window(self) -> float:
@@ -115,33 +108,34 @@ class PoseSearch:
         for window in (narrow, limits.motion_model_widening * narrow):
             frame.clear_associations()
             n_matches = core.match_last_frame(
-                frame, motion.last, motion.last_points, window, self._sensor.has_depth
+                frame, motion.last, motion.last_points, window, self.has_depth
             )
             if n_matches >= limits.motion_model_matches:
                 return self._optimize(frame, n_matches, Reason.FEW_MATCHES_LAST_FRAME)
         return PoseEstimate(Reason.FEW_MATCHES_LAST_FRAME, n_matches)
 
-    def by_reference_keyframe(self, frame: core.TrackedFrame, state: State) -> PoseEstimate:
-        """From the reference keyframe's points, matched by words, beginning at the last pose."""
-        state.motion.stand_still(frame)
-        core.describe(frame.features, self._vocabulary)
-        n_matches = core.match_keyframe_by_words(
-            self.map, state.reference_keyframe, frame, self.limits.reference_ratio
-        )
-        if n_matches < self.limits.reference_matches:
-            return PoseEstimate(Reason.FEW_MATCHES_REFERENCE, n_matches)
-        estimate = self._optimize(frame, n_matches, Reason.FEW_INLIERS_REFERENCE)
-        return replace(estimate, method=PoseMethod.REFERENCE_KEYFRAME)
-
-    def by_keyframes_around(
-        self, frame: core.TrackedFrame, state: State, n_neighbours: int
+    def by_keyframes(
+        self, frame: core.TrackedFrame, state: State, n_neighbours: int = 0
     ) -> PoseEstimate:
-        """The same from that of the reference keyframe and its neighbours that matches best."""
+        """From a keyframe's points, matched by words, beginning at the last pose.
+
+        Parameters
+        ----------
+        frame : orbslam2py._core.TrackedFrame
+            The frame.
+        state : State
+            The state before it.
+        n_neighbours : int
+            So many covisible keyframes of the reference keyframe are tried as well, and the one
+            with most matches is taken.
+        """
         state.motion.stand_still(frame)
         core.describe(frame.features, self._vocabulary)
-        best, n_best = frame, -1
-        neighbours = self.map.best_neighbours(state.reference_keyframe, n_neighbours)
-        for keyframe in (state.reference_keyframe, *map(int, neighbours)):
+        keyframes = [state.reference_keyframe]
+        if n_neighbours:
+            keyframes += map(int, self.map.best_neighbours(keyframes[0], n_neighbours))
+        n_best = -1
+        for keyframe in keyframes:
             version = core.TrackedFrame(frame.features)
             state.motion.stand_still(version)
             n_matches = core.match_keyframe_by_words(
@@ -152,7 +146,8 @@ class PoseSearch:
         frame.take_over(best)
         if n_best < self.limits.reference_matches:
             return PoseEstimate(Reason.FEW_MATCHES_REFERENCE, n_best)
-        return self._optimize(frame, n_best, Reason.FEW_INLIERS_REFERENCE)
+        estimate = self._optimize(frame, n_best, Reason.FEW_INLIERS_REFERENCE)
+        return replace(estimate, method=PoseMethod.REFERENCE_KEYFRAME)
 
     def by_all_keypoints(self, frame: core.TrackedFrame, state: State) -> PoseEstimate:
         """From the reference keyframe's points, each compared with every keypoint of the frame.
@@ -180,14 +175,14 @@ class PoseSearch:
             not_found = Reason.SEARCHING_LOADED_MAP
         if self._relocalizer is None:
             return PoseEstimate(not_found), state
-        n_inliers, where_expected = 0, False
+        n_inliers = 0
         if state.initial_pose is not None:
             n_inliers = self._relocalizer.relocalize_near(frame, state.initial_pose)
         if n_inliers == 0:
             core.describe(frame.features, self._vocabulary)
             found, lost = self._relocalizer.relocalize(frame, state.lost)
             state = replace(state, lost=lost)
-            n_inliers, where_expected = found.n_inliers, found.where_expected
+            n_inliers = found.n_inliers
             if n_inliers == 0:
                 several = Reason.SEVERAL_PLACES if found.is_ambiguous else not_found
                 return PoseEstimate(several), state
@@ -197,7 +192,6 @@ class PoseSearch:
             n_matches=n_inliers,
             n_inliers=n_inliers,
             relocalized=True,
-            where_expected=where_expected,
             method=PoseMethod.RELOCALIZATION,
         )
         return estimate, state
@@ -227,27 +221,6 @@ class PoseSearch:
         enough = estimate.n_inliers >= self.limits.map_matches
         return estimate if enough else estimate.failed(too_few)
 
-    # ---- local map -------------------------------------------------------------------------------
-    def in_local_map(
-        self, frame: core.TrackedFrame, first: PoseEstimate, state: State
-    ) -> RefinedPose:
-        """Refine a first estimate with all points around it, and count how many are found.
-
-        The state stays as it is until `settle`: a frame may have several hypotheses.
-        """
-        refined = self.local_map_search.refine(frame, first, state.probation)
-        if refined.estimate.visual_odometry:
-            return self.beyond_the_map(frame, refined.estimate, state.motion)
-        return refined
-
-    def beyond_the_map(
-        self, frame: core.TrackedFrame, odometry: PoseEstimate, motion: Motion
-    ) -> RefinedPose:
-        """Take a pose from the depths of the last frame; these points should be in view."""
-        assert frame.T_cw is not None
-        n_predicted = core.count_staying(motion.last, frame.T_cw)
-        return RefinedPose(frame, odometry, None, np.zeros(0, np.int64), n_predicted)
-
     def settle(self, refined: RefinedPose, state: State, *, fixed_map: bool) -> State:
         """Take a refined pose, found or not, as that of its frame.
 
@@ -269,6 +242,6 @@ class PoseSearch:
             reference = state.reference_keyframe
         if not fixed_map:
             core.count_sightings(self.map, refined.frame, refined.visible)
-        if self._sensor.has_depth:
+        if self.has_depth:
             refined.frame.discard_outliers()
         return replace(state, local_map=local_map, reference_keyframe=reference)

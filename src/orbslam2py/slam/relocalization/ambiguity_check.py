@@ -17,6 +17,7 @@ from orbslam2py.slam.config import RelocalizationConfig
 from orbslam2py.slam.relocalization.candidates import CandidatePlaces
 from orbslam2py.slam.relocalization.pnp_verification import Candidate, PnPVerification
 
+_SUPPORT_WINDOW = 5.0  # factor on the search radius: the pose at another place is inexact
 _log = logging.getLogger(__name__)
 
 
@@ -134,5 +135,5 @@ class AmbiguityCheck:
         seen.take_over(version)
         local_map = core.select_local_map(self._map, seen)
         nothing = np.zeros(0, np.int64)
-        core.match_local_map(seen, local_map.points, nothing, self._limits.support_window)
+        core.match_local_map(seen, local_map.points, nothing, _SUPPORT_WINDOW)
         return int(core.optimize_pose(seen).n_inliers)

@@ -7,8 +7,11 @@ import itertools
 from dataclasses import replace
 
 from orbslam2py import _core as core
-from orbslam2py.slam.config import RelocalizationConfig
-from orbslam2py.slam.state import LostSearch
+from orbslam2py.slam.state import COVISIBLE_KEYFRAMES, LostSearch
+
+_WORD_FRAMES = 3  # lost frames, the newest included, whose words name candidates
+_WORD_CANDIDATES = 8  # named by words, that are matched with one frame: bounds its time
+_NEAR_CANDIDATES = 4  # near the last known pose, that are matched with one frame
 
 
 class CandidatePlaces:
@@ -20,19 +23,11 @@ class CandidatePlaces:
         The map.
     keyframe_index : orbslam2py._core.KeyFrameIndex
         Which keyframes contain which words.
-    config : RelocalizationConfig
-        Limits.
     """
 
-    def __init__(
-        self,
-        slam_map: core.Map,
-        keyframe_index: core.KeyFrameIndex,
-        config: RelocalizationConfig,
-    ) -> None:
+    def __init__(self, slam_map: core.Map, keyframe_index: core.KeyFrameIndex) -> None:
         self._map = slam_map
         self._keyframe_index = keyframe_index
-        self._limits = config
 
     def of(self, frame: core.Frame, lost: LostSearch) -> tuple[list[int], LostSearch]:
         """Choose keyframes for a described frame.
@@ -51,14 +46,13 @@ class CandidatePlaces:
         LostSearch
             For the next frame.
         """
-        limits = self._limits
         lost = self._with_scores(frame, lost)
         named = self._by_words(lost)
-        if len(named) < limits.word_candidates:
+        if len(named) < _WORD_CANDIDATES:
             named += self._around(named)
-        by_words = _taken(named, limits.word_candidates, lost.failures)
-        near = [] if lost.place is None else lost.place.keyframes(self._map, limits)
-        by_place = _taken(near, limits.near_candidates, lost.failures)
+        by_words = _taken(named, _WORD_CANDIDATES, lost.failures)
+        near = [] if lost.place is None else lost.place.keyframes(self._map)
+        by_place = _taken(near, _NEAR_CANDIDATES, lost.failures)
         return list(dict.fromkeys(by_words + by_place)), lost
 
     def alike(self, keyframe: int) -> list[int]:
@@ -68,12 +62,12 @@ class CandidatePlaces:
         """
         found = core.find_loop_candidates(self._keyframe_index, self._map, keyframe, 0.0)
         ranked = sorted(found, key=lambda place: (-place.group_score, place.keyframe))
-        return [place.keyframe for place in ranked[: self._limits.word_candidates]]
+        return [place.keyframe for place in ranked[:_WORD_CANDIDATES]]
 
     def _with_scores(self, frame: core.Frame, lost: LostSearch) -> LostSearch:
         found = core.find_relocalization_candidates(self._keyframe_index, self._map, frame)
         scores = {place.keyframe: place.group_score for place in found}
-        recent = (*lost.recent_scores, scores)[-self._limits.word_frames :]
+        recent = (*lost.recent_scores, scores)[-_WORD_FRAMES:]
         return replace(lost, recent_scores=recent)
 
     def _by_words(self, lost: LostSearch) -> list[int]:
@@ -94,7 +88,7 @@ class CandidatePlaces:
         A place is named by the keyframe whose words are most alike; the camera may be much nearer
         to another one.
         """
-        n = self._limits.covisible_keyframes
+        n = COVISIBLE_KEYFRAMES
         neighbours = [self._map.best_neighbours(keyframe, n).tolist() for keyframe in places]
         in_turns = itertools.chain.from_iterable(itertools.zip_longest(*neighbours))
         named = {None, *places}

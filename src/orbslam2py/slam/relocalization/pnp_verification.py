@@ -12,6 +12,10 @@ import numpy as np
 from orbslam2py import _core as core
 from orbslam2py.slam.config import RelocalizationConfig
 
+_THOROUGH_RATIO = 0.85  # of best to second best distance, where all keypoints are compared
+_THOROUGH_MATCHES = 12  # fewest matches then
+_VERIFIED_POSES = 20  # most RANSAC poses that are optimised for one frame: bounds its time
+
 
 def optimize(frame: core.TrackedFrame) -> int:
     """Optimise a pose and drop the outliers; the number of inliers."""
@@ -73,7 +77,7 @@ class PnPVerification:
         match, ratio, fewest = core.match_keyframe_by_words, limits.ratio, limits.matches
         if thoroughly:
             match = core.match_keyframe_by_descriptors
-            ratio, fewest = limits.thorough_ratio, limits.thorough_matches
+            ratio, fewest = _THOROUGH_RATIO, _THOROUGH_MATCHES
         candidates = []
         for keyframe in keyframes:
             matches = core.TrackedFrame(frame.features)
@@ -89,11 +93,11 @@ class PnPVerification:
         """The candidate that gives the frame a pose, and its inliers."""
         limits = self._limits
         n_verified = 0
-        while candidates and n_verified < limits.verified_poses:
+        while candidates and n_verified < _VERIFIED_POSES:
             remaining = []
             for candidate in candidates:
                 pose = candidate.ransac.iterate(limits.iterations)
-                if pose is not None and n_verified < limits.verified_poses:
+                if pose is not None and n_verified < _VERIFIED_POSES:
                     n_verified += 1
                     n_inliers = self._verify(frame, candidate, pose)
                     if n_inliers >= enough:

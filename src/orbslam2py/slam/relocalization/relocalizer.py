@@ -18,7 +18,12 @@ from orbslam2py.slam.config import RelocalizationConfig
 from orbslam2py.slam.relocalization.ambiguity_check import AmbiguityCheck
 from orbslam2py.slam.relocalization.candidates import CandidatePlaces
 from orbslam2py.slam.relocalization.pnp_verification import PnPVerification, optimize
-from orbslam2py.slam.state import LostSearch
+from orbslam2py.slam.state import MOTION_FRAMES, LostSearch
+
+_GUESS_KEYFRAMES = 5  # nearest to a guessed pose, that are tried
+_GUESS_COSINE = 0.5  # 60 degrees: largest angle between their viewing direction and the guess's
+_GUESSED_FRAMES = 60  # after a loss, in which the last known pose is searched
+_WIDENING, _WIDEST = 0.25, 3.0  # growth of its search radius at a failure, and largest multiple
 
 
 class Relocalization(NamedTuple):
@@ -26,8 +31,6 @@ class Relocalization(NamedTuple):
 
     n_inliers: int = 0
     """0: not found."""
-    where_expected: bool = False
-    """Found where tracking was just lost, or where the velocity led from there."""
     is_ambiguous: bool = False
     """Not found, because it fits at several places."""
 
@@ -60,7 +63,7 @@ class Relocalizer:
     ) -> None:
         self._map = slam_map
         self._limits = limits = config
-        self._places = CandidatePlaces(slam_map, keyframe_index, limits)
+        self._places = CandidatePlaces(slam_map, keyframe_index)
         self._fitting = PnPVerification(slam_map, seed, limits)
         self._rival_places = AmbiguityCheck(
             slam_map, self._places, self._fitting, fix_scale=fix_scale, config=limits
@@ -100,24 +103,21 @@ class Relocalizer:
     ) -> tuple[Relocalization, LostSearch]:
         limits = self._limits
         place = lost.place
-        if place is None or frame.id - place.last.id > limits.guessed_frames:
+        if place is None or frame.id - place.last.id > _GUESSED_FRAMES:
             return Relocalization(), lost
         place = place.following(self._map)
         lost = replace(lost, place=place)
-        ids = np.array(place.keyframes(self._map, limits), np.int64)
+        ids = np.array(place.keyframes(self._map), np.int64)
         T_wc = np.array([self._map.keyframe_pose(k).inverse().matrix for k in ids])
-        wider = min(1 + limits.widening * lost.failures, limits.widest)
-        just_lost = frame.id - place.last.id <= limits.motion_frames
+        wider = min(1 + _WIDENING * lost.failures, _WIDEST)
+        just_lost = frame.id - place.last.id <= MOTION_FRAMES
         enough = limits.enough_near if just_lost else limits.enough
-        for guess in place.guesses(frame.id, limits):
+        for guess in place.guesses(frame.id):
             nearest = self._nearest(guess, ids, T_wc)
             n_inliers = self._near(frame, guess, nearest, wider, enough)
             if n_inliers > 0:
-                return Relocalization(n_inliers, where_expected=just_lost), lost
-        if not just_lost:
-            return Relocalization(), lost
-        likeliest = [int(keyframe) for keyframe in ids[: limits.thorough_keyframes]]
-        return Relocalization(self._compare_with(frame, likeliest, limits.enough)), lost
+                return Relocalization(n_inliers), lost
+        return Relocalization(), lost
 
     def _by_likeness(
         self, frame: core.TrackedFrame, lost: LostSearch
@@ -173,11 +173,8 @@ class Relocalizer:
             Number of inliers, at least `RelocalizationConfig.inliers`; 0 if the frame was not
             found, and then it has no associations.
         """
-        return self._compare_with(frame, keyframes, self._limits.inliers)
-
-    def _compare_with(self, frame: core.TrackedFrame, keyframes: list[int], enough: int) -> int:
         candidates = self._fitting.matched(frame, keyframes, thoroughly=True)
-        found = self._fitting.first_that_fits(frame, candidates, enough)
+        found = self._fitting.first_that_fits(frame, candidates, self._limits.inliers)
         if found is not None:
             return found[1]
         frame.clear_associations()
@@ -203,7 +200,7 @@ class Relocalizer:
                 frame,
                 nothing,
                 wider * limits.guess_window,
-                limits.guess_distance,
+                limits.narrow_distance,
             )
             if n_matches < limits.matches or optimize(frame) < limits.inliers:
                 continue
@@ -227,6 +224,6 @@ class Relocalizer:
         distances = np.linalg.norm(T_wc[:, :3, 3] - guess[:3, 3], axis=1)
         # The optical axes; whoever looks the other way sees other points.
         cosines = T_wc[:, :3, 2] @ guess[:3, 2]
-        distances[cosines < self._limits.guess_cosine] = np.inf
-        nearest = np.argsort(distances, kind="stable")[: self._limits.guess_keyframes]
+        distances[cosines < _GUESS_COSINE] = np.inf
+        nearest = np.argsort(distances, kind="stable")[:_GUESS_KEYFRAMES]
         return [int(ids[i]) for i in nearest if np.isfinite(distances[i])]

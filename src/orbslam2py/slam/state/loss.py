@@ -17,6 +17,12 @@ from orbslam2py._arrays import IntArray
 from orbslam2py.slam.config import RelocalizationConfig
 from orbslam2py.slam.state.motion import scaled
 
+#: Frames after a loss in which the pose predicted by the motion is searched.
+MOTION_FRAMES = 10
+#: Keyframes around a place, by the points that they share.
+COVISIBLE_KEYFRAMES = 10
+_LAST_KEYFRAMES = 5  # newest ones, that are candidates after a loss
+
 
 @dataclass(frozen=True, eq=False)
 class LastKnownPose:
@@ -34,7 +40,7 @@ class LastKnownPose:
         _, scale_change = core.follow_map(slam_map, self.last)
         return replace(self, velocity=scaled(self.velocity, scale_change))
 
-    def keyframes(self, slam_map: core.Map, limits: RelocalizationConfig) -> list[int]:
+    def keyframes(self, slam_map: core.Map) -> list[int]:
         """List the reference keyframe, its best covisible keyframes, and the last ones inserted.
 
         Each once, the most likely first.
@@ -42,25 +48,23 @@ class LastKnownPose:
         reference = slam_map.living(self.reference_keyframe)
         if reference < 0:
             return []
-        covisible = slam_map.best_neighbours(reference, limits.covisible_keyframes)
+        covisible = slam_map.best_neighbours(reference, COVISIBLE_KEYFRAMES)
         same_map = slam_map.keyframe_ids(slam_map.map_of(reference))
-        youngest: IntArray = same_map[: -limits.last_keyframes - 1 : -1]
+        youngest: IntArray = same_map[: -_LAST_KEYFRAMES - 1 : -1]
         return list(dict.fromkeys([reference, *covisible.tolist(), *youngest.tolist()]))
 
-    def guesses(self, frame_id: int, limits: RelocalizationConfig) -> list[core.Pose]:
+    def guesses(self, frame_id: int) -> list[core.Pose]:
         """Predict the pose ``T_cw`` of a later frame: by constant velocity, and at rest.
 
         Parameters
         ----------
         frame_id : int
-            The later frame.
-        limits : RelocalizationConfig
-            For how many frames the velocity is used.
+            The later frame; the velocity is used for a few frames.
         """
         T_lw = self.last.T_cw
         assert T_lw is not None
         steps = frame_id - self.last.id
-        if self.velocity is None or steps > limits.motion_frames:
+        if self.velocity is None or steps > MOTION_FRAMES:
             return [T_lw]
         predicted = T_lw
         for _ in range(steps):

@@ -11,6 +11,10 @@ from dataclasses import dataclass, replace
 
 from orbslam2py.slam.config import AcceptanceConfig
 
+_GAIN = 0.25  # weight of the newest frame in the running means: they forget within some frames
+_SLOW_GAIN = 0.02  # the same in the mean error, for a frame whose error is sudden
+_ERROR_SPREADS = 3.0  # mean deviations above the mean from which an error may be sudden
+
 
 @dataclass(frozen=True)
 class PoseStatistics:
@@ -20,12 +24,12 @@ class PoseStatistics:
     found: float
     deviation: float
 
-    def moved_to(self, other: PoseStatistics, gain: float) -> PoseStatistics:
+    def moved_to(self, other: PoseStatistics) -> PoseStatistics:
         """A step towards those of a newer frame."""
         return PoseStatistics(
-            self.n_inliers + gain * (other.n_inliers - self.n_inliers),
-            self.found + gain * (other.found - self.found),
-            self.deviation + gain * (other.deviation - self.deviation),
+            self.n_inliers + _GAIN * (other.n_inliers - self.n_inliers),
+            self.found + _GAIN * (other.found - self.found),
+            self.deviation + _GAIN * (other.deviation - self.deviation),
         )
 
 
@@ -50,20 +54,18 @@ class SceneStatistics:
         usual = self.error
         if usual is None or usual <= 0:
             return False
-        return error > max(
-            limits.weak_error * usual, usual + limits.weak_error_spreads * self.error_spread
-        )
+        return error > max(limits.weak_error * usual, usual + _ERROR_SPREADS * self.error_spread)
 
-    def with_pose(self, pose: PoseStatistics, limits: AcceptanceConfig) -> SceneStatistics:
+    def with_pose(self, pose: PoseStatistics) -> SceneStatistics:
         """The statistics with an accepted frame of strong evidence."""
-        usual = pose if self.usual is None else self.usual.moved_to(pose, limits.gain)
+        usual = pose if self.usual is None else self.usual.moved_to(pose)
         return replace(self, usual=usual)
 
     def with_error(self, error: float, limits: AcceptanceConfig) -> SceneStatistics:
         """The statistics with any accepted frame, by its median match error."""
         if not math.isfinite(error):
             return self
-        gain = limits.slow_gain if self.is_sudden_error(error, limits) else limits.gain
+        gain = _SLOW_GAIN if self.is_sudden_error(error, limits) else _GAIN
         usual = error if self.error is None else self.error
         return replace(
             self,

@@ -6,10 +6,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 from orbslam2py import _core as core
+from orbslam2py.slam.config import TrackingConfig
 from orbslam2py.slam.records import TrackingState
 from orbslam2py.slam.state.loss import LostSearch, LostTime, Unconfirmed
 from orbslam2py.slam.state.motion import Motion
-from orbslam2py.slam.state.probation import Probation
 from orbslam2py.slam.state.scene import SceneStatistics
 
 
@@ -33,12 +33,14 @@ class SinceKeyframe:
 class State:
     """The state of tracking: a value, which `next_state` replaces."""
 
-    phase: TrackingState
+    phase: TrackingState = TrackingState.NO_IMAGES_YET
     """Before the first map, tracked, or lost."""
-    probation: Probation
-    """Whether more inliers are required, after a relocalization or a new map."""
-    motion: Motion
+    motion: Motion = field(default_factory=Motion)
     """The last frame with a pose, and the velocity."""
+    tracked_since: int = 0
+    """Frame of the last relocalization, or of the last map that began beside others."""
+    found_again: bool = False
+    """It was a relocalization."""
     scene: SceneStatistics = field(default_factory=SceneStatistics)
     """What is usual in the frames before."""
     reference_keyframe: int = -1
@@ -76,24 +78,6 @@ class State:
     n_relocalizations: int = 0
     """Relocalized frames, over all maps."""
 
-    @classmethod
-    def before_first_map(cls, *, has_depth: bool, n_relocalizations: int = 0) -> State:
-        """No image has come yet.
-
-        Parameters
-        ----------
-        has_depth : bool
-            Depths are measured: a map begins with one image and needs no probation.
-        n_relocalizations : int
-            So far, in maps that were reset.
-        """
-        return cls(
-            TrackingState.NO_IMAGES_YET,
-            Probation.of_first_map(has_depth=has_depth),
-            Motion(),
-            n_relocalizations=n_relocalizations,
-        )
-
     @property
     def initializing(self) -> bool:
         """There is no map yet."""
@@ -112,20 +96,28 @@ class State:
             reference_keyframe=slam_map.living(self.reference_keyframe),
         )
 
-    def relocalized(self, frame_id: int, *, where_expected: bool) -> State:
-        """A frame was found without its predecessor; see `Probation.relocalized`."""
-        probation = self.probation.relocalized(frame_id, where_expected=where_expected)
-        return replace(self, probation=probation)
+    def has_just_begun(self, frame_id: int, limits: TrackingConfig) -> bool:
+        """Whether this frame or the one right before was relocalized, or began a map."""
+        return frame_id < self.tracked_since + limits.frames_after_relocalization
+
+    def relocalized(self, frame_id: int) -> State:
+        """A frame was found without its predecessor."""
+        return replace(self, tracked_since=frame_id, found_again=True)
+
+    def map_begun(self, frame_id: int) -> State:
+        """A map begins that is not the first."""
+        return replace(self, tracked_since=frame_id, found_again=False)
 
     def elsewhere(self) -> State:
         """The camera is in another place, or in another map."""
         return replace(self, scene=self.scene.elsewhere(), n_uncertain=0)
 
-    def in_another_map(self, *, has_depth: bool) -> State:
+    def in_another_map(self) -> State:
         """Forget the frames before: the next ones are in another map."""
         return replace(
             self,
-            probation=Probation.of_first_map(has_depth=has_depth),
+            tracked_since=0,
+            found_again=False,
             motion=Motion(),
             scene=self.scene.elsewhere(),
             reference_keyframe=-1,

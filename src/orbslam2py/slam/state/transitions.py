@@ -45,14 +45,9 @@ class Relocalized:
     n_inliers: int
 
 
-@dataclass(frozen=True)
-class Confirmed:
-    """The frame after a relocalization confirms it."""
-
-
 @dataclass(frozen=True, eq=False)
 class Tracked:
-    """The frame has an accepted pose, which follows from the frame before."""
+    """The frame has an accepted pose, which follows from the frame before and confirms it."""
 
     frame: core.TrackedFrame
     n_inliers: int
@@ -98,7 +93,6 @@ Event = (
     NotInitialized
     | MapBegun
     | Relocalized
-    | Confirmed
     | Tracked
     | NotFound
     | KeyframeInserted
@@ -134,16 +128,13 @@ class Transitions:
     ----------
     config : Config
         Thresholds.
-    has_depth : bool
-        Depths are measured.
     new_map_after : float or None
         Seconds after which a lost camera may begin another map; None: never.
     """
 
-    def __init__(self, config: Config, *, has_depth: bool, new_map_after: float | None) -> None:
+    def __init__(self, config: Config, *, new_map_after: float | None) -> None:
         self._limits = config.tracking
         self._relocalization = config.relocalization
-        self._has_depth = has_depth
         self._patience = new_map_after
 
     def may_begin_map(self, state: State, timestamp: float) -> bool:
@@ -174,8 +165,6 @@ class Transitions:
                 after = self._begun(state, event)
             case Relocalized():
                 after = self._relocalized(state, event)
-            case Confirmed():
-                after = replace(state, unconfirmed=None, lost=LostSearch())
             case Tracked():
                 after, actions = self._tracked(state, event)
             case NotFound():
@@ -187,7 +176,7 @@ class Transitions:
                 after = replace(state, seeks_map=True)
                 actions = _NOTHING if state.seeks_map else (RestartInitializer(),)
             case MapDropped():
-                left = state.in_another_map(has_depth=self._has_depth)
+                left = state.in_another_map()
                 lost = TrackingState.LOST
                 after = replace(left, phase=lost, lost_time=LONG_LOST, seeks_map=True)
             case MapLoaded():
@@ -197,9 +186,8 @@ class Transitions:
     def _begun(self, state: State, event: MapBegun) -> State:
         frame, earlier = event.frame, event.earlier
         if state.is_lost:
-            state = state.in_another_map(has_depth=self._has_depth)
-            probation = state.probation.map_begun(frame.id, has_depth=self._has_depth)
-            state = replace(state, probation=probation, seeks_map=False, lost_time=LostTime())
+            state = state.in_another_map().map_begun(frame.id)
+            state = replace(state, seeks_map=False, lost_time=LostTime())
         motion = state.motion
         if earlier:
             # With these the velocity is known, and the next frame can be predicted.
@@ -234,6 +222,9 @@ class Transitions:
             lost_time=state.lost_time.tracked(frame.timestamp, self._patience),
             n_lost=0,
             seeks_map=False,
+            unconfirmed=None,
+            # Beyond the map frames are tracked and searched at once: that search goes on.
+            lost=state.lost if state.unconfirmed is None else LostSearch(),
         )
         return after, tuple(actions)
 
@@ -265,7 +256,6 @@ class Transitions:
                 after,
                 motion=motion.lost(),
                 lost=LostSearch(here),
-                probation=state.probation.lost(),
             )
         # The relocalized frame was wrong: the search continues where tracking was lost before.
         place = state.lost.place
