@@ -110,14 +110,17 @@ void bind_camera_options(py::module_& module) {
   py::class_<CameraOptions> options(module, "CameraOptions", "What a Camera is made from.");
   options
       .def(py::init([](double fx, double fy, double cx, double cy, int width, int height,
-                       const std::vector<double>& distortion, double bf, double depth_ratio) {
+                       const std::vector<double>& distortion, double bf, double depth_ratio,
+                       const std::shared_ptr<CameraModel>& model) {
              const Distortion lens = distortion_of(distortion);
-             return CameraOptions{{fx, fy, cx, cy}, lens, bf, depth_ratio, {width, height}};
+             return CameraOptions{{fx, fy, cx, cy}, lens, bf, depth_ratio, {width, height}, model};
            }),
            py::arg("fx") = 0.0, py::arg("fy") = 0.0, py::arg("cx") = 0.0, py::arg("cy") = 0.0,
            py::arg("width") = 0, py::arg("height") = 0,
            py::arg("distortion") = std::vector<double>{}, py::arg("bf") = 0.0,
-           py::arg("depth_ratio") = 0.0, "Nothing is checked before a Camera is made.")
+           py::arg("depth_ratio") = 0.0, py::arg("model") = nullptr,
+           "`model`: a CameraModel in place of fx, fy, cx, cy and distortion. Nothing is checked\n"
+           "before a Camera is made.")
       .def_property(
           "distortion", [](const CameraOptions& o) { return o.distortion; },
           [](CameraOptions& o, const std::vector<double>& d) { o.distortion = distortion_of(d); },
@@ -156,6 +159,8 @@ void bind_camera(py::module_& module) {
             return std::pair(camera.image_size().width, camera.image_size().height);
           },
           "(width, height) [px].")
+      .def_property_readonly("is_flat", &Camera::is_flat,
+                             "The image plane is that of a pinhole, not of a fisheye lens.")
       .def_property_readonly(
           "is_rectified", [](const Camera& camera) { return !camera.distorts(); },
           "True when the lens does not distort.")
