@@ -45,11 +45,14 @@ std::int64_t model_number_of(const CameraOptions& camera) {
 
 StoredLens stored_lens_of(const CameraOptions& camera) {
   StoredLens lens{};
-  if (camera.model) std::copy_n(camera.model->parameters().begin(), camera.model->parameters().size(), lens.begin());
+  if (camera.model)
+    std::copy_n(camera.model->parameters().begin(), camera.model->parameters().size(),
+                lens.begin());
   return lens;
 }
 
-std::shared_ptr<const CameraModel> model_of(std::int64_t number, const StoredLens& lens, ImageSize size) {
+std::shared_ptr<const CameraModel> model_of(std::int64_t number, const StoredLens& lens,
+                                            ImageSize size) {
   if (number == 0) return nullptr;
   const auto& rows = camera_model_rows();
   if (number < 0 || number > static_cast<std::int64_t>(rows.size())) {

@@ -134,8 +134,11 @@ bool Camera::project_wide(const Eigen::Vector3d& p_c, Eigen::Vector2d& uv) const
 
 Eigen::Vector3d Camera::wide_ray(double u, double v) const {
   Eigen::Vector3d ray;
-  const bool shown =
-      std::visit([&](const auto& lens) { return lens.unproject({u, v}, ray); }, lens_);
+  const bool shown = std::visit(
+      [&](const auto& lens) {
+        return lens.unproject({u, v}, ray);
+      },
+      lens_);
   return shown ? ray : Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
 }
 
@@ -159,14 +162,14 @@ Sight Camera::sight(double u, double v) const {
   Sight B;
   if (flat_) {
     B << k.fx, 0, k.cx - u, 0, k.fy, k.cy - v, 0, 0, 1;
-    if (distorts_) B.topRows<2>() = raw_by_plane(u, v) * Eigen::Matrix<double, 2, 3>(B.topRows<2>());
+    if (distorts_)
+      B.topRows<2>() = raw_by_plane(u, v) * Eigen::Matrix<double, 2, 3>(B.topRows<2>());
     return B;
   }
   const Eigen::Vector3d ray = wide_ray(u, v);
   Seen seen;
-  const bool shown =
-      ray.allFinite() &&
-      std::visit([&](const auto& lens) { return lens.project(ray, seen); }, lens_);
+  const bool shown = ray.allFinite() &&
+                     std::visit([&](const auto& lens) { return lens.project(ray, seen); }, lens_);
   if (!shown) return Sight::Constant(std::numeric_limits<double>::quiet_NaN());
   B.topRows<2>() = seen.J;
   B.row(2) = ray.transpose();

@@ -135,9 +135,8 @@ struct SmallPlane {
     const double middle = 0.5 * (shrink - 1);
     for (int y = 0; y < height; ++y) {
       for (int x = 0; x < width; ++x) {
-        all.push_back(fisheye == nullptr
-                          ? pinhole.unproject(x, y, 1.0)
-                          : fisheye->ray(x * shrink + middle, y * shrink + middle));
+        all.push_back(fisheye == nullptr ? pinhole.unproject(x, y, 1.0)
+                                         : fisheye->ray(x * shrink + middle, y * shrink + middle));
       }
     }
     return all;

@@ -10,9 +10,9 @@
 
 namespace orbslam {
 
-/// A keypoint as homogeneous coordinates h of its image, and what compares others with it: the error
-/// of h' is ((B h')_0, (B h')_1) / (B h')_2 in raw pixels. Of a flat plane h is (u, v, 1), of a fisheye
-/// lens the unit ray.
+/// A keypoint as homogeneous coordinates h of its image, and what compares others with it: the
+/// error of h' is ((B h')_0, (B h')_1) / (B h')_2 in raw pixels. Of a flat plane h is (u, v, 1), of
+/// a fisheye lens the unit ray.
 struct HomogeneousPoint {
   Eigen::Vector3d h;
   Eigen::Matrix3d B;

@@ -47,8 +47,7 @@ class EpipolarGeometry {
       : scales_(*b.frame->scales), camera_1_(*a.frame->camera), camera_2_(*b.frame->camera) {
     on_image_ = camera_1_.is_flat() && camera_2_.is_pinhole();
     const Eigen::Matrix3d K_1 = calibration_of(camera_1_);
-    const Eigen::Matrix3d K_2 =
-        on_image_ ? calibration_of(camera_2_) : Eigen::Matrix3d::Identity();
+    const Eigen::Matrix3d K_2 = on_image_ ? calibration_of(camera_2_) : Eigen::Matrix3d::Identity();
     F_ = fundamental_matrix(a.T_cw, b.T_cw, K_1, K_2);
     const Eigen::Vector3d center = b.T_cw * a.T_cw.center();
     Eigen::Vector2d epipole;

@@ -38,8 +38,7 @@ bool PairTriangulation::View::sees(const Eigen::Vector3d& point, std::size_t i) 
   double error = off.squaredNorm();
   double gate = kMonoGate;
   if (frame->has_depth(i)) {
-    const double error_right =
-        frame->camera->right_error(p_c, off, keypoint.x, frame->right_u[i]);
+    const double error_right = frame->camera->right_error(p_c, off, keypoint.x, frame->right_u[i]);
     error += error_right * error_right;
     gate = kStereoGate;
   }

@@ -35,9 +35,16 @@ void BlockBundle::Slots::resize(std::size_t n, bool with_sights) {
 }
 
 bundle_kernels::Observations BlockBundle::Slots::pointers() const {
-  bundle_kernels::Observations all{u.data(),        v.data(),        right_u.data(),
-                                   base.data(),     weight_u.data(), weight_v.data(),
-                                   weight_right.data(), view.data(), point.data(), {}};
+  bundle_kernels::Observations all{u.data(),
+                                   v.data(),
+                                   right_u.data(),
+                                   base.data(),
+                                   weight_u.data(),
+                                   weight_v.data(),
+                                   weight_right.data(),
+                                   view.data(),
+                                   point.data(),
+                                   {}};
   if (sight[0].empty()) return all;
   for (std::size_t k = 0; k < sight.size(); ++k) all.sight[k] = sight[k].data();
   return all;

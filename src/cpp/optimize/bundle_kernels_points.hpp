@@ -99,7 +99,8 @@ inline Lanes weigh(const Task& task, Sight& s) {
   return choose(inside, q, width * (all(2) * distance - width));
 }
 
-/// J^T W J and J^T W e of the projection by the point in the camera frame. Entry 01 is 0 of a pinhole.
+/// J^T W J and J^T W e of the projection by the point in the camera frame. Entry 01 is 0 of a
+/// pinhole.
 struct Normal {
   Lanes m00, m01, m02, m11, m12, m22;
   Vector3 b;

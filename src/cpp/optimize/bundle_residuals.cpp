@@ -97,8 +97,8 @@ double BundleMeasurement::evaluate() {
     p_c[i] = R(i, 0) * point[0] + R(i, 1) * point[1] + R(i, 2) * point[2] + t(i);
   }
   const double q = sight(2, 0) * p_c[0] + sight(2, 1) * p_c[1] + sight(2, 2) * p_c[2];
-  const bool usable = scale > 0 && std::abs(q) > kTinyDepth &&
-                      !(has_depth && !(std::abs(p_c[2]) > kTinyDepth));
+  const bool usable =
+      scale > 0 && std::abs(q) > kTinyDepth && !(has_depth && !(std::abs(p_c[2]) > kTinyDepth));
   if (!usable) {  // also when the point is NaN
     std::fill_n(p_c, 3, 0.0);
     p_c[2] = 1;
@@ -114,8 +114,8 @@ double BundleMeasurement::evaluate() {
         (sight(row, 0) * p_c[0] + sight(row, 1) * p_c[1] + sight(row, 2) * p_c[2]) * inverse_q;
     residual[row] = -factor * predicted[row];
   }
-  residual[2] = has_depth ? factor * (-predicted[0] - (u - right_u) + view->camera().bf() / p_c[2])
-                          : 0.0;
+  residual[2] =
+      has_depth ? factor * (-predicted[0] - (u - right_u) + view->camera().bf() / p_c[2]) : 0.0;
   if (huber == 0) return 0;
   const double square =
       residual[0] * residual[0] + residual[1] * residual[1] + residual[2] * residual[2];

@@ -20,9 +20,9 @@ struct Group {
   std::vector<double> x, y, z;        ///< world
   std::vector<double> u, v, right_u;  ///< pixels; right_u only in the group with depth
   std::vector<double> inverse_sigma2;
-  std::vector<double> weight;     ///< inverse_sigma2 of those in use, 0 of the others
+  std::vector<double> weight;                ///< inverse_sigma2 of those in use, 0 of the others
   std::array<std::vector<double>, 9> sight;  ///< by rows; empty for a pinhole
-  std::vector<std::size_t> slot;  ///< position in the caller's list
+  std::vector<std::size_t> slot;             ///< position in the caller's list
 
   std::size_t size() const { return slot.size(); }
   void clear();

@@ -234,7 +234,8 @@ PoseEstimate optimize_pose(const Pose& T_cw_initial, const Camera& camera,
   estimate.outlier.resize(observations.size());
   for (std::size_t i = 0; i < observations.size(); ++i) {
     const PoseObservation& o = observations[i];
-    const bool usable = w.add(camera, o.position, o.u, o.v, o.right_u, o.inverse_sigma2, o.has_depth, i);
+    const bool usable =
+        w.add(camera, o.position, o.u, o.v, o.right_u, o.inverse_sigma2, o.has_depth, i);
     estimate.outlier[i] = usable ? 0 : 1;
   }
   run_rounds(w, camera, T_cw_initial, estimate, estimate.outlier.data());

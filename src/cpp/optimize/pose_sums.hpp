@@ -28,7 +28,7 @@ struct Task {
   const double* weight;
   bool has_sights;         ///< false: the camera is a pinhole, and u and v say the same
   const double* sight[9];  ///< by rows
-  double rotation[9];  ///< R_cw by rows
+  double rotation[9];      ///< R_cw by rows
   double translation[3];
   double fx, fy, cx, cy;
   double base;   ///< baseline [m]

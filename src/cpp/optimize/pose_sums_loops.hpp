@@ -58,8 +58,8 @@ struct Sums {
   Lanes b[kUnknowns];
 };
 
-/// Adds weight * J^T J and -weight * J^T e. The entry named `kZero`, if not negative, is known to be
-/// zero.
+/// Adds weight * J^T J and -weight * J^T e. The entry named `kZero`, if not negative, is known to
+/// be zero.
 template <int kZero>
 inline void add_row(Sums& sums, const Lanes (&jacobian)[kUnknowns], Lanes weight, Lanes error) {
   int k = 0;
@@ -241,9 +241,8 @@ double accumulate(const Task& task, double* system) {
   double cost = 0;
   for (Size pass = 0; pass < kPasses; ++pass) {
     const Size first = pass * kWidth;
-    cost += task.has_sights
-                ? accumulate_sights<kStereo, kRobust, kSystem>(task, first, system)
-                : accumulate_lanes<kStereo, kRobust, kSystem>(task, first, system);
+    cost += task.has_sights ? accumulate_sights<kStereo, kRobust, kSystem>(task, first, system)
+                            : accumulate_lanes<kStereo, kRobust, kSystem>(task, first, system);
   }
   return cost;
 }

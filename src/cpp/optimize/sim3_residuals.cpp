@@ -27,8 +27,7 @@ std::optional<Residual> residual(const Eigen::Vector3d& p_c,
   const Eigen::Vector2d predicted = q.head<2>() * inverse_q;
   Residual result;
   result.error = -weight * predicted;
-  result.jacobian =
-      -weight * inverse_q * (B.topRows<2>() - predicted * B.row(2)) * derivative;
+  result.jacobian = -weight * inverse_q * (B.topRows<2>() - predicted * B.row(2)) * derivative;
   result.depth = q.z();
   return result;
 }

@@ -292,9 +292,3 @@ def _camera_options(settings: Settings, width: int, height: int) -> core.CameraO
         bf=camera.bf,
         depth_ratio=settings.depth.close_factor if settings.depth is not None else 0.0,
     )
-
-
-def intrinsics(camera: core.Camera) -> npt.NDArray[np.float64]:
-    """Focal lengths and principal point fx, fy, cx, cy of a camera, float64 (4,), pixels."""
-    pinhole = camera.pinhole
-    return np.array([pinhole.fx, pinhole.fy, pinhole.cx, pinhole.cy])

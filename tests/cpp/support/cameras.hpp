@@ -18,8 +18,8 @@ inline std::shared_ptr<const Camera> make_camera(const Pinhole& pinhole, double 
   return std::make_shared<Camera>(options);
 }
 
-/// The same image through a lens: radial-tangential distortion of a flat plane, or a fisheye lens of
-/// about 150 degrees across (Kannala-Brandt).
+/// The same image through a lens: radial-tangential distortion of a flat plane, or a fisheye lens
+/// of about 150 degrees across (Kannala-Brandt).
 enum class TestLens { none, distorted, fisheye };
 
 inline std::shared_ptr<const Camera> make_camera(TestLens lens, double bf = 0) {
