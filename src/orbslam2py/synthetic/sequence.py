@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -417,15 +417,20 @@ class SyntheticSequence(FramesInOrder):
         self, T_wc: FloatArray, seconds: float, **image: Any
     ) -> tuple[ByteArray, NDArray[np.float32]]:
         """Render a pinhole image of the world and of what moves in it."""
-        image["threads"] = self._threads
-        grey, depth = core.render(self._built, inverse_poses(T_wc), **image)
+        grey, depth = self._rendered(self._built, T_wc, image)
         for part, world in zip(self._scene.moving, self._built_parts, strict=True):
             # A part that moves is one that stands still and a camera that moves the other way.
             T_pc = T_wc.copy()
             T_pc[:3, 3] -= part.shift(seconds)
-            grey_part, depth_part = core.render(world, inverse_poses(T_pc), **image)
+            grey_part, depth_part = self._rendered(world, T_pc, image)
             before = (depth_part > 0) & ((depth == 0) | (depth_part < depth))
             grey, depth = np.where(before, grey_part, grey), np.where(before, depth_part, depth)
+        return grey, depth
+
+    def _rendered(
+        self, world: core.World, T_wc: FloatArray, image: Mapping[str, Any]
+    ) -> tuple[ByteArray, NDArray[np.float32]]:
+        grey, depth = core.render(world, inverse_poses(T_wc), **image, threads=self._threads)
         return grey, depth
 
     def _measured(self, depth: NDArray[np.float32], number: int) -> NDArray[np.uint16]:
